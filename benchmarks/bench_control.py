@@ -1,4 +1,4 @@
-"""One control step, its parts, and the solvers on the program of a disturbed stand.
+"""One control step and its quadratic program in a disturbed stand; the execution of a second.
 
 Run with ``pytest benchmarks/bench_control.py``; a step has 5 ms of simulated time to beat.
 """
@@ -9,9 +9,9 @@ import pytest
 
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
-from manikin.control import Controller, ControlSettings
+from manikin.control import Controller
 from manikin.motion import Motion
-from manikin.numerics.qp import make_solver
+from manikin.numerics.qp import WarmQPSolver
 from manikin.scene import Scene
 from manikin.simulation import execute
 
@@ -51,10 +51,9 @@ def disturbed_states(body, count=200):
     ]
 
 
-@pytest.mark.parametrize("solver", ["daqp", "proxqp", "piqp"])
-def test_control_step(benchmark, standing, solver):
+def test_control_step(benchmark, standing):
     body, motion, schedule = standing
-    controller = Controller(body, motion, schedule, ControlSettings(solver=solver))
+    controller = Controller(body, motion, schedule)
     states = disturbed_states(body)
     number = iter(range(10**9))
 
@@ -66,15 +65,14 @@ def test_control_step(benchmark, standing, solver):
     assert not output.fallback
 
 
-@pytest.mark.parametrize("solver", ["daqp", "proxqp", "piqp"])
-def test_program_alone(benchmark, standing, solver):
+def test_program_alone(benchmark, standing):
     body, motion, schedule = standing
     controller = Controller(body, motion, schedule)
     programs = [controller.step(0.0, q, v).problem.program for q, v in disturbed_states(body)]
-    tool = make_solver(solver)
+    solver = WarmQPSolver()
     number = iter(range(10**9))
-    solution = benchmark(lambda: tool.solve(programs[next(number) % len(programs)]))
-    assert solution.found
+    solution = benchmark(lambda: solver.solve(programs[next(number) % len(programs)]))
+    assert solution.solved
 
 
 def test_execution_of_one_second(benchmark, standing):

@@ -13,13 +13,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from acknowledgements import THANKS
-from scipy.optimize import minimize_scalar
-from scipy.stats import binomtest
-
-from manikin.numerics.spatial import FloatArray
-from manikin.recordings import Recording, read_recording
-from manikin.walking import LITERAL_ORDER, PROSE_ORDER, ShoulderPaths, WalkObjective
-from manikin.walking.path.inverse import (
+from identify_objective import (
     FIRST_GUESS,
     HEADING_LENGTH,
     IDENTIFIED,
@@ -31,6 +25,12 @@ from manikin.walking.path.inverse import (
     recorded_walk,
     share_errors,
 )
+from scipy.optimize import minimize_scalar
+from scipy.stats import binomtest
+
+from manikin.numerics.spatial import FloatArray
+from manikin.recordings import Recording, read_recording
+from manikin.walking import LITERAL_ORDER, PROSE_ORDER, ShoulderPaths, WalkObjective
 from manikin.walking.path.walking_path import WalkingPath
 
 mpl.use("Agg")
@@ -67,7 +67,7 @@ TEXT = """# Weights from recorded walks
 
 Which weights of Truong's criterion (5.6) explain recorded walks? {count} walks of the CMU Graphics Lab and
 of the ACCAD Open Motion Project are reduced to the middle of the shoulders and the heading; one set of
-weights is fitted to all of them at once (`manikin.walking.path.inverse`). By `docs/inverse.py`.
+weights is fitted to all of them at once (`docs/identify_objective.py`). By `docs/inverse.py`.
 
 * *Walks*: the classes {classes} of `clips_locomotion.csv` without runs, and two clips from standing to
   walking and back. Of turns, the window and {around:g} s on both sides, for the recordings are told where

@@ -38,15 +38,14 @@ import json
 import sys
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
-from threadpoolctl import threadpool_limits
 
 from manikin.balance.zmp import SupportPlane, contact_wrench, projection_plane
 from manikin.body import BodyModel, Configuration
@@ -62,6 +61,7 @@ from manikin.reports.figures.style import dress, new_figure
 from manikin.reports.figures.write_figures import save_figure
 from manikin.runtime.files import atomic_path
 from manikin.runtime.palette import COLOURS, CYCLE
+from manikin.runtime.parallel import side_by_side
 from manikin.scene import Scene
 from manikin.simulation import Push, execute, push_on_the_way
 
@@ -290,24 +290,21 @@ def without_gaps(good: Callable[[float], bool], found: float) -> float:
 
 def measured(folder: str, job: Job) -> dict[str, Any]:
     """Largest impulse of one job, and what was predicted."""
-    with threadpool_limits(1):
-        plan = Plan.of(Path(folder) / job.scenario)
-        motion = plan.motion
-        push = push_on_the_way(motion, 1.0, job.direction_deg, job.time_s, DURATION)
-        at = motion.q[min(np.searchsorted(motion.time, job.time_s), len(motion.q) - 1)]
-        height = Configuration(plan.body, at).point(push.segment, plan.body.segment(push.segment).com)[2]
-        velocity = np.gradient(motion.com[:, :2], motion.time, axis=0)
-        speed = float(np.linalg.norm([np.interp(job.time_s, motion.time, column) for column in velocity.T]))
-        found = predict_impulse(
-            motion, plan.schedule, plan.body.mass, job.time_s, push.force[:2],
-            duration=DURATION, height=float(height),
-        )  # fmt: skip
-        feet, brisk = len(plan.schedule.stance_at(job.time_s)), ReturnSettings().brisk
-        values = {key: round(getattr(found, key), 1) for key in ("plan", "capture", "margin")}
-        values["best"] = (
-            max(values["plan"], values["capture"]) if feet == 2 and speed < brisk else values["plan"]
-        )
-        values["measured_Ns"] = round(largest_impulse(plan, job, found.plan), 1)
+    plan = Plan.of(Path(folder) / job.scenario)
+    motion = plan.motion
+    push = push_on_the_way(motion, 1.0, job.direction_deg, job.time_s, DURATION)
+    at = motion.q[min(np.searchsorted(motion.time, job.time_s), len(motion.q) - 1)]
+    height = Configuration(plan.body, at).point(push.segment, plan.body.segment(push.segment).com)[2]
+    velocity = np.gradient(motion.com[:, :2], motion.time, axis=0)
+    speed = float(np.linalg.norm([np.interp(job.time_s, motion.time, column) for column in velocity.T]))
+    found = predict_impulse(
+        motion, plan.schedule, plan.body.mass, job.time_s, push.force[:2],
+        duration=DURATION, height=float(height),
+    )  # fmt: skip
+    feet, brisk = len(plan.schedule.stance_at(job.time_s)), ReturnSettings().brisk
+    values = {key: round(getattr(found, key), 1) for key in ("plan", "capture", "margin")}
+    values["best"] = max(values["plan"], values["capture"]) if feet == 2 and speed < brisk else values["plan"]
+    values["measured_Ns"] = round(largest_impulse(plan, job, found.plan), 1)
     return {**job._asdict(), "feet": feet, **values}
 
 
@@ -329,11 +326,11 @@ def measure() -> None:
     found = json.loads(RESULTS.read_text()) if RESULTS.exists() else []
     done = {Job(*(item[name] for name in Job._fields)) for item in found}
     wanted = [job for job in jobs() if job not in done]
-    with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(2) as pool:
+    with tempfile.TemporaryDirectory() as folder:
         for name in sorted({job.scenario for job in wanted}):
             run(name, out=Path(folder) / name)
-        for answer in as_completed([pool.submit(measured, folder, job) for job in wanted]):
-            found.append(answer.result())
+        for _, answer in side_by_side(partial(measured, folder), wanted, 2, "pushes"):
+            found.append(answer)
             found.sort(key=lambda item: tuple(item[name] for name in Job._fields))
             with atomic_path(RESULTS) as path:
                 path.write_text(json.dumps(found, indent=1) + "\n")

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+from clothoid_words import clothoid_words
 
 from manikin.numerics.spatial import FloatArray
 from manikin.reports.directories import WordsDirectory, partition_as_dict
@@ -29,7 +30,6 @@ from manikin.walking import (
     walking_path,
 )
 from manikin.walking.words import HEADINGS, THESIS_GRID, THESIS_WORDS, EqualPaths, WordSlice, equal_paths
-from manikin.walking.words.word_path import clothoid_words
 from manikin.walking.words.word_solver import cheapest, guesses
 
 DOCS = Path(__file__).parent
@@ -56,11 +56,11 @@ which goes on where it was interrupted. `--slices 340,150` takes some final head
 
 The integral of 1 + u² along the path, with u = dκ/ds in 1/m², free length, and no curvature at both ends:
 the squared norm of both controls of the system (3.2) with the speed 1. [Why not the derivative of the
-curvature alone, or its largest value](api/walking.md): neither has an optimum, because loops may be as
-large as one likes. Of {clothoids} random goals of the grid, {extremal} have a word of three exact clothoid
-arcs, IDI or DID, that satisfies the maximum principle; large loops improve all. The price of the length
-makes the problem one with an optimum, and brings the longer words. Its arcs are monotone in the curvature,
-but no exact clothoids.
+curvature alone](api/walking.md), or its largest value (`docs/clothoid_words.py`): neither has an optimum,
+because loops may be as large as one likes. Of {clothoids} random goals of the grid, {extremal} have a word
+of three exact clothoid arcs, IDI or DID, that satisfies the maximum principle; large loops improve all. The
+price of the length makes the problem one with an optimum, and brings the longer words. Its arcs are monotone
+in the curvature, but no exact clothoids.
 
 Headings may end up to one whole turn to either side. Each goal is solved by Newton's method from {guesses}
 guesses for each turn, then from the paths of its neighbours, until none gets cheaper.

@@ -7,7 +7,7 @@ from scipy.interpolate import BSpline
 from manikin.balance import pseudo_wrench, stability_margins, wrench_polytope
 from manikin.contact import Stance, grasp, point, sole
 from manikin.errors import ContactError, InputError
-from manikin.numerics.spatial import GRAVITY_VECTOR, rotation_from_rpy
+from manikin.numerics.spatial import GRAVITY_VECTOR, rotation_from_rpy, skew
 
 seeds = st.integers(0, 100_000)
 # HiGHS satisfies constraints to 1e-7 of a kilonewton.
@@ -272,11 +272,7 @@ def test_moving_the_reference_is_exact(random_stance, seed):
 
 @given(seeds)
 def test_margins_about_the_com_do_not_feel_a_rigid_motion_of_the_world(random_stance, seed):
-    """Stance and state turned and shifted together (gravity included) keep their margins.
-
-    Not so off a W_p that is flat in two directions or more: its pairs of rows may lie
-    anyhow across it. Soles are never flat.
-    """
+    """Stance and state turned and shifted together (gravity included) keep their margins."""
     rng = np.random.default_rng(seed)
     stance = random_stance(rng, kinds=("sole",), most=3)
     turn, shift = rotation_from_rpy(*rng.uniform(-3, 3, 3)), 2 * rng.normal(size=3)
@@ -299,6 +295,36 @@ def test_margins_about_the_com_do_not_feel_a_rigid_motion_of_the_world(random_st
 def _moved_contact(contact, turn, shift):
     pose = {"position": turn @ contact.position + shift, "rotation": turn @ contact.rotation_contact_to_world}
     return sole(contact.effector, length=0.28, width=0.12, friction=contact.friction, **pose)
+
+
+@given(seeds, st.integers(1, 2))
+def test_margins_off_a_flat_polytope_do_not_depend_on_the_basis_of_its_equalities(seed, count):
+    """Points on a turned and shifted ground; about the CoM the margin is the distance to the flat."""
+    rng = np.random.default_rng(seed)
+    turn, shift = rotation_from_rpy(*rng.uniform(-3, 3, 3)), 2 * rng.normal(size=3)
+    places = rng.normal(size=(count, 3)) * 0.3
+    com, w = (
+        np.array([0.0, 0.0, 0.9]),
+        rng.normal(size=6) * [100, 100, 100, 30, 30, 30] + [0, 0, 700, 0, 0, 0],
+    )
+    found = []
+    for rotation, moved in ((np.eye(3), np.zeros(3)), (turn, shift)):
+        contacts = [
+            point(f"p{k}", rotation @ place + moved, friction=0.5, rotation=rotation)
+            for k, place in enumerate(places)
+        ]
+        x, force = rotation @ com + moved, rotation @ w[:3]
+        wrench = np.concatenate([force, np.cross(x, force) + rotation @ w[3:]])
+        W = wrench_polytope(Stance(contacts, 1000.0))
+        margins = stability_margins(W, wrench, x)
+        found.append([margins.force, margins.moment, margins.wrench_about_com])
+        assert W.limiting(wrench, x).margin == pytest.approx(float(margins.wrench_about_com), abs=1e-6)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-5, atol=1e-5)
+    span = np.hstack([np.vstack([np.eye(3), skew(place - com)]) for place in places])
+    off = np.linalg.norm(w - span @ np.linalg.pinv(span) @ w)
+    W = wrench_polytope(Stance([point(f"p{k}", p, friction=0.5) for k, p in enumerate(places)], 1000.0))
+    facets = W.at_reference(com).distances(w)[: -2 * len(W.equalities[1])].min()
+    assert found[0][2] == pytest.approx(min(facets, -off), abs=1e-6)
 
 
 # [Qiu2012]_ Tables 5.3 and 5.4: feet look along world +y (soles are long along y).

@@ -100,7 +100,7 @@ def test_the_first_steps_offered_are_the_quickest():
 def test_a_foot_comes_to_rest_at_a_goal_that_moves(x, y, moved, at):
     start, duration, tick = np.array([0.02, 0.15, 0.0]), 0.3, 0.005
     goal, other = start + np.array([x, y, 0.0]), start + np.array([x + moved, y, 0.0])
-    foot = SwingFoot.begin("left_foot", np.eye(3), start, goal, 1.0, duration, 0.06)
+    foot = SwingFoot("left_foot", np.eye(3), start, goal, 1.0, duration, 0.06)
     places, speeds = [], []
     for number in range(1, round(duration / tick)):
         time = 1.0 + number * tick

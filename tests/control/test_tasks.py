@@ -4,10 +4,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from manikin.balance.friction import edges_in_world
 from manikin.contact import grasp, sole
 from manikin.control.build_qp import joint_acceleration_bounds
 from manikin.control.dynamics import Dynamics
-from manikin.control.edge_forces import contact_force_basis, contact_geometry, edges_in_world
+from manikin.control.edge_forces import contact_force_basis, contact_geometry
 from manikin.control.reference import Reference
 
 
@@ -70,16 +71,14 @@ def test_pyramid_edges_lie_on_the_friction_cone(mu, seed, model):
 def test_sole_points_are_shared_between_foot_and_toes(body, contacts):
     """Heel and toe-hinge points belong to the foot, tips to the toes, all inside the sole."""
     geometry = contact_geometry(body, contacts[0], inset=0.01)
-    assert geometry.segments == ("left_foot", "left_toes")
+    assert [segment for segment, _ in geometry.patches] == ["left_foot", "left_toes"]
     q = body.standing_posture()
     state = Dynamics(body, frames_of(body)).evaluate(q, np.zeros(body.nv))
-    points = np.concatenate(
-        [
-            state.frames[f"segment/{p.segment}"].position
-            + p.points @ state.frames[f"segment/{p.segment}"].rotation.T
-            for p in geometry.patches
-        ]
-    )
+    frames = state.frames
+    points = np.concatenate([
+        frames[f"segment/{name}"].position + local @ frames[f"segment/{name}"].rotation.T
+        for name, local in geometry.patches
+    ])  # fmt: skip
     local = points - contacts[0].position
     assert np.abs(points[:, 2]).max() < 1e-9
     assert np.ptp(local[:, 0]) == pytest.approx(body.sole_length - 0.02)

@@ -6,7 +6,7 @@ from manikin.errors import ScenarioError
 from manikin.pipeline import runner
 from manikin.scenarios import load_scenario
 from manikin.scenarios.sections.task_sections import LARGEST_FORCE
-from manikin.simulation.recover import STRONGEST
+from manikin.simulation.push_force import STRONGEST
 
 PUSH = "push={force_N: 100, direction_deg: 0, duration_s: 0.1, at_s: 1.0}"
 

@@ -104,7 +104,7 @@ def test_outside_the_nearest_velocity_is_walked():
 def test_mirror_images():
     """Posture and root of a mirrored cycle, half a step later, are the reflected ones."""
     for name in [n for n in LIBRARY.names if n.endswith(MIRRORED)][:10]:
-        one, other = LIBRARY.index(name.removesuffix(MIRRORED)), LIBRARY.index(name)
+        one, other = (LIBRARY.names.index(n) for n in (name.removesuffix(MIRRORED), name))
         np.testing.assert_allclose(LIBRARY.velocities[other], LIBRARY.velocities[one] * [1.0, -1.0, -1.0])
         both = [GAIT.blend(LIBRARY.velocities[[i] * 8]) for i in (one, other)]
         phase = np.arange(8) / 8
@@ -280,8 +280,6 @@ def test_misuse():
         Gait(replace(LIBRARY, joint_names=tuple(f"x{name}" for name in LIBRARY.joint_names)), BODY)
     with pytest.raises(InputError, match="span no volume"):
         ControlSpace(LIBRARY.chosen([0, 1, 2]))
-    with pytest.raises(InputError, match="no cycle 'trot'"):
-        LIBRARY.index("trot")
 
 
 @pytest.mark.parametrize("velocity", [(0.5, 0, 0), (1.2, 0, 0), (0, 0.4, 0), (-0.7, 0, 0), (3.0, 0, 0)])

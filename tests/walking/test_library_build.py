@@ -96,7 +96,7 @@ def test_movements_are_the_recorded_ones(built, recordings):
     file = recordings / "mocap" / "cmu_asf_amc" / "16_25.amc"
     q = reconstruct(read_recording(file)).q[first:last]
     share = np.linspace(0.0, 1.0, len(q), endpoint=False)
-    cycle = library.coefficients[library.index(name)]
+    cycle = library.coefficients[library.names.index(name)]
     for joint in ("left_knee_flexion", "right_knee_flexion", "left_ankle_dorsiflexion"):
         slot = BODY.joint_index(joint)
         recorded = q[:, 7 + slot]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from manikin.balance.friction import pyramid_edges, pyramid_sides
+from manikin.balance.friction import edges_in_world, pyramid_sides
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
 from manikin.numerics.spatial import FloatArray, cross
 
@@ -79,7 +79,7 @@ class ContactGenerators:
                 point = np.tile(contact.position, (len(wrench), 1))
             else:
                 rotation = contact.rotation_contact_to_world
-                edges = pyramid_edges(contact, stance.friction_model) @ rotation.T
+                edges = edges_in_world(contact, stance.friction_model)
                 force = np.tile(edges, (len(local), 1))
                 point = np.repeat(contact.position + local @ rotation.T, len(edges), axis=0)
                 couple, normal = np.zeros(force.shape), np.ones(len(force))
@@ -209,8 +209,8 @@ class _Program:
         weight, stiff = np.asarray(self.gain[row] ** -0.5), self.softness**-0.5
         stacked = np.vstack([stiff * self.A, np.diag(weight)])
         target = np.concatenate([stiff * self.b[row], weight * self.prior[row]])
-        found = lsq_linear(stacked, target, bounds=(0.0, self.upper), method="bvls", tol=1e-12).x
-        magnitude: FloatArray = np.clip(found, 0.0, self.upper).astype(np.float64)
+        solution = lsq_linear(stacked, target, bounds=(0.0, self.upper), method="bvls", tol=1e-12).x
+        magnitude: FloatArray = np.clip(solution, 0.0, self.upper).astype(np.float64)
         return magnitude, (self.b[row] - self.A @ magnitude) / self.softness
 
 

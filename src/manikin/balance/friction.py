@@ -6,6 +6,7 @@ moments about its origin; they are of unit length, with alpha = 1 m.
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from manikin.numerics.spatial import FloatArray, cross
 
 
 class LimitKind(StrEnum):
-    """What gives way when a limit is reached."""
+    """Kinds of limits by what gives way."""
 
     SLIPPING = "slipping"
     TIPPING = "tipping"
@@ -196,6 +197,21 @@ def pyramid_edges(contact: Contact, friction_model: FrictionModel = "outer") -> 
     else:
         tangential = pyramid_friction(contact, friction_model) * _CORNERS
     return np.column_stack([tangential, np.ones(len(tangential))])
+
+
+@lru_cache(maxsize=256)
+def edges_in_world(
+    contact: Contact, friction_model: FrictionModel = "outer", share: float = 1.0
+) -> FloatArray:
+    """(k, 3) forces along the pyramid's edges in world axes, with unit normal force; read-only.
+
+    Edges of ``inner`` and ``cone`` lie on the friction cone, or inside it where a share of the friction is
+    made use of: their tangential part is ``share mu`` long.
+    """
+    local = pyramid_edges(contact, friction_model) * [share, share, 1.0]
+    edges = local @ contact.rotation_contact_to_world.T
+    edges.setflags(write=False)
+    return edges
 
 
 def pyramid_sides(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:

@@ -21,8 +21,8 @@ from manikin.balance.wrench import LimitingConstraint, WrenchPolytope, pseudo_wr
 from manikin.contact import ContactKind, FrictionModel, Stance
 from manikin.errors import InputError
 from manikin.numerics.polygon import signed_distance
-from manikin.numerics.polytope import Polytope
-from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.numerics.polytope import Polytope, least_change
+from manikin.numerics.spatial import FloatArray, cross, frozen_array, skew
 from manikin.runtime.display import Displayed
 
 _BLOCK = 200_000
@@ -69,7 +69,8 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
     """All margins of pseudo-wrenches, each the smallest over the facets of a distance.
 
     Row ``i`` is reached after ``d_i = h_i - H_i w``; a unit force at the CoM covers
-    ``|H1_i + H2_i (x - o)^|`` of it, a unit moment ``|H2_i|``.
+    ``|H1_i + H2_i (x - o)^|`` of it, a unit moment ``|H2_i|``. Off a flat W_p the least perturbation that
+    leads back to the flat takes the place of its pairs of rows.
 
     Args:
         W: Wrench polytope.
@@ -111,12 +112,29 @@ def wrench_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
 def _margins(W: WrenchPolytope, wrench: FloatArray, arm: FloatArray) -> FloatArray:
     """(4, n) margins in the order of :class:`StabilityMargins`."""
     distances = W.distances(wrench)
-    moment_lever = np.linalg.norm(W.H[:, 3:], axis=1)
-    force_lever = force_levers(W.H, arm)
+    margins = _row_margins(distances, W.H, arm)
+    off, residual = W.off_flat(wrench)
+    if len(off):
+        rows = W.equalities[0]
+        facets = slice(0, -2 * len(rows))
+        at_com = rows[:, :3] + cross(np.broadcast_to(rows[:, 3:], (len(off), len(rows), 3)), arm[off, None])
+        moment = np.broadcast_to(rows[:, 3:], at_com.shape)
+        perturbed = (at_com, moment, rows, np.concatenate([at_com, moment], axis=-1))
+        margins[:, off] = np.minimum(
+            _row_margins(distances[off, facets], W.H[facets], arm[off]),
+            np.stack([-least_change(matrix, residual) for matrix in perturbed]),
+        )
+    return margins
+
+
+def _row_margins(distances: FloatArray, H: FloatArray, arm: FloatArray) -> FloatArray:
+    """(4, n) margins by distances (n, m) to rows (m, 6) with the CoM at ``arm`` (n, 3) from the reference."""
+    moment_lever = np.linalg.norm(H[:, 3:], axis=1)
+    force_lever = force_levers(H, arm)
     return np.stack([
         _smallest(distances, force_lever),
         _smallest(distances, moment_lever),
-        distances.min(axis=1),
+        distances.min(axis=1, initial=np.inf),
         _smallest(distances, np.hypot(force_lever, moment_lever)),
     ])  # fmt: skip
 
@@ -125,10 +143,10 @@ def _smallest(distances: FloatArray, lever: FloatArray) -> FloatArray:
     """Smallest ``distance / lever``; rows without lever count only when they are broken."""
     still = lever < _NO_LEVER
     if not still.any():
-        return (distances / lever).min(axis=1)
+        return (distances / lever).min(axis=1, initial=np.inf)
     ratio = distances / np.where(still, 1.0, lever)
     out_of_reach = np.where(distances < 0, -np.inf, np.inf)
-    return np.where(still, out_of_reach, ratio).min(axis=1)
+    return np.where(still, out_of_reach, ratio).min(axis=1, initial=np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,16 +248,10 @@ class BalanceReport(Displayed):
 
 
 def evaluate_balance(
-    stance: Stance,
-    mass: float,
-    com: ArrayLike,
-    acceleration: ArrayLike = (0.0, 0.0, 0.0),
-    angular_momentum_rate: ArrayLike = (0.0, 0.0, 0.0),
-    *,
-    friction_model: FrictionModel | None = None,
-    reference: ArrayLike = (0.0, 0.0, 0.0),
-    plane_height: float | None = None,
-) -> BalanceReport:
+    stance: Stance, mass: float, com: ArrayLike, acceleration: ArrayLike = (0.0, 0.0, 0.0),
+    angular_momentum_rate: ArrayLike = (0.0, 0.0, 0.0), *, friction_model: FrictionModel | None = None,
+    reference: ArrayLike = (0.0, 0.0, 0.0), plane_height: float | None = None,
+) -> BalanceReport:  # fmt: skip
     """Judge one stance and CoM state by W_p and by every classical criterion.
 
     Args:
@@ -303,7 +315,5 @@ def _number(value: float) -> float | None:
 
 
 def _ground(point: GroundPoint) -> dict[str, Any]:
-    return {
-        "position_m": [_number(float(value)) for value in point.position],
-        "distance_m": _number(point.distance),
-    }
+    position = [_number(float(value)) for value in point.position]
+    return {"position_m": position, "distance_m": _number(point.distance)}

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import daqp
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Sta
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.dynamics import CarriedForces, FreeDynamics, centroidal_motion
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_about
 from manikin.scene.distance import moves_by_joint
 
@@ -341,19 +341,12 @@ def _share_within_limits(
     cost = cost**2
     count = len(cost)
     limit = np.where(np.isfinite(generators.upper), generators.upper, 1e6)
-    solution, _, flag, _ = daqp.solve(
-        np.diag(cost / cost.mean()),
-        np.zeros(count),
-        np.ascontiguousarray(np.vstack([matrix, joint_map])),
-        np.concatenate([limit, target, needed - torque_lower]),
-        np.concatenate([np.zeros(count), target, needed - torque_upper]),
-        np.concatenate([np.zeros(count), np.full(6, _EQUALITY), np.zeros(len(needed))]).astype(np.int32),
-    )
-    return np.maximum(np.asarray(solution, dtype=np.float64), 0.0) if flag > 0 else None
-
-
-_EQUALITY = 5
-"""DAQP's mark of an equality."""
+    solution = solve_qp(
+        np.diag(cost / cost.mean()), np.zeros(count), np.vstack([matrix, joint_map]),
+        np.concatenate([target, needed - torque_upper]), np.concatenate([target, needed - torque_lower]),
+        (np.zeros(count), limit), equalities=6,
+    )  # fmt: skip
+    return np.maximum(solution.x, 0.0) if solution.solved else None
 
 
 def _joint_map(jacobians: FloatArray, generators: _Generators) -> FloatArray:

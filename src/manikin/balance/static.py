@@ -74,7 +74,7 @@ def _onto(polygon: FloatArray, point: FloatArray) -> FloatArray:
 
 
 def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 8) -> float:
-    """How far the centre of mass may move in any direction on the ground while the contacts hold it at rest.
+    """Distance that the centre of mass may move in any horizontal direction while held at rest [m].
 
     One linear program for each direction; the room is exact in these directions.
 
@@ -98,15 +98,15 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
         step = np.array([np.cos(angle), np.sin(angle), 0.0])
         column = np.concatenate([np.zeros(3), -np.cross(step, [0.0, 0.0, weight])])
         wanted = np.concatenate([[0.0, 0.0, weight], np.cross(com, [0.0, 0.0, weight])])
-        found = linprog(
+        solution = linprog(
             np.append(np.zeros(len(bounds)), -1.0),
             A_ub=np.append(generators.normal, 0.0)[None], b_ub=[cap],
             A_eq=np.column_stack([about_origin, column]), b_eq=wanted,
             bounds=[*bounds, (0.0, 1e3)], method="highs",
         )  # fmt: skip
-        if not found.success:
+        if not solution.success:
             return -np.inf
-        room = min(room, float(found.x[-1]))
+        room = min(room, float(solution.x[-1]))
     return room
 
 
@@ -138,14 +138,14 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     count = len(wrenches)
     above = np.column_stack([columns[6:], body.torque_lower])
     below = np.column_stack([-columns[6:], -body.torque_upper])
-    found = linprog(
+    solution = linprog(
         np.append(np.zeros(count), 1.0),
         A_ub=np.vstack([above, below, np.append(generators.normal, 0.0)]),
         b_ub=np.concatenate([gravity[6:], -gravity[6:], [_cap(stance, body.mass)]]),
         A_eq=np.column_stack([columns[:6], np.zeros(6)]), b_eq=gravity[:6],
         bounds=[*((0.0, limit) for limit in generators.upper), (0.0, None)], method="highs",
     )  # fmt: skip
-    return float(found.x[-1]) if found.success else np.inf
+    return float(solution.x[-1]) if solution.success else np.inf
 
 
 def _cap(stance: Stance, mass: float) -> float:

@@ -7,7 +7,7 @@ grasp box is a segment added to it. Each facet is explained by the contacts and 
 
 A stance with few contacts has a flat W_p (a point contact can give no moment about itself). Such a W_p
 carries each equality as a pair of opposite rows at the end of H: the margin of a wrench is then 0 at best,
-and negative as soon as the equality is broken.
+and at most the negative distance to the flat off it.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class LimitingConstraint:
     Attributes:
         row: Index of the facet in ``W.H``.
         effector: Whose limit weighs most.
-        kind: What gives way there.
+        kind: What gives way at the facet.
         description: ``"left_foot: tipping over its outer edge"``.
         direction: (6,) the facet's unit normal: the wrench that would be needed and cannot be had;
             the body escapes along the twist ``-direction``.
@@ -206,7 +206,7 @@ class WrenchPolytope(Displayed, Polytope):
         return self.stance.friction_model
 
     def at_reference(self, reference: ArrayLike) -> WrenchPolytope:
-        """The same set with moments about another point, rows of unit length there.
+        """The same set with moments about another point, with rows of unit length.
 
         The margin changes with the reference ([Qiu2012]_ 4.2.9, remark 2).
         """
@@ -237,19 +237,15 @@ class WrenchPolytope(Displayed, Polytope):
         row = int(np.argmin(distances))
         shares = facet_shares(self, row)
         first = shares[0]
-        return LimitingConstraint(
-            row, first.effector, first.kind, str(first), self.H[row], float(distances[row]), shares
-        )
+        margin = float(self.margin(w) if len(self.off_flat(w[None])[0]) else distances[row])
+        return LimitingConstraint(row, first.effector, first.kind, str(first), self.H[row], margin, shares)
 
 
 def pseudo_wrench(
-    mass: float,
-    com: ArrayLike,
-    acceleration: ArrayLike,
-    angular_momentum_rate: ArrayLike | None = None,
+    mass: float, com: ArrayLike, acceleration: ArrayLike, angular_momentum_rate: ArrayLike | None = None,
     reference: ArrayLike | None = None,
-) -> FloatArray:
-    """Wrench that the scene must apply: ``[m (a - g); (x - o) ^ m (a - g) + Ldot]``.
+) -> FloatArray:  # fmt: skip
+    """(..., 6) wrench that the scene must apply [N, N.m]: ``[m (a - g); (x - o) ^ m (a - g) + Ldot]``.
 
     [Qiu2012]_ 4.6 for the point mass, 4.51 with the rate of change of angular momentum.
 
@@ -259,9 +255,6 @@ def pseudo_wrench(
         acceleration: (..., 3) of the CoM [m/s^2].
         angular_momentum_rate: (..., 3) about the CoM [N.m]; zero when omitted.
         reference: (..., 3) point ``o`` of the moments [m]; the world origin when omitted.
-
-    Returns:
-        (..., 6) [N, N.m].
 
     Raises:
         InputError: If the mass is not positive.
@@ -292,13 +285,13 @@ def wrench_polytope(
         stance = stance.with_friction_model(friction_model)
     origin = frozen_array(reference, "reference [m]", (3,), ContactError)
     local = _middle(stance) if len(stance) else origin
-    caps = _Caps.of(stance)
-    generators, levels = _generators(stance, caps, local)
+    caps, total = _caps(stance)
+    generators, levels = _generators(stance, caps, total, local)
     segments = [_grasp_segments(c, local) for c in stance if c.kind is ContactKind.GRASP]
     fan = fan_of_generators(generators, levels, np.ones(levels.shape[1], dtype=np.bool_))
     fan = fan.plus_segments(np.vstack([np.zeros((0, 6)), *segments]))
     H, h, multipliers = facet_rows(fan, max(1.0, float(np.abs(generators).max(initial=0.0))))
-    of_stance = np.zeros(len(h)) if caps.total is None else multipliers[:, -1] / caps.total
+    of_stance = np.zeros(len(h)) if total is None else multipliers[:, -1] / total
     return WrenchPolytope(rows_about(H, origin - local), h, stance, origin, of_stance)
 
 
@@ -331,7 +324,7 @@ def _middle(stance: Stance) -> FloatArray:
 
 
 def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
-    """What a wrench polytope depends on but for the place of the stance, lengths to a nanometre."""
+    """Values that a wrench polytope depends on but for the stance's position, lengths to a nanometre."""
     contacts = []
     for contact in stance:
         place = np.concatenate([contact.points_in_world - centre, contact.normal[None]])
@@ -341,27 +334,17 @@ def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
     return (stance.model, *sorted(contacts))
 
 
-@dataclass(frozen=True)
-class _Caps:
-    """Caps that matter: each contact's own, and the one on the sum.
+def _caps(stance: Stance) -> tuple[list[float | None], float | None]:
+    """Caps that matter: of each frictional contact, and on their sum.
 
-    Attributes:
-        own: One per frictional contact; None where only the sum bounds it.
-        total: On the sum; None where the contacts' own caps imply it.
+    The first are None where only the sum bounds a contact, the last where the contacts' own caps imply it.
     """
-
-    own: Sequence[float | None]
-    total: float | None
-
-    @classmethod
-    def of(cls, stance: Stance) -> _Caps:
-        total = stance.normal_force_cap
-        frictional = [c for c in stance if c.kind is not ContactKind.GRASP]
-        own = [_own_cap(contact, total) for contact in frictional]
-        known = [cap for cap in own if cap is not None]
-        if not own or (total is not None and len(known) == len(own) and sum(known) <= total):
-            total = None
-        return cls(own, total)
+    total = stance.normal_force_cap
+    own = [_own_cap(contact, total) for contact in stance if contact.kind is not ContactKind.GRASP]
+    known = [cap for cap in own if cap is not None]
+    if not own or (total is not None and len(known) == len(own) and sum(known) <= total):
+        total = None
+    return own, total
 
 
 def _own_cap(contact: Contact, total: float | None) -> float | None:
@@ -374,24 +357,26 @@ def _own_cap(contact: Contact, total: float | None) -> float | None:
     return own if total is None or own is None or own < total else None
 
 
-def _generators(stance: Stance, caps: _Caps, reference: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _generators(
+    stance: Stance, caps: list[float | None], total: float | None, reference: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Generators (n, 6) and the share of each level that each one uses (n, k).
 
     The levels are one per contact with a cap or a torsion limit of its own, then the
     stance's cap.
     """
     frictional = [c for c in stance if c.kind is not ContactKind.GRASP]
-    pairs = list(zip(frictional, caps.own, strict=True))
+    pairs = list(zip(frictional, caps, strict=True))
     has_level = [own is not None or contact.torsion_limit is not None for contact, own in pairs]
-    columns = sum(has_level) + (caps.total is not None)
+    columns = sum(has_level) + (total is not None)
     generators, levels = [np.zeros((0, 6))], [np.zeros((0, columns))]
     for i, (contact, own) in enumerate(pairs):
-        local, bounded = _extreme_wrenches(contact, own, caps.total, stance.friction_model)
+        local, bounded = _extreme_wrenches(contact, own, total, stance.friction_model)
         level = np.zeros((len(local), columns))
         if has_level[i]:
             level[:, sum(has_level[:i])] = bounded
-        if caps.total is not None:
-            level[:, -1] = local[:, 2] / caps.total
+        if total is not None:
+            level[:, -1] = local[:, 2] / total
         generators.append(contact_to_world(contact, local, reference))
         levels.append(level)
     return np.vstack(generators), np.vstack(levels)

@@ -3,33 +3,29 @@
 What comes from where:
 
 * Segment masses, centres of mass, radii of gyration and lengths: de Leva, "Adjustments to
-  Zatsiorsky-Seluyanov's segment inertia parameters", J. Biomech. 29(9), 1996, Table 4
-  (61.9 kg, 1.735 m women; 73.0 kg, 1.741 m men). Joint-centre rows are used: VERT-CERV for
-  head and neck, CERV-XYPH, XYPH-OMPH and OMPH-MIDH for the trunk, KJC-AJC for the shank,
-  WJC-DAC3 for the hand.
+  Zatsiorsky-Seluyanov's segment inertia parameters", J. Biomech. 29(9), 1996, Table 4 (61.9 kg, 1.735 m
+  women; 73.0 kg, 1.741 m men). Joint-centre rows are used: VERT-CERV for head and neck, CERV-XYPH, XYPH-OMPH
+  and OMPH-MIDH for the trunk, KJC-AJC for the shank, WJC-DAC3 for the hand.
 * Height of the shoulder joints above the hip joints: the MIDS-MIDH length of the same table.
-* Hip breadth 0.191 H: Drillis and Contini (1966), as reprinted in Winter, "Biomechanics and
-  Motor Control of Human Movement", 4th ed. 2009, Fig. 4.1. The same figure has the malleolus
-  at 0.039 H.
+* Hip breadth 0.191 H: Drillis and Contini (1966), as reprinted in Winter, "Biomechanics and Motor Control of
+  Human Movement", 4th ed. 2009, Fig. 4.1. The same figure has the malleolus at 0.039 H.
 
 Our choices, for want of one table that fits the others:
 
-* Ankle joint 0.043 H above the sole (0.075 m at 1.75 m): Drillis and Contini's bare malleolus
-  plus a thin shoe sole, well below the 0.10 m of [Qiu2012]_ Fig. 6.7.
-* de Leva's vertical lengths are curve and landmark distances; with the ankle they add up to
-  1.003 H (women) and 1.024 H (men). Legs, trunk, neck and head are therefore scaled by one common
-  factor, so that sole to vertex is the stature exactly. Arms and feet keep their lengths.
-* Distances between hip joint centres 0.100 H and between shoulder joint centres 0.210 H (men)
-  and 0.200 H (women), both well inside the breadths over the flesh.
-* The neck is the lower third of VERT-CERV and has a fifth of the head-and-neck mass, as an upright
-  cylinder; the head has the rest, so that both together keep de Leva's mass, centre of mass
-  and radii of gyration.
-* The toes are the front 27 % of the foot (the metatarsal heads lie at about 73 % of its length
-  from the heel) with a tenth of its mass, as a box; the rest of the foot keeps what is left,
-  so that both together keep de Leva's foot. Its centre of mass is at 0.4 of the ankle's height.
-* The fingers are rigid in the hand.
-* The sole is 0.16 H x 0.12/1.75 H, the shoe of [Qiu2012]_ 5.4.4 at 1.75 m; de Leva's bare foot
-  lies in its middle. The ankle is above 26 % of the sole's length from the heel.
+* Ankle joint 0.043 H above the sole (0.075 m at 1.75 m): Drillis and Contini's bare malleolus plus a thin
+  shoe sole, well below the 0.10 m of [Qiu2012]_ Fig. 6.7.
+* de Leva's vertical lengths are curve and landmark distances; with the ankle they add up to 1.003 H (women)
+  and 1.024 H (men). Legs, trunk, neck and head are scaled by one common factor, so that sole to vertex is the
+  stature exactly. Arms and feet keep their lengths.
+* Distances between hip joint centres 0.100 H and between shoulder joint centres 0.210 H (men) and 0.200 H
+  (women), both well inside the breadths over the flesh.
+* The neck is the lower third of VERT-CERV and has a fifth of the head-and-neck mass, as an upright cylinder;
+  the head has the rest, so that both together keep de Leva's mass, centre of mass and radii of gyration.
+* The toes are the front 27 % of the foot (the metatarsal heads lie at about 73 % of its length from the heel)
+  with a tenth of its mass, as a box; both together keep de Leva's foot. Its centre of mass is at 0.4 of the
+  ankle's height. The fingers are rigid in the hand.
+* The sole is 0.16 H x 0.12/1.75 H, the shoe of [Qiu2012]_ 5.4.4 at 1.75 m; de Leva's bare foot lies in its
+  middle. The ankle is above 26 % of the sole's length from the heel.
 """
 
 from collections.abc import Mapping

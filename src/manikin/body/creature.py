@@ -1,6 +1,6 @@
 """Creatures of any shape from robot descriptions, with limbs that are named ([Tonneau2015]_ 4.3.1).
 
-A robot description has no limbs; whoever has one says where they end. Its frames may be turned any way; ours
+A robot description has no limbs; the caller names where they end. Its frames may be turned any way; ours
 are all parallel to the root's in the zero posture, so that axes, inertias and shapes are turned. Links on
 fixed joints become part of what they are fixed to. A chain of massless links at one point becomes
 one segment with several hinges.
@@ -29,7 +29,7 @@ _MOST_HINGES = 3
 
 @dataclass(frozen=True)
 class LimbSpec:
-    """Where a limb of a robot ends, and how it touches.
+    """End of a limb of a robot, and its kind of contact.
 
     Attributes:
         tip: Link that touches; the effector gets its name.
@@ -291,7 +291,7 @@ class _Tree:
 def _standing(segments: tuple[Segment, ...], wanted: Mapping[str, float]) -> dict[str, float]:
     """Angles within the ranges; those not wanted as near to 0 as they can be."""
     hinges = {hinge.name: hinge for segment in segments for hinge in segment.hinges}
-    found = {name: float(np.clip(0.0, hinge.lower, hinge.upper)) for name, hinge in hinges.items()}
+    angles = {name: float(np.clip(0.0, hinge.lower, hinge.upper)) for name, hinge in hinges.items()}
     for name, angle in wanted.items():
         if name not in hinges:
             raise BodyError(f"standing angle of {name!r}; valid: one of {list(hinges)}")
@@ -300,8 +300,8 @@ def _standing(segments: tuple[Segment, ...], wanted: Mapping[str, float]) -> dic
             raise BodyError(
                 f"standing angle of {name!r} is {angle:g} rad; valid: {hinge.lower:g} to {hinge.upper:g}"
             )
-        found[name] = float(angle)
-    return {name: angle for name, angle in found.items() if angle != 0.0}
+        angles[name] = float(angle)
+    return {name: angle for name, angle in angles.items() if angle != 0.0}
 
 
 def _with_upright(body: BodyModel, effectors: list[str]) -> BodyModel:
@@ -325,16 +325,14 @@ def _with_mirrors(body: BodyModel) -> BodyModel:
 def _with_soft_pairs(body: BodyModel) -> BodyModel:
     """The body without checks of segments that overlap in its zero or standing posture."""
     geometry, model = body.geometry, body.pinocchio
-    data, found = pin.GeometryData(geometry), set(body.soft_pairs)
+    data, pairs = pin.GeometryData(geometry), set(body.soft_pairs)
     for q in (body.zero_posture(), body.standing_posture()):
         pin.computeCollisions(model, model.createData(), geometry, data, q, False)
         for pair, result in zip(geometry.collisionPairs, data.collisionResults, strict=True):
             if result.isCollision():
-                names = (
-                    geometry.geometryObjects[index].name.split("/")[0] for index in (pair.first, pair.second)
-                )
-                found.add(frozenset(names))
-    return replace(body, soft_pairs=frozenset(found))
+                shapes = (geometry.geometryObjects[index] for index in (pair.first, pair.second))
+                pairs.add(frozenset(shape.name.split("/")[0] for shape in shapes))
+    return replace(body, soft_pairs=frozenset(pairs))
 
 
 def _tidy(vector: FloatArray) -> FloatArray:

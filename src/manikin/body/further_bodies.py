@@ -202,7 +202,7 @@ class PartSize:
 
 
 DENSITY = 1000.0
-"""Of the cylinders [kg/m^3]; ours."""
+"""Density of the cylinders [kg/m^3]; ours."""
 
 PARTS: Mapping[str, PartSize] = MappingProxyType({
     "head": PartSize(4.90, 0.25),
@@ -221,7 +221,7 @@ SHOULDER_WIDTH, HIP_WIDTH = 0.40, 0.30
 """Distances between the shoulder joints and between the hip joints [m] ([Kudoh2002]_ 3.2)."""
 
 MASS = 70.0
-"""Of the whole body [kg]."""
+"""Mass of the whole body [kg]."""
 
 ANKLE_HEIGHT, SOLE_WIDTH = 0.07, 0.10
 """Height of the ankle above the sole and width of the sole [m]; ours, the thesis has neither."""
@@ -349,7 +349,7 @@ def _leg(side: str, sign: float) -> list[Segment]:
 
 
 def _below(name: str) -> FloatArray:
-    """Where the next joint of a hanging part is, in its frame [m]."""
+    """(3,) next joint of a hanging part, in its frame [m]."""
     return np.array([0.0, 0.0, -PARTS[name].length])
 
 

@@ -195,7 +195,7 @@ class _Inertia:
     moments: FloatArray
 
     def without(self, part: "_Inertia") -> "_Inertia":
-        """What is left when ``part`` is cut away, both in this frame."""
+        """The rest when ``part`` is cut away, both in this frame."""
         mass = self.mass - part.mass
         com = (self.mass * self.com - part.mass * part.com) / mass
         return _Inertia(mass, com, self.about(com) - part.about(com))

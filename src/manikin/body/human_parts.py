@@ -40,7 +40,7 @@ from manikin.numerics.spatial import FloatArray
 
 @dataclass(frozen=True)
 class Offset:
-    """Of a centre of mass from the line between the joints of its segment.
+    """Offset of a centre of mass from the line between the joints of its segment.
 
     Attributes:
         forward: Per length of the segment.

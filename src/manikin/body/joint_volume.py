@@ -1,7 +1,7 @@
 """Range of motion of a ball joint as a volume of its three angles ([Tonneau2015]_ 4.3.3).
 
 The angles of a hip or shoulder depend on each other: how far an arm turns inward depends on where it points.
-One interval for each angle either holds postures that nobody can take or forbids some that people
+One interval for each angle either holds postures that are impossible or forbids some that people
 do take. The thesis therefore takes the non-convex hull of recorded angles, which it then treats as a
 polytope; a polytope, though, is convex. We keep the hull as the signed distance to its surface, on a grid.
 
@@ -72,7 +72,7 @@ CLOSING = float(np.deg2rad(30.0))
 """Half the width of the gaps between recorded angles that are filled [rad]; our choice."""
 
 MARGIN = float(np.deg2rad(10.0))
-"""How far beyond recorded angles the volume reaches [rad]; our choice, for recordings of everyday movement.
+"""Reach of the volume beyond recorded angles [rad]; our choice, for recordings of everyday movement.
 
 Those of the thesis are of the largest movement that the subject could do."""
 
@@ -149,7 +149,7 @@ class JointVolume:
         return self.distance(angles) >= 0.0
 
     def _on_grid(self, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Places on the grid in steps, and the distance [rad] from the angles to there."""
+        """Points of the grid in steps, and the distance [rad] from the angles to them."""
         q = np.asarray(angles, dtype=np.float64)
         if q.shape[-1:] != (3,):
             raise BodyError(f"angles of a ball joint have shape {q.shape}; valid: (..., 3)")

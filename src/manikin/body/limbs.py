@@ -2,7 +2,7 @@
 
 Knees, elbows and the pelvis are further contacts of a human ([Tonneau2015]_ 5.4.1, left open there). They are
 on the segments that exist: the knee in front of the origin of the lower leg, the elbow behind that of the
-forearm, each on the thickest shape that meets there. Their z axes, the normals of contacts, point through the
+forearm, each on the thickest shape of the joint. Their z axes, the normals of contacts, point through the
 joint, backwards and forwards. What a human sits on, the effector ``buttocks``, belongs to the root: no joint
 moves it, so its limb has none.
 """
@@ -39,7 +39,7 @@ def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
 
 
 def hinge_line(body: BodyModel, effector: str) -> float | None:
-    """Where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
+    """Place where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
     frame = body.effector(effector)
     hanging = hanging_segment(body, frame.segment)
     return None if hanging is None else float((frame.rotation.T @ (hanging.origin - frame.translation))[0])
@@ -131,7 +131,7 @@ def with_further_contacts(body: BodyModel, kinds: Collection[str] = FURTHER) -> 
     unknown = sorted(set(kinds) - set(FURTHER))
     if unknown:
         raise BodyError(f"further contact is {unknown[0]!r}; valid: {', '.join(FURTHER)}")
-    effectors, limbs = dict(body.effectors), list(limbs_of(body))
+    effectors, limbs = dict(body.effectors), list(body.limbs)
     for joint, parts, ahead in _JOINTS:
         if f"{joint}s" not in kinds:
             continue
@@ -151,7 +151,7 @@ def with_knees_and_elbows(body: BodyModel) -> BodyModel:
 
 
 def _pelvis(body: BodyModel) -> Limb:
-    """What presses on a seat: a patch of the root, with no joint between."""
+    """Limb that presses on a seat: a patch of the root, with no joint between."""
     if body.stature is None or "buttocks" not in body.effectors:
         raise BodyError(f"body {body.name!r} has no buttocks; valid: a human")
     segment = body.effector("buttocks").segment
@@ -187,12 +187,7 @@ def with_root(body: BodyModel) -> tuple[BodyModel, str]:
 
 
 REFLECTION = np.array([1.0, -1.0, 1.0])
-"""What the reflection in the sagittal plane does to the coordinates of a point."""
-
-
-def limbs_of(body: BodyModel) -> tuple[Limb, ...]:
-    """Return the limbs of a body, in its own order; none for a point mass."""
-    return body.limbs
+"""Factors of the coordinates of a point under reflection in the sagittal plane."""
 
 
 def limb_named(body: BodyModel, name: str) -> Limb:
@@ -253,11 +248,11 @@ def are_mirrored(body: BodyModel, first: Limb, second: Limb, tolerance: float = 
     if len(first.segments) != len(second.segments) or not same_parent:
         return False
     pairs = zip(first.segments, second.segments, strict=True)
-    one, other = body.effector(first.effector), body.effector(second.effector)
-    reflected = np.outer(REFLECTION, REFLECTION) * one.rotation
+    end, other = body.effector(first.effector), body.effector(second.effector)
+    reflected = np.outer(REFLECTION, REFLECTION) * end.rotation
     return (
         all(_segments_mirrored(body.segment(a), body.segment(b), tolerance) for a, b in pairs)
-        and np.allclose(REFLECTION * one.translation, other.translation, rtol=0.0, atol=tolerance)
+        and np.allclose(REFLECTION * end.translation, other.translation, rtol=0.0, atol=tolerance)
         and np.allclose(reflected, other.rotation, rtol=0.0, atol=tolerance)
     )
 

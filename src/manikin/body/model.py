@@ -290,7 +290,7 @@ class BodyModel(Displayed):
     # --- as plain values -------------------------------------------------------------------
 
     def signature(self) -> dict[str, str | float]:
-        """What a file must keep to build this body again: its name and the arguments of its maker."""
+        """Name of the body and the arguments of its maker, from which a file builds it again."""
         values = {
             "model": self.name, "stature": self.stature, "mass": self.own_mass, "sex": self.sex,
             "sole_length": self.sole_length, "sole_width": self.sole_width,

@@ -1,4 +1,4 @@
-"""How far a limb's posture is from violating its range of motion ([Tonneau2015]_ 4.3.3).
+"""Distance of a limb's posture to a violation of its range of motion ([Tonneau2015]_ 4.3.3).
 
 Hips and shoulders of the human have volumes that were learnt from recordings; every other hinge has its
 interval. The file of the volumes holds computed distances and no recorded data. The recordings are everyday
@@ -33,7 +33,7 @@ from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, frozen_array
 
 FILE = Path(__file__).with_name("human_volumes.npz")
-"""Where the shipped volumes are."""
+"""File of the shipped volumes."""
 
 FORMAT = "manikin-joint-volumes-1"
 UNIT = 1e-4

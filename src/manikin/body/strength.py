@@ -42,7 +42,7 @@ MEAN_MEN_PER_WOMEN = 85.52 / 67.76
 
 
 class Grade(StrEnum):
-    """How a value was come by: from the paper or its abstract, as others quote it, or estimated by us."""
+    """Origin of a value: the paper or its abstract, a quotation by others, or our estimate."""
 
     PAPER = "paper"
     QUOTED = "quoted"

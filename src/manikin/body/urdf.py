@@ -105,8 +105,8 @@ def _mesh_file(name: str, folder: Path) -> Path | None:
         return None
     plain = name.removeprefix("file://")
     if not name.startswith("package://"):
-        found = folder / plain
-        return found if found.is_file() else None
+        file = folder / plain
+        return file if file.is_file() else None
     inside = name.removeprefix("package://")
     rest = inside.partition("/")[2]
     tried = [base / part for base in (folder, *folder.resolve().parents[:3]) for part in (inside, rest)]
@@ -387,7 +387,7 @@ def _name(element: ElementTree.Element, kind: str, where: str) -> str:
 
 
 def _child(element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element:
-    found = element.find(tag)
-    if found is None:
+    child = element.find(tag)
+    if child is None:
         raise BodyError(f"{where} has no <{tag}>; valid: one")
-    return found
+    return child

@@ -1,9 +1,7 @@
 """``manikin analyze``: measures of recorded people, the same as those of planned motions."""
 
-import multiprocessing
 import time as clock
 from collections.abc import Sequence
-from multiprocessing import forkserver
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -77,10 +75,6 @@ def analyze(
     if not single:
         refuse(plan is not None or execute, "--plan", "there are several files")
         refuse(frames is not None, "--frames", "there are several files")
-        if jobs != 1 and "forkserver" in multiprocessing.get_all_start_methods():
-            # The server of processes imports, which takes seconds, while this process goes on.
-            forkserver.set_forkserver_preload(["manikin.reports.analysis_directory"])
-            forkserver.ensure_running()
     from manikin.analysis import AnalysisOptions, recordings_in
 
     options = AnalysisOptions(

@@ -131,7 +131,7 @@ def push(
     """Push a standing body and see whether it stays on its feet."""
     from manikin.numerics.spatial import finite_number
     from manikin.scenarios.planned import push_task
-    from manikin.simulation.recover import STRONGEST
+    from manikin.simulation.push_force import STRONGEST
 
     if body not in ("kudoh", "human"):
         raise InputError(f"--body is {body!r}; valid: kudoh or human")

@@ -56,9 +56,9 @@ def friction_model(value: object) -> FrictionModel:
 
 @dataclass(frozen=True)
 class ContactModel:
-    """How the contacts of a stance carry: the friction cone and the cap that they share.
+    """Friction cone and normal-force cap that the contacts of a stance share.
 
-    What differs between the contacts is with each :class:`~manikin.contact.Contact`: its coefficient of
+    Values that differ between contacts are with each :class:`~manikin.contact.Contact`: its coefficient of
     friction, its own normal-force cap, its torsion limit, and the force and moment limits of a grasp.
 
     Attributes:
@@ -86,7 +86,7 @@ class ContactModel:
 
 
 class ContactKind(StrEnum):
-    """How a contact may push or pull."""
+    """Kind of contact: the forces that it can give."""
 
     SOLE = "sole"
     """Unilateral, frictional, over a rectangle: four corner points carrying forces."""
@@ -104,12 +104,12 @@ class SolePart(StrEnum):
     HEEL = "heel"
     """Its rear edge, about which the foot tilts after it has landed."""
     TOES = "toes"
-    """What lies before the hinge of the toes, about which the foot tilts before it leaves."""
+    """The part before the hinge of the toes, about which the foot tilts before it leaves."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contact(Displayed):
-    """Where and how an effector touches the scene ([Qiu2012]_ 4.2.1).
+    """Pose, points and limits of an effector's contact with the scene ([Qiu2012]_ 4.2.1).
 
     Use :func:`sole`, :func:`point` or :func:`grasp` to make one.
 

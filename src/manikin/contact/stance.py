@@ -299,7 +299,7 @@ class ContactSchedule(Displayed):
 
 @dataclass(frozen=True)
 class Rolling:
-    """How feet roll.
+    """Durations of the parts of a rolling foot's support.
 
     Attributes:
         heel: Least time on the heel's edge after landing [s].

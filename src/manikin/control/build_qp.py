@@ -1,15 +1,16 @@
 """The inverse-dynamics quadratic program of one control step ([Qiu2012]_ 6.3).
 
-Unknowns are the generalised acceleration and the contact forces; the joint torques follow
-from them by the equation of motion, which splits into six equalities (nobody pushes the
-pelvis) and the torque limits.
+Unknowns are the generalised acceleration and the contact forces; the joint torques follow from them by the
+equation of motion, which splits into six equalities (nothing acts on the root) and the torque limits.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from manikin.body import BodyModel
 from manikin.control.dynamics import DynamicsState
 from manikin.control.edge_forces import ContactForceBasis
 from manikin.control.tasks import AccelerationTask
@@ -19,21 +20,37 @@ from manikin.numerics.spatial import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class JointBounds:
-    """Limits of the joints at one control step.
+    """Limits of the joints at one control step, (nv - 6,) each.
 
     Attributes:
-        torque_lower: (nv - 6,) most negative torque of the muscles [N.m].
-        torque_upper: (nv - 6,) largest one [N.m].
-        damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; the muscles overcome it.
-        acceleration_lower: (nv - 6,) [rad/s^2].
-        acceleration_upper: (nv - 6,) [rad/s^2].
+        torque_lower: Most negative torque of the muscles [N.m].
+        torque_upper: Largest one [N.m].
+        acceleration_lower: [rad/s^2].
+        acceleration_upper: [rad/s^2].
     """
 
     torque_lower: FloatArray
     torque_upper: FloatArray
-    damping: FloatArray
     acceleration_lower: FloatArray
     acceleration_upper: FloatArray
+
+    @classmethod
+    def of(
+        cls, body: BodyModel, state: DynamicsState, horizon: float, largest: float, strength: float = 1.0
+    ) -> "JointBounds":
+        """Limits of a body at a state; see :func:`joint_acceleration_bounds`.
+
+        Args:
+            body: With limits of its own on torques, angles and speeds.
+            state: Its angles and speeds.
+            horizon: Angles and speeds must stay admissible over this time [s].
+            largest: No joint is accelerated faster than this [rad/s^2].
+            strength: Torque and speed limits relative to the body's own.
+        """
+        accelerations = joint_acceleration_bounds(
+            state.q[7:], state.v[6:], body.lower, body.upper, strength * body.velocity_limit, horizon, largest
+        )
+        return cls(strength * body.torque_lower, strength * body.torque_upper, *accelerations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +81,8 @@ class ControlProblem:
         state: Dynamics it was built from.
         tasks: The tasks of its cost.
         contacts: The contacts whose forces are unknowns, in order.
-        joint_map: (nv - 6, n) and ...
-        joint_offset: (nv - 6,) ... give ``torque = joint_map @ x + joint_offset`` [N.m].
+        joint_map: (nv - 6, n) with ``torque = joint_map @ x + joint_offset``.
+        joint_offset: (nv - 6,) [N.m].
     """
 
     program: QuadraticProgram
@@ -85,31 +102,29 @@ class ControlProblem:
 
     def wrenches(self, x: FloatArray) -> dict[str, FloatArray]:
         """Force and moment about the effector frame of each contact in ``x``, by effector."""
-        return {name: basis.wrench @ part for name, basis, part in self._forces(x)}
+        return {basis.contact.effector: basis.wrench @ part for basis, part in self._forces(x)}
 
     def normal_forces(self, x: FloatArray) -> dict[str, float]:
         """Normal force of each contact in ``x`` by effector [N]; 0 for a grasp."""
-        return {name: float(basis.normal @ part) for name, basis, part in self._forces(x)}
+        return {basis.contact.effector: float(basis.normal @ part) for basis, part in self._forces(x)}
 
-    def _forces(self, x: FloatArray) -> Iterator[tuple[str, ContactForceBasis, FloatArray]]:
-        start = len(self.state.v)
-        for loaded in self.contacts:
-            end = start + len(loaded.basis.normal)
-            yield loaded.basis.contact.effector, loaded.basis, x[start:end]
-            start = end
+    def _forces(self, x: FloatArray) -> Iterator[tuple[ContactForceBasis, FloatArray]]:
+        bases = [loaded.basis for loaded in self.contacts]
+        parts = force_variables(bases, len(self.state.v))
+        return ((basis, x[part]) for basis, part in zip(bases, parts, strict=True))
+
+
+def force_variables(bases: Sequence[ContactForceBasis], start: int) -> list[slice]:
+    """Indices of the force variables of each contact; those of the first one begin at ``start``."""
+    ends = np.cumsum([start, *(len(basis.normal) for basis in bases)]).tolist()
+    return [slice(first, end) for first, end in pairwise(ends)]
 
 
 def build_qp(
-    state: DynamicsState,
-    tasks: Sequence[AccelerationTask],
-    contacts: Sequence[LoadedContact],
-    bounds: JointBounds,
-    *,
-    period: float,
-    acceleration_weight: float,
-    force_weight: float,
-    sum_cap: float | None = None,
-) -> ControlProblem:
+    state: DynamicsState, tasks: Sequence[AccelerationTask], contacts: Sequence[LoadedContact],
+    bounds: JointBounds, damping: FloatArray, *, period: float, acceleration_weight: float,
+    force_weight: float, sum_cap: float | None = None,
+) -> ControlProblem:  # fmt: skip
     """Build the program of one control step.
 
     The torques that muscles must give against the passive damping of the joints are taken
@@ -120,6 +135,7 @@ def build_qp(
         tasks: Weighted tasks on the acceleration.
         contacts: Contacts that may carry load.
         bounds: Joint limits.
+        damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; the muscles overcome it.
         period: Time over which the torques will be held [s].
         acceleration_weight: Regularisation of the accelerations.
         force_weight: Regularisation of the force variables.
@@ -127,46 +143,34 @@ def build_qp(
     """
     nv = len(state.v)
     bases = [loaded.basis for loaded in contacts]
+    variables = force_variables(bases, nv)
     generalised = np.concatenate([b.generalised for b in bases], axis=1) if bases else np.zeros((nv, 0))
     size = nv + generalised.shape[1]
     equation = np.concatenate((state.mass_matrix, -generalised), axis=1)
     joint_map = equation[6:].copy()
-    joint_map[:, 6:nv] += np.diag(0.5 * period * bounds.damping)
-    joint_offset = state.bias[6:] + bounds.damping * state.v[6:]
-    caps, cap_limits = _normal_force_rows(contacts, nv, size, sum_cap)
+    joint_map[:, 6:nv] += np.diag(0.5 * period * damping)
+    joint_offset = state.bias[6:] + damping * state.v[6:]
+    caps, cap_limits = _normal_force_rows(contacts, variables, size, sum_cap)
     rows = np.concatenate((equation[:6], joint_map, caps))
     free = np.full(len(cap_limits), -np.inf)
     rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, free))
     rows_upper = np.concatenate((-state.bias[:6], bounds.torque_upper - joint_offset, cap_limits))
     lower, upper = _variable_bounds(contacts, bounds)
     hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
-    _add_wishes(hessian, gradient, contacts, nv)
+    _add_wishes(hessian, gradient, contacts, variables)
     program = QuadraticProgram(hessian, gradient, rows, rows_lower, rows_upper, lower, upper, 6)
     return ControlProblem(program, state, tuple(tasks), tuple(contacts), joint_map, joint_offset)
 
 
 def joint_acceleration_bounds(
-    angle: FloatArray,
-    speed: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    speed_limit: FloatArray,
-    horizon: float,
-    largest: float,
-) -> tuple[FloatArray, FloatArray]:
+    angle: FloatArray, speed: FloatArray, lower: FloatArray, upper: FloatArray, speed_limit: FloatArray,
+    horizon: float, largest: float,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Accelerations that keep angles and speeds admissible over ``horizon``.
 
-    ``q + v T + a T^2 / 2`` must stay within the range and ``v + a T`` within the speed
-    limit; near the end of its range a joint meets a stiff, damped stop. All arrays (n,).
-
-    Args:
-        angle: [rad].
-        speed: [rad/s].
-        lower: Least angles [rad].
-        upper: Greatest angles [rad].
-        speed_limit: [rad/s].
-        horizon: ``T`` [s].
-        largest: Bounds are cut to this [rad/s^2].
+    ``q + v T + a T^2 / 2`` must stay within the range and ``v + a T`` within the speed limit; near the end of
+    its range a joint meets a stiff, damped stop. Angles and speeds are (n,) [rad, rad/s], ``T`` is the
+    horizon [s], and the bounds are cut to the largest acceleration [rad/s^2].
     """
     coasting = angle + horizon * speed
     half_square = 0.5 * horizon**2
@@ -193,32 +197,26 @@ def _cost(
 
 
 def _add_wishes(
-    hessian: FloatArray, gradient: FloatArray, contacts: Sequence[LoadedContact], nv: int
+    hessian: FloatArray, gradient: FloatArray, contacts: Sequence[LoadedContact], variables: Sequence[slice]
 ) -> None:
     """Add ``weight |force - wished|^2 / 2`` of the contacts that should feel a force."""
-    start = nv
-    for loaded in contacts:
-        end = start + len(loaded.basis.normal)
+    for loaded, part in zip(contacts, variables, strict=True):
         if loaded.wished is not None:
             forces = loaded.basis.wrench[:3]
-            hessian[start:end, start:end] += loaded.wish_weight * forces.T @ forces
-            gradient[start:end] -= loaded.wish_weight * forces.T @ loaded.wished
-        start = end
+            hessian[part, part] += loaded.wish_weight * forces.T @ forces
+            gradient[part] -= loaded.wish_weight * forces.T @ loaded.wished
 
 
 def _normal_force_rows(
-    contacts: Sequence[LoadedContact], nv: int, size: int, sum_cap: float | None
+    contacts: Sequence[LoadedContact], variables: Sequence[slice], size: int, sum_cap: float | None
 ) -> tuple[FloatArray, FloatArray]:
     rows, limits = [], []
-    start = nv
-    for loaded in contacts:
-        end = start + len(loaded.basis.normal)
+    for loaded, part in zip(contacts, variables, strict=True):
         if loaded.basis.normal.any():
             row = np.zeros(size)
-            row[start:end] = loaded.basis.normal
+            row[part] = loaded.basis.normal
             rows.append(row)
             limits.append(loaded.cap)
-        start = end
     if sum_cap is not None and rows:
         rows.append(np.sum(rows, axis=0))
         limits.append(sum_cap)

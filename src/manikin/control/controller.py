@@ -9,13 +9,7 @@ from numpy.typing import ArrayLike
 from manikin.body import BodyModel, with_root
 from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
-from manikin.control.build_qp import (
-    ControlProblem,
-    JointBounds,
-    LoadedContact,
-    build_qp,
-    joint_acceleration_bounds,
-)
+from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import (
     ContactGeometry,
@@ -23,11 +17,10 @@ from manikin.control.edge_forces import (
     contact_geometry,
     points_along,
     segment_key,
-    touches,
 )
 from manikin.control.plan_return import Deviation, PlanClock, deviation_from_plan, returning_acceleration
 from manikin.control.reference import Reference, ReferenceSample
-from manikin.control.settings import ControlSettings, Impedance
+from manikin.control.settings import ControlSettings
 from manikin.control.supports import SupportMode, SupportState, SupportSwitch
 from manikin.control.tasks import (
     AccelerationTask,
@@ -43,7 +36,7 @@ from manikin.control.tasks import (
     swing_task,
 )
 from manikin.motion import Motion
-from manikin.numerics.qp import QPSolution, make_solver
+from manikin.numerics.qp import QPSolution, WarmQPSolver
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
 
 YIELDING = 0.2
@@ -56,7 +49,7 @@ far none [m]."""
 
 @dataclass(frozen=True, eq=False)
 class ControlOutput:
-    """What one control step decided.
+    """Decision of one control step.
 
     Attributes:
         tau: (nv - 6,) joint torques to hold until the next step [N.m].
@@ -108,12 +101,11 @@ class Controller:
         """Prepare the controller.
 
         Args:
-            body: The body.
-            motion: Planned motion of this body.
+            body: Whose motion it is.
+            motion: What to follow.
             schedule: Its contacts in time.
             settings: Weights, gains and limits; the defaults when omitted.
-            joint_damping: (nv - 6,) passive damping of the controlled body's joints
-                [N.m.s/rad]; none when omitted.
+            joint_damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; none when omitted.
             wishes: Forces that effectors in contact should feel, at most one of each.
 
         Raises:
@@ -122,7 +114,9 @@ class Controller:
         body, self._root = with_root(body)
         self.body = body
         self.schedule = schedule
-        self._friction_model: FrictionModel = _inside_the_cone(schedule.sequence[0].stance.friction_model)
+        # Where the plan has the outer pyramid control has the inner one: a foot must not slip.
+        planned = schedule.sequence[0].stance.friction_model
+        self._friction_model: FrictionModel = "cone" if planned == "cone" else "inner"
         self.settings = settings or ControlSettings()
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
@@ -140,12 +134,11 @@ class Controller:
         segments = {
             segment_key(segment): body.segment_frame(segment)
             for geometry in self._geometry.values()
-            for segment in geometry.segments
+            for segment, _ in geometry.patches
         }
         self._dynamics = Dynamics(body, {**segments, **frames})
         self.reference = Reference(body, motion, frames, self.settings.period)
-        self._solver = make_solver(self.settings.solver)
-        self._spare_solver = make_solver(self.settings.solver)
+        self._solver, self._spare_solver = WarmQPSolver(), WarmQPSolver()
         self.clock = PlanClock(self.settings.period, self.settings.returning)
         self._previous = np.zeros(joints)
         self._carried: dict[str, float] = {}
@@ -159,8 +152,7 @@ class Controller:
             time: Current time of the motion [s].
             q: (nq,) measured configuration.
             v: (nv,) measured velocity.
-            touching: Whether each effector is felt to touch its support; the schedule is
-                trusted where it says nothing.
+            touching: Whether each effector is felt to touch; the schedule is trusted where it says nothing.
         """
         waited = self.clock.waited
         time = self.clock.at(time)
@@ -175,17 +167,9 @@ class Controller:
             self._remember_loads(supports, problem.normal_forces(solution.x))
         x = np.zeros(len(problem.program.gradient)) if solution is None else solution.x
         return ControlOutput(
-            tau=tau,
-            acceleration=problem.acceleration(x).copy(),
-            wrenches=problem.wrenches(x),
-            supports=supports,
-            fallback=fallback,
-            state=state,
-            reference=reference,
-            problem=problem,
-            iterations=0 if solution is None else solution.iterations,
-            waited=waited,
-        )
+            tau, problem.acceleration(x).copy(), problem.wrenches(x), supports, fallback, state, reference,
+            problem, iterations=0 if solution is None else solution.iterations, waited=waited,
+        )  # fmt: skip
 
     def _carried_at(self, time: float) -> Mapping[str, float]:
         """Point masses [kg] that effectors carry at a time of the plan [s]."""
@@ -207,51 +191,37 @@ class Controller:
         return reference, deviation
 
     def problem(
-        self,
-        state: DynamicsState,
-        reference: ReferenceSample,
-        supports: Mapping[str, SupportState],
-        time: float = -np.inf,
-        deviation: Deviation | None = None,
-    ) -> ControlProblem:
+        self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState],
+        time: float = -np.inf, deviation: Deviation | None = None,
+    ) -> ControlProblem:  # fmt: skip
         """Build the program of one step, without solving it; wished forces are those of the time [s]."""
-        return build_qp(
-            state,
-            self.tasks(state, reference, supports, deviation),
-            [
-                self._wishing(self._loaded(support, support.contact, state), time)
-                for support in supports.values()
-                if support.mode is SupportMode.STANCE and support.contact is not None
-            ],
-            self._bounds(state),
-            period=self.settings.period,
-            acceleration_weight=self.settings.weights.acceleration,
-            force_weight=self.settings.weights.force,
+        settings = self.settings
+        loaded = [
+            self._wishing(self._loaded(support, support.contact, state), time)
+            for support in supports.values()
+            if support.mode is SupportMode.STANCE and support.contact is not None
+        ]
+        bounds = JointBounds.of(
+            self.body, state, settings.joint_limit_horizon, settings.max_joint_acceleration
         )
+        return build_qp(
+            state, self.tasks(state, reference, supports, deviation), loaded, bounds, self._damping,
+            period=settings.period, acceleration_weight=settings.weights.acceleration,
+            force_weight=settings.weights.force,
+        )  # fmt: skip
 
     def tasks(
-        self,
-        state: DynamicsState,
-        reference: ReferenceSample,
-        supports: Mapping[str, SupportState],
+        self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState],
         deviation: Deviation | None = None,
-    ) -> list[AccelerationTask]:
+    ) -> list[AccelerationTask]:  # fmt: skip
         """List the weighted tasks of one step."""
         gains, weights = self.settings.impedances, self.settings.weights
         tasks = [self._com_task(state, reference, deviation)]
         if not self._rests(supports):
-            tasks.append(
-                orientation_task(
-                    self._root,
-                    state.frames[self._root],
-                    reference.effectors[self._root],
-                    gains.pelvis,
-                    weights.pelvis,
-                )
-            )
+            frame, planned = state.frames[self._root], reference.effectors[self._root]
+            tasks.append(orientation_task(self._root, frame, planned, gains.pelvis, weights.pelvis))
         tasks += [self._effector_task(support, state, reference) for support in supports.values()]
-        posture_weight = self._posture_weight(supports)
-        tasks.append(posture_task(state, reference, gains.posture, posture_weight))
+        tasks.append(posture_task(state, reference, gains.posture, self._posture_weight(supports)))
         if weights.angular_momentum > 0:
             tasks.append(
                 angular_momentum_task(state, reference, gains.angular_momentum, weights.angular_momentum)
@@ -291,7 +261,9 @@ class Controller:
             if support.mode is SupportMode.LANDING and not grasps:
                 planned = landing_reference(support, planned)
             # A hand that presses yields to what it presses on: stiff, it would take off some of the force.
-            gain = _yielding(gains.stance) if name in self._wishes and grasps else gains.swing
+            gain = gains.swing
+            if name in self._wishes and grasps:
+                gain = replace(gains.stance, stiffness=YIELDING * gains.stance.stiffness)
             return swing_task(name, frame, planned, gain, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
@@ -340,9 +312,9 @@ class Controller:
     ) -> FloatArray:
         """(e k,) share of the load that each point may carry: those that a tilt has raised carry none."""
         heights = []
-        for patch in geometry.patches:
-            frame = state.frames[segment_key(patch.segment)]
-            heights.append((frame.position + patch.points @ frame.rotation.T) @ contact.normal)
+        for segment, points in geometry.patches:
+            frame = state.frames[segment_key(segment)]
+            heights.append((frame.position + points @ frame.rotation.T) @ contact.normal)
         height = np.concatenate(heights)
         return np.repeat(np.clip(2.0 - (height - height.min()) / RAISED, 0.0, 1.0), edges)
 
@@ -351,7 +323,9 @@ class Controller:
         along = self._along[contact.effector, contact.part]
         shares = np.full(len(along), np.inf)
         for part, share in support.fades:
-            shares[~touches(part, along)] = np.minimum(shares[~touches(part, along)], share)
+            if part is not SolePart.FULL:  # a heel is what lies behind the middle of its sole
+                beyond = along >= 0 if part is SolePart.HEEL else along <= 0
+                shares[beyond] = np.minimum(shares[beyond], share)
         return np.repeat(shares, edges)
 
     def _remember_loads(self, supports: Mapping[str, SupportState], loads: Mapping[str, float]) -> None:
@@ -360,50 +334,25 @@ class Controller:
             if supports[name].unload_share >= 1.0:
                 self._carried[name] = load
 
-    def _bounds(self, state: DynamicsState) -> JointBounds:
-        body, settings = self.body, self.settings
-        lower, upper = joint_acceleration_bounds(
-            state.q[7:],
-            state.v[6:],
-            body.lower,
-            body.upper,
-            body.velocity_limit,
-            settings.joint_limit_horizon,
-            settings.max_joint_acceleration,
-        )
-        return JointBounds(body.torque_lower, body.torque_upper, self._damping, lower, upper)
-
     def _solve(self, problem: ControlProblem) -> tuple[QPSolution | None, str]:
         solution = self._solver.solve(problem.program)
-        if solution.found:
+        if solution.solved:
             return solution, ""
         relaxed = self._spare_solver.solve(problem.program.without_bounds(6, self.body.nv))
-        if relaxed.found:
+        if relaxed.solved:
             return relaxed, f"without joint bounds: {solution.status}"
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
-
-
-def _inside_the_cone(friction_model: FrictionModel) -> FrictionModel:
-    """The friction model of control: what was asked for, and never more than the circular cone holds.
-
-    Where the plan has the outer pyramid control has the inner one: a foot must not slip.
-    """
-    return "cone" if friction_model == "cone" else "inner"
-
-
-def _yielding(gain: Impedance) -> Impedance:
-    return replace(gain, stiffness=YIELDING * gain.stiffness)
 
 
 def _geometries(
     body: BodyModel, schedule: ContactSchedule, inset: float
 ) -> dict[tuple[str, SolePart], ContactGeometry]:
-    found: dict[tuple[str, SolePart], ContactGeometry] = {}
-    for phase in schedule.sequence:
-        for contact in phase.stance:
-            if (contact.effector, contact.part) not in found:
-                found[contact.effector, contact.part] = contact_geometry(body, contact, inset)
-    return found
+    """Force-carrying points of each part of an effector that touches, as it first does."""
+    result: dict[tuple[str, SolePart], ContactGeometry] = {}
+    for contact in (contact for phase in schedule.sequence for contact in phase.stance):
+        if (contact.effector, contact.part) not in result:
+            result[contact.effector, contact.part] = contact_geometry(body, contact, inset)
+    return result
 
 
 def _hanging_joints(body: BodyModel, effector: str) -> list[int]:

@@ -1,30 +1,16 @@
 """Contact forces as non-negative combinations of the edges of friction pyramids."""
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from manikin.balance.friction import pyramid_edges
+from manikin.balance.friction import edges_in_world
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
 from manikin.control.dynamics import DynamicsState
 from manikin.numerics.spatial import FloatArray, skew
-
-
-@dataclass(frozen=True, eq=False)
-class ContactPatch:
-    """Points of one segment that carry force.
-
-    Attributes:
-        segment: Name of the segment.
-        points: (k, 3) in the segment's frame [m].
-    """
-
-    segment: str
-    points: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,21 +22,16 @@ class ContactGeometry:
 
     Attributes:
         effector: Name of the effector.
-        patches: The effector's own segment first.
+        patches: Segments and (k, 3) points in their frames [m], the effector's own segment first.
     """
 
     effector: str
-    patches: tuple[ContactPatch, ...]
-
-    @property
-    def segments(self) -> tuple[str, ...]:
-        """Names of the segments that carry force."""
-        return tuple(patch.segment for patch in self.patches)
+    patches: tuple[tuple[str, FloatArray], ...]
 
     @cached_property
     def point_count(self) -> int:
         """Number of points of all patches."""
-        return sum(len(patch.points) for patch in self.patches)
+        return sum(len(points) for _, points in self.patches)
 
 
 def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
@@ -65,59 +46,40 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
         BodyError: If the body has no such effector.
     """
     effector = body.effector(contact.effector)
-    if contact.part is not SolePart.FULL:
-        return _part_geometry(body, contact, inset)
-    if contact.kind is not ContactKind.SOLE:
-        local = effector.translation + contact.points @ effector.rotation.T
-        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
-    half_length = 0.5 * contact.length - inset
-    half_width = 0.5 * contact.width - inset
     toes = hanging_segment(body, effector.segment)
+
+    def on_segment(points: FloatArray) -> FloatArray:
+        return effector.translation + points @ effector.rotation.T
+
+    if contact.part is not SolePart.FULL:
+        points = contact.points.copy()
+        points[:, 1] -= inset * np.sign(points[:, 1])
+        if contact.part is SolePart.TOES:
+            points[points[:, 0] >= points[:, 0].max(), 0] -= inset
+        if contact.part is SolePart.TOES and toes is not None:
+            return ContactGeometry(contact.effector, ((toes.name, on_segment(points) - toes.origin),))
+        return ContactGeometry(contact.effector, ((effector.segment, on_segment(points)),))
+    if contact.kind is not ContactKind.SOLE:
+        return ContactGeometry(contact.effector, ((effector.segment, on_segment(contact.points)),))
+    half_length, half_width = 0.5 * contact.length - inset, 0.5 * contact.width - inset
     if toes is None:
         corners = _rectangle((-half_length, half_length), half_width)
-        local = effector.translation + corners @ effector.rotation.T
-        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
+        return ContactGeometry(contact.effector, ((effector.segment, on_segment(corners)),))
     line = float((effector.rotation.T @ (toes.origin - effector.translation))[0])
     line = float(np.clip(line, -half_length + 0.01, half_length - 0.01))
-    heel = effector.translation + _rectangle((-half_length, line), half_width) @ effector.rotation.T
-    tips = effector.translation + _rectangle((half_length,), half_width) @ effector.rotation.T
-    return ContactGeometry(
-        contact.effector,
-        (ContactPatch(effector.segment, heel), ContactPatch(toes.name, tips - toes.origin)),
-    )
-
-
-def _part_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
-    """Points of a heel's edge on the foot; of toes, the hinge's ends on the foot and the tips on the toes."""
-    effector, toes = (
-        body.effector(contact.effector),
-        hanging_segment(body, body.effector(contact.effector).segment),
-    )
-    points = contact.points.copy()
-    points[:, 1] -= inset * np.sign(points[:, 1])
-    if contact.part is SolePart.TOES:
-        points[points[:, 0] >= points[:, 0].max(), 0] -= inset
-    local = effector.translation + points @ effector.rotation.T
-    if contact.part is SolePart.HEEL or toes is None:
-        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
-    return ContactGeometry(contact.effector, (ContactPatch(toes.name, local - toes.origin),))
+    heel = on_segment(_rectangle((-half_length, line), half_width))
+    tips = on_segment(_rectangle((half_length,), half_width)) - toes.origin
+    return ContactGeometry(contact.effector, ((effector.segment, heel), (toes.name, tips)))
 
 
 def points_along(body: BodyModel, geometry: ContactGeometry) -> FloatArray:
-    """(k,) place of each force-carrying point along the effector's x axis, toes straight [m]."""
+    """(k,) position of each force-carrying point along the effector's x axis, toes straight [m]."""
     effector = body.effector(geometry.effector)
-    places = []
-    for patch in geometry.patches:
-        offset = np.zeros(3) if patch.segment == effector.segment else body.segment(patch.segment).origin
-        places.append(((patch.points + offset - effector.translation) @ effector.rotation)[:, 0])
-    return np.concatenate(places)
-
-
-def touches(part: SolePart, along: FloatArray) -> NDArray[np.bool_]:
-    """(k,) whether points at these places along a sole belong to a part (heel: behind its middle)."""
-    if part is SolePart.FULL:
-        return np.ones(len(along), dtype=np.bool_)
-    return along < 0 if part is SolePart.HEEL else along > 0
+    along = []
+    for segment, points in geometry.patches:
+        offset = np.zeros(3) if segment == effector.segment else body.segment(segment).origin
+        along.append(((points + offset - effector.translation) @ effector.rotation)[:, 0])
+    return np.concatenate(along)
 
 
 def segment_key(segment: str) -> str:
@@ -138,12 +100,12 @@ class ContactForceBasis:
     along the world axes and, where it can hold one, three moments.
 
     Attributes:
-        contact: The contact.
+        contact: Its kind, planned place and limits.
         generalised: (nv, m) forces on the generalised coordinates per variable.
         wrench: (6, m) force and moment about the effector frame's origin per variable.
         normal: (m,) normal force per variable; zero for a grasp.
         lower: (m,) bound of each variable at full load [N, N.m].
-        upper: (m,) bound of each variable at full load [N, N.m].
+        upper: (m,) the same.
     """
 
     contact: Contact
@@ -155,14 +117,9 @@ class ContactForceBasis:
 
 
 def contact_force_basis(
-    contact: Contact,
-    geometry: ContactGeometry,
-    state: DynamicsState,
-    *,
-    sliding: bool = False,
-    friction_share: float = 1.0,
-    friction_model: FrictionModel = "inner",
-) -> ContactForceBasis:
+    contact: Contact, geometry: ContactGeometry, state: DynamicsState, *, sliding: bool = False,
+    friction_share: float = 1.0, friction_model: FrictionModel = "inner",
+) -> ContactForceBasis:  # fmt: skip
     """Build the force map of a contact at the current state.
 
     Args:
@@ -175,7 +132,7 @@ def contact_force_basis(
     """
     if contact.kind is ContactKind.GRASP:
         return _grasp_basis(contact, state)
-    edges = edges_in_world(contact, friction_share, friction_model)
+    edges = edges_in_world(contact, friction_model, friction_share)
     if sliding:
         edges = sliding_edges(contact, state.frames[contact.effector].twist[:3], edges)
     origin = state.frames[contact.effector].position
@@ -183,21 +140,15 @@ def contact_force_basis(
     generalised = np.empty((len(state.v), count))
     wrench = np.empty((6, count))
     start = 0
-    for patch in geometry.patches:
-        frame = state.frames[segment_key(patch.segment)]
-        end = start + len(edges) * len(patch.points)
-        wrench[:, start:end] = _edge_wrenches(edges, patch.points @ frame.rotation.T)
+    for segment, points in geometry.patches:
+        frame = state.frames[segment_key(segment)]
+        end = start + len(edges) * len(points)
+        wrench[:, start:end] = _edge_wrenches(edges, points @ frame.rotation.T)
         generalised[:, start:end] = frame.jacobian.T @ wrench[:, start:end]
         wrench[3:, start:end] += skew(frame.position - origin) @ wrench[:3, start:end]
         start = end
-    return ContactForceBasis(
-        contact,
-        generalised,
-        wrench,
-        np.ones(count),
-        np.zeros(count),
-        np.full(count, np.inf),
-    )
+    upper = np.full(count, np.inf)
+    return ContactForceBasis(contact, generalised, wrench, np.ones(count), np.zeros(count), upper)
 
 
 def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
@@ -210,21 +161,6 @@ def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
     wrench[4] = arm[2] * force[0] - arm[0] * force[2]
     wrench[5] = arm[0] * force[1] - arm[1] * force[0]
     return wrench.reshape(6, -1)
-
-
-@lru_cache(maxsize=256)
-def edges_in_world(
-    contact: Contact, share: float = 1.0, friction_model: FrictionModel = "inner"
-) -> FloatArray:
-    """(e, 3) edges of the friction pyramid in the world, each with unit normal force.
-
-    Edges of ``inner`` and ``cone`` lie on the friction cone, or inside it: their tangential part is
-    ``share mu`` long.
-    """
-    local = pyramid_edges(contact, friction_model) * [share, share, 1.0]
-    edges = local @ contact.rotation_contact_to_world.T
-    edges.setflags(write=False)
-    return edges
 
 
 SLIDING_SPEED = 0.03

@@ -1,25 +1,23 @@
-"""What the controller does when something has pushed the body off its plan.
+"""Return of a pushed body to its plan.
 
 The capture point ``c = s + s' / w`` of the body is compared with that of the plan; ``e`` is their difference.
-As long as ``|e|`` is small nothing is done, and the plan is followed as if nothing were looked at. Beyond
-that, two things change:
+As long as ``|e|`` is small the plan is followed as ever. Beyond that two things change:
 
-*The wish of the centre of mass.* Following the plan stiffly asks for a ZMP far beyond the soles, and arms and
-trunk are thrown about for it. Instead the wish is the ZMP that brings the capture point back to that of the
-plan at the rate ``k``, ``p = p_plan + (1 + k / w) e``, and it is kept within a distance beyond the
-support polygon: so much is left for arms and trunk.
+*The wish of the centre of mass.* Following the plan stiffly asks for a ZMP far beyond the soles, and turns
+arms and trunk for it. Instead the wish is the ZMP that brings the capture point back to that of the plan at
+the rate ``k``, ``p = p_plan + (1 + k / w) e``, kept within a distance beyond the support polygon: so much is
+left for arms and trunk.
 
 *The time of the plan.* A plan that goes on takes its next foot off the ground whether the body stands well
 or not. Its clock is stopped, over a short time, and goes on when ``e`` is small again; but only while all
-feet are on the ground, only where both the body and the plan could be stopped as they stand, which is where
-both capture points are well inside the polygon, and not where the body is pushed ahead, the way that the plan
-goes anyway. While a foot flies, therefore, time goes on and it lands when it should.
+feet are on the ground, where both capture points are well inside the polygon, so that body and plan can be
+stopped as they stand, and not where the body is pushed ahead, the way of the plan. While a foot flies,
+therefore, time goes on and it lands when it should.
 
 Neither is done where the plan is brisk, as in the middle of a stride: it cannot be stopped there, and a body
-that follows it stiffly was found to take more.
-
-The polygon is the hull of the soles that carry load, seen from above; the height of the pendulum is taken
-over their mean height. With anything else than soles in contact neither is done.
+that follows it stiffly was found to take more. The polygon is the hull of the soles that carry load, seen
+from above; the height of the pendulum is taken over their mean height. With anything else than soles in
+contact neither is done.
 """
 
 from collections.abc import Mapping
@@ -37,10 +35,10 @@ from manikin.numerics.polygon import convex_polygon
 from manikin.numerics.spatial import GRAVITY, FloatArray
 
 LEAST_HEIGHT = 0.2
-"""A centre of mass lower than this over its soles is no pendulum's [m]."""
+"""Least height of the centre of mass over the soles of a pendulum [m]."""
 
 LEAST_SPEED = 0.05
-"""A plan slower than this goes nowhere [m/s]."""
+"""Least speed of a plan that has a direction [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +74,7 @@ class Deviation:
 def deviation_from_plan(
     state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState]
 ) -> Deviation | None:
-    """Compare the body with its plan; None where it does not stand on soles alone.
-
-    Args:
-        state: Of the body.
-        reference: The plan at this time.
-        supports: Of its effectors.
-    """
+    """Compare the body with its plan; None where it does not stand on soles alone."""
     held = [
         support.contact
         for support in supports.values()
@@ -108,20 +100,12 @@ def deviation_from_plan(
 
 
 def returning_acceleration(
-    wanted: FloatArray,
-    state: DynamicsState,
-    reference: ReferenceSample,
-    deviation: Deviation,
+    wanted: FloatArray, state: DynamicsState, reference: ReferenceSample, deviation: Deviation,
     settings: ReturnSettings,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(3,) wanted acceleration of the centre of mass of a body that is off its plan [m/s^2].
 
-    Args:
-        wanted: (3,) what following the plan asks for; upward it is kept.
-        state: Of the body.
-        reference: The plan at this time.
-        deviation: How far the body is from it.
-        settings: Gains and limits.
+    ``wanted`` (3,) is that of a body that follows its plan; upward it is kept.
     """
     share = settings.share(deviation.size, deviation.speed)
     square, area = deviation.frequency**2, deviation.area
@@ -142,12 +126,7 @@ class PlanClock:
     """
 
     def __init__(self, period: float, settings: ReturnSettings | None) -> None:
-        """Start together with real time.
-
-        Args:
-            period: Of the control steps [s].
-            settings: When it waits; None for never.
-        """
+        """Start with real time, for control steps of a period [s]; without settings it never waits."""
         self.waited, self.rate = 0.0, 1.0
         self._period, self._settings = period, settings
         self._off = False

@@ -1,6 +1,6 @@
 """The planned motion as the controller reads it: placements, velocities, accelerations."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -21,8 +21,7 @@ class EffectorReference:
         rotation: (3, 3) frame to world.
         position: (3,) [m].
         twist: (6,) linear, angular [m/s, rad/s].
-        acceleration: (6,) mean over the hold, linear (of the frame's origin), angular
-            [m/s^2, rad/s^2].
+        acceleration: (6,) mean over the hold, linear (of the frame's origin), angular [m/s^2, rad/s^2].
     """
 
     rotation: FloatArray
@@ -57,6 +56,27 @@ class ReferenceSample:
     angular_momentum_rate: FloatArray
     effectors: dict[str, EffectorReference]
 
+    def slowed(self, rate: float) -> "ReferenceSample":
+        """The same state, passed at ``rate`` times the speed."""
+        effectors = {name: replace(frame, twist=rate * frame.twist) for name, frame in self.effectors.items()}
+        return replace(
+            self, v=rate * self.v, com_velocity=rate * self.com_velocity,
+            angular_momentum=rate * self.angular_momentum, effectors=effectors,
+        )  # fmt: skip
+
+    def until(self, end: "ReferenceSample", period: float) -> "ReferenceSample":
+        """The same state with the mean accelerations over the time [s] until another one."""
+        effectors = {
+            name: replace(frame, acceleration=(end.effectors[name].twist - frame.twist) / period)
+            for name, frame in self.effectors.items()
+        }
+        return replace(
+            self, a=(end.v - self.v) / period,
+            com_acceleration=(end.com_velocity - self.com_velocity) / period,
+            angular_momentum_rate=(end.angular_momentum - self.angular_momentum) / period,
+            effectors=effectors,
+        )  # fmt: skip
+
 
 class Reference:
     """Samples a motion anywhere in time; before and after it the body is at rest.
@@ -84,12 +104,10 @@ class Reference:
                 f"{len(body.joint_names)}, or they differ in name; valid: a motion planned for this body"
             )
         self.motion = motion
-        self._model = body.pinocchio
-        self._data = self._model.createData()
-        self._frames = dict(frames)
-        self._period = period
+        self._model, self._data = body.pinocchio, body.pinocchio.createData()
+        self._frames, self._period = dict(frames), period
         self._rest = np.zeros(self._model.nv)
-        self._next: _Rates | None = None
+        self._next: tuple[float, ReferenceSample] | None = None
 
     def sample(self, time: float, rate: float = 1.0, next_rate: float = 1.0) -> ReferenceSample:
         """Return the planned state at a time, interpolated between the samples.
@@ -99,40 +117,25 @@ class Reference:
             rate: How fast the plan's time goes now, relative to real time.
             next_rate: And at the end of the hold.
         """
-        now, then = self._rates(time), self._rates(time + next_rate * self._period)
-        self._next = then
+        end = time + next_rate * self._period
+        now, then = self._rates(time), self._rates(end)
+        if self._next is None or then is not self._next[1]:
+            self._next = end, then
         if rate != 1.0 or next_rate != 1.0:
             now, then = now.slowed(rate), then.slowed(next_rate)
-        return ReferenceSample(
-            q=now.q,
-            v=now.v,
-            a=(then.v - now.v) / self._period,
-            com=now.com,
-            com_velocity=now.com_velocity,
-            com_acceleration=(then.com_velocity - now.com_velocity) / self._period,
-            angular_momentum=now.angular_momentum,
-            angular_momentum_rate=(then.angular_momentum - now.angular_momentum) / self._period,
-            effectors={
-                name: EffectorReference(
-                    frame.rotation,
-                    frame.position,
-                    frame.twist,
-                    (then.frames[name].twist - frame.twist) / self._period,
-                )
-                for name, frame in now.frames.items()
-            },
-        )
+        return now.until(then, self._period)
 
-    def _rates(self, time: float) -> "_Rates":
-        if self._next is not None and abs(self._next.time - time) < 1e-9:
-            return self._next
+    def _rates(self, time: float) -> ReferenceSample:
+        """Planned state at a time [s], with no accelerations."""
+        if self._next is not None and abs(self._next[0] - time) < 1e-9:
+            return self._next[1]
         q, v, com = self._state(time)
         model, data = self._model, self._data
         pin.forwardKinematics(model, data, q, v)
         pin.computeCentroidalMomentum(model, data)
         frames = {name: self._frame(index) for name, index in self._frames.items()}
-        velocity = data.hg.linear / data.mass[0]
-        return _Rates(time, q, v, com, velocity, data.hg.angular.copy(), frames)
+        velocity, momentum, none = data.hg.linear / data.mass[0], data.hg.angular.copy(), np.zeros(3)
+        return ReferenceSample(q, v, self._rest, com, velocity, none, momentum, none, frames)
 
     def _state(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         motion = self.motion
@@ -148,41 +151,8 @@ class Reference:
         v, com = ((1 - share) * values[before] + share * values[after] for values in (motion.v, motion.com))
         return q, v, com
 
-    def _frame(self, index: int) -> "_FrameRate":
+    def _frame(self, index: int) -> EffectorReference:
         model, data = self._model, self._data
         placement = pin.updateFramePlacement(model, data, index)
         twist = pin.getFrameVelocity(model, data, index, _WORLD_ALIGNED).vector
-        return _FrameRate(placement.rotation.copy(), placement.translation.copy(), twist)
-
-
-@dataclass(frozen=True, eq=False)
-class _FrameRate:
-    """Planned placement and twist of a frame at one time."""
-
-    rotation: FloatArray
-    position: FloatArray
-    twist: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class _Rates:
-    """Planned state and velocities at one time."""
-
-    time: float
-    q: FloatArray
-    v: FloatArray
-    com: FloatArray
-    com_velocity: FloatArray
-    angular_momentum: FloatArray
-    frames: dict[str, _FrameRate]
-
-    def slowed(self, rate: float) -> "_Rates":
-        """The same state, passed at ``rate`` times the speed."""
-        frames = {
-            name: _FrameRate(frame.rotation, frame.position, rate * frame.twist)
-            for name, frame in self.frames.items()
-        }
-        return _Rates(
-            self.time, self.q, rate * self.v, self.com, rate * self.com_velocity,
-            rate * self.angular_momentum, frames,
-        )  # fmt: skip
+        return EffectorReference(placement.rotation.copy(), placement.translation.copy(), twist, np.zeros(6))

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
-from manikin.errors import InputError
 from manikin.numerics.spatial import finite_number
 
 
@@ -110,17 +109,11 @@ class SupportSettings:
     friction_share: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in (
-            "unload_time",
-            "follow_time",
-            "load_time",
-            "rolling_load_time",
-            "press_speed",
-            "press_time",
-            "rolling_press_speed",
-            "default_cap",
-            "friction_share",
-        ):
+        positive = (
+            "unload_time", "follow_time", "load_time", "rolling_load_time", "press_speed", "press_time",
+            "rolling_press_speed", "default_cap", "friction_share",
+        )  # fmt: skip
+        for name in positive:
             finite_number(getattr(self, name), f"support setting {name!r}", above=0.0)
         for name in ("early_window", "release_time", "hover", "press_depth", "sole_inset"):
             finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)
@@ -180,12 +173,7 @@ class ReturnSettings:
         finite_number(self.brisk, "return setting 'brisk'", above=self.slow)
 
     def share(self, deviation: float, speed: float) -> float:
-        """Share of the law of the return, in [0, 1].
-
-        Args:
-            deviation: Of the capture point [m].
-            speed: Of the planned centre of mass [m/s].
-        """
+        """Share in [0, 1] of the law of the return, by the deviation [m] and the planned speed [m/s]."""
         off = min(max((deviation - self.small) / (self.large - self.small), 0.0), 1.0)
         return off * min(max((self.brisk - speed) / (self.brisk - self.slow), 0.0), 1.0)
 
@@ -201,7 +189,6 @@ class ControlSettings:
         supports: How supports are switched.
         joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
-        solver: ``"daqp"``, ``"proxqp"`` or ``"piqp"``.
         returning: What to do when the body is off its plan; None follows the plan as ever.
     """
 
@@ -211,11 +198,8 @@ class ControlSettings:
     supports: SupportSettings = field(default_factory=SupportSettings)
     joint_limit_horizon: float = 0.05
     max_joint_acceleration: float = 500.0
-    solver: str = "daqp"
     returning: ReturnSettings | None = None
 
     def __post_init__(self) -> None:
         for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):
             finite_number(getattr(self, name), f"control setting {name!r}", above=0.0)
-        if self.solver not in ("daqp", "proxqp", "piqp"):
-            raise InputError(f"control solver is {self.solver!r}; valid: 'daqp', 'proxqp', 'piqp'")

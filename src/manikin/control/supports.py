@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from itertools import groupby
 
 import numpy as np
 
@@ -14,18 +15,17 @@ from manikin.numerics.spatial import FloatArray
 _FIRST_SHARE = 0.05
 """Load share at touch-down, and of a foot that lands early until its planned landing."""
 
-
 EARLY_SHARE = 0.15
 """Share of a long flight before its end in which a touch counts as the landing."""
 
 LONG_FLIGHT = 1.0
 """Flights longer than this come down, and rise, slowly [s]."""
 
-_NO_LIFT: FloatArray = np.zeros(3)
-_NO_LIFT.setflags(write=False)
-
 _LIFTING_SHARE = 0.6
 """Share of the early window in which the hovering height is reached."""
+
+_NO_LIFT: FloatArray = np.zeros(3)
+_NO_LIFT.setflags(write=False)
 
 
 class SupportMode(StrEnum):
@@ -100,11 +100,8 @@ class SupportInterval:
 
     def contact_at(self, time: float) -> Contact:
         """Part of the contact that is planned at a time [s]; before the first, the first."""
-        found = self.contact
-        for start, contact in self.parts:
-            if start <= time + 1e-9:
-                found = contact
-        return found
+        begun = [contact for start, contact in self.parts if start <= time + 1e-9]
+        return begun[-1] if begun else self.contact
 
     def part_before(self, time: float) -> tuple[SolePart, float] | None:
         """Part that touched before the one of a time [s], and when it changed; None without."""
@@ -136,24 +133,18 @@ def support_intervals(
     found: list[SupportInterval] = []
     phases = list(schedule.sequence)
     previous_end = -math.inf
-    index = 0
-    while index < len(phases):
-        if effector not in phases[index].stance:
-            index += 1
+    for held, run in groupby(range(len(phases)), key=lambda number: effector in phases[number].stance):
+        if not held:
             continue
-        first = index
-        while index < len(phases) and effector in phases[index].stance:
-            index += 1
+        numbers = list(run)
+        first, index = numbers[0], numbers[-1] + 1
         start = -math.inf if first == 0 else float(schedule.instants[first])
         end = math.inf if index == len(phases) else float(schedule.instants[index])
         flight = start - previous_end
         long = LONG_FLIGHT < flight < math.inf
         window = max(early_window, EARLY_SHARE * flight) if long else early_window
         early = max(start - window, start - flight / 3) if first else start
-        parts = tuple(
-            (float(schedule.instants[number]), phases[number].stance[effector])
-            for number in range(first, index)
-        )
+        parts = tuple((float(schedule.instants[k]), phases[k].stance[effector]) for k in numbers)
         found.append(SupportInterval(parts[0][1], start, end, early, end + early_window, parts))
         if len(found) > 1:
             # A long flight rises as slowly as it comes down.
@@ -176,12 +167,7 @@ class SupportSwitch:
     """State machine that turns the schedule and the felt touches into support states."""
 
     def __init__(self, schedule: ContactSchedule, settings: SupportSettings) -> None:
-        """Start with every support of the first phase fully loaded.
-
-        Args:
-            schedule: Planned stances.
-            settings: Ramps and windows.
-        """
+        """Start with every support of the first phase fully loaded."""
         self.effectors = schedule.sequence.effectors
         self._settings = settings
         self._intervals = {
@@ -190,12 +176,11 @@ class SupportSwitch:
         self._memory = {name: _Memory() for name in self.effectors}
 
     def update(self, time: float, touching: Mapping[str, bool] | None = None) -> dict[str, SupportState]:
-        """Advance to ``time`` and return the state of every effector of the schedule.
+        """Advance to a time [s] and return the state of every effector of the schedule.
 
         Args:
-            time: Current time [s], not decreasing from call to call.
-            touching: Whether each effector is felt to touch; None (or a missing name)
-                trusts the schedule.
+            time: Not decreasing from call to call.
+            touching: Whether each effector is felt to touch; the schedule is trusted where it says nothing.
         """
         return {name: self._update(name, time, (touching or {}).get(name)) for name in self.effectors}
 
@@ -217,15 +202,11 @@ class SupportSwitch:
             rising = 1.0 if interval.contact.settle > 0.0 else since / self._settings.load_time
             falling = (interval.end - time) / self._settings.unload_time
             return SupportState(
-                name,
-                SupportMode.STANCE,
-                interval.contact_at(time),
+                name, SupportMode.STANCE, interval.contact_at(time),
                 load_share=float(np.clip(rising, _FIRST_SHARE, 1.0)),
-                unload_share=float(np.clip(falling, 0.0, 1.0)),
-                planned=planned,
-                fades=self._fades(interval, time),
-                settling=settling,
-            )
+                unload_share=float(np.clip(falling, 0.0, 1.0)), planned=planned,
+                fades=self._fades(interval, time), settling=settling,
+            )  # fmt: skip
         if not planned:
             return self._hovering(name, interval, time)
         late = time - max(interval.start, memory.touched)
@@ -242,13 +223,8 @@ class SupportSwitch:
         duration = _LIFTING_SHARE * (interval.start - interval.early)
         share = float(np.clip((time - interval.early) / duration, 0.0, 1.0))
         up = self._hover(interval) * interval.contact.normal
-        return SupportState(
-            name,
-            SupportMode.SWING,
-            None,
-            lift=share**2 * (3.0 - 2.0 * share) * up,
-            lift_rate=6.0 * share * (1.0 - share) / duration * up,
-        )
+        lift, rate = share**2 * (3.0 - 2.0 * share) * up, 6.0 * share * (1.0 - share) / duration * up
+        return SupportState(name, SupportMode.SWING, None, lift=lift, lift_rate=rate)
 
     def _hover(self, interval: SupportInterval) -> float:
         """Height at which a support is waited for [m]; one made at speed has to press in time."""

@@ -1,9 +1,8 @@
-"""Tasks: wanted accelerations, linear in the generalised acceleration ([Qiu2012]_ 6.3).
+"""Tasks of the controller: wanted accelerations and forces ([Qiu2012]_ 6.3).
 
-Each function turns a reference and the current state into an :class:`AccelerationTask`
-by the impedance law ``reference acceleration + stiffness * error + damping * error rate``.
-
-Also here. A force that an effector in contact should feel, such as the reaction of what it pushes.
+An acceleration is linear in the generalised acceleration and follows a reference by the impedance law
+``reference acceleration + stiffness * error + damping * error rate``. A force is what an effector in contact
+should feel, such as the reaction of what it pushes.
 """
 
 from dataclasses import dataclass, replace
@@ -90,10 +89,7 @@ def angular_momentum_task(
     error = reference.angular_momentum - state.momentum[3:]
     wanted = reference.angular_momentum_rate + gains.damping * error
     return AccelerationTask(
-        "angular_momentum",
-        state.centroidal_map[3:],
-        wanted - state.momentum_drift[3:],
-        np.full(3, weight),
+        "angular_momentum", state.centroidal_map[3:], wanted - state.momentum_drift[3:], np.full(3, weight)
     )
 
 
@@ -110,20 +106,12 @@ def orientation_task(
 
 
 def swing_task(
-    name: str,
-    frame: FrameState,
-    reference: EffectorReference,
-    gains: Impedance,
-    weight: float,
+    name: str, frame: FrameState, reference: EffectorReference, gains: Impedance, weight: float,
     follow: float = 1.0,
-) -> AccelerationTask:
+) -> AccelerationTask:  # fmt: skip
     """Follow placement, twist and acceleration of a flying effector; the gains times ``follow``."""
-    error = np.concatenate(
-        (
-            reference.position - frame.position,
-            orientation_error(reference.rotation, frame.rotation),
-        )
-    )
+    turn = orientation_error(reference.rotation, frame.rotation)
+    error = np.concatenate((reference.position - frame.position, turn))
     wanted = (
         reference.acceleration
         + follow * gains.stiffness * error
@@ -140,12 +128,7 @@ def lifted(reference: EffectorReference, support: SupportState) -> EffectorRefer
 
 
 def landing_reference(support: SupportState, planned: EffectorReference) -> EffectorReference:
-    """Reference of an effector that is due to touch and does not: as planned, but on along the normal.
-
-    Args:
-        support: A landing effector.
-        planned: Where it should be; its small remaining motion is kept, so that nothing is sudden.
-    """
+    """Reference of an effector that is due to touch and does not: as planned, but on along the normal."""
     contact = support.contact
     if contact is None or support.mode is not SupportMode.LANDING:
         raise ValueError(f"{support.effector} is in {support.mode}; valid: a landing effector")
@@ -155,13 +138,9 @@ def landing_reference(support: SupportState, planned: EffectorReference) -> Effe
 
 
 def rolling_task(
-    name: str,
-    frame: FrameState,
-    reference: EffectorReference,
-    support: SupportState,
-    gains: Impedance,
+    name: str, frame: FrameState, reference: EffectorReference, support: SupportState, gains: Impedance,
     weight: float,
-) -> AccelerationTask:
+) -> AccelerationTask:  # fmt: skip
     """Let a foot tilt as planned about the part of its sole that touches.
 
     The planned twist turns about that part, which itself has no velocity in it. As in
@@ -169,9 +148,8 @@ def rolling_task(
     landing the foot keeps its tilt.
     """
     if not support.planned:
-        return AccelerationTask(
-            name, frame.jacobian, -gains.damping * frame.twist - frame.drift, np.full(6, weight)
-        )
+        held = -gains.damping * frame.twist - frame.drift
+        return AccelerationTask(name, frame.jacobian, held, np.full(6, weight))
     wanted = reference.acceleration + gains.damping * (reference.twist - frame.twist)
     wanted[3:] += gains.stiffness * orientation_error(reference.rotation, frame.rotation)
     return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
@@ -196,14 +174,7 @@ def stance_task(
 def posture_task(
     state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: FloatArray
 ) -> AccelerationTask:
-    """Follow the planned joint angles.
-
-    Args:
-        state: Current state.
-        reference: Planned state.
-        gains: Stiffness and damping.
-        weight: (nv - 6,) one per joint.
-    """
+    """Follow the planned joint angles, with a weight (nv - 6,) for each."""
     nv = len(state.v)
     matrix = np.zeros((nv - 6, nv))
     matrix[:, 6:] = np.eye(nv - 6)

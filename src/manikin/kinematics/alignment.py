@@ -10,10 +10,10 @@ from manikin.kinematics.limb_kinematics import LimbKinematics
 from manikin.numerics.spatial import FloatArray, skew
 
 LEVER = 0.3
-"""What one radian of tilt weighs beside one metre [m]."""
+"""Weight of one radian of tilt relative to one metre [m]."""
 DAMPING = 1e-3
 LARGEST_STEP = 0.4
-"""Of each joint [rad]."""
+"""Largest step of each joint [rad]."""
 _ZERO = 1e-12  # what is smaller comes from rounding
 
 
@@ -134,7 +134,7 @@ def _constant(values: FloatArray) -> Any:
 
 
 POSITION_TOLERANCE = 1e-5
-"""How far the effector may be from the surface point [m]."""
+"""Distance of the effector to the surface point that counts as arrived [m]."""
 TILT_TOLERANCE = 1e-4
 """Angle between the effector's z axis and the normal that counts as aligned [rad]."""
 STEPS = 7

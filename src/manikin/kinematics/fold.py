@@ -25,7 +25,7 @@ HEAD_CLEARANCE = 0.03
 """Distance kept from the ceiling [m]."""
 
 HABIT = 0.5
-"""Where people are between the squat (0) and the stoop on straight legs (1)."""
+"""Posture of recorded people between the squat (0) and the stoop on straight legs (1)."""
 
 FEET_APART = 0.115
 """Distance of the soles' centres over stature."""

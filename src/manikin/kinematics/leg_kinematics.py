@@ -16,7 +16,7 @@ LEAST_BEND = np.deg2rad(5.0)
 """A leg that cannot reach its foot is stretched to this [rad]; nearly straight knees jerk."""
 
 _AXES = ((0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0))
-"""Of the left leg's hinges; those of the right one are reflected."""
+"""Axes of the left leg's hinges; those of the right one are reflected."""
 
 _KNEE_ROTATION = HINGES.index("knee_rotation")
 _REFLECT = np.outer(REFLECTION, REFLECTION)

@@ -95,7 +95,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Preferences:
-    """What a posture should look like where the requirements leave freedom: weights of squares.
+    """Weights of squared deviations, for the freedom that the requirements of a posture leave.
 
     The values are our choice, by eye.
 

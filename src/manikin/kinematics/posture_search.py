@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
-import daqp
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -29,6 +28,7 @@ from manikin.kinematics.posture_terms import (
     ClearanceTerm,
     Linearised,
 )
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.scene.distance import Pair
 
@@ -316,7 +316,7 @@ class PostureSolver:
         return float(0.5 * soft + 0.5 * self.settings.stiffness * hard)
 
     def _step(self, iterate: _Iterate, trust: float, *, wishes: bool = True) -> tuple[FloatArray, float]:
-        """Solve the quadratic programme; returns the step and the merit it predicts."""
+        """Solve the quadratic program; returns the step and the merit it predicts."""
         rho, buffer = self.settings.stiffness, self.settings.buffer
         residual, jacobian = iterate.requirement
         wish, wish_jacobian = iterate.wish
@@ -327,17 +327,10 @@ class PostureSolver:
         gradient = (weighted.T @ wish if wishes else 0.0) + rho * (jacobian.T @ residual)
         lower, upper = self._bounds(iterate.q, trust)
         distance, slope = iterate.clearance
-        count = len(distance)
-        step, _, flag, _ = daqp.solve(
-            np.ascontiguousarray(hessian),
-            np.ascontiguousarray(gradient),
-            np.ascontiguousarray(slope),
-            np.concatenate([upper, np.full(count, 1e30)]),
-            np.concatenate([lower, buffer - distance]),
-            np.concatenate([np.zeros(nv), np.full(count, _SOFT)]).astype(np.int32),
-            rho_soft=1.0 / rho,
+        program = solve_qp(
+            hessian, gradient, slope, buffer - distance, None, (lower, upper), softness=1.0 / rho
         )
-        step = np.asarray(step, dtype=np.float64) if flag > 0 else np.zeros(nv)
+        step = program.x if program.solved else np.zeros(nv)
         hard = np.sum((residual + jacobian @ step) ** 2)
         hard += np.sum(np.minimum(distance + slope @ step - buffer, 0.0) ** 2)
         soft = np.sum(self._wish_weights * (wish + wish_jacobian @ step) ** 2)
@@ -352,7 +345,7 @@ class PostureSolver:
         return lower, upper
 
     def _misses(self, iterate: _Iterate) -> tuple[str, ...]:
-        """What is not met, worst first."""
+        """Descriptions of the requirements that are not met, worst first."""
         misses: list[tuple[float, str]] = []
         for term, part in zip(self.requirements, iterate.parts, strict=True):
             residual = iterate.requirement.residual[part]
@@ -374,10 +367,6 @@ class PostureSolver:
                 if generate_posture(lighter, settings=quick).succeeded:
                     return f"{text}; a posture exists without {name}"
         return text
-
-
-_SOFT = 8
-"""DAQP's mark of a constraint that may be broken at a price."""
 
 
 def _starts(

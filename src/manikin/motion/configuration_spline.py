@@ -109,7 +109,7 @@ def tangent_map(raw: FloatArray) -> FloatArray:
 
 
 class TurnDerivatives(NamedTuple):
-    """How the pelvis' angular velocity and acceleration depend on the raw quaternion.
+    """Derivatives of the pelvis' angular velocity and acceleration by the raw quaternion.
 
     Attributes:
         omega_by_value: (n, 3, 4) derivative of the angular velocity by the raw quaternion.

@@ -5,8 +5,6 @@ came from.  Numbers are written with Python's shortest exact form: what is read 
 bit for bit what was written.
 """
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import StrEnum
@@ -100,11 +98,6 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
             for limb in description.get("limbs", ())
         ),
     )  # fmt: skip
-
-
-def body_key(body: BodyModel) -> str:
-    """Digest of everything that makes a body, to tell whether a file is about the same one."""
-    return hashlib.sha256(json.dumps(describe_body(body), sort_keys=True).encode()).hexdigest()
 
 
 def _describe_segment(segment: Segment) -> Json:

@@ -26,7 +26,7 @@ def foot_positions(schedule: ContactSchedule, times: FloatArray) -> dict[str, Fl
 
     In flight a foot follows the straight line to its next contact with the smootherstep of time,
     lifted along the mean of both normals by ``LIFT sin^2(pi u)``; it has no mass, so any path will
-    do. Before its first contact and after its last one it waits there.
+    do. Before its first contact and after its last one it waits at it.
 
     Args:
         schedule: Contacts in time.

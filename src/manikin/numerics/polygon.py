@@ -7,7 +7,7 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 
 MERGE = 1e-9
-"""Vertices closer than this are one [m]."""
+"""Distance below which vertices are merged [m]."""
 
 _FAR = 1e4
 

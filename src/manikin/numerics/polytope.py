@@ -1,11 +1,13 @@
 """Convex polytopes ``{x : H x <= h}`` with unit rows, and hulls that may be flat.
 
-A flat (lower-dimensional) hull carries each equality ``n x = c`` as the pair of rows
-``n x <= c`` and ``-n x <= -c``, both loosened by :data:`FLATNESS` times the size of the
-hull, so that the margin of a point on the flat is zero (to that rounding), never negative.
+A flat (lower-dimensional) hull carries each equality ``n x = c`` as the pair of rows ``n x <= c`` and
+``-n x <= -c`` at the end, both loosened by :data:`FLATNESS` times the size of the hull, so that the margin of
+a point on the flat is zero (to that rounding), never negative. The margin of a point off the flat is at most
+its negative distance to the flat, whatever basis the equalities have.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +20,9 @@ from manikin.numerics.spatial import FloatArray
 
 FLATNESS = 1e-12
 """Half thickness of a flat polytope, relative to its extent."""
+
+_THIN = 1e-6
+"""Thickness, relative to the offsets, below which two opposite rows are an equality."""
 
 _BLOCK = 400_000
 """Distances looked at together: they stay in the processor's cache."""
@@ -58,7 +63,8 @@ class Polytope:
     def margin(self, points: ArrayLike) -> FloatArray:
         """(...) smallest signed facet distance of (..., d) points, ``min_i h_i - H_i x``, negative outside.
 
-        Inside it is the residual radius, that of the largest ball about the point within the polytope.
+        Inside it is the residual radius, that of the largest ball about the point within the polytope. Off a
+        flat polytope the distance to the flat takes the place of those to its pairs of rows.
         """
         x = np.asarray(points, dtype=np.float64)
         if x.shape[-1:] != (self.dimension,):
@@ -75,11 +81,32 @@ class Polytope:
             block = np.matmul(lifted, columns, out=excess[:, : len(part)] if len(part) == step else None)
             margins[start : start + step] = block.max(axis=0, initial=-np.inf)
         np.negative(margins, out=margins)
+        off, residual = self.off_flat(flat)
+        if len(off):
+            facets = (self.h - flat[off] @ self.H.T)[:, : -2 * residual.shape[1]].min(axis=1, initial=np.inf)
+            margins[off] = np.minimum(facets, -least_change(self.equalities[0], residual))
         return margins.reshape(x.shape[:-1])
 
-    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
-        """Whether each point is inside or at most ``tolerance`` beyond a facet."""
-        return np.asarray(self.margin(points) >= -tolerance)
+    @cached_property
+    def equalities(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows (e, d), offsets (e,) and half thickness (e,) of the equalities ``n x = c``."""
+        for count in range(min(self.dimension, len(self) // 2), 0, -1):
+            rows, opposite = self.H[-2 * count :].reshape(2, count, -1)
+            above, below = self.h[-2 * count :].reshape(2, count)
+            thickness = 0.5 * (above + below)
+            thin = _THIN * max(1.0, float(np.abs(self.h).max()))
+            if np.array_equal(rows, -opposite) and np.all(np.abs(thickness) < thin):
+                return rows, 0.5 * (above - below), thickness
+        return self.H[:0], self.h[:0], self.h[:0]
+
+    def off_flat(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+        """Indices of points (n, d) off two or more equalities' flat, and their residuals (k, e) there."""
+        rows, offsets, thickness = self.equalities
+        if len(offsets) < 2:  # of a single one the pair of rows measures the distance
+            return np.zeros(0, dtype=np.int64), np.zeros((0, len(offsets)))
+        residual = points @ rows.T - offsets
+        off = np.flatnonzero(np.any(np.abs(residual) > thickness, axis=1))
+        return off, residual[off]
 
     def inscribed_ball(self) -> tuple[FloatArray, float]:
         """Centre (d,) and radius of the largest ball inside ([Qiu2012]_ 2.25).
@@ -87,32 +114,6 @@ class Polytope:
         Raises:
             PolytopeError: If the polytope is empty or holds balls of any size.
         """
-        centre, radius = self._largest_ball()
-        if radius < -_tolerance(self.h):
-            raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
-        return centre, max(radius, 0.0)
-
-    def intersection(self, other: "Polytope") -> "Polytope":
-        """Points of both polytopes (rows of both, none removed)."""
-        return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
-
-    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
-        """Points ``y`` (k,) with ``matrix (d, k) @ y + offset (d,)`` inside: a slice of the polytope."""
-        m = np.asarray(matrix, dtype=np.float64)
-        return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
-
-    def vertices(self) -> FloatArray:
-        """(n, d) vertices.
-
-        Raises:
-            PolytopeError: If the polytope is empty, flat, unbounded or of dimension 1.
-        """
-        centre, radius = self.inscribed_ball()
-        if radius <= _tolerance(self.h):
-            raise PolytopeError("polytope is flat; valid: one with a ball inside")
-        return vertices_around(self.H, self.h, centre)
-
-    def _largest_ball(self) -> tuple[FloatArray, float]:
         d = self.dimension
         cost = np.zeros(d + 1)
         cost[-1] = -1.0
@@ -123,9 +124,18 @@ class Polytope:
         )
         if answer.status == 3:
             raise PolytopeError("polytope holds balls of any size; valid: a bounded polytope")
-        if answer.x is None:
-            return np.full(d, np.nan), -np.inf
-        return answer.x[:-1] * scale, float(answer.x[-1]) * scale
+        if answer.x is None or answer.x[-1] * scale < -_tolerance(self.h):
+            raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
+        return answer.x[:-1] * scale, max(float(answer.x[-1]) * scale, 0.0)
+
+    def intersection(self, other: "Polytope") -> "Polytope":
+        """Points of both polytopes (rows of both, none removed)."""
+        return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
+
+    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
+        """Points ``y`` (k,) with ``matrix (d, k) @ y + offset (d,)`` inside: a slice of the polytope."""
+        m = np.asarray(matrix, dtype=np.float64)
+        return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
 
 
 def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
@@ -151,6 +161,20 @@ def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[F
     fan = fan_of_generators(v - centre, np.ones((len(v), 1)), np.array([False])).plus_segments(s)
     H, h = facet_rows(fan, max(1.0, float(np.abs(v).max())))[:2]
     return H, h + H @ centre
+
+
+def least_change(rows: FloatArray, residual: FloatArray) -> FloatArray:
+    """(n,) length of the least change ``c`` with ``rows c = residual``; infinite where there is none.
+
+    Args:
+        rows: (e, d) or (n, e, d).
+        residual: (n, e).
+    """
+    wanted = residual[..., None]
+    change = np.linalg.pinv(rows, rcond=1e-9) @ wanted
+    missing = np.linalg.norm(rows @ change - wanted, axis=(-2, -1))
+    reached = missing <= 1e-6 * np.linalg.norm(residual, axis=-1)
+    return np.where(reached, np.linalg.norm(change, axis=(-2, -1)), np.inf)
 
 
 def vertices_around(H: FloatArray, h: FloatArray, interior: FloatArray) -> FloatArray:

@@ -1,30 +1,135 @@
-"""Solvers of the control step's quadratic program, behind one interface.
+"""Quadratic programs: one dense program, a sequence of similar dense ones, one sparse program.
 
-DAQP (dual active set) is the default: from the previous active set it needs one or two
-iterations on most steps. Recipe for another solver: subclass :class:`QPSolver`, import the
-package inside ``__init__``, and add the class to ``_SOLVERS``.
+Each is ``minimise x' H x / 2 + g' x`` under ``rows_lower <= A x <= rows_upper`` and ``lower <= x <= upper``,
+where the first ``equalities`` rows have equal bounds. Bounds of 1e30 and more count as infinite.
+
+DAQP, a dual active-set method, solves the dense ones, exact to rounding; from the working set of a similar
+program it needs one or two iterations. PIQP, an interior-point method, solves the sparse ones.
 """
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import daqp
 import numpy as np
+import piqp
+from scipy import sparse
 
-from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
+
+SparseMatrix = sparse.sparray | sparse.spmatrix
+
+_INFINITY = 1e30
+_EQUALITY, _SOFT = 5, 8
+"""DAQP's marks of a row that is an equality, and of one that may be violated at a price."""
+
+
+@dataclass(frozen=True, eq=False)
+class QPSolution:
+    """Answer of a solver.
+
+    Attributes:
+        x: (n,) the minimiser; without meaning unless ``solved``.
+        solved: Whether it is the minimiser.
+        status: The solver's own word.
+        iterations: Its iterations.
+        multipliers: Of dense programs, those of the bounds, where there are any, and of the rows; positive at
+            an upper bound.
+    """
+
+    x: FloatArray
+    solved: bool
+    status: str
+    iterations: int
+    multipliers: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+
+def solve_qp(
+    hessian: FloatArray,
+    gradient: FloatArray,
+    rows: FloatArray,
+    rows_lower: FloatArray | None,
+    rows_upper: FloatArray | None,
+    bounds: tuple[FloatArray, FloatArray] | None = None,
+    *,
+    equalities: int = 0,
+    softness: float | None = None,
+    tolerance: float = 1e-6,
+) -> QPSolution:
+    """Solve one dense program.
+
+    Args:
+        hessian: (n, n) positive definite.
+        gradient: (n,).
+        rows: (m, n).
+        rows_lower: (m,); None for no lower bounds.
+        rows_upper: (m,); None for no upper bounds.
+        bounds: (n,) lower and (n,) upper bounds of the unknowns.
+        equalities: Number of leading rows that are equalities.
+        softness: Rows may be violated by ``e`` at the cost ``e^2 / (2 softness)``; None where they may not.
+        tolerance: Accepted violation of a unit row.
+    """
+    count = len(rows)
+    lower = np.full(count, -_INFINITY) if rows_lower is None else rows_lower
+    upper = np.full(count, _INFINITY) if rows_upper is None else rows_upper
+    if bounds is not None:
+        lower, upper = np.concatenate((bounds[0], lower)), np.concatenate((bounds[1], upper))
+    options = {} if softness is None else {"rho_soft": softness}
+    x, _, flag, info = daqp.solve(
+        np.require(hessian, np.float64, ["C", "W"]), gradient, np.require(rows, np.float64, ["C", "W"]),
+        upper, lower, _sense(len(upper), count, equalities, soft=softness is not None),
+        primal_tol=tolerance, **options,
+    )  # fmt: skip
+    return QPSolution(np.array(x), flag > 0, f"daqp {flag}", int(info["iterations"]), np.array(info["lam"]))
+
+
+def solve_sparse_qp(
+    hessian: SparseMatrix,
+    gradient: FloatArray,
+    rows: SparseMatrix,
+    rows_lower: FloatArray | None,
+    rows_upper: FloatArray,
+    bounds: tuple[FloatArray, FloatArray],
+    *,
+    equalities: int = 0,
+    tolerance: float | None = None,
+) -> QPSolution:
+    """Solve one sparse program.
+
+    Args:
+        hessian: (n, n) positive semidefinite.
+        gradient: (n,).
+        rows: (m, n).
+        rows_lower: (m,); None for no lower bounds.
+        rows_upper: (m,).
+        bounds: (n,) lower and (n,) upper bounds of the unknowns.
+        equalities: Number of leading rows that are equalities.
+        tolerance: Absolute and relative, of residuals; None for PIQP's own.
+    """
+    solver = piqp.SparseSolver()
+    if tolerance is not None:
+        solver.settings.eps_abs = solver.settings.eps_rel = tolerance
+    equal, rest, matrix = slice(equalities), slice(equalities, None), sparse.csc_matrix(rows)
+    solver.setup(
+        sparse.csc_matrix(hessian), gradient,
+        matrix[equal] if equalities else None, rows_upper[equal] if equalities else None,
+        matrix[rest], None if rows_lower is None else rows_lower[rest], rows_upper[rest], *bounds,
+    )  # fmt: skip
+    status = solver.solve()
+    result = solver.result
+    return QPSolution(np.array(result.x), status == piqp.PIQP_SOLVED, str(status), int(result.info.iter))
 
 
 @dataclass(frozen=True, eq=False)
 class QuadraticProgram:
-    """Minimise ``x' hessian x / 2 + gradient' x`` under two-sided rows and bounds.
+    """A dense program with bounds on rows and unknowns; infinite ones where there are none.
 
     Attributes:
-        hessian: (n, n) symmetric, positive definite.
+        hessian: (n, n) positive definite.
         gradient: (n,).
         rows: (m, n).
         rows_lower: (m,).
-        rows_upper: (m,); equal to ``rows_lower`` in the first ``equalities`` rows.
+        rows_upper: (m,).
         lower: (n,).
         upper: (n,).
         equalities: Number of leading rows that are equalities.
@@ -46,156 +151,50 @@ class QuadraticProgram:
         return float(max(0.0, *(gap.max() for gap in gaps if gap.size)))
 
     def without_bounds(self, start: int, end: int) -> "QuadraticProgram":
-        """Return the same program with the variables ``start`` to ``end`` (exclusive) unbounded."""
+        """The same program with the unknowns ``start`` to ``end`` (exclusive) unbounded."""
         lower, upper = self.lower.copy(), self.upper.copy()
         lower[start:end], upper[start:end] = -np.inf, np.inf
         return replace(self, lower=lower, upper=upper)
 
 
-_INFINITY = 1e30
+class WarmQPSolver:
+    """Solves a sequence of similar dense programs, each from the working set of the one before.
 
-
-@dataclass(frozen=True, eq=False)
-class QPSolution:
-    """What a solver found.
+    A solution is checked whatever DAQP says of it.
 
     Attributes:
-        x: (n,) the minimiser, or the last iterate when it was not found.
-        found: Whether the solver claims success and the point keeps the constraints.
-        status: The solver's own word.
-        iterations: Its iterations.
+        tolerance: Largest violation of a row or bound in an accepted solution, in their units.
     """
 
-    x: FloatArray
-    found: bool
-    status: str
-    iterations: int
-
-
-class QPSolver(ABC):
-    """Solves a series of similar programs, starting from the previous solution."""
-
-    tolerance = 1e-3
-    """Largest violation of a constraint (N, N.m, rad/s^2) in an accepted solution."""
+    def __init__(self, tolerance: float = 1e-3) -> None:
+        self.tolerance = tolerance
+        self._model: Any = None
+        self._shape = (-1, -1)
 
     def solve(self, program: QuadraticProgram) -> QPSolution:
-        """Solve one program; the answer is checked whatever the solver says."""
-        x, claimed, status, iterations = self._solve(program)
-        found = claimed and bool(np.all(np.isfinite(x))) and program.violation(x) <= self.tolerance
-        return QPSolution(x, found, status, iterations)
-
-    @abstractmethod
-    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
-        """Return the point, whether it is claimed optimal, the status and the iterations."""
-
-
-def make_solver(name: str) -> QPSolver:
-    """Make the solver called ``name``.
-
-    Raises:
-        InputError: If there is none.
-    """
-    if name not in _SOLVERS:
-        raise InputError(f"QP solver is {name!r}; valid: {sorted(_SOLVERS)}")
-    return _SOLVERS[name]()
-
-
-class DaqpSolver(QPSolver):
-    """DAQP, a dual active-set method that keeps its working set between solves."""
-
-    def __init__(self) -> None:
-        import daqp
-
-        self._module = daqp
-        self._model = None
-        self._shape = (-1, -1)
-
-    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
+        """Solve the next program."""
         upper = np.minimum(np.concatenate((program.upper, program.rows_upper)), _INFINITY)
         lower = np.maximum(np.concatenate((program.lower, program.rows_lower)), -_INFINITY)
-        if self._model is None or self._shape != program.rows.shape:
-            model, flag = self._set_up(program, lower, upper)
+        H, f, A = program.hessian, program.gradient, program.rows
+        if self._model is None or self._shape != A.shape:
+            self._model, self._shape = daqp.Model(), A.shape
+            flag, _ = self._model.setup(H, f, A, upper, lower, _sense(len(upper), len(A), program.equalities))
         else:
-            model = self._model
-            flag = model.update(
-                H=program.hessian, f=program.gradient, A=program.rows, bupper=upper, blower=lower
-            )
+            flag = self._model.update(H=H, f=f, A=A, bupper=upper, blower=lower)
         if flag < 0:
             self._model = None
-            return np.zeros(len(program.gradient)), False, f"daqp set-up {flag}", 0
-        x, _, flag, info = model.solve()
-        # A failed solve leaves a working set that is not worth starting from.
-        self._model = model if flag > 0 else None
-        return np.array(x), flag > 0, f"daqp {flag}", int(info["iterations"])
-
-    def _set_up(self, program: QuadraticProgram, lower: FloatArray, upper: FloatArray) -> tuple[Any, int]:
-        size = len(program.gradient)
-        sense = np.zeros(len(upper), dtype=np.int32)
-        sense[size : size + program.equalities] = 5
-        model = self._module.Model()
-        self._shape = program.rows.shape
-        flag, _ = model.setup(program.hessian, program.gradient, program.rows, upper, lower, sense)
-        return model, flag
+            return QPSolution(np.zeros(len(f)), False, f"daqp set-up {flag}", 0)
+        x, _, flag, info = self._model.solve()
+        if flag <= 0:  # its working set is not worth starting from
+            self._model = None
+        solved = flag > 0 and bool(np.all(np.isfinite(x))) and program.violation(x) <= self.tolerance
+        return QPSolution(np.array(x), solved, f"daqp {flag}", int(info["iterations"]), np.array(info["lam"]))
 
 
-class ProxqpSolver(QPSolver):
-    """ProxQP, an augmented Lagrangian method, dense backend."""
-
-    def __init__(self) -> None:
-        import proxsuite
-
-        self._module = proxsuite.proxqp
-        self._qp = None
-        self._shape = (-1, -1)
-
-    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
-        values = _split(program)
-        if self._qp is None or self._shape != program.rows.shape:
-            size, rows, split = len(program.gradient), len(program.rows), program.equalities
-            self._qp = self._module.dense.QP(size, split, rows - split, True)
-            self._qp.settings.eps_abs = 1e-5
-            self._qp.settings.initial_guess = self._module.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
-            self._shape = program.rows.shape
-            self._qp.init(*values)
-        else:
-            self._qp.update(*values)
-        self._qp.solve()
-        results = self._qp.results
-        solved = results.info.status == self._module.QPSolverOutput.PROXQP_SOLVED
-        return np.array(results.x), solved, str(results.info.status), int(results.info.iter)
-
-
-class PiqpSolver(QPSolver):
-    """PIQP, a proximal interior-point method, dense backend; does not warm-start."""
-
-    def __init__(self) -> None:
-        import piqp
-
-        self._module = piqp
-        self._qp = None
-        self._shape = (-1, -1)
-
-    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
-        values = _split(program)
-        if self._qp is None or self._shape != program.rows.shape:
-            self._qp = self._module.DenseSolver()
-            self._shape = program.rows.shape
-            self._qp.setup(*values)
-        else:
-            self._qp.update(*values)
-        status = self._qp.solve()
-        solved = status == self._module.PIQP_SOLVED
-        return np.array(self._qp.result.x), solved, str(status), int(self._qp.result.info.iter)
-
-
-def _split(program: QuadraticProgram) -> tuple[FloatArray, ...]:
-    """Cost, equalities, inequalities and bounds in the order that ProxQP and PIQP take them."""
-    split = program.equalities
-    return (
-        program.hessian, program.gradient, program.rows[:split], program.rows_lower[:split],
-        program.rows[split:], program.rows_lower[split:], program.rows_upper[split:],
-        program.lower, program.upper,
-    )  # fmt: skip
-
-
-_SOLVERS: dict[str, type[QPSolver]] = {"daqp": DaqpSolver, "proxqp": ProxqpSolver, "piqp": PiqpSolver}
+def _sense(size: int, rows: int, equalities: int, *, soft: bool = False) -> np.ndarray:
+    """(size,) DAQP's marks of bounds and rows, the rows last."""
+    sense = np.zeros(size, dtype=np.int32)
+    if soft:
+        sense[size - rows :] = _SOFT
+    sense[size - rows : size - rows + equalities] = _EQUALITY
+    return sense

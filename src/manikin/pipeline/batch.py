@@ -8,20 +8,20 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import time as clock
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import IO, Any
+from typing import Any
 
 from manikin.scenarios import Scenario, list_scenarios, list_variants, load_scenario
 
 TIME_LIMIT = 1800.0
 """Wall time after which a run is ended [s]."""
 
-_POLL = 0.05
 _EXPLAINED = 3
 """Exit status of a run that ended in an explained failure."""
 
@@ -158,55 +158,54 @@ def usable_cores() -> int:
     return os.cpu_count() or 1
 
 
-@dataclass(eq=False)
-class _Run:
-    """A process that runs."""
-
-    job: Job
-    process: subprocess.Popen[bytes]
-    output: IO[bytes]
-    errors: IO[bytes]
-    began: float = field(default_factory=clock.perf_counter)
-
-    @property
-    def seconds(self) -> float:
-        return clock.perf_counter() - self.began
-
-
 def _completed(
     jobs: Sequence[Job], command: Callable[[Job], list[str]], workers: int, time_limit: float
 ) -> Generator[tuple[int, dict[str, Any]]]:
-    """Index and entry of each job, in the order in which they end."""
-    waiting = list(enumerate(jobs))[::-1]
-    running: dict[int, _Run] = {}
-    with ExitStack() as stack:
-        stack.callback(lambda: [_end(run.process) for run in running.values()])
-        while waiting or running:
-            while waiting and len(running) < workers:
-                index, job = waiting.pop()
-                running[index] = _start(job, command(job), stack)
-            clock.sleep(_POLL)
-            for index, run in list(running.items()):
-                late = run.seconds > time_limit
-                if late:
-                    _end(run.process)
-                if run.process.poll() is not None:
-                    yield index, _entry(running.pop(index), time_limit if late else None)
+    """Index and entry of each job, in the order in which they end.
+
+    One thread waits for each process. When the iterator is closed early, processes that run are ended, at the
+    latest by their threads.
+    """
+    running: set[subprocess.Popen[str]] = set()
+    closed = threading.Event()
+
+    def run(job: Job) -> dict[str, Any]:
+        began, status = clock.perf_counter(), None
+        # A session of its own: Ctrl-C reaches this process alone, which then ends the others in order.
+        process = subprocess.Popen(
+            command(job), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            errors="replace", start_new_session=True, env={**os.environ, "OMP_NUM_THREADS": "1"},
+        )  # fmt: skip
+        running.add(process)
+        try:
+            output, errors = process.communicate(timeout=0.0 if closed.is_set() else time_limit)
+            status = process.returncode
+        except subprocess.TimeoutExpired:
+            _end(process)
+            output, errors = process.communicate()
+        running.discard(process)
+        seconds = clock.perf_counter() - began
+        summary = None if status is None else _summary(output)
+        explained = summary is not None and status == _EXPLAINED
+        if summary is None:
+            late = f"did not end within {time_limit:g} s"
+            ending = late if status is None else f"ended with status {status}"
+            summary = _broken_off(job, f"the run {ending}", errors, seconds)
+        return _entry(job, summary, explained=explained)
+
+    with ThreadPoolExecutor(workers) as pool:
+        futures = {pool.submit(run, job): index for index, job in enumerate(jobs)}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            closed.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in list(running):
+                _end(process)
 
 
-def _start(job: Job, words: list[str], stack: ExitStack) -> _Run:
-    # Files and not pipes: nobody has to read them while the process runs.
-    output = stack.enter_context(TemporaryFile())  # noqa: SIM115
-    errors = stack.enter_context(TemporaryFile())  # noqa: SIM115
-    # A session of its own: Ctrl-C reaches this process alone, which then ends the others in order.
-    process = subprocess.Popen(
-        words, stdin=subprocess.DEVNULL, stdout=output, stderr=errors, start_new_session=True,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-    )  # fmt: skip
-    return _Run(job, process, output, errors)
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: subprocess.Popen[str]) -> None:
     """Ask a process to end, and make it."""
     process.terminate()
     try:
@@ -216,42 +215,32 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def _entry(run: _Run, time_limit: float | None) -> dict[str, Any]:
-    """Summary of a run that has ended, or one that says how it broke off."""
-    summary = None if time_limit is not None else _summary(run.output)
-    explained = summary is not None and run.process.returncode == _EXPLAINED
-    if summary is None:
-        summary = _broken_off(run, time_limit)
+def _entry(job: Job, summary: dict[str, Any], *, explained: bool) -> dict[str, Any]:
+    """Summary of a run with what was expected of it."""
     ended = "success" if summary["succeeded"] else "failure" if explained else "broken off"
-    right_stage = run.job.stage in (None, (summary["failure"] or {}).get("stage"))
+    right_stage = job.stage in (None, (summary["failure"] or {}).get("stage"))
     return {
-        **summary, "variant": run.job.variant, "expected": run.job.expected,
-        "expected_because": run.job.because or None,
-        "as_expected": ended == run.job.expected and right_stage,
+        **summary, "variant": job.variant, "expected": job.expected, "expected_because": job.because or None,
+        "as_expected": ended == job.expected and right_stage,
     }  # fmt: skip
 
 
-def _summary(output: IO[bytes]) -> dict[str, Any] | None:
-    output.seek(0)
+def _summary(output: str) -> dict[str, Any] | None:
     try:
-        summary = json.loads(output.read())
+        summary = json.loads(output)
     except ValueError:
         return None
     return summary if isinstance(summary, dict) and "succeeded" in summary else None
 
 
-def _broken_off(run: _Run, time_limit: float | None) -> dict[str, Any]:
-    run.errors.seek(0)
-    lines = run.errors.read().decode(errors="replace").strip().splitlines()
-    what = f"the run ended with status {run.process.returncode}"
-    if time_limit is not None:
-        what = f"the run did not end within {time_limit:g} s"
+def _broken_off(job: Job, what: str, errors: str, seconds: float) -> dict[str, Any]:
+    """Summary of a run that has none."""
+    lines = errors.strip().splitlines()
     reason = f"{what}: {lines[-1]}" if lines else what
     failure = {"stage": "run", "reason": reason, "time_s": 0.0, "where": ""}
     stages = dict.fromkeys(("centroidal", "wholebody", "execution"))
     unknown = dict.fromkeys(("stature_m", "mass_kg", "seed"))
     return {
-        "scenario": run.job.folder, **unknown, "verdict": "failed", "planned": False, "proved": False,
-        "succeeded": False, "failure": failure, "requirements": [], **stages,
-        "wall_s": run.seconds,
+        "scenario": job.folder, **unknown, "verdict": "failed", "planned": False, "proved": False,
+        "succeeded": False, "failure": failure, "requirements": [], **stages, "wall_s": seconds,
     }  # fmt: skip

@@ -13,7 +13,6 @@ Each file is written atomically. A plan made on the stances of a recording is co
 ([Qiu2012]_ Table 7.7, Fig. 7.16 to 7.18).
 """
 
-import gc
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -34,7 +33,7 @@ from manikin.reports.analysis_sheet import recording_sheet
 from manikin.reports.comparison.compare import RunComparison, compare_runs
 from manikin.reports.pages import analysis_page, render
 from manikin.runtime.files import ResultDirectory, columns_csv, csv_text, make_directory, write_result
-from manikin.runtime.parallel import SERVED, prepare_worker, side_by_side
+from manikin.runtime.parallel import side_by_side
 
 
 def analyze_files(
@@ -59,13 +58,8 @@ def analyze_files(
     # Longest first, so that all processes end together.
     ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)
     item = partial(analyze_one, options=options)
-    for _, entry in side_by_side(item, ordered, workers, "analysis", prepare=_prepare, method=SERVED):
+    for _, entry in side_by_side(item, ordered, workers, "analysis"):
         yield entry
-
-
-def _prepare() -> None:
-    prepare_worker()
-    gc.freeze()  # what the libraries brought along is not looked through again with every collection
 
 
 def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:

@@ -17,7 +17,6 @@ from manikin.scene.obstacle import (
     HalfSpace,
     Obstacle,
     Plane,
-    Shape,
     Sphere,
     local_bounds,
 )
@@ -28,7 +27,7 @@ class CollisionPart:
     """One Coal geometry of an obstacle.
 
     A convex mesh piece has a signed distance as exact as a primitive's. A closed piece
-    that is not convex carries ``surface`` so that depth can be told from clearance; an
+    that is not convex carries ``surface`` so that depth differs from clearance; an
     open piece is a surface without inside.
 
     Attributes:
@@ -58,29 +57,19 @@ def collision_parts(obstacle: Obstacle) -> tuple[CollisionPart, ...]:
     if isinstance(shape, (Plane, HalfSpace)):
         return (_endless_part(obstacle, shape),)
     low, high = local_bounds(shape)
-    geometry = primitive_geometry(shape)
-    return (CollisionPart(obstacle.name, geometry, obstacle.rotation, obstacle.translation, low, high),)
+    return (
+        CollisionPart(obstacle.name, _primitive(shape), obstacle.rotation, obstacle.translation, low, high),
+    )
 
 
-def primitive_geometry(shape: Shape) -> coal.CollisionGeometry:
-    """Coal geometry of a primitive in its own frame.
-
-    Raises:
-        TypeError: If the shape is a mesh, which may need several geometries.
-    """
+def _primitive(shape: Box | Sphere | Cylinder | Capsule) -> coal.CollisionGeometry:
+    """Coal geometry of a primitive in its own frame."""
     if isinstance(shape, Box):
         return coal.Box(*shape.size)
     if isinstance(shape, Sphere):
         return coal.Sphere(shape.radius)
-    if isinstance(shape, Cylinder):
-        return coal.Cylinder(shape.radius, shape.length)
-    if isinstance(shape, Capsule):
-        return coal.Capsule(shape.radius, shape.length)
-    if isinstance(shape, Plane):
-        return coal.Plane(shape.normal, shape.offset)
-    if isinstance(shape, HalfSpace):
-        return coal.Halfspace(shape.normal, shape.offset)
-    raise TypeError(f"{type(shape).__name__} is no primitive")
+    kind = coal.Cylinder if isinstance(shape, Cylinder) else coal.Capsule
+    return kind(shape.radius, shape.length)
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,21 +57,21 @@ def cover(shape: Shape, *, count: int | None = None, radius: float | None = None
 def _cover_to_radius(shape: Shape, radius: float) -> SphereCover:
     """Double the count until the spheres are small enough, then bisect."""
     low, high = 0, 1
-    while (found := _cover_with(shape, high)).radii.max() > radius:
+    while (best := _cover_with(shape, high)).radii.max() > radius:
         low, high = high, 2 * high
         if high > _LARGEST_COUNT:
             raise SceneError(
                 f"cover radius is {radius:g} m, which needs more than {_LARGEST_COUNT} spheres for this "
-                f"{type(shape).__name__}; valid: about {found.radii.max():.3g} m or more"
+                f"{type(shape).__name__}; valid: about {best.radii.max():.3g} m or more"
             )
     while high - low > 1:
         middle = (low + high) // 2
         trial = _cover_with(shape, middle)
         if trial.radii.max() <= radius:
-            found, high = trial, middle
+            best, high = trial, middle
         else:
             low = middle
-    return found
+    return best
 
 
 def _cover_with(shape: Shape, count: int) -> SphereCover:

@@ -25,6 +25,7 @@ class Meter(Protocol):
         self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
     ) -> Measured:
         """Distance, normal and nearest points; see :class:`PairMeter`."""
+        ...
 
 
 _FINE = 1e-8

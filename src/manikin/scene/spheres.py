@@ -195,7 +195,7 @@ class _Spheres(_Groups):
 
 
 class _Targets(_Groups):
-    """What stands still: one column per plane or half-space, then one per obstacle sphere."""
+    """Fixed targets: one column per plane or half-space, then one per obstacle sphere."""
 
     def __init__(
         self, flats: Sequence[Obstacle], solids: Sequence[Obstacle], covers: Sequence[SphereCover]

@@ -147,7 +147,7 @@ def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
     A facet with a hole gives its outer outline only; an outline that touches itself is
     skipped. Open pieces are seen from the side their triangles turn to.
     """
-    found = []
+    surfaces = []
     for piece in mesh.pieces:
         whole = as_trimesh(piece.vertices, piece.faces)
         groups = [np.asarray(group) for group in whole.facets]
@@ -158,8 +158,8 @@ def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
                 normal = np.einsum("i,ij->j", whole.area_faces[group], whole.face_normals[group])
                 outline = _outline(whole, group, normal / np.linalg.norm(normal))
                 if outline is not None:
-                    found.append(_surface(obstacle, outline, normal / np.linalg.norm(normal)))
-    return tuple(found)
+                    surfaces.append(_surface(obstacle, outline, normal / np.linalg.norm(normal)))
+    return tuple(surfaces)
 
 
 def _outline(mesh: trimesh.Trimesh, group: np.ndarray, normal: FloatArray) -> FloatArray | None:

@@ -1,9 +1,10 @@
 """Physics: the body and the scene in MuJoCo."""
 
-from manikin.simulation.compile import SimulationModel, compile_model
-from manikin.simulation.engine import PhysicsOptions
+from manikin.simulation.carrying import Touch
+from manikin.simulation.compile import PhysicsOptions, SimulationModel, compile_model
 from manikin.simulation.execute import default_physics, execute
-from manikin.simulation.execution import Execution, PushOutcome, push_impulse, push_on_the_way
+from manikin.simulation.execution import Execution, PushOutcome
+from manikin.simulation.push_force import Push, push_impulse, push_near_com, push_on_the_way
 from manikin.simulation.push_map import PushMap, equal_directions, search_directions
 from manikin.simulation.push_search import (
     DirectionSearch,
@@ -13,9 +14,9 @@ from manikin.simulation.push_search import (
     largest_held,
     one_foot_posture,
 )
-from manikin.simulation.recover import Feet, RecoveryTask, push_near_com, recover
+from manikin.simulation.recover import Feet, RecoveryTask, recover
 from manikin.simulation.recovery import Recovery
-from manikin.simulation.world import Push, Touch, World
+from manikin.simulation.world import World
 
 __all__ = [
     "DirectionSearch",

@@ -1,20 +1,23 @@
-"""The contacts that really carry: a stance from what touches in the physics engine.
+"""Contacts as the physics engine measures them, and the stances of those that carry.
 
 A planned contact counts when its effector presses, and with no more of its area than touches: the points of
 the contact that are within :data:`TOUCHING` of the surface, and wherever the engine's contact points carry
-force. What touches without a plan and carries counts too. So the measured wrench of the scene lies in the
+force. Unplanned contacts that carry count too. So the measured wrench of the scene lies in the
 wrench polytope of the stance, up to :data:`TOUCHING`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from manikin.balance.motion_margin import MotionMargin, motion_margin
 from manikin.contact import Contact, ContactKind, ContactModel, SolePart, Stance
-from manikin.numerics.spatial import FloatArray, rotation_from_normal
+from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.spatial import FloatArray, cross, rotation_from_normal
 
 PRESSES = 1.0
 """Force from which something counts as a support [N]."""
@@ -24,7 +27,80 @@ TOUCHING = 1e-3
 lift by less, which a rigid sole on a rigid floor would not."""
 
 ALONG = 0.9
-"""Least cosine between the force's normal and the planned contact's for one to be the other."""
+"""Least cosine between the normals of a measured and a planned contact that are the same [-]."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The first time of a touch that was not planned.
+
+    Attributes:
+        time: [s].
+        segment: Segment of the body.
+        other: Obstacle or other segment.
+        force: Largest normal force of any instant, of all its points together [N].
+    """
+
+    time: float
+    segment: str
+    other: str
+    force: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for the run's summary."""
+        return {"segment": self.segment, "other": self.other, "time_s": self.time, "max_force_N": self.force}
+
+    def __str__(self) -> str:
+        return f"{self.segment} touches {self.other} at {self.time:.3f} s"
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """Measurements of one engine step; all values belong to the state at its beginning.
+
+    Attributes:
+        time: Beginning of the step [s].
+        a: (nv,) generalised acceleration [m/s^2, rad/s^2].
+        segments: Segment of each of the k contact points.
+        others: Obstacle, or other segment, of each contact point.
+        on_scene: (k,) whether ``others`` is an obstacle.
+        positions: (k, 3) of the contact points [m].
+        normals: (k, 3) unit, out of ``others``.
+        forces: (k, 3) on ``segments`` [N].
+        depths: (k,) penetration [m].
+        grips: Force [N] and its point [m] of every grip, (2, 3) each, by effector.
+    """
+
+    time: float
+    a: FloatArray
+    segments: tuple[str, ...]
+    others: tuple[str, ...]
+    on_scene: NDArray[np.bool_]
+    positions: FloatArray
+    normals: FloatArray
+    forces: FloatArray
+    depths: FloatArray
+    grips: Mapping[str, FloatArray]
+
+    def wrench(self, about: FloatArray, segments: Sequence[str] | None = None) -> FloatArray:
+        """(6,) force and moment of the scene, grips apart.
+
+        Args:
+            about: (3,) point of the moments [m].
+            segments: Names of the segments to count; the whole body when omitted.
+        """
+        chosen = self.on_scene
+        if segments is not None:
+            chosen = chosen & np.array([name in segments for name in self.segments], dtype=bool)
+        forces, arms = self.forces[chosen], self.positions[chosen] - about
+        return np.concatenate((forces.sum(axis=0), cross(arms, forces).sum(axis=0)))
+
+    def grip_wrench(self, effector: str, about: FloatArray) -> FloatArray:
+        """(6,) force and moment of the grip of an effector; zero without one."""
+        if effector not in self.grips:
+            return np.zeros(6)
+        force, position = self.grips[effector]
+        return np.concatenate((force, cross(position - about, force)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +139,11 @@ class CarryingContacts:
     """Turns carried points into stances, sample after sample; a contact that stays is the same object."""
 
     def __init__(self, segments: Mapping[str, Sequence[str]], mass: float) -> None:
-        """Start with nothing known.
+        """Start without contacts.
 
         Args:
             segments: Names of the segments with which each effector touches.
-            mass: Of the body [kg]; bounds the forces of a stance without caps.
+            mass: Mass of the body [kg]; bounds the forces of a stance without caps.
         """
         self._segments = dict(segments)
         self._mass = mass
@@ -84,8 +160,8 @@ class CarryingContacts:
         """Stance of one control step.
 
         Args:
-            points: What carried.
-            pose: Of an effector, as it is.
+            points: Contact points that carried.
+            pose: Function of an effector's name: its measured pose.
             planned: Contact that each effector has, had last or is about to make.
             gripping: Effectors that hold on.
             model: Friction cone and cap of the planned stance; without a cap, that of a body.
@@ -119,6 +195,25 @@ class CarryingContacts:
         return kept
 
 
+def carried_margin(stances: Sequence[Stance], wrenches: FloatArray, com: FloatArray) -> MotionMargin:
+    """Margins of n measured wrenches about the centre of mass in the stances that carried them.
+
+    Args:
+        stances: n stances; those of the same contacts count as one.
+        wrenches: (n, 6) mean wrenches of the scene about the world origin [N, N.m].
+        com: (n, 3) [m].
+    """
+    numbers, different = dict[tuple[int, ...], int](), list[Stance]()
+    rows = np.empty(len(stances), dtype=np.int64)
+    for row, stance in enumerate(stances):
+        key = tuple(id(contact) for contact in stance)
+        if key not in numbers:
+            numbers[key] = len(different)
+            different.append(stance)
+        rows[row] = numbers[key]
+    return motion_margin(different, rows, wrenches.reshape(-1, 6), com.reshape(-1, 3))
+
+
 def _same_place(first: Contact, second: Contact) -> bool:
     """Whether a contact is the one of before but for less than :data:`TOUCHING`.
 
@@ -134,22 +229,9 @@ def _same_place(first: Contact, second: Contact) -> bool:
     if np.abs(np.concatenate([one[:, 2], other[:, 2]])).max() > TOUCHING:
         return False
     missing = np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1)
-    return bool(missing.max() <= TOUCHING and _outside(other[:, :2], one[:, :2]) <= TOUCHING)
-
-
-def _outside(points: FloatArray, corners: FloatArray) -> float:
-    """Farthest that any of (k, 2) points is outside the hull of (m, 2) corners [m]."""
-    ends = np.roll(corners, -1, axis=0)
-    along = ends - corners
-    length = np.maximum(np.sum(along**2, axis=1), 1e-18)
-    offset = points[:, None] - corners
-    share = np.clip(np.sum(offset * along, axis=2) / length, 0.0, 1.0)
-    apart = np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1)
-    if len(corners) > 2:
-        turn = along[:, 0] * offset[..., 1] - along[:, 1] * offset[..., 0]
-        inside = np.all(turn >= 0.0, axis=1) | np.all(turn <= 0.0, axis=1)
-        apart = np.where(inside, 0.0, apart)
-    return float(apart.max(initial=0.0))
+    if missing.max() > TOUCHING:
+        return False
+    return bool(signed_distance(other[:, :2], convex_polygon(one[:, :2])).min() >= -TOUCHING)
 
 
 def _touched(
@@ -211,7 +293,7 @@ def _height(points: FloatArray, corners: list[int], number: int) -> float:
 
 
 def _unplanned(name: str, points: CarriedPoints, chosen: NDArray[np.bool_]) -> Contact:
-    """A contact of what touches without a plan: its points, about the mean of their normals."""
+    """A contact that is not planned: its points, about the mean of their normals."""
     weights = points.forces[chosen]
     centre = weights @ points.positions[chosen] / weights.sum()
     normal = weights @ points.normals[chosen]

@@ -1,9 +1,9 @@
 """The body and the scene as a MuJoCo model, and the translation of states.
 
-The model is built from the same neutral description as the Pinocchio one, through
-``MjSpec``. It has one MuJoCo body per segment, a free joint on the root, the segment's hinges
-in the same order, one torque motor per hinge, one geometry ``"segment/shape"`` per shape and
-one site ``"effector/<name>"`` per effector.
+The model is built from the same neutral description as the Pinocchio one, through ``MjSpec``. It has one
+MuJoCo body per segment, a free joint on the root, the segment's hinges in the same order, one torque motor
+per hinge, one geometry ``"segment/shape"`` per shape and one site ``"effector/<name>"`` per effector.
+Obstacles of the scene are static geometries.
 
 The engines describe the free root differently. With ``R`` the rotation from the root's axes to the
 world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocchio:
@@ -12,29 +12,75 @@ world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocch
 * its velocity is ``(R v_l, w)``: the linear part in world axes, the angular part in the root's;
 * its acceleration is ``(R (a_l + w x v_l), w')``, the time derivative of that;
 * its generalised force is ``(R f, m)`` for our ``(f, m)``, so that the power is the same.
-
-Also here. Obstacles of a scene as static geometries of the physics engine.
 """
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Hinge, Segment, Shape, ShapeKind
-from manikin.errors import SceneError
-from manikin.numerics.spatial import FloatArray, cross, rotation_from_normal
+from manikin.errors import InputError, SceneError
+from manikin.numerics.spatial import FloatArray, cross, finite_number, rotation_from_normal
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.scene.mesh import MeshPiece
-from manikin.simulation.engine import PhysicsOptions
+
+
+@dataclass(frozen=True)
+class PhysicsOptions:
+    """Settings of the compiled physics model.
+
+    Attributes:
+        timestep: [s]; 1 ms as in [Qiu2012]_ 6.1.
+        friction: Coulomb coefficient between the body and the scene and of the body with itself.
+        segment_friction: Pairs of a segment and the coefficient between it and whatever it touches; such a
+            segment is soft, see ``soft_time_constant``.
+        cone: Shape of the friction cones.
+        impratio: Stiffness of friction relative to the normal direction; above 1 holds feet still under
+            sideways load.
+        contact_time_constant: How fast a contact pushes penetration out [s]; at least two time steps.
+        soft_time_constant: The same for segments with their own friction: flesh on a cushion [s].
+        contact_damping_ratio: 1 is critically damped.
+        joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
+        armature: Inertia added to the axis of each hinge [kg.m^2]; 0 keeps the mass matrix of the planning
+            model.
+        joint_limits: Whether hinges stop at the ends of their ranges.
+        self_collision: Whether :attr:`~manikin.body.BodyModel.collision_pairs` may touch.
+    """
+
+    timestep: float = 1e-3
+    friction: float = 0.7
+    segment_friction: tuple[tuple[str, float], ...] = ()
+    cone: Literal["elliptic", "pyramidal"] = "elliptic"
+    impratio: float = 10.0
+    contact_time_constant: float = 5e-3
+    soft_time_constant: float = 0.012
+    contact_damping_ratio: float = 1.0
+    joint_damping: float = 0.0
+    armature: float = 0.0
+    joint_limits: bool = True
+    self_collision: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("timestep", "friction", "impratio", "contact_time_constant", "soft_time_constant",
+                     "contact_damping_ratio"):  # fmt: skip
+            finite_number(getattr(self, name), f"physics {name}", above=0.0)
+        for segment, value in self.segment_friction:
+            finite_number(value, f"physics friction of {segment}", above=0.0)
+        for name in ("joint_damping", "armature"):
+            finite_number(getattr(self, name), f"physics {name}", at_least=0.0)
+        if self.cone not in ("elliptic", "pyramidal"):
+            raise InputError(f"physics cone is {self.cone!r}; valid: elliptic, pyramidal")
+
 
 PREFIX = "scene/"
-"""Every geometry of an obstacle is named ``scene/<obstacle>`` or ``scene/<obstacle>/<number>``."""
+"""Geometries of obstacles are named ``scene/<obstacle>`` or ``scene/<obstacle>/<number>``."""
 
 PLANE_THICKNESS = 2e-3
 """Thickness given to a two-sided plane, half on each side [m]."""
@@ -49,19 +95,11 @@ _GEOM = mujoco.mjtGeom
 
 
 def add_scene(spec: Any, scene: Scene, contact: dict[str, Any]) -> None:
-    """Add every obstacle to the world body of a MuJoCo specification.
+    """Add every obstacle to the world body of a ``mujoco.MjSpec``, with the same contact settings.
 
-    A convex mesh piece becomes one convex geometry. A piece that is not convex becomes one
-    thin prism per triangle, :data:`SHEET_THICKNESS` thick towards its inside, since MuJoCo
-    would collide with its convex hull instead.
-
-    Args:
-        spec: ``mujoco.MjSpec``.
-        scene: The obstacles.
-        contact: Contact settings of every geometry.
-
-    Raises:
-        SceneError: If a mesh that is not convex has too many triangles.
+    A convex mesh piece becomes one convex geometry. A piece that is not convex becomes one thin prism per
+    triangle, :data:`SHEET_THICKNESS` thick towards its inside, since MuJoCo would collide with its convex
+    hull instead; too many of them are refused.
     """
     for obstacle in scene:
         shape = obstacle.shape
@@ -96,10 +134,9 @@ def _primitive(obstacle: Obstacle) -> tuple[Any, list[float], FloatArray, FloatA
         return _GEOM.mjGEOM_BOX, list(shape.size / 2), rotation, translation
     if isinstance(shape, Sphere):
         return _GEOM.mjGEOM_SPHERE, [shape.radius, 0.0, 0.0], rotation, translation
-    if isinstance(shape, Cylinder):
-        return _GEOM.mjGEOM_CYLINDER, [shape.radius, shape.length / 2, 0.0], rotation, translation
-    if isinstance(shape, Capsule):
-        return _GEOM.mjGEOM_CAPSULE, [shape.radius, shape.length / 2, 0.0], rotation, translation
+    if isinstance(shape, Cylinder | Capsule):
+        kind = _GEOM.mjGEOM_CYLINDER if isinstance(shape, Cylinder) else _GEOM.mjGEOM_CAPSULE
+        return kind, [shape.radius, shape.length / 2, 0.0], rotation, translation
     assert isinstance(shape, (Plane, HalfSpace))
     normal, offset = obstacle.world_plane
     turned, place = rotation_from_normal(normal), normal * offset
@@ -116,14 +153,11 @@ def _add_mesh(spec: Any, obstacle: Obstacle, mesh: Mesh, contact: dict[str, Any]
             f"obstacle {obstacle.name!r} has {sheets} triangles in pieces that are not convex; "
             f"valid: at most {MAX_SHEETS} to simulate, so decimate it or set convex to 'parts'"
         )
-    number = 0
-    for piece in mesh.pieces:
-        for vertices in _convex_bodies(piece):
-            name = f"{PREFIX}{obstacle.name}/{number}"
-            number += 1
-            item = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
-            item.uservert = (vertices @ obstacle.rotation.T + obstacle.translation).ravel()
-            spec.worldbody.add_geom(name=name, type=_GEOM.mjGEOM_MESH, meshname=name, **contact)
+    for number, vertices in enumerate(body for piece in mesh.pieces for body in _convex_bodies(piece)):
+        name = f"{PREFIX}{obstacle.name}/{number}"
+        item = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+        item.uservert = (vertices @ obstacle.rotation.T + obstacle.translation).ravel()
+        spec.worldbody.add_geom(name=name, type=_GEOM.mjGEOM_MESH, meshname=name, **contact)
 
 
 def _convex_bodies(piece: MeshPiece) -> list[FloatArray]:
@@ -147,21 +181,15 @@ _CONE = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone
 
 @dataclass(frozen=True, eq=False)
 class SimulationModel:
-    """A compiled MuJoCo model with the translation of states from and to Pinocchio's.
+    """A compiled body and scene with the translation of states from and to Pinocchio's.
 
-    Attributes:
-        body: The body that was compiled.
-        scene: The scene that was compiled, or None.
-        options: The settings.
-        mujoco: The ``mujoco.MjModel``; make a ``MjData`` of it for each simulation.
+    ``mujoco`` is the ``mujoco.MjModel``; make a ``MjData`` of it for each simulation.
     """
 
     body: BodyModel
     scene: Scene | None
     options: PhysicsOptions
     mujoco: Any = field(repr=False)
-
-    # --- states ----------------------------------------------------------------------------
 
     def q_to_mujoco(self, q: ArrayLike) -> FloatArray:
         """(nq,) ``qpos`` of a configuration."""
@@ -185,12 +213,6 @@ class SimulationModel:
         """(nv,) velocity of ``qvel`` at ``qpos``."""
         return _turned(root_rotation(self.q_from_mujoco(qpos)).T, qvel)
 
-    def a_to_mujoco(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> FloatArray:
-        """(nv,) ``qacc`` of an acceleration at the state ``(q, v)``."""
-        speed, acceleration = np.asarray(v, dtype=np.float64), np.array(a, dtype=np.float64)
-        acceleration[:3] += cross(speed[3:6], speed[:3])
-        return _turned(root_rotation(q), acceleration)
-
     def a_from_mujoco(self, qpos: ArrayLike, qvel: ArrayLike, qacc: ArrayLike) -> FloatArray:
         """(nv,) acceleration of ``qacc`` at ``(qpos, qvel)``."""
         to_root = root_rotation(self.q_from_mujoco(qpos)).T
@@ -198,21 +220,11 @@ class SimulationModel:
         acceleration[:3] -= cross(speed[3:6], speed[:3])
         return acceleration
 
-    def tau_to_mujoco(self, q: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """(nv,) generalised force for MuJoCo of Pinocchio's, root included."""
-        return _turned(root_rotation(q), tau)
-
-    def tau_from_mujoco(self, qpos: ArrayLike, force: ArrayLike) -> FloatArray:
-        """(nv,) generalised force of Pinocchio of MuJoCo's, root included."""
-        return _turned(root_rotation(self.q_from_mujoco(qpos)).T, force)
-
     def set_state(self, data: Any, q: ArrayLike, v: ArrayLike | None = None) -> None:
         """Write a state into a ``MjData`` and bring its kinematics up to date."""
         data.qpos[:] = self.q_to_mujoco(q)
         data.qvel[:] = 0.0 if v is None else self.v_to_mujoco(q, v)
         mujoco.mj_forward(self.mujoco, data)
-
-    # --- names -----------------------------------------------------------------------------
 
     @cached_property
     def geom_names(self) -> tuple[str, ...]:
@@ -223,28 +235,9 @@ class SimulationModel:
         """MuJoCo body id of a segment."""
         return self.mujoco.body(self.body.segment(segment).name).id
 
-    def geom_id(self, name: str) -> int:
-        """MuJoCo geometry id of ``"segment/shape"`` or ``"scene/obstacle"``."""
-        return self.mujoco.geom(name).id
-
     def site_id(self, effector: str) -> int:
         """MuJoCo site id of an effector."""
         return self.mujoco.site(f"effector/{self.body.effector(effector).name}").id
-
-    @cached_property
-    def colliding_segments(self) -> frozenset[frozenset[str]]:
-        """Pairs of segments whose geometries the engine lets touch."""
-        if not self.options.self_collision:
-            return frozenset()
-        names = [self.mujoco.body(number).name for number in range(self.mujoco.nbody)]
-        excluded = {frozenset((names[code >> 16], names[code & 0xFFFF])) for code in self._excludes}
-        segments = [segment.name for segment in self.body.segments]
-        pairs = {frozenset((a, b)) for a in segments for b in segments if a != b}
-        return frozenset(pairs - excluded)
-
-    @property
-    def _excludes(self) -> list[int]:
-        return [int(code) for code in self.mujoco.exclude_signature]
 
 
 def root_rotation(q: ArrayLike) -> FloatArray:
@@ -282,8 +275,8 @@ def compile_model(
         body: The body.
         scene: Obstacles and floor; None for an empty world without a floor.
         options: Settings; defaults when None.
-        held: Effectors that are welded to the world, with the rotation (3, 3) and the place (3,) at which
-            they are [m]; their segments pass through the scene.
+        held: Effectors that are welded to the world, with rotation (3, 3) and position (3,) [m]; their
+            segments pass through the scene.
 
     Raises:
         SceneError: If a mesh is too large to simulate.
@@ -314,13 +307,12 @@ def _set_options(spec: Any, options: PhysicsOptions) -> None:
 
 def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:
     """Contact settings of a geometry; bits let body and scene touch, and body and body if wanted."""
-    both = options.self_collision
     return {
         "friction": [options.friction, 0.005, 0.0001],
         "condim": 3,
         "solref": [options.contact_time_constant, options.contact_damping_ratio],
         "contype": 2 if scenery else 1,
-        "conaffinity": 1 if scenery else (3 if both else 2),
+        "conaffinity": 1 if scenery else (3 if options.self_collision else 2),
     }
 
 
@@ -336,8 +328,8 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
             item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
         for hinge in segment.hinges:
             _add_hinge(spec, item, hinge, options)
-        own = dict(options.segment_friction).get(segment.name)
-        special = {} if own is None else _soft_contact(own, options)
+        friction = dict(options.segment_friction).get(segment.name)
+        special = {} if friction is None else _soft_contact(friction, options)
         for shape in segment.shapes:
             _add_shape(item, segment, shape, {**contact, **special})
     for effector in body.effectors.values():
@@ -347,8 +339,8 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
 
 
 SOFT_IMPEDANCE = (0.3, 0.8, 0.005)
-"""Of soft flesh: the engine's impedance at first touch and at a depth [m], as a third value.  Low ones give
-way under load, so that a body slides on a cushion instead of bouncing along it."""
+"""Impedance of soft flesh in the engine at first touch and at a depth, the third value [m]. Low ones give way
+under load, so that a body slides on a cushion instead of bouncing along it."""
 
 
 def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
@@ -362,13 +354,8 @@ def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
 
 
 def _set_inertia(item: Any, segment: Segment) -> None:
-    inertia = segment.inertia
-    item.explicitinertial = True
-    item.mass = segment.mass
-    item.ipos = segment.com
-    item.fullinertia = [
-        inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2],
-    ]  # fmt: skip
+    item.explicitinertial, item.mass, item.ipos = True, segment.mass, segment.com
+    item.fullinertia = segment.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
 def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions) -> None:
@@ -410,8 +397,6 @@ def _hold(spec: Any, body: BodyModel, name: str, rotation: FloatArray, position:
 
 def _add_excludes(spec: Any, body: BodyModel) -> None:
     allowed = {frozenset(pair) for pair in body.segment_pairs}
-    names = [segment.name for segment in body.segments]
-    for number, first in enumerate(names):
-        for second in names[number + 1 :]:
-            if frozenset((first, second)) not in allowed:
-                spec.add_exclude(bodyname1=first, bodyname2=second)
+    for first, second in itertools.combinations([segment.name for segment in body.segments], 2):
+        if frozenset((first, second)) not in allowed:
+            spec.add_exclude(bodyname1=first, bodyname2=second)

@@ -8,28 +8,28 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.limbs import end_segments
-from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.contact import ContactKind, ContactSchedule
 from manikin.control import Controller, ControlOutput, ControlSettings, ForceWish
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.numerics.spatial import finite_number
 from manikin.scene import Scene
-from manikin.simulation.compile import compile_model
-from manikin.simulation.engine import PhysicsOptions
+from manikin.simulation.carrying import Touch
+from manikin.simulation.compile import PhysicsOptions, compile_model
 from manikin.simulation.execution import Execution, push_outcome
+from manikin.simulation.push_force import Push
 from manikin.simulation.recorder import SWITCHING, Recorder, near
-from manikin.simulation.world import Grip, Push, Touch, World
+from manikin.simulation.world import Grip, World
 
 JOINT_DAMPING = 0.1
-"""Passive damping of every joint in the default physics [N.m.s/rad]. Relaxed human joints have
-about 0.1 to 2; the engine's contact solver does not see damping, so that a light segment under
-load (toes: 3e-4 kg.m^2) sinks and chatters where damping times time step exceeds its inertia.
-The controller overcomes the damping."""
+"""Passive damping of every joint in the default physics [N.m.s/rad]. Relaxed human joints have about 0.1 to
+2; the engine's contact solver does not see damping, so that a light segment under load (toes: 3e-4 kg.m^2)
+sinks and chatters where damping times time step exceeds its inertia. The controller overcomes the damping."""
 
 CONTACT_TIME = 3e-3
-"""Time constant of the contacts in the default physics [s]: a stiff floor, three time steps.
-Halves sinking and creeping of loaded feet against the engine's usual 5 ms or more."""
+"""Time constant of the contacts in the default physics [s]: a stiff floor, three time steps. Halves sinking
+and creeping of loaded feet against the engine's usual 5 ms or more."""
 
 GRASPING = 0.4
 """Time before and after a grasp in which the hand may touch what it holds on to [s]."""
@@ -38,8 +38,8 @@ FALL_DISTANCE = 0.3
 """A body whose CoM is this far from its plan has fallen [m]."""
 
 SETTLING = 0.2
-"""Time to stand in the first posture before the motion begins, unrecorded [s]; the feet sink
-in by the fraction of a millimetre that the contact needs to carry."""
+"""Time to stand in the first posture before the motion begins, unrecorded [s]; the feet sink in by the
+fraction of a millimetre that the contact needs to carry."""
 
 _AT_REST = 1e-2
 """A motion whose first, or last, speeds are smaller than this begins, or ends, at rest [m/s, rad/s]."""
@@ -58,14 +58,10 @@ class _Hold:
 def default_physics(body: BodyModel, schedule: ContactSchedule) -> PhysicsOptions:
     """Physics of an execution: the schedule's least friction, stiff contacts, passive damping.
 
-    What slides to its place on a seat has the friction of that contact alone.
+    A segment that slides to its place on a seat has the friction of that contact alone.
     """
-    contacts = [
-        contact
-        for phase in schedule.sequence
-        for contact in phase.stance
-        if contact.kind is not ContactKind.GRASP
-    ]
+    every = (contact for phase in schedule.sequence for contact in phase.stance)
+    contacts = [contact for contact in every if contact.kind is not ContactKind.GRASP]
     options = PhysicsOptions(joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME)
     sliding = {body.effector(c.effector).segment: c.friction for c in contacts if c.settle > 0.0}
     firm = [contact.friction for contact in contacts if contact.settle == 0.0]
@@ -91,10 +87,10 @@ def execute(
 
     Args:
         body: The body.
-        scene: Where it moves.
+        scene: Its surroundings.
         motion: Planned motion.
         schedule: Its contacts in time.
-        settings: Controller settings; the defaults when omitted.
+        settings: Settings of the controller; the defaults when omitted.
         physics: Settings of the engine; :func:`default_physics` when omitted.
         hold: Time to stand at the end [s]. With none, the last step of a motion that ends at speed is left
             out, for it would be stopped dead.
@@ -105,7 +101,7 @@ def execute(
         progress: Called with the share done, in [0, 1], after every control step.
 
     Returns:
-        What happened; a fall, a divergence or an unplanned touch is a result, not an error.
+        The outcome; a fall, a divergence or an unplanned touch is a result, not an error.
 
     Raises:
         InputError: If the control period is not a multiple of the engine's time step, or the
@@ -118,7 +114,7 @@ def execute(
 
 
 class _Run:
-    """One execution, from its setting up to its report."""
+    """One execution, from its set-up to its report."""
 
     def __init__(
         self,
@@ -143,10 +139,7 @@ class _Run:
         self.world = World(compile_model(body, scene, physics), padded)
         self.pushes = tuple(pushes)
         for push in pushes:
-            self.world.apply_push(
-                push.segment, push.force, push.start, push.duration, point=push.point,
-                frequency=push.frequency,
-            )  # fmt: skip
+            self.world.apply_push(**vars(push))
         segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, segments)
         self.failure, self.failure_time = "", None
@@ -159,7 +152,9 @@ class _Run:
         began = clock.perf_counter()
         control = 0.0
         start = float(self.plan.time[0])
-        settle = self._settling_steps()
+        # None when the motion begins at speed.
+        at_rest = float(np.abs(self.plan.v[0]).max()) < _AT_REST
+        settle = round(SETTLING / self.period) if at_rest else 0
         self.world.reset(self.plan.q[0], self.plan.v[0], start - settle * self.period)
         count = round((self.plan.duration + hold) / self.period) + 1
         if hold == 0.0 and np.abs(self.plan.v[-1]).max() >= _AT_REST:
@@ -187,13 +182,8 @@ class _Run:
                 progress(min(number / count, 1.0))
         return self._report(clock.perf_counter() - began, control)
 
-    def _settling_steps(self) -> int:
-        """Control steps before the motion; none when it begins at speed."""
-        at_rest = float(np.abs(self.plan.v[0]).max()) < _AT_REST
-        return round(SETTLING / self.period) if at_rest else 0
-
     def _switch(self, time: float) -> None:
-        """Tell the world which touches are planned at a time of the plan, and hold on to grasps."""
+        """Set the touches planned at a time of the plan, and hold on to grasps."""
         load = self.schedule.sequence[int(self.schedule.phase_at(time))].load
         self.world.carry({} if load is None else load.masses)
         now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
@@ -214,13 +204,10 @@ class _Run:
             self.world.close_hand(effector)
         self._leaving = leaving
         for contact in held.values():
-            self._grip(contact)
+            self.world.grip(Grip(contact.effector, contact.position, contact.max_force))
         for item in grasps:
             if item.start - GRASPING <= time < item.start and item.contact.effector not in held:
                 self.world.open_hand(item.contact.effector)
-
-    def _grip(self, contact: Contact) -> None:
-        self.world.grip(Grip(contact.effector, contact.position, contact.max_force))
 
     def _touching(self, time: float) -> dict[str, bool]:
         """Whether each effector touches the support it holds or is about to make."""
@@ -290,8 +277,8 @@ class _Run:
     def _counted_touches(self) -> tuple[Touch, ...]:
         """Unplanned touches that are a failure; an arm that swings in a recovery may brush the body."""
         pushed = min((push.start for push in self.pushes), default=np.inf)
-        own = {segment.name for segment in self.body.segments}
-        return tuple(t for t in self.world.touches if t.time < pushed or t.other not in own)
+        segments = {segment.name for segment in self.body.segments}
+        return tuple(t for t in self.world.touches if t.time < pushed or t.other not in segments)
 
 
 def _expected(interval: SupportInterval, time: float) -> bool:
@@ -312,12 +299,7 @@ def _substeps(period: float, timestep: float) -> int:
 
 def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_Hold, ...]:
     return tuple(
-        _Hold(
-            effector,
-            end_segments(body, effector),
-            interval,
-            scene.touched_obstacle(interval.contact),
-        )
+        _Hold(effector, end_segments(body, effector), interval, scene.touched_obstacle(interval.contact))
         for effector in schedule.sequence.effectors
         for interval in support_intervals(schedule, effector, SWITCHING)
     )

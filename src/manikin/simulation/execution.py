@@ -1,8 +1,4 @@
-"""The outcome of executing a motion in the physics engine.
-
-Also here. What became of a push during an execution: how far off its plan the body came, and when it was
-back.
-"""
+"""The outcome of executing a motion in the physics engine, and of pushes during it."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -13,26 +9,23 @@ import numpy as np
 from manikin.balance.contact_forces import FrictionUse
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray, rotation_from_quaternion, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import Displayed
+from manikin.simulation.carrying import Touch
+from manikin.simulation.push_force import Push, push_impulse
 from manikin.simulation.recorder import Recorder
-from manikin.simulation.world import Push, Touch
 
 BACK = 0.02
 """A body whose centre of mass stays within this of its plan, to the end, is back on it [m]."""
 
 
-PUSHED_SEGMENT = "thorax"
-"""Segment on whose centre of mass a body on its way is pushed."""
-
-
 @dataclass(frozen=True)
 class PushOutcome:
-    """What became of the pushes of an execution.
+    """Outcome of the pushes of an execution.
 
     Attributes:
-        impulse_Ns: Of all of them, a sine's without regard to its sign [N.s].
-        direction_deg: Of the first, counter-clockwise from the world's x axis [deg].
+        impulse_Ns: Sum of all impulses, a sine's without regard to its sign [N.s].
+        direction_deg: Direction of the first, counter-clockwise from the world's x axis [deg].
         at_s: When the first began [s].
         recovered: Whether the body came back on its plan, and nothing failed.
         max_deviation_m: Largest distance of the centre of mass from its plan since then [m].
@@ -56,43 +49,8 @@ class PushOutcome:
         return asdict(self)
 
 
-def push_on_the_way(
-    motion: Motion, force: float, direction: float, start: float, duration: float, frequency: float = 0.0
-) -> Push:
-    """Push on the thorax of a body that carries out a motion.
-
-    Args:
-        motion: What it carries out.
-        force: Size [N]; of a sine its amplitude.
-        direction: Counter-clockwise from the forward axis that the pelvis has in the plan then [deg].
-        start: In the motion's time [s].
-        duration: [s].
-        frequency: Of a sine that begins with the push [Hz]; 0 for a constant force.
-    """
-    sample = min(int(np.searchsorted(motion.time, start)), len(motion.time) - 1)
-    forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
-    heading = float(np.arctan2(forward[1], forward[0]))
-    way = rotation_from_yaw(heading + np.deg2rad(direction))[:, 0]
-    return Push(PUSHED_SEGMENT, force * way, start, duration, frequency=frequency)
-
-
-def push_impulse(push: Push) -> float:
-    """Impulse of a push without regard to the sign of a sine [N.s]."""
-    size = float(np.linalg.norm(push.force))
-    if push.frequency == 0.0:
-        return size * push.duration
-    half_waves, rest = divmod(2.0 * push.frequency * push.duration, 1.0)
-    return size / (np.pi * push.frequency) * (half_waves + 0.5 * (1.0 - np.cos(np.pi * rest)))
-
-
 def push_outcome(pushes: Sequence[Push], recorder: Recorder, failure: str) -> PushOutcome | None:
-    """Say what became of the pushes; None without one.
-
-    Args:
-        pushes: What disturbed the execution.
-        recorder: What happened.
-        failure: Why the execution is no success; empty for one.
-    """
+    """Outcome of the pushes of a recorded execution, None without one; ``failure`` is empty for a success."""
     if not pushes:
         return None
     first = min(pushes, key=lambda push: push.start)
@@ -125,22 +83,21 @@ class Execution(Displayed):
     """An executed motion and how well it followed the plan.
 
     Attributes:
-        motion: What happened, one sample per control step; ``tau`` are the joint torques
-            held from the sample on, ``a`` and ``contact_force`` what the engine measured in
-            the step's first millisecond, moments about the *planned* contact frame's origin,
-            ``support`` where it presses, ``margin`` that of the measured wrench of all
-            contacts, averaged over the control step, about the centre of mass, in the polytope
-            of the contacts that really carried it.
+        motion: Executed motion, one sample per control step; ``tau`` are the joint torques held from the
+            sample on, ``a`` and ``contact_force`` measured in the step's first millisecond, moments about the
+            origin of the *planned* contact frame, ``support`` where it presses, ``margin`` that of the wrench
+            of all contacts, averaged over the control step, about the centre of mass, in the polytope of the
+            contacts that really carried it.
         fell: Whether the body fell.
         failure: Why the run is no success, in one line; empty for a success.
         failure_time_s: When it failed [s], or None.
-        com_rms_error_m: Of the distance from the planned CoM, over motion and hold, but only until
-            the body sits down where it does [m].
+        com_rms_error_m: RMS distance from the planned CoM, over motion and hold, but only until the body
+            sits down where it does [m].
         com_max_error_m: Largest such distance [m].
         max_foot_error_m: Largest distance of an effector of the schedule from its plan, but not of one
             that slides to its place on a seat [m].
-        worst_effector: Which effector that is; empty without one.
-        worst_effector_time_s: When [s].
+        worst_effector: Its name; empty without one.
+        worst_effector_time_s: Its time [s].
         final_com_error_m: Distance of the CoM from its plan at the end of the hold [m].
         min_margin: Least wrench margin, about the CoM [N.m].
         max_penetration_m: Deepest penetration of any hard contact, at every engine step [m].
@@ -151,10 +108,10 @@ class Execution(Displayed):
         wall_s: Wall time [s].
         control_ms: Mean wall time of a control step [ms].
         touches: Touches that were not planned.
-        counted_touches: Those among them that are a failure: all but those of a pushed body with itself.
+        counted_touches: Touches among them that are a failure: all but those of a pushed body with itself.
         fallbacks: Time [s] and reason of every control step whose program was not solved.
         max_slip_m: Farthest that an effector moved along its surface while in contact [m].
-        push: What became of the pushes; None without one.
+        push: Outcome of the pushes; None without one.
         friction: Largest use of friction by the forces that control counted on; None without control.
         schedule: When the planned contacts were due, later where the plan waited; None where it did not.
         min_force_at_com_N: Smallest force at the CoM that would have ended balance; None where none does [N].

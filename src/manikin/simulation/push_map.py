@@ -1,93 +1,77 @@
-"""How hard a standing body can be pushed, by direction.
+"""Push maps: how hard a standing body can be pushed, by direction, searched in several processes."""
 
-Also here. The conditions of push maps in words: what several have in common, and what tells them apart.
-Searches of several directions at once, each in a process beside this one.
-"""
-
-import multiprocessing
-from collections.abc import Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from multiprocessing.synchronize import Event
 from typing import Any
 
 import numpy as np
 
 from manikin.control.recovery import RecoverySettings
-from manikin.errors import InputError, ManikinError
+from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import Displayed
-from manikin.runtime.parallel import FRESH, prepare_worker, side_by_side
+from manikin.runtime.parallel import side_by_side
 from manikin.simulation.push_search import DirectionSearch, HeldImpulse
 
 USUAL = {
-    "on both feet",
-    "usual stance",
-    "no step",
-    "nothing locked",
-    "with the program",
-    "usual strength",
+    "on both feet", "usual stance", "no step", "nothing locked", "with the program", "usual strength",
     "usual ankles",
-}
-"""What goes without saying."""
+}  # fmt: skip
+"""Conditions that are not mentioned where all maps have them."""
 
 
 def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
-    """What maps have in common, and a name for each that tells it from the others.
+    """Conditions that maps have in common, and a name for each that tells it from the others.
 
     Args:
         maps: Conditions of each, as in its JSON.
 
     Returns:
-        Words for what is common, but for what goes without saying, and for each map those for what
-        differs; empty where nothing does.
+        Words for the common conditions that are not usual, and for each map those for the conditions that
+        differ; empty where none does.
     """
-    spoken = [_words(one) for one in maps]
-    differ = [len({words[place] for words in spoken}) > 1 for place in range(len(spoken[0]))]
-    common = [word for word, other in zip(spoken[0], differ, strict=True) if not other]
-    names = [[word for word, other in zip(words, differ, strict=True) if other] for words in spoken]
-    return ", ".join(word for word in common if word not in USUAL), [", ".join(name) for name in names]
+    lists = [_words(conditions) for conditions in maps]
+    differ = [len(set(words)) > 1 for words in zip(*lists, strict=True)]
+    names = [", ".join(itertools.compress(words, differ)) for words in lists]
+    common = [word for word, other in zip(lists[0], differ, strict=True) if not other and word not in USUAL]
+    return ", ".join(common), names
 
 
-def _words(one: Mapping[str, Any]) -> list[str]:
+def _words(conditions: Mapping[str, Any]) -> list[str]:
     """One text per condition, the same conditions in every list."""
-    locked = " and ".join(one["locked"])
-    apart = one.get("feet_apart_m")  # not in maps that were searched before there was a choice
-    strength, ankles, steps = one["strength"], one["ankle_stiffness"], one["steps"]
+    body, locked = conditions["body"], " and ".join(conditions["locked"])
+    apart = conditions.get("feet_apart_m")  # not in maps that were searched before there was a choice
+    strength, ankles, steps = (conditions[key] for key in ("strength", "ankle_stiffness", "steps"))
     return [
-        _body(one["body"]),
-        f"feet {one['feet']}",
-        "on both feet" if one["support"] == "both" else f"on the {one['support']} foot",
+        "body of Kudoh" if body["model"] == "kudoh"
+        else f"{body['sex']} of {body['stature_m']:g} m and {body['mass_kg']:g} kg",
+        f"feet {conditions['feet']}",
+        "on both feet" if conditions["support"] == "both" else f"on the {conditions['support']} foot",
         f"feet {apart:g} m apart" if apart else "usual stance",
         f"up to {steps} step{'s' * (steps > 1)}" if steps else "no step",
         f"{locked} locked" if locked else "nothing locked",
-        "posture control only" if one["posture_control_only"] else "with the program",
+        "posture control only" if conditions["posture_control_only"] else "with the program",
         "usual strength" if strength == 1.0 else f"{strength:g} times the strength",
         "usual ankles" if ankles == RecoverySettings.ankle_stiffness else f"ankles of {ankles:g} m g h",
-        f"reaction after {one['delay_s']:g} s",
-        f"push of {one['duration_s']:g} s",
-    ]
-
-
-def _body(body: Mapping[str, Any]) -> str:
-    if body["model"] == "kudoh":
-        return "body of Kudoh"
-    return f"{body['sex']} of {body['stature_m']:g} m and {body['mass_kg']:g} kg"
+        f"reaction after {conditions['delay_s']:g} s",
+        f"push of {conditions['duration_s']:g} s",
+    ]  # fmt: skip
 
 
 def search_directions(
     searches: Sequence[DirectionSearch], *, jobs: int = 1
-) -> Iterator[tuple[int, HeldImpulse]]:
+) -> Generator[tuple[int, HeldImpulse]]:
     """Search directions, of one map or several, side by side.
 
     Each search depends on nothing but itself, so the result is the same for any number of jobs.
 
     Args:
-        searches: What to search.
+        searches: Directions to search.
         jobs: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
 
-    Yields:
-        Index of a search that is done, and what it found, in the order in which they end.
+    Returns:
+        Index of each search and its result, in the order in which they end; closing it ends the rest.
 
     Raises:
         InputError: If ``jobs`` is less than 1, or a search refuses its push.
@@ -95,31 +79,7 @@ def search_directions(
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; valid: at least 1")
-    given_up = multiprocessing.get_context(FRESH).Event()
-    try:
-        yield from side_by_side(_run, searches, jobs, "search", prepare=partial(_prepare, given_up))
-    finally:
-        given_up.set()
-
-
-_given_up: Event | None = None
-
-
-def _prepare(given_up: Event) -> None:
-    """Make a new process one of the search, which ends when it is given up."""
-    global _given_up
-    _given_up = given_up
-    prepare_worker()
-
-
-def _run(search: DirectionSearch) -> HeldImpulse:
-    return search.run(_still_wanted)
-
-
-def _still_wanted() -> None:
-    """Raise if nobody wants the result any more."""
-    if _given_up is not None and _given_up.is_set():
-        raise ManikinError("the search was given up")
+    return side_by_side(DirectionSearch.run, searches, jobs, "search")
 
 
 def equal_directions(count: int) -> tuple[float, ...]:
@@ -138,9 +98,9 @@ class PushMap(Displayed):
     """The largest impulses held, by direction; every direction is searched, none follows from symmetry.
 
     Attributes:
-        conditions: Plain values that say who was pushed and how, for files and figures.
+        conditions: Plain values of the body and the pushes, for files and figures.
         directions: (n,) of the force, counter-clockwise from the body's forward axis, ascending [deg].
-        found: What was found for each direction; None where it has not been searched yet.
+        found: Result of each direction; None where it has not been searched yet.
         bound: (n,) upper bound of the impulse held without a step, from the pendulum with a flywheel
             [N.s]; None where there is none, as of feet that are held.
     """
@@ -154,7 +114,7 @@ class PushMap(Displayed):
     def empty(
         cls, conditions: Mapping[str, Any], directions: Sequence[float], bound: Sequence[float] | None = None
     ) -> "PushMap":
-        """A map of which nothing is known but its bound."""
+        """A map of directions that have not been searched yet."""
         bounds = None if bound is None else tuple(bound)
         return cls(conditions, tuple(directions), (None,) * len(directions), bounds)
 
@@ -174,11 +134,11 @@ class PushMap(Displayed):
         return np.array([np.nan if f is None or f.beyond is None else f.beyond for f in self.found])
 
     def with_found(self, number: int, found: HeldImpulse) -> "PushMap":
-        """The same map with one direction more."""
+        """The map with the result of one direction more."""
         return replace(self, found=(*self.found[:number], found, *self.found[number + 1 :]))
 
     def surely_held(self, direction_deg: float) -> float:
-        """Impulse held from any direction [N.s]: the smaller one of the two neighbours, to be safe."""
+        """Impulse held from any direction [N.s]: the smaller one of the two neighbouring directions."""
         return float(np.min(self.held[list(self._neighbours(direction_deg))]))
 
     def surely_beyond(self, direction_deg: float) -> float:

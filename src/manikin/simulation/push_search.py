@@ -1,7 +1,4 @@
-"""The largest impulse that a standing body recovers from, from one direction.
-
-Also here. Postures to be pushed in: on one foot, or with the feet nearer to each other or wider apart.
-"""
+"""The largest impulse from one direction that a standing body recovers from, and postures to be pushed in."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -23,14 +20,12 @@ from manikin.errors import InputError
 from manikin.kinematics import Placement, PostureProblem, com_target, generate_posture
 from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_yaw
 from manikin.scene import Proximity, Scene
-from manikin.simulation.recover import STRONGEST, Feet, RecoveryTask, push_near_com, recover
+from manikin.simulation.push_force import STRONGEST, push_near_com
+from manikin.simulation.recover import Feet, RecoveryTask, recover
 from manikin.simulation.recovery import Recovery
 
 RAISED = np.array([-0.1, 0.0, 0.12])
-"""Where the other foot is held, from its place on the ground [m]: behind and clear of it."""
-
-APART = "distance between the feet [m]"
-"""Its name in messages."""
+"""Displacement of a raised foot from its place on the ground [m]: behind and clear of it."""
 
 
 def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
@@ -65,7 +60,7 @@ def feet_apart_posture(body: BodyModel, distance: float) -> FloatArray:
 
     Args:
         body: A body with two legs.
-        distance: Between the middles of the soles, sideways [m].
+        distance: Distance between the middles of the soles, sideways [m].
 
     Returns:
         (nq,) configuration.
@@ -73,7 +68,7 @@ def feet_apart_posture(body: BodyModel, distance: float) -> FloatArray:
     Raises:
         InputError: If the soles would overlap, or the body cannot stand like that.
     """
-    finite_number(distance, APART, at_least=0.0)
+    finite_number(distance, "distance between the feet [m]", at_least=0.0)
     start = Configuration(body, body.standing_posture())
     feet = joint_groups(body).feet
     placements = [start.effector_placement(foot) for foot in feet]
@@ -83,24 +78,24 @@ def feet_apart_posture(body: BodyModel, distance: float) -> FloatArray:
         side = np.array([place[0], middle[1] + 0.5 * distance * np.sign(place[1] - middle[1]), place[2]])
         soles.append(sole_at(body, foot, rotation, side, friction=1.0))
     width = max(float(np.ptp(sole.points_in_world[:, 1])) for sole in soles)
-    finite_number(distance, APART, at_least=width)
+    finite_number(distance, "distance between the feet [m]", at_least=width)
     com = np.mean([sole.position[:2] for sole in soles], axis=0)
     problem = PostureProblem(body, tuple(soles), com=com_target(*com))
     return _standing(problem, f"with the feet {distance:g} m apart")
 
 
 def _standing(problem: PostureProblem, how: str) -> FloatArray:
-    found = generate_posture(problem)
-    if not found.succeeded:
-        raise InputError(f"body {problem.body.name!r} does not stand {how}: {found.failure}")
-    return found.q
+    posture = generate_posture(problem)
+    if not posture.succeeded:
+        raise InputError(f"body {problem.body.name!r} does not stand {how}: {posture.failure}")
+    return posture.q
 
 
 FIRST = 20.0
-"""Impulse that a search begins with [N.s]."""
+"""First impulse of a search [N.s]."""
 
 PUSH_BEGINS = 0.2
-"""When pushes begin [s], as in the scenarios after the thesis."""
+"""Time at which pushes begin [s], as in the scenarios after the thesis."""
 
 AFTERWARDS = 5.2
 """Time from the end of a push to the end of its run [s]; a body that does not stand at rest by then has
@@ -117,9 +112,9 @@ class PushTrials:
     Attributes:
         body: The body.
         task: Its stance; the pushes and the duration are those of each trial.
-        settings: Of the controller.
-        push_duration: Of every push [s]; its force is the impulse divided by this.
-        begins: When the push begins [s].
+        settings: Settings of the controller.
+        push_duration: Duration of every push [s]; its force is the impulse divided by this.
+        begins: Beginning of the push [s].
     """
 
     body: BodyModel
@@ -169,7 +164,7 @@ class PushTrials:
         """Push once.
 
         Args:
-            direction_deg: Of the force, counter-clockwise from the body's forward axis [deg].
+            direction_deg: Direction of the force, counter-clockwise from the body's forward axis [deg].
             impulse: [N.s].
             until_at_rest: End the run early, see :class:`~manikin.simulation.recover.RecoveryTask`.
 
@@ -191,12 +186,12 @@ def run_duration(push_duration: float, begins: float = PUSH_BEGINS) -> float:
 
 @dataclass(frozen=True)
 class HeldImpulse:
-    """Between which two impulses a body ceases to recover.
+    """The two impulses between which a body ceases to recover.
 
     Attributes:
         held: Largest impulse found that it recovers from [N.s]; None where it falls without any push.
         beyond: Smallest impulse found that it does not recover from [N.s]; None where it recovers from the
-            strongest push there may be.
+            strongest push.
         trials: Number of pushes that were simulated.
     """
 
@@ -211,16 +206,15 @@ def largest_held(
     """Search the largest impulse that is held, by bisection.
 
     The first impulse is doubled until one is not held, or halved until one is; the gap between the two is
-    then bisected down to the tolerance.  Recovery need not be monotone in the force: a body may fall from a
-    push and recover from a harder one, for which it swings its arms in time.  What is found is *one* border
-    between an impulse that was held and a larger one that was not; both were tried, what lies elsewhere was
-    not.
+    then bisected down to the tolerance. Recovery need not be monotone in the force: a body may fall from a
+    push and recover from a harder one, for which it swings its arms in time. The result is *one* border
+    between an impulse that was held and a larger one that was not; both were tried.
 
     Args:
         holds: Whether an impulse [N.s] is held.
         tolerance: Largest gap between the two impulses [N.s].
         first: Impulse to begin with [N.s].
-        strongest: No impulse beyond this is tried [N.s].
+        strongest: Largest impulse that is tried [N.s].
 
     Raises:
         InputError: If the tolerance is not positive.
@@ -246,7 +240,7 @@ def largest_held(
 def _bracket(
     holds: Callable[[float], bool], tolerance: float, first: float, strongest: float
 ) -> tuple[float | None, float | None]:
-    """An impulse that is held and one that is not; None for what there is not."""
+    """An impulse that is held and one that is not, each None if there is none."""
     impulse = first
     if holds(impulse):
         while impulse < strongest:
@@ -267,38 +261,31 @@ class DirectionSearch:
     """Search of the largest impulse held from one direction; it can be sent to another process.
 
     Attributes:
-        trials: Who is pushed, and how.
-        direction_deg: Of the force, counter-clockwise from the body's forward axis [deg].
-        tolerance: Largest gap between what is held and what is not [N.s].
+        trials: The body and its pushes.
+        direction_deg: Direction of the force, counter-clockwise from the body's forward axis [deg].
+        tolerance: Largest gap between an impulse that is held and one that is not [N.s].
     """
 
     trials: PushTrials
     direction_deg: float
     tolerance: float = 1.0
 
-    def run(self, go_on: Callable[[], None] | None = None) -> HeldImpulse:
+    def run(self) -> HeldImpulse:
         """Search.
 
-        Trials end early once the body has stood at rest for a while.  The impulse found in the end is
-        confirmed by a run to its end; should it fail there, the search is made again with such runs alone.
-
-        Args:
-            go_on: Called before every trial; raises to give up.
+        Trials end early once the body has stood at rest for a while. The final impulse is confirmed by a run
+        to its end; if the body falls there, the search is repeated with such runs alone.
         """
-        quick = self._search(AT_REST, go_on)
+        quick = self._search(AT_REST)
         if not quick.held:
             return quick
-        if go_on is not None:
-            go_on()
         if self.trials.push(self.direction_deg, quick.held).recovered:
             return replace(quick, trials=quick.trials + 1)
-        whole = self._search(None, go_on)
+        whole = self._search(None)
         return replace(whole, trials=whole.trials + quick.trials + 1)
 
-    def _search(self, until_at_rest: float | None, go_on: Callable[[], None] | None) -> HeldImpulse:
+    def _search(self, until_at_rest: float | None) -> HeldImpulse:
         def holds(impulse: float) -> bool:
-            if go_on is not None:
-                go_on()
             return self.trials.push(self.direction_deg, impulse, until_at_rest=until_at_rest).recovered
 
         return largest_held(holds, tolerance=self.tolerance, strongest=self.trials.strongest)

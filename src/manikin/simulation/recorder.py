@@ -1,19 +1,20 @@
-"""Collects what happens during an execution and turns it into a motion and its measures."""
+"""Records every control step of an execution and turns them into a motion and its measures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from manikin.balance.contact_forces import FrictionUse, friction_share
-from manikin.balance.motion_margin import MotionMargin, motion_margin
+from manikin.balance.motion_margin import MotionMargin
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
+from manikin.control.dynamics import DynamicsState
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
-from manikin.simulation.carrying import PRESSES, CarriedPoints, CarryingContacts
-from manikin.simulation.world import Sensed
+from manikin.simulation.carrying import PRESSES, CarriedPoints, CarryingContacts, Sensed, carried_margin
 
 SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""
@@ -25,7 +26,7 @@ class Sample:
 
     Attributes:
         sensed: Contact forces and acceleration at the beginning of the step.
-        output: What the controller decided there.
+        output: Decision of the controller there.
         wrenches: (effectors, 6) measured force and moment about the planned contact's origin.
         total: (6,) mean over the step of the wrench of all contacts about the world origin.
         carried: Contact points that carried it.
@@ -68,8 +69,8 @@ class Recorder:
         """Add one control step.
 
         Args:
-            sensed: What was felt in its first engine step.
-            output: What the controller decided.
+            sensed: Measurements of its first engine step.
+            output: Decision of the controller.
             total: (6,) mean wrench of all contacts over the whole step.
             carried: Contact points that carried it.
         """
@@ -112,17 +113,16 @@ class Recorder:
     def friction_use(self) -> FrictionUse:
         """Largest use of friction by the forces that control counted on, in the model of the plan.
 
-        What slides to its place is left out: it has kinetic friction only, which is on the friction cone.
+        Contacts that slide to their places are left out: kinetic friction is on the friction cone.
         """
         model = self._schedule.sequence[0].stance.friction_model
         most = FrictionUse(model, 0.0, 0.0, "")
         for sample in self.samples:
             for name, support in sample.output.supports.items():
-                contact = support.contact
-                wrench = sample.output.wrenches.get(name)
-                if contact is None or wrench is None:
+                contact, wrench = support.contact, sample.output.wrenches.get(name)
+                if contact is None or wrench is None or support.settling:
                     continue
-                if contact.kind is ContactKind.GRASP or support.settling:
+                if contact.kind is ContactKind.GRASP:
                     continue
                 share = float(friction_share(contact, wrench[None, :3], model)[0])
                 if share > most.share:
@@ -139,14 +139,14 @@ class Recorder:
         """Number of samples before the body sits down, after which its CoM need not follow a plan."""
         times = np.array([s.plan_time for s in self.samples])
         seated = [
-            item.start for found in self._intervals.values() for item in found if item.contact.settle > 0.0
+            item.start for items in self._intervals.values() for item in items if item.contact.settle > 0.0
         ]
         return int(np.sum(times < min(seated, default=np.inf)))
 
     def worst_effector(self) -> tuple[float, str, float]:
         """Largest distance of an effector's origin from its plan [m], its name and the time [s].
 
-        What slides to its place on a seat does not count.
+        Effectors that slide to their places on a seat do not count.
         """
         firm = self._firm()
         errors = _lengths(
@@ -196,18 +196,11 @@ class Recorder:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
         """
         carrying = CarryingContacts(self._segments, mass)
-        stances, numbers = list[Stance](), dict[tuple[int, ...], int]()
-        rows = np.empty(len(self.samples), dtype=np.int64)
-        for row, sample in enumerate(self.samples):
-            stance = self._carrying_stance(carrying, sample)
-            key = tuple(id(contact) for contact in stance)
-            if key not in numbers:
-                numbers[key] = len(stances)
-                stances.append(stance)
-            rows[row] = numbers[key]
-        totals = np.array([sample.total for sample in self.samples]).reshape(-1, 6)
-        com = np.array([sample.output.state.com for sample in self.samples]).reshape(-1, 3)
-        return motion_margin(stances, rows, totals, com)
+        return carried_margin(
+            [self._carrying_stance(carrying, sample) for sample in self.samples],
+            np.array([sample.total for sample in self.samples]),
+            np.array([sample.output.state.com for sample in self.samples]),
+        )
 
     def _carrying_stance(self, carrying: CarryingContacts, sample: Sample) -> Stance:
         frames = sample.output.state.frames
@@ -220,23 +213,41 @@ class Recorder:
 
     def motion(self, joint_names: Sequence[str], margin: FloatArray) -> Motion:
         """Turn the samples into a motion with its margin (n,) [N.m]."""
-        states = [s.output.state for s in self.samples]
-        wrenches = np.array([s.wrenches for s in self.samples])
-        tau = np.array([s.output.tau for s in self.samples])
-        return Motion(
-            time=np.round([s.sensed.time for s in self.samples], 9) + 0.0,  # the engine adds up its steps
-            q=np.array([state.q for state in states]),
-            v=np.array([state.v for state in states]),
+        return executed_motion(
+            np.round([s.sensed.time for s in self.samples], 9) + 0.0,  # the engine adds up its steps
+            [s.output.state for s in self.samples],
             a=np.array([s.sensed.a for s in self.samples]),
-            tau=np.concatenate((np.zeros((len(tau), 6)), tau), axis=1),
-            com=np.array([state.com for state in states]),
-            angular_momentum=np.array([state.momentum[3:] for state in states]),
+            tau=np.array([s.output.tau for s in self.samples]),
             margin=margin,
-            support=np.linalg.norm(wrenches[..., :3], axis=-1) > PRESSES,
-            contact_force=wrenches,
+            contact_force=np.array([s.wrenches for s in self.samples]),
             contact_names=tuple(self.effectors),
             joint_names=tuple(joint_names),
         )
+
+
+def executed_motion(
+    time: FloatArray,
+    states: Sequence[DynamicsState],
+    *,
+    tau: FloatArray,
+    contact_force: FloatArray,
+    **series: Any,
+) -> Motion:
+    """Motion of n states, (n, nv - 6) joint torques [N.m] and (n, contacts, 6) wrenches [N, N.m].
+
+    A contact supports where it presses by more than :data:`PRESSES`; ``series`` are the other fields.
+    """
+    return Motion(
+        time=time,
+        q=np.array([state.q for state in states]),
+        v=np.array([state.v for state in states]),
+        tau=np.concatenate((np.zeros((len(tau), 6)), tau), axis=1),
+        com=np.array([state.com for state in states]),
+        angular_momentum=np.array([state.momentum[3:] for state in states]),
+        support=np.linalg.norm(contact_force[..., :3], axis=-1) > PRESSES,
+        contact_force=contact_force,
+        **series,
+    )
 
 
 def _lengths(vectors: list[FloatArray]) -> FloatArray:

@@ -2,39 +2,38 @@
 
 import math
 import time as clock
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from enum import StrEnum
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments
 from manikin.control.dynamics import DynamicsState
-from manikin.control.recovery import BalanceRecovery, FeltPush, RecoverySettings, joint_groups
+from manikin.control.recovery import BalanceRecovery, FeltPush, RecoverySettings
 from manikin.control.stepping import SteppingRecovery, StepSettings
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.scene import Scene
-from manikin.simulation.compile import compile_model
-from manikin.simulation.engine import PhysicsOptions, quiet_engine
+from manikin.simulation.compile import PhysicsOptions, compile_model
 from manikin.simulation.execute import CONTACT_TIME, JOINT_DAMPING
+from manikin.simulation.push_force import Push
 from manikin.simulation.recovery import Recovery, at_rest, judge, trunk_lean
 from manikin.simulation.recovery_record import RecoveryRecorder
-from manikin.simulation.world import Push, World
+from manikin.simulation.world import World
 
 STANDING = 0.1
 """Time to stand before the run begins, unrecorded [s]; free feet sink in by a fraction of a millimetre."""
 
 FALLEN = 0.6
-"""A centre of mass lower than this share of its height in the posture has fallen."""
-
-STRONGEST = 5000.0
-"""Largest force of a push [N]: some seven body weights, and far beyond what can be held."""
+"""Share of the height of the centre of mass in the posture below which the body has fallen [-]."""
 
 UPRIGHT = 0.3
-"""A posture whose trunk leans by more than this is not one to be pushed in [rad]."""
+"""Largest lean of the trunk in a posture to be pushed in [rad]."""
 
 
 class Feet(StrEnum):
@@ -48,16 +47,16 @@ class Feet(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class RecoveryTask:
-    """A posture and what disturbs it.
+    """A posture and the pushes that disturb it.
 
     Attributes:
-        pushes: In the run's time.
-        feet: How they are on the ground.
-        duration: Of the run [s].
+        pushes: Pushes in the run's time.
+        feet: How the feet are on the ground.
+        duration: Duration of the run [s].
         q: (nq,) the posture; the body's standing one when None.
-        friction: Of the soles.
+        friction: Coulomb coefficient of the soles [-].
         support: Effectors of the feet that carry; both when None.
-        steps: How many steps may be taken; feet that are held take none.
+        steps: Largest number of steps; feet that are held take none.
         until_at_rest: Once pushes and reaction delay are over, a body that has stood at rest for this time
             ends the run [s]; it saves most of the time where only the verdict is wanted. None for a run to
             its end, which alone shows all that follows, such as swung arms that come back.
@@ -73,52 +72,6 @@ class RecoveryTask:
     until_at_rest: float | None = None
 
 
-def push_near_com(
-    body: BodyModel,
-    force: ArrayLike,
-    start: float,
-    duration: float,
-    *,
-    frequency: float = 0.0,
-    q: ArrayLike | None = None,
-) -> Push:
-    """Push that acts near the centre of mass ([Kudoh2002]_ 3.2).
-
-    It acts on the trunk's segment at whose height the centre of mass is in the posture, at that point.
-
-    Args:
-        body: The body.
-        force: (3,) in the world, at its largest [N].
-        start: [s].
-        duration: [s].
-        frequency: Of the sine that begins with the push [Hz]; 0 for a constant force.
-        q: (nq,) the posture; the body's standing one when omitted.
-
-    Raises:
-        InputError: If the force is not finite or beyond :data:`STRONGEST`, or a time is not usable.
-    """
-    strength = np.asarray(force, dtype=np.float64)
-    if strength.shape != (3,) or not np.all(np.isfinite(strength)):
-        raise InputError(f"push force is {strength.tolist()} N; valid: three finite numbers")
-    if np.linalg.norm(strength) > STRONGEST:
-        raise InputError(f"push force is {np.linalg.norm(strength):g} N; valid: at most {STRONGEST:g} N")
-    begin = finite_number(start, "push start [s]", at_least=0.0)
-    lasting = finite_number(duration, "push duration [s]", above=0.0)
-    wave = finite_number(frequency, "push frequency [Hz]", at_least=0.0)
-    state = Configuration(body, body.standing_posture() if q is None else q)
-    segment = _segment_at(body, state)
-    rotation, position = state.segment_placement(segment)
-    return Push(segment, strength, begin, lasting, rotation.T @ (state.com - position), wave)
-
-
-def _segment_at(body: BodyModel, state: Configuration) -> str:
-    """Segment of the trunk whose centre is nearest to the centre of mass."""
-    trunk = joint_groups(body).segments["trunk"]
-    return min(
-        trunk, key=lambda name: float(np.linalg.norm(state.point(name, body.segment(name).com) - state.com))
-    )
-
-
 def recover(
     body: BodyModel,
     task: RecoveryTask,
@@ -132,24 +85,38 @@ def recover(
     Args:
         body: A body with two legs.
         task: Its posture and the pushes.
-        settings: Of the controller; the defaults when omitted.
-        scene: What is around it; a floor under its soles when omitted.
+        settings: Settings of the controller; the defaults when omitted.
+        scene: Scene around the body; a floor under its soles when omitted.
         progress: Called with the share done, in [0, 1].
 
     Returns:
-        What happened; a fall is a result, not an error.
+        The outcome; a fall is a result, not an error.
 
     Raises:
         InputError: If the body lies or leans, its soles are not level, or a number is not usable.
         BodyError: If it does not stand on two legs.
     """
     run = _Run(body, task, settings or RecoverySettings(), scene)
-    with quiet_engine():
+    with _quiet_engine():
         return run.run(progress)
 
 
+@contextmanager
+def _quiet_engine() -> Iterator[None]:
+    """Context in which a simulation that diverges leaves no ``MUJOCO_LOG.TXT`` in the working directory.
+
+    :attr:`manikin.simulation.world.World.divergence` says the same.
+    """
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
 class _Run:
-    """One recovery, from its setting up to its verdict."""
+    """One recovery, from its set-up to its verdict."""
 
     def __init__(
         self, body: BodyModel, task: RecoveryTask, settings: RecoverySettings, scene: Scene | None
@@ -176,19 +143,14 @@ class _Run:
         ground = scene or Scene([], floor_height=self.controller.area.height)
         self.world = World(compile_model(body, ground, physics, held))
         for push in task.pushes:
-            self.world.apply_push(
-                push.segment, push.force, push.start, push.duration, point=push.point,
-                frequency=push.frequency,
-            )  # fmt: skip
+            self.world.apply_push(**vars(push))
         self.substeps = max(1, round(settings.period / physics.timestep))
         feet = [name for foot in self.controller.groups.feet for name in end_segments(body, foot)]
         self.world.plan_touches([(feet, obstacle.name) for obstacle in ground])
         self.recorder = RecoveryRecorder(body, self.controller)
         self.grounds = tuple(ground.names)
         self.placed = Configuration(body)
-        self.stepping = SteppingRecovery(
-            body, self.controller, ground, replace(StepSettings(), most=task.steps)
-        )  # fmt: skip
+        self.stepping = SteppingRecovery(body, self.controller, ground, StepSettings(most=task.steps))
         ends = [push.start + max(push.duration, settings.delay) for push in task.pushes]
         self.rest_from = self.disturbed_until = max(ends, default=0.0)
 
@@ -222,9 +184,8 @@ class _Run:
                 progress(number / count)
         trace = self.recorder.trace(1e3 * control / (number + settle + 1))
         return judge(
-            self.body, self.controller, trace, self.task.pushes, str(self.task.feet), fallen,
-            self.world.touches, clock.perf_counter() - began, tuple(self.stepping.steps),
-            self.stepping.refused,
+            self.controller, trace, self.task.pushes, str(self.task.feet), fallen, self.world.touches,
+            clock.perf_counter() - began, tuple(self.stepping.steps), self.stepping.refused,
         )  # fmt: skip
 
     def _touching(self) -> dict[str, bool]:
@@ -240,11 +201,10 @@ class _Run:
         return not start - 1e-9 <= time < start + self.settings.delay - 1e-9
 
     def _felt(self, q: FloatArray, time: float) -> FeltPush:
-        """What pushes now, as the skin feels it."""
+        """Wrench and generalised force of the pushes that act now, as the skin feels them."""
         acting = [push for push in self.task.pushes if push.active(time)]
-        felt = FeltPush.none(self.body.nv)
         if not acting:
-            return felt
+            return FeltPush.none(self.body.nv)
         state = self.placed.update(q)
         wrench, generalised = np.zeros(6), np.zeros(self.body.nv)
         for push in acting:
@@ -274,10 +234,10 @@ class _Run:
 
 def _check_standing(controller: BalanceRecovery, q: FloatArray) -> None:
     """Refuse a body that lies, leans or is about to fall over."""
-    place = controller.com[:2]
-    if controller.area.reach(place) >= 1.0:
+    com = controller.com[:2]
+    if controller.area.reach(com) >= 1.0:
         raise InputError(
-            f"the body does not stand: its centre of mass is over {np.round(place, 3).tolist()}, "
+            f"the body does not stand: its centre of mass is over {np.round(com, 3).tolist()}, "
             "outside its soles; valid: a posture that stands on both feet"
         )
     lean = trunk_lean(Configuration(controller.body, q), controller.groups)

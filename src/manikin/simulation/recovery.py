@@ -1,4 +1,4 @@
-"""The outcome of a push: whether the body stands, and by which means it stayed on its feet."""
+"""The outcome of a push: whether the body stands, and by which strategies it stayed on its feet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from manikin.body import BodyModel, Configuration
+from manikin.body import Configuration
 from manikin.contact import Contact
 from manikin.control.recovery import BalanceRecovery, JointGroups, Strategy, capture_point
 from manikin.control.stepping import StepTaken
@@ -14,29 +14,30 @@ from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable
+from manikin.simulation.carrying import Touch
+from manikin.simulation.push_force import Push
 from manikin.simulation.recovery_record import RecoveryTrace
-from manikin.simulation.world import Push, Touch
 
 STANDS_HEIGHT = 0.95
-"""A standing body has its centre of mass at least at this share of its first height; kneeling, a human has
-some 0.7 of it and lying 0.2."""
+"""Least height of the centre of mass of a standing body, as a share of its first one [-]; kneeling, a human
+has some 0.7 of it and lying 0.2."""
 
 STANDS_LEAN = 0.3
-"""Its trunk leans by at most this [rad]."""
+"""Largest lean of the trunk of a standing body [rad]."""
 
 STANDS_SPEED = 0.1
-"""The speed of its centre of mass is at most this [m/s]."""
+"""Largest speed of the centre of mass of a standing body [m/s]."""
 
 FOOT_MOVED = 0.02
-"""A foot that ends farther than this from where it stood has moved [m]."""
+"""Largest motion of a foot without a step [m]."""
 
 FOOT_SLID = 0.1
-"""After a step a foot that slides by up to this is still one to stand on [m]."""
+"""Largest slide of a foot after a step [m]."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recovery(Displayed):
-    """What became of a push.
+    """Outcome of a push.
 
     Attributes:
         trace: Every control step.
@@ -50,10 +51,10 @@ class Recovery(Displayed):
         capture_point: Farthest reach of the capture point over the support area; 1 is its edge.
         foot_motion: Farthest that a foot is, in the end, from where it was put down [m].
         control_from: When the control acted first after the first push began [s].
-        soles: Where the feet that carry stand in the end.
+        soles: Contacts of the feet that carry in the end.
         steps: Steps that were taken.
         wall: Wall time [s].
-        requirements: What a body that stands in the end keeps.
+        requirements: Requirements on a body that stands in the end.
     """
 
     trace: RecoveryTrace
@@ -74,7 +75,7 @@ class Recovery(Displayed):
 
     @property
     def recovered(self) -> bool:
-        """Whether the body stands at the end, at rest and upright, on its own feet where they were."""
+        """Whether the body stands at the end, at rest and upright, on its feet where they were."""
         return not self.failure
 
     def strategy_share(self, strategy: Strategy) -> float:
@@ -125,7 +126,6 @@ class Recovery(Displayed):
 
 
 def judge(
-    body: BodyModel,
     controller: BalanceRecovery,
     trace: RecoveryTrace,
     pushes: Sequence[Push],
@@ -136,13 +136,12 @@ def judge(
     steps: tuple[StepTaken, ...] = (),
     refused: str = "",
 ) -> Recovery:
-    """Say what became of a push.
+    """Outcome of a push.
 
     Args:
-        body: The body.
-        controller: What kept it.
-        trace: What happened.
-        pushes: What disturbed it.
+        controller: Controller of the body.
+        trace: Every control step.
+        pushes: Pushes that disturbed it.
         feet: How its feet were on the ground.
         fallen: Why the run was ended before its time; empty when it was not.
         touches: Unplanned touches; those of the body with itself, as hand and thigh, are no support.
@@ -151,32 +150,33 @@ def judge(
         refused: Why a step that was needed was not taken.
     """
     motion, area = trace.motion, controller.area
+    ahead = capture_point(motion.com, trace.com_velocity, controller.com[2] - area.height)
     start = min((push.start for push in pushes), default=0.0)
     control_from = start + controller.settings.delay
-    direction = _direction(pushes)
-    rests_from = _rests_from(body, controller, trace)
+    level = [push.force[:2] for push in pushes if np.linalg.norm(push.force[:2]) > 0.0]
+    rests_from = _rests_from(controller, trace)
     excess = -trace.zmp_inside
     counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
-    moved = _foot_motion(body, controller.soles, motion, steps)
-    segments = {segment.name for segment in body.segments}
+    moved, most = _foot_motion(controller, motion, steps), FOOT_SLID if steps else FOOT_MOVED
+    segments = {segment.name for segment in controller.body.segments}
     propped = [touch for touch in touches if touch.other not in segments]
-    fault = fallen or _fault(rests_from is not None, moved, propped, FOOT_SLID if steps else FOOT_MOVED)
+    fault = fallen or _fault(rests_from is not None, moved, propped, most)
     return Recovery(
         trace=trace,
         feet=feet,
         failure=_explained(fault, controller, trace, control_from, refused),
-        direction=direction,
+        direction=level[0] / float(np.linalg.norm(level[0])) if level else np.zeros(2),
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
         time_to_rest=None if rests_from is None else max(0.0, rests_from - start),
         final_height=float(motion.com[-1, 2] - area.height),
-        capture_point=_capture_reach(controller, trace),
+        capture_point=max(s.area.reach(point) for s, point in zip(trace.standings, ahead, strict=True)),
         foot_motion=moved,
         control_from=control_from,
         soles=controller.soles,
         steps=steps,
         wall=wall,
-        requirements=_requirements(motion, fallen, propped, rests_from, moved, bool(steps)),
+        requirements=_requirements(motion, fallen, propped, rests_from, moved, most),
     )
 
 
@@ -186,7 +186,7 @@ def _requirements(
     propped: Sequence[Touch],
     rests_from: float | None,
     moved: float,
-    stepped: bool,
+    most: float,
 ) -> RequirementTable:
     end, first = float(motion.time[-1]), propped[0] if propped else None
     return RequirementTable((
@@ -196,8 +196,7 @@ def _requirements(
                     "" if first is None else f"{first.segment} on {first.other}"),
         Requirement("at_rest", "stands at rest and upright at the end", "", float(rests_from is not None),
                     ">=", 1.0, end),
-        Requirement("max_foot_motion_m", "a foot has moved by", "m", moved, "<=",
-                    FOOT_SLID if stepped else FOOT_MOVED, end),
+        Requirement("max_foot_motion_m", "a foot has moved by", "m", moved, "<=", most, end),
     ))  # fmt: skip
 
 
@@ -214,8 +213,8 @@ def at_rest(
     """Whether a body stands at rest: high, upright and slow, its centre of mass over its soles.
 
     Args:
-        state: Of the body; it is moved to ``q`` where the trunk has to be looked at.
-        controller: What keeps it.
+        state: State of the body; it is moved to ``q`` where the trunk has to be measured.
+        controller: Controller of the body.
         q: (nq,) configuration.
         com: (3,) centre of mass [m].
         velocity: (3,) of the centre of mass [m/s].
@@ -229,10 +228,10 @@ def at_rest(
     )
 
 
-def _rests_from(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -> float | None:
+def _rests_from(controller: BalanceRecovery, trace: RecoveryTrace) -> float | None:
     """Time from which the body stands at rest to the end [s]; None if it does not."""
     samples = zip(trace.motion.time, trace.motion.q, trace.motion.com, trace.com_velocity, strict=True)
-    state, since = Configuration(body), None
+    state, since = Configuration(controller.body), None
     for time, *sample in reversed(list(samples)):
         if not at_rest(state, controller, *sample):
             break
@@ -253,7 +252,7 @@ def _fault(rests: bool, moved: float, touches: Sequence[Touch], most: float) -> 
 def _explained(
     fault: str, controller: BalanceRecovery, trace: RecoveryTrace, control_from: float, refused: str
 ) -> str:
-    """The fault with where the capture point was when the control began, if that was outside."""
+    """The fault with the place of the capture point when the control began, if that was outside."""
     if not fault:
         return ""
     if refused:
@@ -267,33 +266,17 @@ def _explained(
     return f"{fault}; the capture point was {outside:.3f} m beyond the soles when the control began"
 
 
-def _foot_motion(
-    body: BodyModel, soles: Sequence[Contact], motion: Motion, steps: Sequence[StepTaken]
-) -> float:
+def _foot_motion(controller: BalanceRecovery, motion: Motion, steps: Sequence[StepTaken]) -> float:
     """Farthest that a foot is in the end from where it was put down, or where it was in the beginning [m]."""
-    first, last = Configuration(body, motion.q[0]), Configuration(body, motion.q[-1])
-    places = {contact.effector: first.effector_placement(contact.effector)[1] for contact in soles}
+    first, last = (Configuration(controller.body, motion.q[row]) for row in (0, -1))
+    places = {sole.effector: first.effector_placement(sole.effector)[1] for sole in controller.soles}
     places |= {step.foot: step.position for step in steps}
     return max(
         float(np.linalg.norm(last.effector_placement(name)[1] - place)) for name, place in places.items()
     )
 
 
-def _capture_reach(controller: BalanceRecovery, trace: RecoveryTrace) -> float:
-    height = controller.com[2] - controller.area.height
-    ahead = capture_point(trace.motion.com, trace.com_velocity, height)
-    return max(standing.area.reach(point) for standing, point in zip(trace.standings, ahead, strict=True))
-
-
-def _direction(pushes: Sequence[Push]) -> FloatArray:
-    for push in pushes:
-        size = float(np.linalg.norm(push.force[:2]))
-        if size > 0.0:
-            return push.force[:2] / size
-    return np.zeros(2)
-
-
 def _impulse(push: Push) -> float:
-    """Of a constant force, or of one half wave of a sine [N.s]."""
+    """Impulse of a constant force, or of one half wave of a sine [N.s]."""
     size = float(np.linalg.norm(push.force))
     return size / (np.pi * push.frequency) if push.frequency > 0.0 else size * push.duration

@@ -1,4 +1,4 @@
-"""What happens while a pushed body keeps its balance, step by step, and what follows from it."""
+"""Every control step of a pushed body that keeps its balance, as a motion with its measures."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,15 +7,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from manikin.balance.motion_margin import motion_margin
 from manikin.body import BodyModel
 from manikin.body.limbs import end_segments
 from manikin.contact import Stance, default_normal_force_cap
 from manikin.control.recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, skew
-from manikin.simulation.carrying import CarriedPoints, CarryingContacts
-from manikin.simulation.world import Sensed
+from manikin.simulation.carrying import CarriedPoints, CarryingContacts, Sensed, carried_margin
+from manikin.simulation.recorder import executed_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,13 +22,13 @@ class RecoveryTrace:
     """Samples of a recovery, one per control step.
 
     Attributes:
-        motion: What happened; ``contact_force`` is what the ground did to each foot, measured on free feet
+        motion: Executed motion; ``contact_force`` is what the ground did to each foot, measured on free feet
             and, on held ones, the measured whole in equal shares, and ``margin`` that of the measured wrench
             of the ground about the centre of mass, in the polytope of the contacts that carry.
         zmp: (n, 2) of the measured force of the ground over the step, NaN where nothing carries [m].
         zmp_inside: (n,) distance of the ZMP to the edge of the soles that carry, negative outside [m].
         standings: n ways to stand about which the balance was kept.
-        strategies: (n,) what decided the torques.
+        strategies: (n,) strategy that decided the torques.
         gain_share: (n,) share of the largest posture gains.
         com_velocity: (n, 3) [m/s].
         momenta: Measures the angular momentum of groups of segments.
@@ -63,9 +62,8 @@ class RecoveryTrace:
     def work(self, group: str) -> tuple[float, float]:
         """Work given and taken by the joints of a group [J], both positive."""
         power, time = self.power[group], self.motion.time
-        return float(np.trapezoid(np.maximum(power, 0.0), time)), float(
-            np.trapezoid(np.maximum(-power, 0.0), time)
-        )
+        given, taken = (np.trapezoid(np.maximum(part, 0.0), time) for part in (power, -power))
+        return float(given), float(taken)
 
 
 class RecoveryRecorder:
@@ -88,12 +86,12 @@ class RecoveryRecorder:
         """Add a step.
 
         Args:
-            time: Of its beginning [s].
-            output: What the controller decided then.
-            sensed: What was felt in the first engine step after it.
+            time: Beginning of the step [s].
+            output: Decision of the controller then.
+            sensed: Measurements of the first engine step after it.
             wrench: (6,) mean force and moment of the ground about the world's origin.
             carried: Contact points of the scene that carried that wrench.
-            held: Whether the feet are held, which is not felt as a touch.
+            held: Whether the feet are welded to the ground, which is no touch.
         """
         self._stances.append(
             Stance(output.standing.soles, default_normal_force_cap(self._body.mass))
@@ -120,10 +118,23 @@ class RecoveryRecorder:
         states = [output.state for output in outputs]
         torque = np.array([output.tau for output in outputs])
         speed = np.array([state.v[6:] for state in states])
-        joints = self._controller.groups.joints
-        zmp = np.array([self._zmp(wrench) for *_, wrench in self._rows])
+        joints, height = self._controller.groups.joints, self._controller.area.height
+        wrenches = np.array([wrench for *_, wrench in self._rows])
+        # About the origin instead of the centre of mass: the formula holds for any point.
+        zmp = np.array([zmp_of(wrench[:3], wrench[3:], np.zeros(3), height) for wrench in wrenches])
+        # Held feet are judged by the soles on which the body stands.
+        com = np.array([state.com for state in states])
         return RecoveryTrace(
-            motion=self._motion(torque),
+            motion=executed_motion(
+                np.array([time for time, *_ in self._rows]),
+                states,
+                a=np.array([a for _, _, a, _ in self._rows]),
+                tau=torque,
+                margin=carried_margin(self._stances, wrenches, com).margin,
+                contact_force=np.array(self._forces),
+                contact_names=self._controller.groups.feet,
+                joint_names=self._body.joint_names,
+            ),
             zmp=zmp,
             zmp_inside=np.array(
                 [float(o.standing.area.inside(point)) for o, point in zip(outputs, zmp, strict=True)]
@@ -140,30 +151,6 @@ class RecoveryRecorder:
             control_ms=control_ms,
         )
 
-    def _zmp(self, wrench: FloatArray) -> FloatArray:
-        # About the origin instead of the centre of mass: the formula holds for any point.
-        return zmp_of(wrench[:3], wrench[3:], np.zeros(3), self._controller.area.height)
-
-    def _motion(self, torque: FloatArray) -> Motion:
-        outputs = [output for _, output, _, _ in self._rows]
-        states = [output.state for output in outputs]
-        feet = self._controller.groups.feet
-        forces = np.array(self._forces)
-        return Motion(
-            time=np.array([time for time, *_ in self._rows]),
-            q=np.array([state.q for state in states]),
-            v=np.array([state.v for state in states]),
-            a=np.array([a for _, _, a, _ in self._rows]),
-            tau=np.concatenate((np.zeros((len(torque), 6)), torque), axis=1),
-            com=np.array([state.com for state in states]),
-            angular_momentum=np.array([state.momentum[3:] for state in states]),
-            margin=self._margins(),
-            support=np.linalg.norm(forces[..., :3], axis=-1) > 1.0,
-            contact_force=forces,
-            contact_names=feet,
-            joint_names=self._body.joint_names,
-        )
-
     def _carrying_stance(self, output: RecoveryOutput, carried: CarriedPoints) -> Stance:
         """Stance of the contacts that really carry: soles as far as they touch, and anything else."""
         frames = output.state.frames
@@ -171,23 +158,6 @@ class RecoveryRecorder:
         return self._carrying.stance(
             carried, lambda name: (frames[name].position, frames[name].rotation), soles
         )
-
-    def _margins(self) -> FloatArray:
-        """(n,) margins of the measured wrenches about the centre of mass, in the contacts that carried.
-
-        Held feet are welded to the ground; they are judged by the soles on which the body stands.
-        """
-        numbers, stances = dict[tuple[int, ...], int](), list[Stance]()
-        rows = np.empty(len(self._stances), dtype=np.int64)
-        for row, stance in enumerate(self._stances):
-            key = tuple(id(contact) for contact in stance)
-            if key not in numbers:
-                numbers[key] = len(stances)
-                stances.append(stance)
-            rows[row] = numbers[key]
-        wrenches = np.array([wrench for *_, wrench in self._rows]).reshape(-1, 6)
-        com = np.array([output.state.com for _, output, *_ in self._rows]).reshape(-1, 3)
-        return motion_margin(stances, rows, wrenches, com).margin
 
 
 class SegmentMomenta:
@@ -211,8 +181,10 @@ class SegmentMomenta:
             com: (3,) centre of mass [m].
         """
         pin.forwardKinematics(self._model, self._data, q, v)
-        velocity = self._mean_velocity()
-        found: dict[str, FloatArray] = {}
+        # The velocity of the centre of mass is taken off, so that no group's share depends on it.
+        momentum = pin.computeCentroidalMomentum(self._model, self._data).linear
+        velocity = np.array(momentum) / float(pin.computeTotalMass(self._model))
+        momenta: dict[str, FloatArray] = {}
         for group, members in self._groups.items():
             total = np.zeros(3)
             for frame, segment in members:
@@ -223,11 +195,5 @@ class SegmentMomenta:
                 arm = placement.translation + rotation @ segment.com - com
                 total += rotation @ (segment.inertia @ twist.angular)
                 total += segment.mass * (skew(arm) @ (speed - velocity))
-            found[group] = total
-        return found
-
-    def _mean_velocity(self) -> FloatArray:
-        """(3,) of the centre of mass; taken off, so that each group's share does not depend on it."""
-        return np.array(pin.computeCentroidalMomentum(self._model, self._data).linear) / float(
-            pin.computeTotalMass(self._model)
-        )
+            momenta[group] = total
+        return momenta

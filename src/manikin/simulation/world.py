@@ -1,9 +1,8 @@
-"""A running simulation: state, joint torques, pushes, grips and felt contacts."""
+"""A running simulation: state, joint torques, pushes, grips and contact forces."""
 
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,79 +11,33 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.body.load import with_masses
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
-from manikin.simulation.carrying import CarriedPoints
+from manikin.simulation.carrying import CarriedPoints, Sensed, Touch
 from manikin.simulation.compile import SimulationModel, compile_model, obstacle_of, root_rotation
+from manikin.simulation.push_force import Push
 
+_NOTHING = (np.zeros((0, 2), dtype=int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+"""Contacts that carry in a step without any: geometries, points, normals, forces, friction."""
 
-@dataclass(frozen=True)
-class Touch:
-    """The first time of a touch that was not planned.
-
-    Attributes:
-        time: [s].
-        segment: Segment of the body.
-        other: Obstacle or other segment.
-        force: Largest normal force of any instant, of all its points together [N].
-    """
-
-    time: float
-    segment: str
-    other: str
-    force: float = 0.0
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for the run's summary."""
-        return {"segment": self.segment, "other": self.other, "time_s": self.time, "max_force_N": self.force}
-
-    def __str__(self) -> str:
-        return f"{self.segment} touches {self.other} at {self.time:.3f} s"
-
-
-@dataclass(frozen=True, eq=False)
-class Push:
-    """A force on a point of a segment, constant or a sine of time.
-
-    Attributes:
-        segment: Name of the segment.
-        force: (3,) in the world, at its largest [N].
-        start: [s].
-        duration: [s].
-        point: (3,) where it acts in the segment's frame [m]; None for the segment's centre of mass.
-        frequency: Of the sine that begins with the push [Hz]; 0 for a constant force.
-    """
-
-    segment: str
-    force: FloatArray
-    start: float
-    duration: float
-    point: FloatArray | None = None
-    frequency: float = 0.0
-
-    def active(self, time: float) -> bool:
-        """Whether the force acts in the step that begins at ``time``."""
-        return self.start - 1e-9 <= time < self.start + self.duration - 1e-9
-
-    def at(self, time: float) -> FloatArray:
-        """(3,) force in the step that begins at ``time`` [N]."""
-        if not self.active(time):
-            return np.zeros(3)
-        wave = np.sin(2.0 * np.pi * self.frequency * (time - self.start)) if self.frequency > 0.0 else 1.0
-        return float(wave) * self.force
+_INERTIAL = (
+    "body_mass", "body_ipos", "body_iquat", "body_inertia", "body_subtreemass", "body_invweight0", "dof_M0",
+    "dof_invweight0", "actuator_acc0",
+)  # fmt: skip
+"""Arrays of the engine's model that depend on the masses."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
     """A hand's hold on a point of the scene: a stiff, damped spring of limited force.
 
-    A contact engine has no fingers; a grasp is felt as this spring, and the hand slips
-    (the spring saturates) where more is asked of it than it may hold.
+    A contact engine has no fingers; this spring stands for a grasp, and it saturates (the hand slips) where
+    more is asked of it than it may hold.
 
     Attributes:
         effector: Name of the gripping effector.
         position: (3,) where it holds on [m].
         max_force: Limit along each world axis [N].
-        stiffness: [N/m].
-        damping: [N.s/m].
+        stiffness: Stiffness of the spring [N/m].
+        damping: Damping of the spring [N.s/m].
     """
 
     effector: str
@@ -94,82 +47,8 @@ class Grip:
     damping: float = 200.0
 
 
-@dataclass(frozen=True, eq=False)
-class Sensed:
-    """What was felt in one engine step; all values belong to the state at its beginning.
-
-    Attributes:
-        time: Beginning of the step [s].
-        a: (nv,) generalised acceleration [m/s^2, rad/s^2].
-        segments: Segment of each of the k contact points.
-        others: Obstacle, or other segment, of each contact point.
-        on_scene: (k,) whether ``others`` is an obstacle.
-        positions: (k, 3) of the contact points [m].
-        normals: (k, 3) unit, out of ``others``.
-        forces: (k, 3) on ``segments`` [N].
-        depths: (k,) penetration [m].
-        grips: Force [N] and its point [m] of every grip, (2, 3) each, by effector.
-    """
-
-    time: float
-    a: FloatArray
-    segments: tuple[str, ...]
-    others: tuple[str, ...]
-    on_scene: NDArray[np.bool_]
-    positions: FloatArray
-    normals: FloatArray
-    forces: FloatArray
-    depths: FloatArray
-    grips: Mapping[str, FloatArray]
-
-    def wrench(self, about: FloatArray, segments: Sequence[str] | None = None) -> FloatArray:
-        """(6,) force and moment of the scene, grips apart.
-
-        Args:
-            about: (3,) point of the moments [m].
-            segments: Names of the segments to count; the whole body when omitted.
-        """
-        chosen = self.on_scene
-        if segments is not None:
-            chosen = chosen & np.array([name in segments for name in self.segments], dtype=bool)
-        forces, arms = self.forces[chosen], self.positions[chosen] - about
-        return np.concatenate((forces.sum(axis=0), cross(arms, forces).sum(axis=0)))
-
-    def grip_wrench(self, effector: str, about: FloatArray) -> FloatArray:
-        """(6,) force and moment of the grip of an effector; zero without one."""
-        if effector not in self.grips:
-            return np.zeros(6)
-        force, position = self.grips[effector]
-        return np.concatenate((force, cross(position - about, force)))
-
-
-@dataclass(frozen=True, eq=False)
-class _Pressed:
-    """Contacts of one engine step that carry: geometries, points, engine's normals, forces, friction."""
-
-    geoms: NDArray[np.int_]
-    positions: FloatArray
-    normals: FloatArray
-    forces: FloatArray
-    friction: FloatArray
-
-    @classmethod
-    def nothing(cls) -> "_Pressed":
-        return cls(np.zeros((0, 2), dtype=int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-
-
-_INERTIAL = (
-    "body_mass", "body_ipos", "body_iquat", "body_inertia", "body_subtreemass", "body_invweight0", "dof_M0",
-    "dof_invweight0", "actuator_acc0",
-)  # fmt: skip
-"""Arrays of the engine's model that depend on the masses."""
-
-
 class World:
-    """Steps the physics engine and tells what it feels.
-
-    States go in and come out in Pinocchio's convention.
-    """
+    """The physics engine with a body in a scene; states go in and come out in Pinocchio's convention."""
 
     def __init__(self, model: SimulationModel, padded: Sequence[str] = ()) -> None:
         """Make a world at rest in the zero configuration.
@@ -197,7 +76,7 @@ class World:
         self._touches: dict[tuple[str, str], Touch] = {}
         self._depth, self._padded_depth = 0.0, 0.0
         self._total, self._steps = np.zeros(6), 0
-        self._carried: list[_Pressed] = []
+        self._carried: list[tuple[NDArray, ...]] = []
         self._elliptic = self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
         self._is_segment = np.array([segment for _, segment in self._owners], dtype=bool)
 
@@ -219,7 +98,7 @@ class World:
         return self.model.v_from_mujoco(self._data.qpos, self._data.qvel)
 
     def reset(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> None:
-        """Put the body into a state and forget what was felt; pushes and grips stay.
+        """Put the body into a state and forget all measurements; pushes and grips stay.
 
         Args:
             q: (nq,) configuration.
@@ -243,11 +122,7 @@ class World:
     # --- what acts -------------------------------------------------------------------------
 
     def carry(self, masses: Mapping[str, float]) -> None:
-        """Give effectors point masses to carry in place of those before, at rest in their frames.
-
-        Args:
-            masses: [kg] by the name of the effector; none sets everything down.
-        """
+        """Set the point masses that effectors carry, at rest in their frames [kg]; none sets all down."""
         if masses == self._load:
             return
         model = self.model
@@ -266,15 +141,7 @@ class World:
         point: ArrayLike | None = None,
         frequency: float = 0.0,
     ) -> None:
-        """Push a segment.
-
-        Args:
-            segment: Name of the segment.
-            force: (3,) in the world, at its largest [N].
-            start: [s] of simulated time.
-            duration: [s].
-            point: (3,) where it acts in the segment's frame [m]; its centre of mass when omitted.
-            frequency: Of the sine that begins with the push [Hz]; 0 for a constant force.
+        """Push a segment; the arguments are those of :class:`~manikin.simulation.push_force.Push`.
 
         Raises:
             BodyError: If there is no such segment.
@@ -295,8 +162,7 @@ class World:
     def grip(self, grip: Grip) -> None:
         """Let an effector hold on; replaces what it held.
 
-        The gripping segment does not collide with the scene meanwhile: the grip stands for
-        all that the scene does to it.
+        The gripping segment does not collide with the scene meanwhile: the grip stands for all contact.
         """
         self.model.site_id(grip.effector)
         self._grips[grip.effector] = grip
@@ -322,18 +188,17 @@ class World:
     def _set_scene_contact(self, effector: str, enabled: bool) -> None:
         """Let the segment of an effector collide with obstacles or not; with the body it does."""
         mask = self._mask((self.model.body.effector(effector).segment,), True)
-        compiled = self.model.mujoco
-        self._model.geom_contype[mask] = compiled.geom_contype[mask] if enabled else _NO_SCENE_CONTYPE
-        self._model.geom_conaffinity[mask] = (
-            compiled.geom_conaffinity[mask] if enabled else compiled.geom_conaffinity[mask] & 1
-        )
+        bits, affinity = self.model.mujoco.geom_contype[mask], self.model.mujoco.geom_conaffinity[mask]
+        # Obstacles do not answer to the bit 4; segments do through their affinity.
+        self._model.geom_contype[mask] = bits if enabled else 4
+        self._model.geom_conaffinity[mask] = affinity if enabled else affinity & 1
 
     def plan_touches(
         self,
         pairs: Sequence[tuple[Sequence[str], str]],
         leaning: Sequence[tuple[Sequence[str], str]] = (),
     ) -> None:
-        """Say which touches are planned from now on; all others are reported.
+        """Set which touches are planned from now on; all others are reported.
 
         Args:
             pairs: Segments and the obstacle that they are supported by.
@@ -349,14 +214,13 @@ class World:
 
     def _touching(self, pairs: Sequence[tuple[Sequence[str], str]]) -> NDArray[np.bool_]:
         """(geometries, geometries) whether two geometries are a segment and the obstacle of a pair."""
-        found = np.zeros_like(self._planned)
+        touching = np.zeros_like(self._planned)
         for segments, obstacle in pairs:
-            body, scene = self._mask(tuple(segments), True), self._mask((obstacle,), False)
-            if not scene.any():
+            if not self._mask((obstacle,), False).any():
                 names = sorted({name for name, segment in self._owners if not segment})
                 raise InputError(f"planned touch of obstacle {obstacle!r}; valid: one of {names}")
-            found |= np.outer(body, scene) | np.outer(scene, body)
-        return found
+            touching |= self._table(tuple(segments), obstacle)
+        return touching
 
     # --- time ------------------------------------------------------------------------------
 
@@ -380,9 +244,8 @@ class World:
     def mean_wrench(self) -> FloatArray:
         """(6,) mean wrench of the scene on the body since the last call, grips included.
 
-        What presses where the body only leans does not count: it acts like a push. Moments are about
-        the world origin. Of all engine steps since then, not only of the last: an impact of one step
-        counts with the share of time that it lasts.
+        Moments are about the world origin. Where the body only leans, nothing counts: that acts like a push.
+        The mean is over all engine steps since then: an impact of one step counts with its share of time.
         """
         mean = self._total / max(self._steps, 1)
         self._total[:], self._steps = 0.0, 0
@@ -394,17 +257,17 @@ class World:
         A point counts as often as it was met, each time with its force over the number of engine steps.
         Where the body only leans, nothing counts, as in :meth:`mean_wrench`.
         """
-        steps, self._carried = self._carried or [_Pressed.nothing()], []
-        geoms = np.concatenate([step.geoms for step in steps])
+        steps, self._carried = self._carried or [_NOTHING], []
+        geoms, positions, normals, forces, friction = map(np.concatenate, zip(*steps, strict=True))
         second = self._is_segment[geoms[:, 1]]
         return CarriedPoints(
             tuple(self._owners[geom][0] for geom in np.where(second, geoms[:, 1], geoms[:, 0]).tolist()),
             tuple(self._owners[geom][0] for geom in np.where(second, geoms[:, 0], geoms[:, 1]).tolist()),
-            np.concatenate([step.positions for step in steps]),
+            positions,
             # The engine's normal goes from the first geometry to the second.
-            np.where(second, 1.0, -1.0)[:, None] * np.concatenate([step.normals for step in steps]),
-            np.concatenate([step.forces for step in steps]) / len(steps),
-            np.concatenate([step.friction for step in steps]),
+            np.where(second, 1.0, -1.0)[:, None] * normals,
+            forces / len(steps),
+            friction,
         )
 
     def _normal_forces(self) -> FloatArray:
@@ -412,11 +275,14 @@ class World:
         address = self._data.contact.efc_address
         if self._elliptic:
             return np.where(address >= 0, self._data.efc_force[np.maximum(address, 0)], 0.0)
-        local, found = np.zeros(6), np.zeros(self._data.ncon)
+        return self._contact_forces()[:, 0]
+
+    def _contact_forces(self) -> FloatArray:
+        """(ncon, 6) force and torque of each contact of the last step in its frame [N, N.m]."""
+        forces = np.zeros((self._data.ncon, 6))
         for number in range(self._data.ncon):
-            mujoco.mj_contactForce(self._model, self._data, number, local)
-            found[number] = local[0]
-        return found
+            mujoco.mj_contactForce(self._model, self._data, number, forces[number])
+        return forces
 
     def _constraint_wrench(self) -> FloatArray:
         """Wrench of all contacts and grips in the last step; inner forces cancel in the root."""
@@ -471,14 +337,14 @@ class World:
 
     def _note_contacts(self) -> None:
         if self._data.ncon == 0:
-            self._carried.append(_Pressed.nothing())
+            self._carried.append(_NOTHING)
             return
         contact = self._data.contact
         geoms, depths = contact.geom, -contact.dist
         forces = self._normal_forces() if self._data.nefc else np.zeros(self._data.ncon)
         carries = (self._is_segment[geoms[:, 0]] != self._is_segment[geoms[:, 1]]) & (forces > 0.0)
         carries &= ~self._leaning[geoms[:, 0], geoms[:, 1]]
-        self._carried.append(_Pressed(
+        self._carried.append((
             geoms[carries], contact.pos[carries], contact.frame[carries, :3], forces[carries],
             contact.friction[carries, 0],
         ))  # fmt: skip
@@ -498,16 +364,20 @@ class World:
             known = self._touches.get(pair, Touch(self._before[2], *pair))
             self._touches[pair] = replace(known, force=max(known.force, force))
 
-    # --- what is felt ----------------------------------------------------------------------
+    # --- what is measured ------------------------------------------------------------------
 
     def touching(self, segments: Sequence[str], obstacle: str) -> bool:
         """Whether one of the segments was in contact with the obstacle in the last engine step."""
-        key = tuple(segments), obstacle
-        if key not in self._tables:
-            body, scene = self._mask(key[0], True), self._mask((obstacle,), False)
-            self._tables[key] = np.outer(body, scene) | np.outer(scene, body)
         geoms = self._data.contact.geom
-        return bool(self._tables[key][geoms[:, 0], geoms[:, 1]].any())
+        return bool(self._table(tuple(segments), obstacle)[geoms[:, 0], geoms[:, 1]].any())
+
+    def _table(self, segments: tuple[str, ...], obstacle: str) -> NDArray[np.bool_]:
+        """(geometries, geometries) whether two geometries are one of the segments and the obstacle."""
+        key = segments, obstacle
+        if key not in self._tables:
+            body, scene = self._mask(segments, True), self._mask((obstacle,), False)
+            self._tables[key] = np.outer(body, scene) | np.outer(scene, body)
+        return self._tables[key]
 
     def _mask(self, names: tuple[str, ...], segments: bool) -> NDArray[np.bool_]:
         if (names, segments) not in self._masks:
@@ -519,15 +389,12 @@ class World:
     def sense(self) -> Sensed:
         """Return accelerations and contact forces of the last engine step."""
         qpos, qvel, time = self._before
-        contact, count = self._data.contact, self._data.ncon
+        contact = self._data.contact
         parties = [self._parties(first, second) for first, second in contact.geom.tolist()]
         # The engine's contact frame has its x axis from the first geometry to the second and
         # its force is the one on the second.
         sign = np.array([-1.0 if swapped else 1.0 for *_, swapped in parties]).reshape(-1, 1)
         frames = np.array(contact.frame).reshape(-1, 3, 3)
-        local = np.zeros((count, 6))
-        for number in range(count):
-            mujoco.mj_contactForce(self._model, self._data, number, local[number])
         return Sensed(
             time=time,
             a=self.model.a_from_mujoco(qpos, qvel, self._data.qacc),
@@ -536,7 +403,7 @@ class World:
             on_scene=np.array([other not in self._segments for _, other, _ in parties], dtype=bool),
             positions=np.array(contact.pos).reshape(-1, 3),
             normals=sign * frames[:, 0],
-            forces=sign * np.einsum("ki,kij->kj", local[:, :3], frames),
+            forces=sign * np.einsum("ki,kij->kj", self._contact_forces()[:, :3], frames),
             depths=-np.array(contact.dist).reshape(-1),
             grips=dict(self._grip_forces),
         )
@@ -555,25 +422,22 @@ class World:
 
     @property
     def penetration(self) -> float:
-        """Deepest penetration of any contact since the last reset [m], but for those of paddings."""
+        """Deepest penetration of any contact since the last reset, paddings apart [m]."""
         return self._depth
 
     @property
     def padding_compression(self) -> float:
-        """How far the body has sunk into something padded since the last reset [m]."""
+        """Deepest penetration of a padding since the last reset [m]."""
         return self._padded_depth
 
     @property
     def divergence(self) -> str:
-        """What the engine complains about (``"BADQACC"``), or an empty text."""
+        """Fatal warning of the engine, such as ``"BADQACC"``; empty without one."""
         for kind in _FATAL:
             if self._data.warning[kind].number:
                 return kind.name.removeprefix("mjWARN_")
         return ""
 
-
-_NO_SCENE_CONTYPE = 4
-"""A collision bit that obstacles do not answer to; segments do through their affinity."""
 
 _FATAL = (
     mujoco.mjtWarning.mjWARN_BADQPOS,

@@ -1,13 +1,7 @@
 """Recovery from pushes without a step: posture control and a quadratic program ([Kudoh2002]_)."""
 
 from manikin.control.recovery.recovery_controller import BalanceRecovery, RecoveryOutput
-from manikin.control.recovery.recovery_problem import (
-    Objective,
-    RecoveryJointBounds,
-    RecoveryProblem,
-    build_recovery_qp,
-    leg_symmetry,
-)
+from manikin.control.recovery.recovery_problem import Objective, leg_symmetry
 from manikin.control.recovery.standing import (
     ClosedLoop,
     FeltPush,
@@ -22,8 +16,6 @@ from manikin.control.recovery.standing import (
     zmp_rows,
 )
 from manikin.control.recovery.strategy import (
-    ComLaw,
-    PostureControl,
     RecoverySettings,
     Strategy,
     StrategySwitch,
@@ -31,28 +23,22 @@ from manikin.control.recovery.strategy import (
     com_law,
     posture_control,
 )
-from manikin.control.recovery.turning import EdgeLimit, Turning, edge_limits, held_impulse
+from manikin.control.recovery.turning import Turning, edge_limits, held_impulse
 
 __all__ = [
     "BalanceRecovery",
     "ClosedLoop",
-    "ComLaw",
-    "EdgeLimit",
     "FeltPush",
     "JointGroups",
     "LinearMap",
     "Objective",
-    "PostureControl",
-    "RecoveryJointBounds",
     "RecoveryOutput",
-    "RecoveryProblem",
     "RecoverySettings",
     "Standing",
     "Strategy",
     "StrategySwitch",
     "SupportArea",
     "Turning",
-    "build_recovery_qp",
     "capture_point",
     "close_loop",
     "com_law",

@@ -1,6 +1,6 @@
-"""The controller that keeps a pushed body on its feet without a motion given beforehand ([Kudoh2002]_ 2).
+"""The controller that keeps a pushed body on its feet without a planned motion ([Kudoh2002]_ 2).
 
-Also here. Muscles that do not react yet: they hold the posture as springs and dampers do.
+Until the reaction delay is over, muscles hold the posture as springs and dampers do.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments
 from manikin.contact import Contact
-from manikin.control.build_qp import joint_acceleration_bounds
+from manikin.control.build_qp import JointBounds, force_variables
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import ContactForceBasis, contact_force_basis, contact_geometry, segment_key
 from manikin.control.recovery.recovery_problem import (
@@ -20,7 +20,6 @@ from manikin.control.recovery.recovery_problem import (
     ArmSwing,
     Objective,
     Objectives,
-    RecoveryJointBounds,
     RecoveryProblem,
     build_recovery_qp,
     leg_symmetry,
@@ -49,7 +48,7 @@ from manikin.control.recovery.strategy import (
 )
 from manikin.control.reference import EffectorReference
 from manikin.errors import InputError
-from manikin.numerics.qp import QPSolution, make_solver
+from manikin.numerics.qp import QPSolution, WarmQPSolver
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
 
 LEG_STIFFNESS = 3.0
@@ -57,13 +56,10 @@ LEG_STIFFNESS = 3.0
 
 
 def held_posture(
-    state: DynamicsState,
-    standing: Standing,
-    groups: JointGroups,
-    settings: RecoverySettings,
+    state: DynamicsState, standing: Standing, groups: JointGroups, settings: RecoverySettings,
     resting: FloatArray,
-) -> FloatArray:
-    """Joint torques that hold a posture without asking what the ground can give.
+) -> FloatArray:  # fmt: skip
+    """(nv - 6,) joint torques that hold a posture, whatever the ground can give [N.m].
 
     A spring has the gains of :attr:`RecoverySettings.stiffness` on the inertia of what hangs on its joint;
     hips and knees have :data:`LEG_STIFFNESS` at least, ankles :attr:`RecoverySettings.ankle_stiffness`. The
@@ -76,9 +72,6 @@ def held_posture(
         groups: Of the joints.
         settings: Stiffnesses and the period.
         resting: (nv - 6,) torques at rest [N.m].
-
-    Returns:
-        (nv - 6,) [N.m].
     """
     period, joints = settings.period, groups.joints
     inertia = np.diag(state.mass_matrix)[6:]
@@ -106,11 +99,11 @@ ALIKE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class RecoveryOutput:
-    """What one step decided, and why.
+    """Decision of one step.
 
     Attributes:
         tau: (nv - 6,) joint torques to hold until the next step [N.m].
-        strategy: What decided them.
+        strategy: Strategy that gave them.
         gain_share: Share of the largest posture gains that was used; 0 with another strategy.
         wrenches: Expected force [N] and moment about the sole's centre [N.m] (6,) of each foot that carries.
         fallback: Empty when the program was solved; otherwise what was done instead.
@@ -167,7 +160,7 @@ class BalanceRecovery:
             if name not in self.groups.feet:
                 raise InputError(f"support has {name!r}; valid: {', '.join(self.groups.feet)}")
         self._dynamics = Dynamics(body, _frames(body, self.groups.feet))
-        self._solvers = {name: make_solver(self.settings.solver) for name in ("full", "relaxed", "loose")}
+        self._solvers = {name: WarmQPSolver() for name in ("full", "relaxed", "loose")}
         self._previous = self._resting = np.zeros(joints)
         self._arms = ArmSwing(body, self.groups)
         self.stand(Standing.of(body, q, feet, friction))
@@ -179,7 +172,8 @@ class BalanceRecovery:
 
     def stand(self, standing: Standing) -> None:
         """Keep the balance about another way to stand from now on."""
-        self._begin_anew()
+        self._time, self._turned = 0.0, np.zeros(2)
+        self._arms.reset()
         self.standing = standing
         self._calm = standing.area.shrunk(self.settings.posture_area)
         self._geometry = tuple(contact_geometry(self.body, contact, 0.0) for contact in standing.soles)
@@ -232,27 +226,23 @@ class BalanceRecovery:
         )  # fmt: skip
 
     def step(
-        self,
-        q: FloatArray,
-        v: FloatArray,
-        push: FeltPush | None = None,
-        *,
-        reacting: bool = True,
+        self, q: FloatArray, v: FloatArray, push: FeltPush | None = None, *, reacting: bool = True,
         swing: tuple[str, EffectorReference] | None = None,
-    ) -> RecoveryOutput:
+    ) -> RecoveryOutput:  # fmt: skip
         """Decide the joint torques of the next period.
 
         Args:
             q: (nq,) measured configuration.
             v: (nv,) measured velocity.
-            push: What pushes the body and is felt.
+            push: Push that is felt.
             reacting: Whether the reaction delay is over.
-            swing: Effector of a foot that is on its way to another place, and where it should be now.
+            swing: Effector of a foot that steps, and where it should be now.
         """
         state = self._dynamics.evaluate(q, v)
         if not reacting:
             tau = held_posture(state, self.standing, self.groups, self.settings, self._resting)
-            return self._output(state, Strategy.STIFF, np.clip(tau, *self._torque_limits))
+            self._previous = np.clip(tau, *self._torque_limits)
+            return RecoveryOutput(self._previous, Strategy.STIFF, 0.0, {}, "", state, None, self.standing)
         felt = push if push is not None else FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
         law = self._law(state, may_turn=swing is None)
@@ -263,16 +253,14 @@ class BalanceRecovery:
         if swing is not None:
             strategy, objective = Strategy.STEP, self._objectives.stepping(state, self.posture, law, *swing)
         elif strategy is Strategy.POSTURE:
-            found = self._posture_control(state, loop)
-            if found is not None:
-                objective = self._objectives.held(state, self.posture, found.joints)
-                share, leaving = found.share, not found.inside
+            control = self._posture_control(state, loop)
+            if control is not None:
+                objective = self._objectives.held(state, self.posture, control.joints)
+                share, leaving = control.share, not control.inside
                 self._arms.reset()
         if objective is None:
-            strategy, objective = (
-                Strategy.PROGRAM,
-                self._objectives.balancing(state, self.posture, law, self._time),
-            )
+            strategy = Strategy.PROGRAM
+            objective = self._objectives.balancing(state, self.posture, law, self._time)
         contacts = self._contacts(state)
         problem = build_recovery_qp(
             state, loop, contacts, felt, self._bounds(state), LinearMap.none(loop.size) if leaving else rows,
@@ -280,22 +268,9 @@ class BalanceRecovery:
         )  # fmt: skip
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else self._torque(problem, solution, state)
-        self._resting = tau
+        self._resting = self._previous = tau
         wrenches = dict(zip(self.standing.feet, _wrenches(contacts, solution, loop.size), strict=True))
-        return self._output(state, strategy, tau, problem, share, wrenches, fallback)
-
-    def _output(
-        self,
-        state: DynamicsState,
-        strategy: Strategy,
-        tau: FloatArray,
-        problem: RecoveryProblem | None = None,
-        share: float = 0.0,
-        wrenches: dict[str, FloatArray] | None = None,
-        fallback: str = "",
-    ) -> RecoveryOutput:
-        self._previous = tau
-        return RecoveryOutput(tau, strategy, share, wrenches or {}, fallback, state, problem, self.standing)
+        return RecoveryOutput(tau, strategy, share, wrenches, fallback, state, problem, self.standing)
 
     def _law(self, state: DynamicsState, *, may_turn: bool) -> ComLaw:
         """The law of the centre of mass one period later, with what has been turned meanwhile."""
@@ -306,11 +281,6 @@ class BalanceRecovery:
             self._arms.begin(self._time, law.settled - self.area.centre, law.reach, self._ahead)
         return law
 
-    def _begin_anew(self) -> None:
-        """Nothing has been turned yet."""
-        self._time, self._turned = 0.0, np.zeros(2)
-        self._arms.reset()
-
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave."""
         calm = zmp_rows(self._calm, loop, state.com, 0.0)
@@ -318,8 +288,6 @@ class BalanceRecovery:
         stiff = gains.stiffness * (self.posture - state.q[7:])
         damped = -gains.damping * state.v[6:]
         return posture_control(loop, calm, stiff, damped, always=self.settings.posture_control_only)
-
-    # --- limits ------------------------------------------------------------------------------
 
     def _wished(self, state: DynamicsState, loop: ClosedLoop) -> LinearMap:
         """Rows that hold where they can: alike legs and a loaded ground."""
@@ -333,13 +301,11 @@ class BalanceRecovery:
             for contact, geometry in zip(self.soles, self._geometry, strict=True)
         ]
 
-    def _bounds(self, state: DynamicsState) -> RecoveryJointBounds:
-        body, settings = self.body, self.settings
-        lower, upper = joint_acceleration_bounds(
-            state.q[7:], state.v[6:], body.lower, body.upper, settings.strength * body.velocity_limit,
-            settings.joint_limit_horizon, settings.max_joint_acceleration,
-        )  # fmt: skip
-        return RecoveryJointBounds(*self._torque_limits, lower, upper)
+    def _bounds(self, state: DynamicsState) -> JointBounds:
+        settings = self.settings
+        return JointBounds.of(
+            self.body, state, settings.joint_limit_horizon, settings.max_joint_acceleration, settings.strength
+        )
 
     @property
     def _torque_limits(self) -> tuple[FloatArray, FloatArray]:
@@ -347,21 +313,19 @@ class BalanceRecovery:
         strength = self.settings.strength
         return strength * self.body.torque_lower, strength * self.body.torque_upper
 
-    # --- solution ----------------------------------------------------------------------------
-
     def _torque(self, problem: RecoveryProblem, solution: QPSolution, state: DynamicsState) -> FloatArray:
         """Torques of the solution, with what overcomes the passive damping."""
         return np.clip(problem.torque(solution.x) + self._damping * state.v[6:], *self._torque_limits)
 
     def _solve(self, problem: RecoveryProblem) -> tuple[QPSolution | None, str]:
         solution = self._solvers["full"].solve(problem.program)
-        if solution.found:
+        if solution.solved:
             return solution, ""
         relaxed = self._solvers["relaxed"].solve(problem.relaxed())
-        if relaxed.found:
+        if relaxed.solved:
             return relaxed, f"without stops: {solution.status}"
         loose = self._solvers["loose"].solve(problem.loose())
-        if loose.found:
+        if loose.solved:
             return loose, f"as on any ground: {solution.status}, then {relaxed.status}"
         return None, f"previous torques: {solution.status}, {relaxed.status}, {loose.status}"
 
@@ -370,27 +334,22 @@ def _wrenches(contacts: list[ContactForceBasis], solution: QPSolution | None, st
     """(k, 6) wrench of each foot in a solution, zero without one."""
     if solution is None:
         return np.zeros((len(contacts), 6))
-    ends = np.cumsum([start, *(basis.wrench.shape[1] for basis in contacts)])
-    return np.array(
-        [b.wrench @ solution.x[i:j] for b, i, j in zip(contacts, ends[:-1], ends[1:], strict=True)]
-    )
+    parts = zip(contacts, force_variables(contacts, start), strict=True)
+    return np.array([basis.wrench @ solution.x[part] for basis, part in parts])
 
 
 def _frames(body: BodyModel, feet: Sequence[str]) -> dict[str, int]:
     """Frames of feet and pelvis, and of the segments of the soles."""
-    found = {name: body.effector_frame(name) for name in (*feet, ROOT)}
+    effectors = {name: body.effector_frame(name) for name in (*feet, ROOT)}
     segments = {name for foot in feet for name in end_segments(body, foot)}
-    return found | {segment_key(name): body.segment_frame(name) for name in sorted(segments)}
+    return effectors | {segment_key(name): body.segment_frame(name) for name in sorted(segments)}
 
 
 def _leg_joints(body: BodyModel) -> list[tuple[int, int]]:
     """Left and right knee flexion and ankle flexion ([Kudoh2002]_ 2.49-2.50)."""
-    names = [
-        ("left_knee_flexion", "right_knee_flexion"),
-        ("left_ankle_dorsiflexion", "right_ankle_dorsiflexion"),
-    ]
+    pairs = [(f"left_{name}", f"right_{name}") for name in ("knee_flexion", "ankle_dorsiflexion")]
     return [
         (body.joint_index(left), body.joint_index(right))
-        for left, right in names
+        for left, right in pairs
         if left in body.joint_names and right in body.joint_names
     ]

@@ -1,17 +1,16 @@
-"""The quadratic program of one step of the recovery ([Kudoh2002]_ 2.54-2.64).
+"""The quadratic program of one step of the recovery, its objectives and the swing of the arms.
 
-Unknowns are the accelerations ``phi''`` of the closed loops and the forces at the corners of the soles. The
-thesis has the former alone: without the latter, which pull no foot down (``f_z > 0``) and keep to friction,
-joint torques cannot be limited, since two feet on the ground share their load in many ways.
+The program is that of [Kudoh2002]_ 2.54-2.64. Unknowns are the accelerations ``phi''`` of the closed loops
+and the forces at the corners of the soles. The thesis has the former alone: without the latter, which pull no
+foot down (``f_z > 0``) and keep to friction, joint torques cannot be limited, since two feet on the ground
+share their load in many ways.
 
-Also here. What the program of a step minimises: to hold a posture, to keep the balance, or to step. Arms that
-are raised and swung: what arms can do against a fall ahead.
-
-Of hanging arms that swing back, the angular momentum about the centre of mass is next to nothing: that of
-their turning is undone by that of their centres, which are as high as the centre of mass and move back. Of
-arms overhead that swing forward and down both go with the fall, over a range of half a turn and more. A
-program that looks at one instant cannot find that out. So arms go up first, sideways to begin with, where
-raising them costs little, and are then swung; meanwhile the trunk turns. This part is ours.
+Arms help against a fall ahead by being raised and swung; this part is ours. Of hanging arms that swing back,
+the angular momentum about the centre of mass is next to nothing: that of their turning is undone by that of
+their centres, which are as high as the centre of mass and move back. Of arms overhead that swing forward and
+down both go with the fall, over a range of half a turn and more. A program that looks at one instant cannot
+find that out. So arms go up first, sideways to begin with, where raising them costs little, and are then
+swung; meanwhile the trunk turns.
 """
 
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
+from manikin.control.build_qp import JointBounds
 from manikin.control.dynamics import DynamicsState
 from manikin.control.edge_forces import ContactForceBasis
 from manikin.control.recovery.standing import ClosedLoop, FeltPush, JointGroups, LinearMap
@@ -63,12 +63,7 @@ class ArmSwing:
     """Raises and swings the arms once, where a body falls ahead and the trunk alone may not do."""
 
     def __init__(self, body: BodyModel, groups: JointGroups) -> None:
-        """Find the joints.
-
-        Args:
-            body: The body; one whose shoulders are not as a person's is left alone.
-            groups: Its joints by group.
-        """
+        """Find the joints by their groups; a body whose shoulders are not as a person's is left alone."""
         arms = {int(index): body.joint_names[index] for index in groups.joints["arm"]}
         flexion, abduction, elbow = (
             [index for index, name in arms.items() if name.endswith(end)]
@@ -85,13 +80,13 @@ class ArmSwing:
         return self._joints
 
     def begin(self, time: float, fall: FloatArray, reach: float, ahead: FloatArray) -> None:
-        """Begin where the body falls far ahead, unless the arms are on their way or have been.
+        """Begin at a time [s] where the body falls far ahead, unless the arms have been swung already.
 
         Args:
-            time: Of the control [s].
+            time: Of the control.
             fall: (2,) direction of the fall, of any length.
-            reach: Of its settled point over the soles.
-            ahead: (2,) unit vector to where the body looks.
+            reach: Of the settled point over the soles.
+            ahead: (2,) unit vector of the body's heading.
         """
         if self._began is None and reach > FAR and fall @ ahead > AHEAD * np.linalg.norm(fall):
             self._began = time
@@ -101,12 +96,7 @@ class ArmSwing:
         self._began = None
 
     def wish(self, state: DynamicsState, time: float) -> tuple[FloatArray, float] | None:
-        """Accelerations (k,) wanted of the joints [rad/s^2] and their weight; None when nothing is.
-
-        Args:
-            state: Of the body.
-            time: Of the control [s].
-        """
+        """Wanted accelerations (k,) of the joints [rad/s^2] at a time [s] and their weight, or None."""
         since = np.inf if self._began is None else time - self._began
         if since >= SWUNG:
             return None
@@ -118,23 +108,6 @@ class ArmSwing:
 
 FORCE_WEIGHT = 1e-5
 """Regularisation of the forces at the corners [1/N^2]: shares the load between the feet."""
-
-
-@dataclass(frozen=True, eq=False)
-class RecoveryJointBounds:
-    """Limits of the joints at one step, (nv - 6,) each.
-
-    Attributes:
-        torque_lower: [N.m].
-        torque_upper: [N.m].
-        acceleration_lower: [rad/s^2].
-        acceleration_upper: [rad/s^2].
-    """
-
-    torque_lower: FloatArray
-    torque_upper: FloatArray
-    acceleration_lower: FloatArray
-    acceleration_upper: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,35 +151,24 @@ class RecoveryProblem:
     relaxable: tuple[int, int]
 
     def relaxed(self) -> QuadraticProgram:
-        """Return the program without the stops of the joints and the symmetry of the legs."""
+        """The program without the stops of the joints and the symmetry of the legs."""
+        return self._without(slice(*self.relaxable))
+
+    def loose(self) -> QuadraticProgram:
+        """The program with the torque limits alone: the ground may pull, the ZMP may be anywhere."""
+        program = self._without(slice(6 + len(self.torque.offset), self.relaxable[1]))
+        return replace(program, lower=np.full_like(program.lower, -np.inf))
+
+    def _without(self, rows: slice) -> QuadraticProgram:
         lower, upper = self.program.rows_lower.copy(), self.program.rows_upper.copy()
-        rows = slice(*self.relaxable)
         lower[rows], upper[rows] = -np.inf, np.inf
         return replace(self.program, rows_lower=lower, rows_upper=upper)
 
-    def loose(self) -> QuadraticProgram:
-        """Return the program with the torque limits alone: the ground may pull, the ZMP may be anywhere."""
-        program = self.relaxed()
-        first, _ = self.relaxable
-        lower, upper = program.rows_lower.copy(), program.rows_upper.copy()
-        after_torques = 6 + len(self.torque.offset)
-        lower[after_torques:first], upper[after_torques:first] = -np.inf, np.inf
-        lowest = np.full_like(program.lower, -np.inf)
-        return replace(program, rows_lower=lower, rows_upper=upper, lower=lowest)
-
 
 def build_recovery_qp(
-    state: DynamicsState,
-    loop: ClosedLoop,
-    contacts: Sequence[ContactForceBasis],
-    push: FeltPush,
-    bounds: RecoveryJointBounds,
-    zmp: LinearMap,
-    symmetry: LinearMap,
-    objective: Objective,
-    *,
-    pulling: bool = False,
-) -> RecoveryProblem:
+    state: DynamicsState, loop: ClosedLoop, contacts: Sequence[ContactForceBasis], push: FeltPush,
+    bounds: JointBounds, zmp: LinearMap, symmetry: LinearMap, objective: Objective, *, pulling: bool = False,
+) -> RecoveryProblem:  # fmt: skip
     """Build the program of one step.
 
     Args:
@@ -247,9 +209,8 @@ def build_recovery_qp(
     least = -np.inf if pulling else 0.0
     variable_lower = np.concatenate((np.full(k, -np.inf), np.full(forces, least)))
     hessian, gradient = _cost(loop, objective, size)
-    program = QuadraticProgram(
-        hessian, gradient, rows, lower, upper, variable_lower, np.full(size, np.inf), 6
-    )
+    free = np.full(size, np.inf)
+    program = QuadraticProgram(hessian, gradient, rows, lower, upper, variable_lower, free, 6)
     return RecoveryProblem(program, loop, torque, (first, len(rows)))
 
 
@@ -264,7 +225,7 @@ def leg_symmetry(
     Args:
         loop: Maps of the accelerations.
         angles: (nv - 6,) [rad].
-        pairs: Left and right hinge indices.
+        pairs: Indices of a left and a right hinge each.
         tolerance: Angles that differ by less count as equal, which leaves the pair free [rad].
     """
     rows, offsets = [], []
@@ -312,14 +273,7 @@ class Objectives:
     def __init__(
         self, settings: RecoverySettings, groups: JointGroups, arms: ArmSwing, upright: EffectorReference
     ) -> None:
-        """Keep what all objectives have in common.
-
-        Args:
-            settings: Weights and gains.
-            groups: Joints of the body.
-            arms: Their swing.
-            upright: How the pelvis is kept while a foot steps.
-        """
+        """Keep weights, joints, the swing of the arms, and how the pelvis is kept while a foot steps."""
         self._settings, self._groups, self._arms, self._upright = settings, groups, arms, upright
         self._locked = groups.locked(settings.locked)
 
@@ -355,11 +309,10 @@ class Objectives:
         settings = self._settings
         weight = np.full(len(posture), STEPPING_JOINTS)
         joints = self._with_locked(state, posture, pull(settings.posture, state, posture), weight)
+        firmness = settings.swing_weight
         tasks = (
-            swing_task(foot, state.frames[foot], way, settings.swing, settings.swing_weight),
-            orientation_task(
-                ROOT, state.frames[ROOT], self._upright, settings.posture, settings.swing_weight
-            ),
+            swing_task(foot, state.frames[foot], way, settings.swing, firmness),
+            orientation_task(ROOT, state.frames[ROOT], self._upright, settings.posture, firmness),
         )
         return Objective(weight, joints, law.acceleration, self._com_weight, tasks=tasks)
 

@@ -1,15 +1,10 @@
-"""A way to stand: which feet carry, where they are, and the posture to come back to.
+"""A way to stand, and the mechanics of a body whose feet are held ([Kudoh2002]_ 2.2).
 
-Also here. Which joints and segments of a standing body are its ankles, hips, arms and so on. The area in
-which the ZMP may be: the hull of the soles, a rectangle for parallel feet. Degrees of freedom of a body whose
-feet are held, and what is linear in their accelerations.
-
-With both feet on the ground the generalised acceleration is ``a = basis phi'' + drift`` ([Kudoh2002]_ 2.2):
-``basis`` spans the accelerations that leave the feet where they are and ``drift`` is what their centripetal
-accelerations ask for. The thesis takes coordinates ``phi`` of the loops and finds the maps by evaluating the
-inverse dynamics at unit vectors (Fig. 2.6); an orthonormal basis gives the same maps at once, and since the
-objective and all limits are written in joint accelerations, forces and moments, it does not matter which
-basis is taken.
+With both feet on the ground the generalised acceleration is ``a = basis phi'' + drift``: ``basis`` spans the
+accelerations that leave the feet where they are and ``drift`` is what their centripetal accelerations ask
+for. The thesis takes coordinates ``phi`` of the loops and finds the maps by evaluating the inverse dynamics
+at unit vectors (Fig. 2.6); an orthonormal basis gives the same maps at once, and since the objective and all
+limits are written in joint accelerations, forces and moments, it does not matter which basis is taken.
 """
 
 from collections.abc import Sequence
@@ -30,13 +25,13 @@ from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
 
 @dataclass(frozen=True, eq=False)
 class JointGroups:
-    """Parts of a body that stands on two soles.
+    """Parts of a body that stands on two soles; each hinge and each segment is in one group.
 
     Attributes:
         feet: Effectors of the two legs, the left one first.
-        joints: Hinge indices by group: ``"ankle"`` (with what hangs on the foot), ``"knee"``, ``"hip"``,
-            ``"trunk"`` and ``"arm"``; each hinge is in one group.
-        segments: Segment names by group: ``"arms"``, ``"trunk"`` and ``"legs"``; each is in one group.
+        joints: Hinge indices of ``"ankle"`` (with what hangs on the foot), ``"knee"``, ``"hip"``, ``"trunk"``
+            and ``"arm"``.
+        segments: Segment names of ``"arms"``, ``"trunk"`` and ``"legs"``.
     """
 
     feet: tuple[str, str]
@@ -103,9 +98,8 @@ class LinearMap:
 
     def joined(self, other: "LinearMap") -> "LinearMap":
         """Both values, one after the other."""
-        return LinearMap(
-            np.concatenate((self.matrix, other.matrix)), np.concatenate((self.offset, other.offset))
-        )
+        matrices, offsets = (self.matrix, other.matrix), (self.offset, other.offset)
+        return LinearMap(np.concatenate(matrices), np.concatenate(offsets))
 
     def __call__(self, phi: FloatArray) -> FloatArray:
         """(m,) value at the accelerations (k,)."""
@@ -157,7 +151,7 @@ class FeltPush:
 def close_loop(
     state: DynamicsState, feet: tuple[str, ...], push: FeltPush, *, settling: float = 0.0
 ) -> ClosedLoop:
-    """Find the maps at a state.
+    """Find the linear maps of the accelerations at a state.
 
     Args:
         state: With a frame for each foot.
@@ -165,14 +159,12 @@ def close_loop(
         push: What pushes besides the ground.
         settling: Rate at which what the feet move all the same is damped [1/s].
     """
-    jacobian = np.concatenate([state.frames[name].jacobian for name in feet])
-    wanted = np.concatenate(
-        [-state.frames[name].drift - settling * state.frames[name].twist for name in feet]
-    )
+    frames = [state.frames[name] for name in feet]
+    jacobian = np.concatenate([frame.jacobian for frame in frames])
+    wanted = np.concatenate([-frame.drift - settling * frame.twist for frame in frames])
     held = len(wanted)
     factors = np.linalg.qr(jacobian.T, mode="complete")
-    full: FloatArray = factors.Q
-    upper: FloatArray = factors.R
+    full, upper = factors.Q, factors.R
     drift = full[:, :held] @ np.linalg.solve(upper[:held].T, wanted)
     basis = full[:, held:]
     momentum_rate = state.centroidal_map @ basis
@@ -267,9 +259,8 @@ class SupportArea:
         along = np.roll(self.corners, -1, axis=0) - self.corners
         normals = np.column_stack((along[:, 1], -along[:, 0]))
         normals /= np.linalg.norm(normals, axis=1)[:, None]
-        return frozen_array(normals, "normals"), frozen_array(
-            np.sum(normals * self.corners, axis=1), "offsets"
-        )
+        offsets = np.sum(normals * self.corners, axis=1)
+        return frozen_array(normals, "normals"), frozen_array(offsets, "offsets")
 
     @cached_property
     def _room(self) -> FloatArray:
@@ -302,12 +293,7 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
 
 
 def load_row(loop: ClosedLoop, least: float) -> LinearMap:
-    """Row that is not positive when the ground carries at least a force; the thesis has no such limit.
-
-    Args:
-        loop: Maps of the force.
-        least: Vertical force [N].
-    """
+    """Row that is not positive when the ground carries at least a vertical force [N]; not in the thesis."""
     return LinearMap(-loop.force.matrix[2:], least - loop.force.offset[2:])
 
 
@@ -330,7 +316,7 @@ def _turned(force: FloatArray, moment: FloatArray, com: FloatArray, height: floa
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """What the balance is kept about.
+    """A way to stand.
 
     Attributes:
         soles: The soles that carry; their effectors are the feet on the ground.
@@ -346,13 +332,7 @@ class Standing:
 
     @classmethod
     def of(cls, body: BodyModel, q: ArrayLike, feet: Sequence[str], friction: float) -> "Standing":
-        """Stand as in a posture.
-
-        Args:
-            body: The body.
-            q: (nq,) the posture, the soles of the feet on one level plane.
-            feet: Effectors of the feet that carry.
-            friction: Of their soles.
+        """Stand as in a posture ``q`` (nq,) on the soles of ``feet``, all on one level plane.
 
         Raises:
             InputError: If no foot carries or the soles are not level.
@@ -377,15 +357,7 @@ class Standing:
 def sole_at(
     body: BodyModel, effector: str, rotation: FloatArray, position: FloatArray, friction: float
 ) -> Contact:
-    """Whole sole of a foot.
-
-    Args:
-        body: The body.
-        effector: Of the foot.
-        rotation: (3, 3) sole to world.
-        position: (3,) middle of the sole [m].
-        friction: Of the sole.
-    """
+    """Whole sole of a foot, from its rotation (3, 3) to the world and its middle (3,) [m]."""
     return sole(
         effector, position, rotation=rotation, length=float(body.sole_length or 0.0),
         width=float(body.sole_width or 0.0), friction=friction,

@@ -1,7 +1,7 @@
-"""The law of the centre of mass ([Kudoh2002]_ 2.45-2.48), and when angular momentum has done its work.
+"""Strategies of the recovery: posture control, and a law of the centre of mass ([Kudoh2002]_ 2.5).
 
-The thesis lets the centre of mass accelerate against its displacement and its speed. With the frequency
-``w = sqrt(g / h)`` of a linear inverted pendulum, whose capture point ``c = s + s' / w`` obeys
+The thesis lets the centre of mass accelerate against its displacement and its speed (2.45-2.48). With the
+frequency ``w = sqrt(g / h)`` of a linear inverted pendulum, whose capture point ``c = s + s' / w`` obeys
 
     ``c' = w (c - p) - w L' / (m g)``
 
@@ -21,9 +21,8 @@ R)``: stopping sooner and harder would throw the capture point out again. Where 
 the law asks for stopping even if the capture point is not back: else the joints stop at their ends, all at
 once. This part is ours; it is what a controller that looks no step ahead has in place of a plan.
 
-Also here. The choice between posture control and the quadratic program ([Kudoh2002]_ 2.5.3). Posture control
-with the largest gains that keep the ZMP inside ([Kudoh2002]_ 2.5.2). Weights, gains and limits of the
-recovery from pushes.
+Near the centre of the soles posture control has the largest gains that keep the ZMP inside (2.5.2); farther
+out the quadratic program is solved instead (2.5.3).
 """
 
 from dataclasses import dataclass
@@ -40,7 +39,7 @@ from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number
 
 @dataclass(frozen=True, eq=False)
 class PostureControl:
-    """What the posture control asks for.
+    """Answer of the posture control.
 
     Attributes:
         joints: (nv - 6,) joint accelerations [rad/s^2], nearest ones that leave the feet where they are.
@@ -85,12 +84,10 @@ def posture_control(
         share = float(shares[inside].max())
     elif always:
         pairs = np.triu_indices(len(values), 1)
-        turns = np.divide(
-            -values[:, 1], 2.0 * values[:, 2], where=values[:, 2] != 0.0, out=np.zeros(len(values))
-        )
-        shares = np.concatenate(
-            (shares, _shares(values[pairs[0]] - values[pairs[1]]), np.clip(turns, 0.0, 1.0))
-        )
+        bent = values[:, 2] != 0.0
+        turns = np.divide(-values[:, 1], 2.0 * values[:, 2], where=bent, out=np.zeros(len(values)))
+        crossings = _shares(values[pairs[0]] - values[pairs[1]])
+        shares = np.concatenate((shares, crossings, np.clip(turns, 0.0, 1.0)))
         share = float(shares[np.argmin(np.max(_at(values, shares), axis=0))])
     else:
         return None
@@ -112,8 +109,7 @@ def _at(values: FloatArray, shares: FloatArray) -> FloatArray:
     return values @ np.power.outer(shares, np.arange(3)).T
 
 
-_HEIGHT, _UNWINDING = Impedance(20.0, 9.0), Impedance(4.0, 4.0)
-_SWING = Impedance(900.0, 60.0)
+_HEIGHT, _UNWINDING, _SWING = Impedance(20.0, 9.0), Impedance(4.0, 4.0), Impedance(900.0, 60.0)
 _POSTURE, _STIFFNESS = Impedance(100.0, 20.0), Impedance(400.0, 40.0)
 
 
@@ -124,50 +120,46 @@ class RecoverySettings:
     Attributes:
         period: Time between two control steps [s]; the thesis has 10 ms ([Kudoh2002]_ 3.2).
         delay: Time from the beginning of the first push until the control reacts [s] (3.2).
-        com_weight: Of the squared error of that law against a squared joint acceleration; it bends where the
-            limits leave no choice, where the thesis' equality would have no solution.
-        calm: Rate at which the law of the centre of mass brings the capture point back [1/s]
-            ([Kudoh2002]_ 2.45-2.48, see :mod:`manikin.control.recovery.strategy`).
+        com_weight: Weight of the squared error of :func:`com_law` against a squared joint acceleration; it
+            bends where the limits leave no choice, where the thesis' equality would have no solution.
+        calm: Rate at which that law brings the capture point back [1/s] (2.45-2.48).
         turning: Largest moment with which arms and trunk turn where the ZMP is not enough, and are stopped
             again, in body weights [m].
         least_braking: Smallest moment with which they are stopped, in body weights [m].
         late_braking: Moment in body weights [m] beyond which the turning is stopped wherever the capture
             point is: otherwise the stops of the joints do it, all at once.
-        range: How far arms, trunk and legs can turn: the integral over time of the angular momentum, for
-            each kilogram of the body [m^2].
-        least_load: The ground carries at least this share of the weight where that is possible: a body that
-            lets itself drop has nothing to push against.
+        range: Integral over time of the angular momentum that arms, trunk and legs can have, for each
+            kilogram of the body [m^2].
+        least_load: Share of the weight that the ground carries where that is possible: a body that lets
+            itself drop has nothing to push against.
         stopping: Damping of all joints while the turning is stopped [1/s].
         height: Gains of the same law for the height.
-        height_weight: Of the squared error of that law; 0, as in the thesis, leaves the height to ``upward``.
-        arm_weight: Of a squared acceleration of an arm's joint, against 1 of any other: the diagonal of
-            ``C_theta`` (2.27).
-        trunk_weight: The same of a joint of the trunk: hips fold first, so that both come to the end of their
-            range together.
-        upward: Wanted acceleration of the centre of mass upward, as the slope of the objective (2.54).
+        height_weight: Weight of its squared error; 0, as in the thesis, leaves the height to ``upward``.
+        arm_weight: Weight of a squared acceleration of an arm's joint, against 1 of any other: the diagonal
+            of ``C_theta`` (2.27).
+        trunk_weight: The same of the trunk: hips fold first, so that both come to the end of their range
+            together.
+        upward: Slope of the objective by the upward acceleration of the centre of mass (2.54).
         swing: Gains with which a stepping foot follows its way.
-        swing_weight: Of its squared error, and of that of the pelvis' tilt meanwhile.
-        unwinding: Of the objective's joint accelerations: they are measured from those that bring the joints
-            gently back to the posture; the thesis has none, so that swung arms go on to their stops.
-        posture: Largest gains of the posture control (2.65); their damping ratio is kept where they must
-            be less.
-        stiffness: With these gains muscles hold the posture before they react, and locked joints always.
+        swing_weight: Weight of its squared error, and of that of the pelvis' tilt meanwhile.
+        unwinding: Gains of the joint accelerations back to the posture, from which the objective is measured;
+            the thesis has none, so that swung arms go on to their stops.
+        posture: Largest gains of the posture control (2.65); less of them at the same damping ratio.
+        stiffness: Gains with which muscles hold the posture before they react, and locked joints always.
         ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react:
             the stiffness of calf muscles at rest, 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie
             2002), too little to stand without control.
         sole_inset: The ZMP is kept this far inside the edge of the soles [m].
         friction_share: Share of the friction of the soles that is made use of.
-        inner, outer: Half sizes of the region in which posture control begins and of that in which it ends,
-            as shares of the support area's half size about its centre ([Kudoh2002]_ Fig. 2.8). The gap
-            between the two keeps the choice from chattering.
-        posture_area: Posture control keeps the ZMP in this share of the support area about its centre, so
+        inner, outer: Half sizes of the regions in which posture control begins and ends, as shares of the
+            support area's half size about its centre (Fig. 2.8); the gap keeps the choice from chattering.
+        posture_area: Share of the support area about its centre in which posture control keeps the ZMP, so
             that its own motion does not carry the body away.
         locked: Groups of joints that hold the posture whatever happens: ``"arms"``, ``"hips"``.
         posture_control_only: Whether the quadratic program is never chosen.
         strength: Torque and speed limits relative to the body's own.
         joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
-        solver: ``"daqp"``, ``"proxqp"`` or ``"piqp"``.
     """
 
     period: float = 0.005
@@ -201,7 +193,6 @@ class RecoverySettings:
     strength: float = 1.0
     joint_limit_horizon: float = 0.1
     max_joint_acceleration: float = 500.0
-    solver: str = "daqp"
 
     def __post_init__(self) -> None:
         positive = (
@@ -271,7 +262,7 @@ SLOW = 5.0
 
 @dataclass(frozen=True, eq=False)
 class ComLaw:
-    """What the law asks for.
+    """Answer of the law of the centre of mass.
 
     Attributes:
         acceleration: (3,) of the centre of mass [m/s^2].
@@ -292,20 +283,15 @@ def fall_momentum(state: DynamicsState) -> FloatArray:
 
 
 def com_law(
-    state: DynamicsState,
-    home: FloatArray,
-    area: SupportArea,
-    settings: RecoverySettings,
-    turned: FloatArray,
-    *,
-    may_turn: bool = True,
-) -> ComLaw:
+    state: DynamicsState, home: FloatArray, area: SupportArea, settings: RecoverySettings, turned: FloatArray,
+    *, may_turn: bool = True,
+) -> ComLaw:  # fmt: skip
     """Find the wanted acceleration of the centre of mass.
 
     Args:
         state: Of the body.
-        home: (3,) where the centre of mass shall be [m].
-        area: Where the ZMP may be.
+        home: (3,) centre of mass to return to [m].
+        area: Admissible area of the ZMP.
         settings: Gains.
         turned: (2,) integral over time of :func:`fall_momentum` [kg.m^2].
         may_turn: Whether arms and trunk may turn where the ZMP is not enough; otherwise they are stopped.
@@ -343,11 +329,5 @@ def _needed_braking(momentum: FloatArray, turned: FloatArray, reach: float) -> f
 
 
 def capture_point(com: FloatArray, velocity: FloatArray, height: float) -> FloatArray:
-    """(..., 2) where the pendulum would come to rest above a foot: ``s + s' / w`` [m].
-
-    Args:
-        com: (..., 3) centre of mass [m].
-        velocity: (..., 3) its velocity [m/s].
-        height: Of the pendulum [m].
-    """
+    """(..., 2) capture point ``s + s' / w`` of centres of mass (..., 3) at a height over the ground [m]."""
     return com[..., :2] + velocity[..., :2] * np.sqrt(height / GRAVITY)

@@ -39,7 +39,7 @@ LONGEST_TURN = 1.5
 
 @dataclass(frozen=True)
 class Turning:
-    """What a body can give towards one side.
+    """How far a body can turn towards one side.
 
     Attributes:
         moment: Beyond what the ZMP gives [N.m].
@@ -56,7 +56,7 @@ class Turning:
 
         Args:
             weight: Of the body [N].
-            frequency: Of the pendulum [1/s].
+            frequency: ``w`` [1/s].
         """
         if self.moment <= 0.0 or self.range <= 0.0:
             return 0.0
@@ -71,22 +71,10 @@ class Turning:
 
 
 def available_turning(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> Turning:
-    """Measure what a body can give against a fall.
-
-    Args:
-        controller: Of the balance, for the feet that carry and all limits.
-        q: (nq,) the posture.
-        towards: (2,) unit direction of the fall.
-    """
-    body = controller.body
-    state = controller.evaluate(q, np.zeros(body.nv))
+    """Measure how far a body can turn in a posture (nq,) against a fall in a unit direction (2,)."""
+    state = controller.evaluate(q, np.zeros(controller.body.nv))
     momentum, travel = _turned(controller, q, towards)
     return Turning(_moment(controller, state, towards), momentum, travel)
-
-
-def _axis(towards: FloatArray) -> FloatArray:
-    """(3,) axis about which a body falls that way."""
-    return np.array([-towards[1], towards[0], 0.0])
 
 
 def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArray) -> float:
@@ -118,7 +106,7 @@ def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArr
 
 def _turned(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> tuple[float, float]:
     """Largest angular momentum on the way to the ends of the ranges, and its integral."""
-    body, axis = controller.body, _axis(towards)
+    body, axis = controller.body, np.array([-towards[1], towards[0], 0.0])
     speed = controller.settings.strength * body.velocity_limit
     speed[controller.locked] = 0.0
     momentum = travel = 0.0
@@ -190,9 +178,8 @@ def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> t
         turning = available_turning(controller, posture, normal)
         excess = turning.excess(weight, frequency)
         room = float(offset - normal @ controller.com[:2])
-        limits.append(
-            EdgeLimit(normal, turning, excess, _impulse(controller, normal, room, excess, duration))
-        )
+        impulse = _impulse(controller, normal, room, excess, duration)
+        limits.append(EdgeLimit(normal, turning, excess, impulse))
     return tuple(limits)
 
 

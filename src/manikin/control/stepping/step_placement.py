@@ -18,7 +18,7 @@ from manikin.numerics.spatial import FloatArray, finite_number
 
 @dataclass(frozen=True)
 class StepSettings:
-    """Limits of a step; the values are ours, of the order of quick steps of people.
+    """Limits of a step; the values are ours, of the order of quick human steps.
 
     Attributes:
         most: Number of steps at most.
@@ -92,7 +92,7 @@ def capture_after(
 
     Args:
         capture: (2,) now [m].
-        area: That carries.
+        area: Support area.
         frequency: Of the pendulum [1/s].
         time: [s].
         inset: Of the ZMP from the edge [m].
@@ -160,10 +160,8 @@ class _Places:
 
     def nearest(self) -> list[tuple[float, StepGoal]]:
         """At each distance across, the goal that leaves the capture point least outside, with how far."""
-        found: dict[float, int] = {}
-        for k in np.argsort(self.room, kind="stable"):
-            found[round(float(self.middles[k, 1]), 6)] = int(k)
-        return [(-float(self.room[k]), self._goal(k)) for k in found.values()]
+        last = {round(float(self.middles[k, 1]), 6): int(k) for k in np.argsort(self.room, kind="stable")}
+        return [(-float(self.room[k]), self._goal(k)) for k in last.values()]
 
     def _goal(self, k: int) -> StepGoal:
         position = np.array([*self.middles[k], self.height])

@@ -1,8 +1,4 @@
-"""Balance recovery that takes a step when standing does not do.
-
-Also here. The way of a foot that steps: polynomials from where it is to a goal that may still move. Whether
-the scene leaves room for a step, and the posture in which the body then stands.
-"""
+"""Balance recovery with steps: where there is room for a foot, and how it gets there."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -28,7 +24,6 @@ PRESSING = 0.15
 """Speed with which a foot that has come to its goal without touching goes on down [m/s]."""
 
 
-@dataclass
 class SwingFoot:
     """A foot on its way; its goal can be moved while it flies.
 
@@ -41,26 +36,16 @@ class SwingFoot:
         clearance: Height half way [m].
     """
 
-    foot: str
-    rotation: FloatArray
-    start: float
-    duration: float
-    goal: FloatArray
-    clearance: float
-    _time: float
-    _level: FloatArray
-    """(3, 2) position, velocity and acceleration along the ground at ``_time``."""
-    _ground: float
-
-    @classmethod
-    def begin(
-        cls, foot: str, rotation: FloatArray, position: FloatArray, goal: FloatArray, start: float,
+    def __init__(
+        self, foot: str, rotation: FloatArray, position: FloatArray, goal: FloatArray, start: float,
         duration: float, clearance: float,
-    ) -> "SwingFoot":  # fmt: skip
+    ) -> None:  # fmt: skip
         """Lift a foot off at a position (3,) [m]."""
-        level = np.zeros((3, 2))
-        level[0] = position[:2]
-        return cls(foot, rotation, start, duration, goal.copy(), clearance, start, level, float(position[2]))
+        self.foot, self.rotation, self.goal = foot, rotation, goal.copy()
+        self.start, self.duration, self.clearance = start, duration, clearance
+        self._time, self._ground = start, float(position[2])
+        # Position, velocity and acceleration along the ground at that time.
+        self._level = np.array([position[:2], np.zeros(2), np.zeros(2)])
 
     def share(self, time: float) -> float:
         """Share of the way in time, in [0, 1]."""
@@ -83,11 +68,8 @@ class SwingFoot:
         if time >= end:
             return self.goal[2] - PRESSING * (time - end), -PRESSING, 0.0
         x = self.share(time)
-        bump, slope, bend = (
-            16.0 * x**2 * (1.0 - x) ** 2,
-            32.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
-            32.0 * (1.0 - 6.0 * x + 6.0 * x**2),
-        )
+        bump, slope = 16.0 * x**2 * (1.0 - x) ** 2, 32.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
+        bend = 32.0 * (1.0 - 6.0 * x + 6.0 * x**2)
         rise = self.goal[2] - self._ground
         ramp = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
         ramp_slope, ramp_bend = 30.0 * x**2 * (1.0 - x) ** 2, 60.0 * x * (1.0 - 3.0 * x + 2.0 * x**2)
@@ -99,10 +81,10 @@ class SwingFoot:
 
 
 def _ahead(state: FloatArray, goal: FloatArray, remaining: float, time: float) -> FloatArray:
-    """State (3, 2) after a time on the fifth-degree polynomial that comes to rest at a goal.
+    """State after a time on the fifth-degree polynomial that comes to rest at a goal.
 
     Args:
-        state: Position, velocity and acceleration.
+        state: (3, 2) position, velocity and acceleration.
         goal: (2,) [m].
         remaining: Time to the goal [s].
         time: Time to go on [s].
@@ -188,21 +170,19 @@ class StepCheck:
     def standing(self, soles: tuple[Contact, ...], q: FloatArray) -> Standing:
         """Posture on given soles with the centre of mass over their middle, near a configuration (nq,)."""
         area = SupportArea.of(soles)
-        found = generate_posture(self._problem(soles, area, q), q)
-        state = Configuration(self._body, found.q)
-        return Standing(tuple(soles), area, found.q[7:].copy(), state.com.copy())
+        result = generate_posture(self._problem(soles, area, q), q)
+        state = Configuration(self._body, result.q)
+        return Standing(tuple(soles), area, result.q[7:].copy(), state.com.copy())
 
     def _problem(self, soles: tuple[Contact, ...], area: SupportArea, q: FloatArray) -> PostureProblem:
         reference = self._home.copy()
         reference[:7] = q[:7]
-        return PostureProblem(
-            self._body, tuple(soles), com=com_target(*area.centre), reference=reference,
-        )  # fmt: skip
+        return PostureProblem(self._body, tuple(soles), com=com_target(*area.centre), reference=reference)
 
     def _stands(self, stays: Contact, moved: Contact, q: FloatArray) -> bool:
         soles = (stays, moved)
-        found = generate_posture(self._problem(soles, SupportArea.of(soles), q), q)
-        return found.succeeded and self._clear(found.q, soles)
+        result = generate_posture(self._problem(soles, SupportArea.of(soles), q), q)
+        return result.succeeded and self._clear(result.q, soles)
 
     def _passes(self, stays: Contact, goal: StepGoal, half: FloatArray, q: FloatArray) -> bool:
         """Whether the body is free with its foot half way."""
@@ -211,14 +191,13 @@ class StepCheck:
             self._body, (stays,), placements={goal.foot: Placement(half, goal.rotation)},
             com=com_target(*middle), com_weight=1.0, reference=q,
         )  # fmt: skip
-        found = generate_posture(problem, q)
-        return found.succeeded and self._clear(found.q, (stays,))
+        result = generate_posture(problem, q)
+        return result.succeeded and self._clear(result.q, (stays,))
 
     def _clear(self, q: FloatArray, soles: tuple[Contact, ...]) -> bool:
-        touching = [
-            (contact.effector, self._scene.supporting_surface(contact, LEVEL).obstacle) for contact in soles
-        ]
-        ignored = touching_pairs(self._body, touching)
+        grounds = [self._scene.supporting_surface(contact, LEVEL).obstacle for contact in soles]
+        touching = zip((contact.effector for contact in soles), grounds, strict=True)
+        ignored = touching_pairs(self._body, list(touching))
         return self._proximity.minimum(q, ignored).distance > 0.0
 
 
@@ -264,14 +243,7 @@ class SteppingRecovery:
     def __init__(
         self, body: BodyModel, balance: BalanceRecovery, scene: Scene, settings: StepSettings | None = None
     ) -> None:
-        """Bind to a controller of the balance.
-
-        Args:
-            body: The body.
-            balance: What keeps the balance on given feet.
-            scene: Where feet can be put down.
-            settings: Limits of steps; the defaults when omitted.
-        """
+        """Bind to a controller of the balance on given feet and a scene in which feet can be put down."""
         self.body, self.balance = body, balance
         self.settings = settings or StepSettings()
         self.check = StepCheck(body, scene, balance.friction)
@@ -283,22 +255,16 @@ class SteppingRecovery:
         self._look_again = -np.inf
 
     def step(
-        self,
-        time: float,
-        q: FloatArray,
-        v: FloatArray,
-        push: FeltPush | None,
-        *,
-        reacting: bool,
+        self, time: float, q: FloatArray, v: FloatArray, push: FeltPush | None, *, reacting: bool,
         touching: Mapping[str, bool],
-    ) -> RecoveryOutput:
-        """Decide the joint torques of the next period.
+    ) -> RecoveryOutput:  # fmt: skip
+        """Decide the joint torques of the next period; see :meth:`BalanceRecovery.step`.
 
         Args:
             time: Of the run [s].
             q: (nq,) measured configuration.
             v: (nv,) measured velocity.
-            push: What pushes the body and is felt.
+            push: Push that is felt.
             reacting: Whether the reaction delay is over.
             touching: Whether each foot touches the ground.
         """
@@ -323,8 +289,7 @@ class SteppingRecovery:
         return room < (self.settings.again if self.steps else -self.settings.beyond)
 
     def _capture(self, state: DynamicsState) -> FloatArray:
-        velocity = state.momentum[:3] / state.mass
-        return capture_point(state.com, velocity, self._home.height)
+        return capture_point(state.com, state.momentum[:3] / state.mass, self._home.height)
 
     @property
     def _frequency(self) -> float:
@@ -335,9 +300,7 @@ class SteppingRecovery:
         soles = {contact.effector: contact for contact in self.balance.soles}
         left, right = (soles[name] for name in self.balance.groups.feet)
         left_over = self.settings.most - len(self.steps)
-        goals = step_goals(
-            (left, right), self._capture(state), self._frequency, self.settings, left_over
-        )  # fmt: skip
+        goals = step_goals((left, right), self._capture(state), self._frequency, self.settings, left_over)
         goal = self.check.first(goals, (left, right), state.q, self.settings.clearance)
         if goal is None:
             self.refused = self.refused or self.check.refusal
@@ -346,21 +309,16 @@ class SteppingRecovery:
         self.refused = ""
         self._from = soles[goal.foot]
         stays = right if goal.foot == left.effector else left
-        self.balance.stand(
-            Standing((stays,), self.balance.area.of([stays]), self._home.posture, self._over(stays))
-        )
-        self._swing = SwingFoot.begin(
+        over = np.array([*stays.position[:2], self._home.com[2]])  # the centre of mass stays as high
+        self.balance.stand(Standing((stays,), SupportArea.of([stays]), self._home.posture, over))
+        self._swing = SwingFoot(
             goal.foot, goal.rotation, self._from.position, goal.position, time, goal.duration,
             self.settings.clearance,
         )  # fmt: skip
         self._goal = goal
 
-    def _over(self, stays: Contact) -> FloatArray:
-        """(3,) home of the centre of mass over a foot, as high as before [m]."""
-        return np.array([*stays.position[:2], self._home.com[2]])
-
     def _aim(self, time: float, state: DynamicsState, swing: SwingFoot) -> None:
-        """Follow the capture point with the goal while there is time."""
+        """Follow the capture point with the goal while there is time, where the foot has room."""
         remaining = swing.start + swing.duration - time
         if remaining < self.settings.aim_until:
             return
@@ -368,15 +326,10 @@ class SteppingRecovery:
             self._capture(state), self.balance.area, self._frequency, remaining, self.settings.inset
         )
         wanted = self._goal.position[:2] + landing - self._goal.capture
-        self._move_goal(swing, wanted)
-
-    def _move_goal(self, swing: SwingFoot, wanted: FloatArray) -> None:
-        """Move the goal where the foot has room; elsewhere it stays as it is."""
         goal = np.array([*wanted, self._goal.position[2]])
-        stays = self.balance.soles[0]
-        if np.linalg.norm(goal - stays.position) <= self.settings.reach and self.check.free(
-            sole_at(self.body, swing.foot, swing.rotation, goal, self.balance.friction)
-        ):
+        moved = sole_at(self.body, swing.foot, swing.rotation, goal, self.balance.friction)
+        near = np.linalg.norm(goal - self.balance.soles[0].position) <= self.settings.reach
+        if near and self.check.free(moved):
             swing.goal = goal
 
     def _land(self, time: float, q: FloatArray, swing: SwingFoot) -> None:
@@ -387,10 +340,9 @@ class SteppingRecovery:
         _, position = state.effector_placement(swing.foot)
         place = np.array([*position[:2], stays.position[2]])
         landed = sole_at(self.body, swing.foot, swing.rotation, place, self.balance.friction)
-        self.steps.append(
-            StepTaken(swing.foot, swing.start, time, self._from.position, swing.goal.copy(), place)
-        )
-        order = {name: number for number, name in enumerate(self.balance.groups.feet)}
-        soles = tuple(sorted((stays, landed), key=lambda contact: order[contact.effector]))
+        step = StepTaken(swing.foot, swing.start, time, self._from.position, swing.goal.copy(), place)
+        self.steps.append(step)
+        order = self.balance.groups.feet.index
+        soles = tuple(sorted((stays, landed), key=lambda contact: order(contact.effector)))
         self.balance.stand(self.check.standing(soles, q))
         self._swing = None

@@ -10,7 +10,6 @@ does not depend on a first guess, and when it has none that is certain.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import daqp
 import numpy as np
 from scipy.linalg import block_diag, null_space, solve_triangular
 from scipy.optimize import linprog
@@ -18,6 +17,7 @@ from scipy.optimize import linprog
 from manikin.balance import WrenchPolytope
 from manikin.contact import ContactSchedule
 from manikin.errors import SolverError
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import GRAVITY, FloatArray, skew
 from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
 from manikin.planning.com.com_problem import CentroidalProblem
@@ -25,8 +25,6 @@ from manikin.planning.com.feasibility import row_slopes
 
 TIGHTENING = 1e-4
 """Margin asked for beyond the required one, so that rounding cannot undercut it [N.m] or [N]."""
-
-_NO_BOUND = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,14 +79,12 @@ class KeyframeProgramme:
         """
         room = self._room()
         limits = room.bounds - room.slopes * (margin + TIGHTENING)
-        y, _, flag, info = daqp.solve(
-            np.eye(room.basis.shape[1]), room.gradient, room.rows, limits,
-            np.full(len(room.rows), -_NO_BOUND), np.zeros(len(room.rows), dtype=np.int32), primal_tol=1e-9,
-        )  # fmt: skip
-        if flag != 1:
+        identity = np.eye(room.basis.shape[1])
+        solution = solve_qp(identity, room.gradient, room.rows, None, limits, tolerance=1e-9)
+        if not solution.solved:
             return None
-        multipliers = np.array(info["lam"]) / room.scale
-        return KeyframeSolution(room.points(np.array(y)), multipliers, int(info["iterations"]))
+        multipliers = solution.multipliers / room.scale
+        return KeyframeSolution(room.points(solution.x), multipliers, solution.iterations)
 
     def most_margin(self) -> tuple[FloatArray, float, int]:
         """Control points with the largest least margin at the key frames, that margin, and its row.

@@ -20,13 +20,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import piqp
 from scipy import sparse
 
 from manikin.balance import WrenchPolytope
 from manikin.balance.margin import wrench_levers
 from manikin.contact import ContactSchedule
 from manikin.errors import InputError
+from manikin.numerics.qp import solve_sparse_qp
 from manikin.numerics.spatial import GRAVITY, FloatArray, skew
 from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
 from manikin.planning.com.com_certificate import TOLERANCE, Residuals, measure, phase_margins
@@ -72,8 +72,6 @@ centimetre."""
 
 TURN_BEND = 1e-7
 """Cost of its mean squared second derivative, in that unit [s^4]."""
-
-_NO_BOUND = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,17 +156,14 @@ class NearProgramme:
         whole = sum(np.kron(quadratic, axis) for (quadratic, _), axis in zip(parts, axes, strict=True))
         lacking = len(self.phases)
         cost = sparse.block_diag([whole, ROOM_PULL / lacking * sparse.eye_array(lacking)])
-        solver = piqp.SparseSolver()
-        solver.settings.verbose = False
-        free = np.full(linear.size, _NO_BOUND)
-        solver.setup(
-            sparse.csc_matrix(2.0 * cost), 2.0 * np.append(linear.ravel(), np.zeros(lacking)), None, None,
-            rows, np.full(len(bounds), -_NO_BOUND), bounds,
-            np.append(-free, np.zeros(lacking)), np.append(free, np.ones(lacking)),
+        free = np.full(linear.size, np.inf)
+        solution = solve_sparse_qp(
+            2.0 * cost, 2.0 * np.append(linear.ravel(), np.zeros(lacking)), rows, None, bounds,
+            (np.append(-free, np.zeros(lacking)), np.append(free, np.ones(lacking))),
         )  # fmt: skip
-        if solver.solve() != piqp.PIQP_SOLVED:
+        if not solution.solved:
             return None
-        return solver.result.x[: linear.size].reshape(linear.shape), int(solver.result.info.iter)
+        return solution.x[: linear.size].reshape(linear.shape), solution.iterations
 
     def _objectives(self, shares: FloatArray, wanted: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """(n, n) and (n, 3) of CoM and turning: the objective is ``C' Q C + 2 l' C`` of each axis."""

@@ -1,6 +1,5 @@
 """A guide for the root from start to goal: roadmap, request, spline ([Tonneau2015]_ chapter 6)."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -31,9 +30,6 @@ from manikin.planning.guide.root_pose import checked_pose
 from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, SamplingRegion
 from manikin.planning.guide.steering import LocalPlanner
 from manikin.scene.scene import Scene
-
-KeepGoing = Callable[[], bool]
-"""Asked by a search now and then: whether its result is still wanted."""
 
 CHUNK = 10
 """Poses drawn between two looks at whether start and goal are joined."""
@@ -156,8 +152,6 @@ def plan_guide(
     task: GuideTask,
     rng: np.random.Generator,
     roadmap: Roadmap | None = None,
-    *,
-    keep_going: KeepGoing | None = None,
 ) -> GuideResult:
     """Plan a path of the root.
 
@@ -166,7 +160,6 @@ def plan_guide(
 
     Args:
         roadmap: A roadmap of this world to begin with; it is left as it is. Empty when omitted.
-        keep_going: Asked now and then; the search gives up when it answers False.
     """
     checker = world.checker()
     planner = LocalPlanner(checker, (task.start, task.goal))
@@ -175,7 +168,7 @@ def plan_guide(
         return _failed(unfit, GuideStatistics(asked=planner.asked))
     growing = Roadmap(world.settings.roadmap) if roadmap is None else roadmap.copy()
     growing.samples = growing.rejected = 0
-    route = _search(world, task, growing, planner, rng, keep_going)
+    route = _search(world, task, growing, planner, rng)
     statistics = GuideStatistics(growing.samples, len(growing.poses), len(growing.components), planner.asked)
     if route.poses is None:
         return _failed(route, statistics)
@@ -195,7 +188,6 @@ def _search(
     roadmap: Roadmap,
     planner: LocalPlanner,
     rng: np.random.Generator,
-    keep_going: KeepGoing | None,
 ) -> Route:
     """Grow the roadmap until start and goal are joined, and ask it for the way."""
     sampler = PoseSampler(planner.checker, world.region, world.settings.sampler)
@@ -203,7 +195,7 @@ def _search(
     goal = attach(roadmap, task.goal, planner, rng)
     budget = world.settings.roadmap.samples
     for _ in range(0, budget, CHUNK):
-        if roadmap.joined(start, goal) or (keep_going is not None and not keep_going()):
+        if roadmap.joined(start, goal):
             break
         before = roadmap.samples
         grow(roadmap, sampler, planner, rng, CHUNK, PATIENCE * world.settings.roadmap.failures)

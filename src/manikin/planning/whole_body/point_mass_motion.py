@@ -5,9 +5,7 @@ the soles' corners with the least square, within the friction pyramids and the c
 """
 
 from collections.abc import Sequence
-from ctypes import c_int
 
-import daqp
 import numpy as np
 
 from manikin.balance import WrenchPolytope, motion_margin
@@ -15,6 +13,7 @@ from manikin.balance.contact_forces import ContactGenerators
 from manikin.balance.motion_forces import load_shares
 from manikin.contact import ContactKind, Stance
 from manikin.motion import Motion
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, skew
 from manikin.planning.com import CentroidalProblem, CentroidalTrajectory
 
@@ -128,13 +127,13 @@ class _Corners:
         if not size:
             return np.zeros((self._count, 6))
         cost = np.diag(1.0 / shares[self._owner])
-        upper = np.concatenate([self._upper, wrench, self._caps])
-        lower = np.concatenate([np.zeros(size), wrench, np.full(len(self._caps), -1e30)])
-        sense = np.zeros(len(upper), dtype=c_int)
-        sense[size : size + 6] = 5  # equalities
-        rows = np.ascontiguousarray(np.vstack([self._wrenches, self._limits]))
-        magnitude, _, flag, _ = daqp.solve(cost, np.zeros(size), rows, upper, lower, sense)
-        if flag < 1:  # on the edge of what is possible rounding decides; the least square of all is near
+        solution = solve_qp(
+            cost, np.zeros(size), np.vstack([self._wrenches, self._limits]),
+            np.concatenate([wrench, np.full(len(self._caps), -1e30)]), np.concatenate([wrench, self._caps]),
+            (np.zeros(size), self._upper), equalities=6,
+        )  # fmt: skip
+        magnitude = solution.x
+        if not solution.solved:  # on the edge of what is possible rounding decides; least squares are near
             magnitude = np.maximum(np.linalg.lstsq(self._wrenches, wrench, rcond=None)[0], 0.0)
         out = np.zeros((self._count, 6))
         for index, origin in self._origin.items():

@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
-import daqp
 import numpy as np
 import pinocchio as pin
 
@@ -19,6 +18,7 @@ from manikin.body import BodyModel
 from manikin.body.limbs import end_segments
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.motion.dynamics import centroidal_motion
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_map
 from manikin.planning.contacts.efort import Task
 from manikin.planning.whole_body.refine_contacts import (
@@ -218,18 +218,15 @@ def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray
     The polytope holds what all admissible contact forces can supply; the nearest point of it is found
     by a quadratic program for each wrench outside.
     """
-    H, h = np.array(room.polytope.H), room.polytope.h
+    H, h = room.polytope.H, room.polytope.h
     missing = np.zeros(len(stance_wrench))
     # Around the wrench itself, in units of the body's weight, the program is well scaled.
     # Above this margin [N.m] the missing wrench is zero.
     for k in np.flatnonzero(room.polytope.margin(stance_wrench) < -1e-3):
         unit = max(1.0, float(np.abs(stance_wrench[k]).max()))
         bound = (h - H @ stance_wrench[k]) / unit
-        found, _, flag, _ = daqp.solve(
-            np.eye(6), np.zeros(6), H, bound, np.full(len(h), -1e30),
-            np.zeros(len(h), dtype=np.int32),
-        )  # fmt: skip
-        missing[k] = unit * np.linalg.norm(found) if flag > 0 else max(0.0, -bound.min() * unit)
+        nearest = solve_qp(np.eye(6), np.zeros(6), H, None, bound)
+        missing[k] = unit * np.linalg.norm(nearest.x) if nearest.solved else max(0.0, -bound.min() * unit)
     return missing
 
 

@@ -10,11 +10,11 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-import daqp
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.errors import InputError
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.planning.whole_body.swing_curve import (
     RESTING,
@@ -356,7 +356,7 @@ BUFFER = 0.003
 
 
 def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, free: FloatArray) -> FloatArray:
-    """One quadratic programme: least squared jerk under linearised distances and speeds."""
+    """One quadratic program: least squared jerk under linearised distances and speeds."""
     n = len(curve.control_position)
     # Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort.
     energy = block_rows(jerk_energy(n) / 720.0)
@@ -371,17 +371,9 @@ def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, fre
     hessian[count, count] = 1.0
     gradient = np.concatenate([free.T @ (energy @ curve.control_position.ravel()), [1e3]])
     matrix = np.hstack([rows, np.ones((len(rows), 1))])
-    bounds_upper = np.concatenate([np.full(count, TRUST), [1e3]])
-    bounds_lower = np.concatenate([np.full(count, -TRUST), [0.0]])
-    solution, _, flag, _ = daqp.solve(
-        np.ascontiguousarray(hessian),
-        gradient,
-        np.ascontiguousarray(matrix),
-        np.concatenate([bounds_upper, np.full(len(rows), 1e30)]),
-        np.concatenate([bounds_lower, lower]),
-        np.zeros(count + 1 + len(rows), dtype=np.int32),
-    )
-    return np.asarray(solution[:count]) if flag > 0 else np.zeros(count)
+    bounds = np.append(np.full(count, -TRUST), 0.0), np.append(np.full(count, TRUST), 1e3)
+    solution = solve_qp(hessian, gradient, matrix, lower, None, bounds)
+    return solution.x[:count] if solution.solved else np.zeros(count)
 
 
 def _distance_rows(

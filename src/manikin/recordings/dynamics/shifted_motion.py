@@ -32,7 +32,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import piqp
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
@@ -40,6 +39,7 @@ from scipy.interpolate import BSpline
 from manikin.balance import WrenchPolytope
 from manikin.contact import ContactKind
 from manikin.errors import InputError
+from manikin.numerics.qp import solve_sparse_qp
 from manikin.numerics.spatial import (
     GRAVITY,
     FloatArray,
@@ -374,13 +374,8 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
     ])  # fmt: skip
     linear = np.concatenate([-(aside.T @ axes.base), np.full(len(frames), PRICE)])
     bound = np.concatenate([np.full(3 * count, LARGEST_SHIFT), np.full(len(frames), np.inf)])
-    solver = piqp.SparseSolver()
-    solver.settings.eps_abs = solver.settings.eps_rel = 1e-8
-    solver.setup(
-        sparse.csc_matrix(quadratic), linear, None, None,
-        sparse.csc_matrix(sparse.hstack([*facets.taken(spline), excess])),
-        None, facets.base, np.where(np.isinf(bound), 0.0, -bound), bound,
+    solution = solve_sparse_qp(
+        quadratic, linear, sparse.hstack([*facets.taken(spline), excess]), None, facets.base,
+        (np.where(np.isinf(bound), 0.0, -bound), bound), tolerance=1e-8,
     )  # fmt: skip
-    if solver.solve() != piqp.PIQP_SOLVED:
-        return None
-    return solver.result.x[: 3 * count].reshape(3, count).T
+    return solution.x[: 3 * count].reshape(3, count).T if solution.solved else None

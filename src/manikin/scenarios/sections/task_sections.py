@@ -25,7 +25,7 @@ from manikin.scenarios.validation import (
 )
 
 LARGEST_FORCE = 5000.0
-"""Largest force of a push [N], some seven body weights; ``manikin.simulation.recover`` has the same."""
+"""Largest force of a push [N], some seven body weights; the same in ``manikin.simulation.push_force``."""
 
 LARGEST_FREQUENCY = 100.0
 """Largest frequency of a sine [Hz]: ten steps of the physics for each period."""

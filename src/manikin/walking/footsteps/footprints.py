@@ -45,23 +45,21 @@ class Footprint:
         if effector not in FEET:
             raise InputError(f"footprint effector is {effector!r}; valid: {', '.join(FEET)}")
         lands = finite_number(lands, f"footprint of {effector} lands [s]")
-        values = {
-            "effector": effector,
-            "position": frozen_array(position, f"footprint of {effector} position [m]", (3,)),
-            "yaw": finite_number(yaw, f"footprint of {effector} yaw [rad]"),
-            "lands": lands,
-            "leaves": finite_number(leaves, f"footprint of {effector} leaves [s]", above=lands),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(
+            effector=effector,
+            position=frozen_array(position, f"footprint of {effector} position [m]", (3,)),
+            yaw=finite_number(yaw, f"footprint of {effector} yaw [rad]"),
+            lands=lands,
+            leaves=finite_number(leaves, f"footprint of {effector} leaves [s]", above=lands),
+        )
 
     def placed(self, place: ArrayLike, height: float = 0.0) -> Footprint:
         """The same in a frame that stands at ``place``: x, y [m] and yaw [rad], at a height [m]."""
         x, y, turn = (float(value) for value in frozen_array(place, "place [m, m, rad]", (3,)))
         c, s = np.cos(turn), np.sin(turn)
-        here = self.position
-        there = [x + c * here[0] - s * here[1], y + s * here[0] + c * here[1], here[2] + height]
-        return Footprint(self.effector, there, self.yaw + turn, self.lands, self.leaves)
+        ahead, left, above = self.position
+        position = [x + c * ahead - s * left, y + s * ahead + c * left, above + height]
+        return Footprint(self.effector, position, self.yaw + turn, self.lands, self.leaves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +87,7 @@ class Footprints:
 
     @property
     def start(self) -> float:
-        """Begin of the walk [s]."""
+        """Start of the walk [s]."""
         return self.steps[0].lands
 
     @property
@@ -99,7 +97,7 @@ class Footprints:
 
     @property
     def duration(self) -> float:
-        """Of the walk [s]."""
+        """Duration of the walk [s]."""
         return self.end - self.start
 
     @property
@@ -130,10 +128,10 @@ class Footprints:
         """Stances of the walk with full soles, at the times of the walk.
 
         Args:
-            length: Of the soles [m].
-            width: Of the soles [m].
-            friction: Coulomb coefficient.
-            normal_force_cap: Of each stance [N].
+            length: Length of the soles [m].
+            width: Width of the soles [m].
+            friction: Coulomb coefficient [-].
+            normal_force_cap: Largest sum of the normal forces of each stance [N].
         """
         made: dict[Footprint, Contact] = {
             step: sole(step.effector, step.position, step.yaw, length=length, width=width, friction=friction)

@@ -1,7 +1,4 @@
-"""Placing the feet of a walk along the path of the body.
-
-Also here. Footprints of a whole-body walk: where its feet stand, and when.
-"""
+"""Footprints of a walk: placed along the path of the body, or read from a whole-body walk."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -22,7 +19,6 @@ SIDE = {"left_foot": 1.0, "right_foot": -1.0}
 """On which side of the body a foot is, along its y axis."""
 
 _REACHED = 1e-6
-_ROUNDING = 0.1
 
 
 @dataclass(frozen=True)
@@ -43,13 +39,13 @@ class StepRule:
         narrowest: Least distance of a landing foot from a parallel one, across their mean heading [m]; feet
             do not cross. Turned feet keep what their soles need beyond that.
         sole_length: Of the soles [m].
-        widest: Largest [m].
+        widest: Largest such distance [m].
         longest: Largest distance along their mean heading [m].
         toes_in: A landing foot is turned inwards from the other one by at most this [rad].
         toes_out: The same, outwards [rad].
         single: Least time on one foot [s].
         double: Least time on both feet between steps [s].
-        double_share: Share of a step that is spent on both feet.
+        double_share: Share of a step that is spent on both feet [-].
         standing: Least time on both feet at the start and the end [s].
     """
 
@@ -81,23 +77,13 @@ class StepRule:
         finite_number(self.double_share, "step rule double_share", above=0.0, at_most=0.9)
 
     def scaled(self, stature: float) -> "StepRule":
-        """The rule of a body of another stature: lengths grow with it, times with its square root.
-
-        Args:
-            stature: [m].
-        """
+        """The rule of a body of another stature [m]: lengths grow with it, times with its square root."""
         length = finite_number(stature, "stature [m]", above=0.0) / 1.75
         time = np.sqrt(length)
         lengths = (
-            "longest_step",
-            "side_step",
-            "width",
-            "standing_width",
-            "narrowest",
-            "sole_length",
-            "widest",
+            "longest_step", "side_step", "width", "standing_width", "narrowest", "sole_length", "widest",
             "longest",
-        )
+        )  # fmt: skip
         times = ("single", "double", "standing")
         return replace(
             self,
@@ -125,10 +111,10 @@ def place_footprints(
     goal. They land half a step before the body passes.
 
     Args:
-        path: Of the middle between the feet.
+        path: Path of the middle between the feet.
         rule: Where and when feet are set down.
         first: Foot of the first step; that on the side to which the body moves or turns, if omitted.
-        height: Of the floor [m].
+        height: Height of the floor [m].
 
     Raises:
         InputError: If the path is no solution, the foot has no such name, or the rule's limits keep the feet
@@ -140,10 +126,9 @@ def place_footprints(
     if first is not None and first not in FEET:
         raise InputError(f"first is {first!r}; valid: {', '.join(FEET)}")
     cuts = _Cuts(path, rule)
-    chosen = _leading(cuts) if first is None else first
-    stands = [_beside(foot, cuts.place(0.0), rule.standing_width) for foot in FEET]
-    steps = list(_steps(cuts, rule, chosen))
-    return _timed(dict(zip(FEET, stands, strict=True)), steps, cuts, rule, height)
+    stands = {foot: _beside(foot, cuts.place(0.0), rule.standing_width) for foot in FEET}
+    steps = list(_steps(cuts, rule, _leading(cuts) if first is None else first, stands))
+    return _timed(stands, steps, cuts, rule, height)
 
 
 class _Cuts:
@@ -152,7 +137,7 @@ class _Cuts:
     def __init__(self, path: WalkingPath, rule: StepRule) -> None:
         self.path = path
         done = cumulative_trapezoid(rule.frequency(path.velocity), path.time, initial=0.0)
-        self.count = max(1, int(np.ceil(done[-1] - _ROUNDING)))
+        self.count = max(1, int(np.ceil(done[-1] - 0.1)))
         # Where the body rests nothing is done; a little keeps the inverse unique.
         done += 1e-9 * path.time
         self._done = done * (self.count / done[-1])
@@ -168,10 +153,10 @@ class _Cuts:
 
 def _leading(cuts: _Cuts) -> str:
     """The foot on the side to which the first step goes, or the left one."""
-    here, there = cuts.place(0.0), cuts.place(1.0)
-    x, y = there[:2] - here[:2]
-    aside = -np.sin(here[2]) * x + np.cos(here[2]) * y
-    return "right_foot" if aside + 0.1 * (there[2] - here[2]) < -0.02 else "left_foot"
+    before, after = cuts.place(0.0), cuts.place(1.0)
+    x, y = after[:2] - before[:2]
+    aside = -np.sin(before[2]) * x + np.cos(before[2]) * y
+    return "right_foot" if aside + 0.1 * (after[2] - before[2]) < -0.02 else "left_foot"
 
 
 def _beside(foot: str, place: FloatArray, width: float) -> FloatArray:
@@ -180,11 +165,13 @@ def _beside(foot: str, place: FloatArray, width: float) -> FloatArray:
     return np.array([x - np.sin(heading) * half, y + np.cos(heading) * half, heading])
 
 
-def _steps(cuts: _Cuts, rule: StepRule, first: str) -> Iterator[tuple[str, FloatArray]]:
-    """Foot and place of each step, until both stand at the goal."""
+def _steps(
+    cuts: _Cuts, rule: StepRule, first: str, stands: dict[str, FloatArray]
+) -> Iterator[tuple[str, FloatArray]]:
+    """Foot and place of each step from where the feet stand, until both stand at the goal."""
     goal = cuts.place(cuts.count)
     ends = {foot: _beside(foot, goal, rule.standing_width) for foot in FEET}
-    feet = {foot: _beside(foot, cuts.place(0.0), rule.standing_width) for foot in FEET}
+    feet = dict(stands)
     order = itertools.cycle((first, *(foot for foot in FEET if foot != first)))
     for number, foot in enumerate(order, start=1):
         if all(np.abs(feet[each] - ends[each]).max() < _REACHED for each in FEET):
@@ -206,8 +193,8 @@ def within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepR
     Args:
         wanted: (3,) x, y [m] and yaw [rad] of the foot.
         other: (3,) the same of the one that stands.
-        side: Of the foot, from :data:`SIDE`.
-        rule: Its limits.
+        side: Side of the foot, from :data:`SIDE`.
+        rule: Limits of the hips.
 
     Returns:
         (3,) x, y [m] and yaw [rad].
@@ -246,24 +233,15 @@ def _timed(
         lifts.append(lift)
         lands.append(max(lift + rule.single, middle - half))
     finish = max(end, (lands[-1] if lands else 0.0) + rule.standing)
-    return Footprints(list(_supports(stands, steps, lifts, lands, finish, height)))
-
-
-def _supports(
-    stands: dict[str, FloatArray],
-    steps: list[tuple[str, FloatArray]],
-    lifts: list[float],
-    lands: list[float],
-    finish: float,
-    height: float,
-) -> Iterator[Footprint]:
+    supports = []
     for foot in FEET:
-        places = [stands[foot], *(place for each, place in steps if each == foot)]
-        own = [number for number, (each, _) in enumerate(steps) if each == foot]
-        begins = [0.0, *(lands[number] for number in own)]
-        ends = [*(lifts[number] for number in own), finish]
+        numbers = [number for number, (each, _) in enumerate(steps) if each == foot]
+        places = [stands[foot], *(steps[number][1] for number in numbers)]
+        begins = [0.0, *(lands[number] for number in numbers)]
+        ends = [*(lifts[number] for number in numbers), finish]
         for (x, y, yaw), begin, leave in zip(places, begins, ends, strict=True):
-            yield Footprint(foot, [x, y, height], yaw, begin, leave)
+            supports.append(Footprint(foot, [x, y, height], yaw, begin, leave))
+    return Footprints(supports)
 
 
 def walked_footprints(walk: Walk, rule: StepRule | None = None, *, height: float = 0.0) -> Footprints:
@@ -276,9 +254,9 @@ def walked_footprints(walk: Walk, rule: StepRule | None = None, *, height: float
     lands in the frame in which the other one leaves, both stand for one frame.
 
     Args:
-        walk: From standing to standing.
-        rule: Of it, where a foot may be set down beside the other one.
-        height: Of the floor [m].
+        walk: A walk from standing to standing.
+        rule: Where a foot may be set down beside the other one.
+        height: Height of the floor [m].
 
     Raises:
         InputError: If the walk has a moment without a foot on the floor, or does not begin and end on both.
@@ -290,8 +268,8 @@ def walked_footprints(walk: Walk, rule: StepRule | None = None, *, height: float
             f"walk has no foot on the floor at {walk.time[flying[0]]:.2f} s; valid here: a slower one"
         )
     held = sorted(
-        (one for foot in range(len(walk.feet)) for one in _walked_footprints_supports(walk, foot)),
-        key=lambda one: (one.lands, one.effector),
+        (step for foot in range(len(walk.feet)) for step in _shifted_footprints(walk, foot)),
+        key=lambda step: (step.lands, step.effector),
     )
     return Footprints(list(_reachable(_overlapping(held, walk), rule, height)))
 
@@ -304,8 +282,8 @@ def walked_supports(walk: Walk, foot: int) -> Iterator[LevelSupport]:
     )
 
 
-def _walked_footprints_supports(walk: Walk, foot: int) -> Iterator[Footprint]:
-    """Of one foot, as the walk has them, shifted so that the walk begins with its feet about its path."""
+def _shifted_footprints(walk: Walk, foot: int) -> Iterator[Footprint]:
+    """Footprints of one foot, shifted so that the walk begins with its feet about its path."""
     start = Configuration(walk.body, walk.q[0])
     feet = [start.effector_placement(name)[1][:2] for name in walk.feet]
     behind = np.mean(feet, axis=0) - walk.place[0, :2]
@@ -317,10 +295,10 @@ def _walked_footprints_supports(walk: Walk, foot: int) -> Iterator[Footprint]:
 
 
 def _overlapping(held: Sequence[Footprint], walk: Walk) -> Iterator[Footprint]:
-    """The same, each foot leaving at least one frame after the next landing of the other one."""
+    """The footprints, each foot leaving at least one frame after the next landing of the other one."""
     frame = float(walk.time[1] - walk.time[0])
     for step in held:
-        landings = [one.lands for one in held if one.effector != step.effector and one.lands > step.lands]
+        landings = [s.lands for s in held if s.effector != step.effector and s.lands > step.lands]
         leaves = step.leaves
         if landings and abs(landings[0] - leaves) < frame / 2:
             leaves += frame
@@ -328,7 +306,7 @@ def _overlapping(held: Sequence[Footprint], walk: Walk) -> Iterator[Footprint]:
 
 
 def _reachable(held: Iterator[Footprint], rule: StepRule, height: float) -> Iterator[Footprint]:
-    """The same where the rule allows a foot beside the other one, on the floor."""
+    """The footprints moved to where the rule allows a foot beside the other one, on the floor."""
     places: dict[str, FloatArray] = {}
     for step in held:
         place = np.append(step.position[:2], step.yaw)

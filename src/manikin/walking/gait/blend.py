@@ -1,10 +1,10 @@
 """Which cycles make up a walk of given velocities, and with what weights.
 
-Also here. Postures of a blended gait, before its feet are put on the floor. The line or circle that a
-walker's root follows over one cycle, and what is left: a periodic error.
+Blended postures are those before the feet are put on the floor. A walker's root follows a line or circle over
+one cycle, with a periodic error around it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -17,19 +17,16 @@ from manikin.numerics.signals import fourier_basis
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.walking.gait.motion_library import MIRRORED, ROOT, MotionLibrary, leg_length
 
-STRAIGHT = 1e-6
-"""Turn [rad] below which a circle is a line."""
-
 
 @dataclass(frozen=True, eq=False)
 class SteadyMotion:
-    """Constant forward, left and angular velocity, around which a root oscillates.
+    """Constant velocity of a root and the periodic error around it.
 
     Attributes:
         velocity: (3,) forward, left [m/s], angular [rad/s].
         start: (3,) x, y [m], heading [rad] at the cycle's begin.
         error: (n, 3) ahead, to the left [m] and in yaw [rad], in the axes of the moving heading; of zero
-            mean and, at the end of the cycle, as at its begin.
+            mean, and equal at both ends of the cycle.
     """
 
     velocity: FloatArray
@@ -45,8 +42,8 @@ def travelled(velocity: FloatArray, time: FloatArray) -> FloatArray:
         time: (...) [s].
     """
     turn = velocity[..., 2] * time
-    # sin(a)/a and (1 - cos a)/a, as series where a is small.
-    small = np.abs(turn) < STRAIGHT
+    # sin(a)/a and (1 - cos a)/a, as series where a is small and the circle a line.
+    small = np.abs(turn) < 1e-6
     safe = np.where(small, 1.0, turn)
     along = np.where(small, 1.0 - turn**2 / 6.0, np.sin(turn) / safe)
     aside = np.where(small, 0.5 * turn, (1.0 - np.cos(turn)) / safe)
@@ -63,7 +60,7 @@ def steady_motion(place: FloatArray, period: float) -> SteadyMotion:
 
     Args:
         place: (n, 3) x, y [m], heading [rad] at even instants from begin to end of the cycle, both included.
-        period: Of the cycle [s].
+        period: Duration of the cycle [s].
     """
     share = np.linspace(0.0, 1.0, len(place))
     mean = np.full(len(place), 1.0 / (len(place) - 1))
@@ -96,9 +93,6 @@ def steady_motion(place: FloatArray, period: float) -> SteadyMotion:
 TURN_RADIUS = 0.5
 """In the control space an angular velocity counts as the speed at this distance [m]."""
 
-INSIDE = 1e-9
-"""A velocity that misses the hull of the library by less than this belongs to it [m/s]."""
-
 _REFLECTED = np.array([1.0, -1.0, -1.0])
 
 
@@ -107,9 +101,9 @@ class Blend:
     """Weights of cycles at n instants.
 
     Attributes:
-        cycles: (n, k) places of the cycles in the library.
-        weights: (n, k) that add up to 1.
-        velocity: (n, 3) forward, left [m/s], angular [rad/s] that the blend walks with.
+        cycles: (n, k) indices of the cycles in the library.
+        weights: (n, k) weights with the sum 1.
+        velocity: (n, 3) forward, left [m/s], angular [rad/s] of the blend.
         outside: (n,) whether other velocities were asked for, beyond those of the library.
     """
 
@@ -133,11 +127,7 @@ class ControlSpace:
     """
 
     def __init__(self, library: MotionLibrary, radius: float = TURN_RADIUS) -> None:
-        """Build the tetrahedra.
-
-        Args:
-            library: Its cycles.
-            radius: See :data:`TURN_RADIUS`.
+        """Build the tetrahedra, with a radius [m] as :data:`TURN_RADIUS`.
 
         Raises:
             InputError: If the velocities of the library span no volume.
@@ -157,16 +147,12 @@ class ControlSpace:
     @cached_property
     def on_hull(self) -> NDArray[np.bool_]:
         """(c,) whether a cycle is at the border of what the library reaches."""
-        found = np.zeros(len(self.library), dtype=np.bool_)
-        found[self._cells.convex_hull.ravel()] = True
-        return found
+        on_hull = np.zeros(len(self.library), dtype=np.bool_)
+        on_hull[self._cells.convex_hull.ravel()] = True
+        return on_hull
 
     def blend(self, velocity: ArrayLike) -> Blend:
-        """Weights for velocities; beyond the library, for the nearest ones that it reaches.
-
-        Args:
-            velocity: (n, 3) forward, left [m/s], angular [rad/s].
-        """
+        """Weights for (n, 3) velocities; beyond the library, for the nearest ones that it reaches."""
         wanted = np.asarray(velocity, dtype=np.float64) * self.scale
         if self._partners is None:
             cycles, weights, reached, outside = self._located(wanted)
@@ -194,7 +180,7 @@ class ControlSpace:
             corners, shares = self._on_faces(points[missed])
             cycles[missed], weights[missed] = corners, shares
             nearest = np.einsum("nk,nki->ni", shares, self._points[corners])
-            outside[missed] = np.linalg.norm(nearest - points[missed], axis=1) > INSIDE
+            outside[missed] = np.linalg.norm(nearest - points[missed], axis=1) > 1e-9
             reached = points.copy()
             reached[missed] = nearest
         weights = np.clip(weights, 0.0, 1.0)
@@ -210,10 +196,8 @@ class ControlSpace:
         return corners, np.hstack([shares[np.arange(len(best)), best], np.zeros((len(best), 1))])
 
 
-@lru_cache(maxsize=4)
-def control_space(library: MotionLibrary) -> ControlSpace:
-    """The control space of a library, built once."""
-    return ControlSpace(library)
+_control_space = lru_cache(maxsize=4)(ControlSpace)
+"""The control space of a library, built once."""
 
 
 def _nearest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
@@ -225,30 +209,30 @@ def _nearest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArr
     wu, wv = np.sum(w * u, axis=-1), np.sum(w * v, axis=-1)
     area = np.maximum(uu * vv - uv**2, 1e-300)
     s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    found = np.stack([1.0 - s - t, s, t], axis=-1)
-    best = np.where((found >= 0.0).all(axis=-1), 0.0, np.inf)
-    for first, second, one, two in ((0, 1, a, b), (1, 2, b, c), (2, 0, c, a)):
-        edge = two - one
-        share = np.sum((p - one) * edge, axis=-1) / np.maximum(np.sum(edge * edge, axis=-1), 1e-300)
+    nearest = np.stack([1.0 - s - t, s, t], axis=-1)
+    best = np.where((nearest >= 0.0).all(axis=-1), 0.0, np.inf)
+    for first, second, begin, end in ((0, 1, a, b), (1, 2, b, c), (2, 0, c, a)):
+        edge = end - begin
+        share = np.sum((p - begin) * edge, axis=-1) / np.maximum(np.sum(edge * edge, axis=-1), 1e-300)
         share = np.clip(share, 0.0, 1.0)
-        away = np.linalg.norm(one + share[..., None] * edge - p, axis=-1)
-        weights = np.zeros_like(found)
+        away = np.linalg.norm(begin + share[..., None] * edge - p, axis=-1)
+        weights = np.zeros_like(nearest)
         weights[..., first], weights[..., second] = 1.0 - share, share
         nearer = away < best
-        found = np.where(nearer[..., None], weights, found)
+        nearest = np.where(nearer[..., None], weights, nearest)
         best = np.where(nearer, away, best)
-    return found
+    return nearest
 
 
 def _partners(library: MotionLibrary) -> NDArray[np.int64] | None:
-    """(c,) place of each cycle's mirror image, itself for a symmetric one; None if one has none."""
-    places = {name: number for number, name in enumerate(library.names)}
-    found = np.empty(len(library), dtype=np.int64)
-    for number, name in enumerate(library.names):
+    """(c,) index of each cycle's mirror image, its own for a symmetric one; None if one has none."""
+    numbers = {name: number for number, name in enumerate(library.names)}
+    partners = np.empty(len(library), dtype=np.int64)
+    for name, number in numbers.items():
         other = name.removesuffix(MIRRORED) if name.endswith(MIRRORED) else name + MIRRORED
-        found[number] = places.get(other, number)
-    reflected = library.velocities[found] * _REFLECTED
-    return found if np.allclose(reflected, library.velocities, rtol=0.0, atol=1e-9) else None
+        partners[number] = numbers.get(other, number)
+    reflected = library.velocities[partners] * _REFLECTED
+    return partners if np.allclose(reflected, library.velocities, rtol=0.0, atol=1e-9) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,11 +240,11 @@ class GaitFrames:
     """n instants of a gait.
 
     Attributes:
-        phase: (n,) share of the cycle, any whole number more counts cycles.
+        phase: (n,) share of the cycle [-]; whole numbers count cycles.
         events: (n, 3) as of :class:`MotionLibrary`.
-        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+        pelvis: (n, 3, 3) rotations from the pelvis to the world.
         turn: (n, 4) the same as xyzw quaternions.
-        place: (n, 3) the pelvis' origin [m].
+        place: (n, 3) origin of the pelvis [m].
         angles: (n, h) of the hinges [rad].
     """
 
@@ -277,7 +261,7 @@ class GaitFrames:
         return np.hstack([self.place, self.turn, self.angles])
 
     def swing(self) -> FloatArray:
-        """(2, n) how far the left and the right foot have swung, 0 to 1; -1 while they stand."""
+        """(2, n) share of the swing of the left and the right foot, 0 to 1; -1 while they stand."""
         phase = self.phase % 1.0
         landing, off, other = self.events.T
         left = phase / np.maximum(landing, 1e-9)
@@ -290,11 +274,7 @@ class Gait:
     """Blends of a library's cycles on a body ([Truong2010]_ 6.6)."""
 
     def __init__(self, library: MotionLibrary, body: BodyModel) -> None:
-        """Prepare a body; places and velocities of the library are scaled with the length of the legs.
-
-        Args:
-            library: Cycles.
-            body: A human.
+        """Prepare a human; places and velocities of the library are scaled with the length of the legs.
 
         Raises:
             BodyError: If the hinges are not those of the library.
@@ -307,28 +287,24 @@ class Gait:
 
     @cached_property
     def space(self) -> ControlSpace:
-        """Of the library.
-
-        Raises:
-            InputError: If the library's velocities span no volume.
-        """
-        return control_space(self.library)
+        """Control space of the library."""
+        return _control_space(self.library)
 
     def blend(self, velocity: FloatArray) -> Blend:
         """Weights for (n, 3) velocities of this body, forward, left [m/s] and angular [rad/s]."""
-        found = self.space.blend(velocity / self._to_velocity)
-        return Blend(found.cycles, found.weights, found.velocity * self._to_velocity, found.outside)
+        blend = self.space.blend(velocity / self._to_velocity)
+        return replace(blend, velocity=blend.velocity * self._to_velocity)
 
     def period(self, blend: Blend) -> FloatArray:
         """(n,) durations of the blended cycles [s], the weighted mean as in the thesis."""
         return np.einsum("nk,nk->n", blend.weights, self.library.periods[blend.cycles])
 
     def frames(self, blend: Blend, phase: FloatArray, place: FloatArray) -> GaitFrames:
-        """Postures at phases, at places of the walker.
+        """Postures of a blend of n instants.
 
         Args:
-            blend: Of n instants.
-            phase: (n,).
+            blend: Weights of the cycles.
+            phase: (n,) shares of the cycle [-].
             place: (n, 3) x, y [m], heading [rad] of the line or circle.
         """
         signals = self._signals(blend, phase)
@@ -351,7 +327,7 @@ class Gait:
         if len(phase) == 1:
             mixed = np.tensordot(blend.weights[0], self.library.coefficients[blend.cycles[0]], axes=1)
             return basis @ mixed
-        found = np.zeros((len(phase), self.library.coefficients.shape[2]))
+        signals = np.zeros((len(phase), self.library.coefficients.shape[2]))
         for cycles, weights in zip(blend.cycles.T, blend.weights.T, strict=True):
-            found += weights[:, None] * np.einsum("nk,nks->ns", basis, self.library.coefficients[cycles])
-        return found
+            signals += weights[:, None] * np.einsum("nk,nks->ns", basis, self.library.coefficients[cycles])
+        return signals

@@ -1,7 +1,8 @@
-"""What recorded skeletons leave open, settled in the same way for every cycle: pelvis tilt and level feet.
+"""Corrections of recorded cycles: pelvis tilt, level feet, limbs clear of the body, habits of persons.
 
-Also here. Limbs of recorded cycles kept out of the reference body, which is wider than some recorded people.
-Cycles of several people as if one had walked them all: each one's habits are taken out.
+Skeletons leave the tilt of the pelvis and the level of the feet open; both are settled in the same way for
+every cycle. The reference body is wider than some recorded people: limbs are spread until they are clear of
+it. Blends of several people need the habits of each taken out.
 """
 
 from collections import Counter
@@ -23,15 +24,13 @@ from manikin.walking.gait.motion_library import ROOT, MotionLibrary
 from manikin.walking.gait.stance_foot import FootPlacement, Sole
 
 INSTANTS = 24
-"""Of a cycle that are looked at."""
+"""Instants of a cycle at which limbs may touch."""
 
 ARM_STEP, LEG_STEP = np.deg2rad(2.5), np.deg2rad(0.75)
-"""By how much limbs are spread at a time [rad]."""
-
-MOST_STEPS = 5
+"""Step by which limbs are spread [rad]."""
 
 ARMS, LEGS = 3 * ARM_STEP, 2 * LEG_STEP
-"""By how much they are spread in every cycle, so that neighbours differ the less in it [rad]."""
+"""Spread of every cycle, so that neighbours differ the less in it [rad]."""
 
 _ARMS, _LEGS = ("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot", "toes")
 
@@ -46,27 +45,27 @@ def spread(body: BodyModel, coefficients: FloatArray) -> FloatArray:
         body: The reference body.
         coefficients: (2 k + 1, s) of one cycle.
     """
-    found = np.array(coefficients)
+    coefficients = np.array(coefficients)
     data, geometry = body.pinocchio.createData(), pin.GeometryData(body.geometry)
     shoulders, hips = (
         [len(ROOT) + body.joint_index(f"{side}_{name}_abduction") for side in SIDES]
         for name in ("shoulder", "hip")
     )
-    found[0, shoulders] += ARMS
-    found[0, hips] += LEGS
+    coefficients[0, shoulders] += ARMS
+    coefficients[0, hips] += LEGS
     pairs = _pairs(body)
-    for _ in range(MOST_STEPS):
-        touching = _touching(body, found, data, geometry)
+    for _ in range(5):
+        touching = _touching(body, coefficients, data, geometry)
         arms, legs = (bool(np.any(touching[chosen])) for chosen in pairs)
         if not arms and not legs:
             break
-        found[0, shoulders] += ARM_STEP * arms
-        found[0, hips] += LEG_STEP * legs
-    return found
+        coefficients[0, shoulders] += ARM_STEP * arms
+        coefficients[0, hips] += LEG_STEP * legs
+    return coefficients
 
 
 def _pairs(body: BodyModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Pairs of shapes with an arm, and pairs of legs."""
+    """(pairs,) whether a pair of shapes has an arm, and whether it is one of legs."""
     names = [shape.name.split("/")[0] for shape in body.geometry.geometryObjects]
     both = [(names[pair.first], names[pair.second]) for pair in body.geometry.collisionPairs]
     arms = np.array([any(name.endswith(_ARMS) for name in pair) for pair in both])
@@ -76,19 +75,23 @@ def _pairs(body: BodyModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
 
 def _touching(body: BodyModel, coefficients: FloatArray, data: Any, geometry: Any) -> NDArray[np.bool_]:
     """(pairs,) whether they touch at any instant."""
-    phase = np.arange(INSTANTS) / INSTANTS
-    signals = fourier_basis(phase, (len(coefficients) - 1) // 2) @ coefficients
+    signals, angles = _signals(body, coefficients, np.arange(INSTANTS) / INSTANTS)
     turns = quaternions(signals[:, 5], signals[:, 4], signals[:, 3])
-    angles = np.clip(signals[:, len(ROOT) :], body.lower, body.upper)
-    found = np.zeros(len(body.geometry.collisionPairs), dtype=np.bool_)
+    touching = np.zeros(len(body.geometry.collisionPairs), dtype=np.bool_)
     for posture in np.hstack([np.zeros((INSTANTS, 3)), turns, angles]):
         pin.computeCollisions(body.pinocchio, data, body.geometry, geometry, posture, False)
-        found |= [result.isCollision() for result in geometry.collisionResults]
-    return found
+        touching |= [result.isCollision() for result in geometry.collisionResults]
+    return touching
+
+
+def _signals(body: BodyModel, coefficients: FloatArray, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, s) signals of a cycle at phases, and (n, h) angles of the hinges within their ranges [rad]."""
+    signals = fourier_basis(phase, (len(coefficients) - 1) // 2) @ coefficients
+    return signals, np.clip(signals[:, len(ROOT) :], body.lower, body.upper)
 
 
 RUNNING, RUNNING_WIDTH = 2.05, 0.15
-"""Speed between walks and runs [m/s], and the width of the change; of the preferred transition in adults."""
+"""Speed of the preferred transition of adults from walks to runs, and width of the change [m/s]."""
 
 DOUBT, TREND_DOUBT = 0.05, 0.01
 """Squared differences [rad^2] over offsets [rad^2]: how readily offsets, and trends, are believed."""
@@ -106,12 +109,12 @@ def as_one_person(
     mean angle of a hinge in a cycle is taken as a function of the velocity, the same for all, plus an offset
     of the person. What is equal on both sides is an even function of lateral and angular
     velocity, what is opposite an odd one; each is fitted by linear least squares. Only offsets are taken
-    out, and only of mean angles; the movement stays the person's own.
+    out, and only of mean angles; the movement stays that of the person.
 
     Args:
         body: The reference body.
-        cycles: One cycle each.
-        persons: Who made it.
+        cycles: Libraries of one cycle each.
+        persons: Name of the person who made each.
     """
     everyone = sorted(set(persons))
     main = Counter(persons).most_common(1)[0][0]
@@ -119,22 +122,22 @@ def as_one_person(
     means = np.concatenate([cycle.coefficients[:, 0] for cycle in cycles])
     reflected = np.concatenate([cycle.mirrored(body).coefficients[:, 0] for cycle in cycles])
     even, odd = _trends(velocities)
-    equal = _offsets(even, persons, [one for one in everyone if one != main], 0.5 * (means + reflected))
+    equal = _offsets(even, persons, [name for name in everyone if name != main], 0.5 * (means + reflected))
     opposite = _offsets(odd, persons, everyone, 0.5 * (means - reflected))
-    found = []
+    alike = []
     for cycle, person in zip(cycles, persons, strict=True):
         coefficients = np.array(cycle.coefficients)
         offset = equal.get(person, 0.0) + opposite[person]
         coefficients[:, 0, _FIRST:] -= offset[_FIRST:]
-        found.append(replace(cycle, coefficients=coefficients))
-    return found
+        alike.append(replace(cycle, coefficients=coefficients))
+    return alike
 
 
 def _offsets(
     trend: FloatArray, persons: Sequence[str], chosen: Sequence[str], means: FloatArray
 ) -> dict[str, FloatArray]:
     """(s,) offsets of the chosen persons from what the trend explains of (n, s) means."""
-    who = np.array([[float(person == one) for one in chosen] for person in persons])
+    who = np.array([[float(person == name) for name in chosen] for person in persons])
     table = np.hstack([trend, who.reshape(len(persons), len(chosen))])
     doubt = np.full(table.shape[1], DOUBT)
     doubt[: trend.shape[1]] = TREND_DOUBT
@@ -163,8 +166,6 @@ MIDDLE = (0.3, 0.7)
 MOST_LEVELLED = np.deg2rad(15.0)
 """A sole with more pitch than this does not lie flat [rad]."""
 
-SAMPLES = 64
-
 LIFTED = 0.02
 """A sole whose lower end is higher than this has left the floor, or not yet landed [m]."""
 
@@ -183,7 +184,7 @@ def tilted(body: BodyModel, q: FloatArray, within: NDArray[np.bool_] | None = No
     Args:
         body: A human.
         q: (n, nq) postures.
-        within: (n,) those of the cycle whose mean counts; all if omitted.
+        within: (n,) postures whose mean counts; all if omitted.
     """
     pelvis = Rotation.from_quat(q[:, 3:7])
     lumbar, thorax = (7 + body.joint_index(f"{name}_flexion") for name in ("lumbar", "thorax"))
@@ -191,12 +192,12 @@ def tilted(body: BodyModel, q: FloatArray, within: NDArray[np.bool_] | None = No
     pitch = pelvis.as_euler("ZYX")[counted, 1].mean()
     lean = pitch + (q[:, lumbar] + q[:, thorax])[counted].mean()
     turn = TILT + TILT_SHARE * lean - pitch
-    found = q.copy()
-    found[:, 3:7] = (pelvis * Rotation.from_rotvec([0.0, turn, 0.0])).as_quat()
-    found[:, lumbar] -= turn
+    tilted_q = q.copy()
+    tilted_q[:, 3:7] = (pelvis * Rotation.from_rotvec([0.0, turn, 0.0])).as_quat()
+    tilted_q[:, lumbar] -= turn
     for side in SIDES:
-        found[:, 7 + body.joint_index(f"{side}_hip_flexion")] += turn
-    return found
+        tilted_q[:, 7 + body.joint_index(f"{side}_hip_flexion")] += turn
+    return tilted_q
 
 
 def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> FloatArray:
@@ -210,21 +211,20 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
         coefficients: (2 k + 1, s) of one cycle.
         events: (3,) phases as of :class:`manikin.walking.gait.motion_library.MotionLibrary`.
     """
-    found = np.array(coefficients)
+    level = np.array(coefficients)
     landing, off, other = events
-    spans = {"left": (landing, 1.0), "right": (other, off)}
-    for number, side in enumerate(SIDES):
-        first, last = spans[side]
+    spans = ((landing, 1.0), (other, off))
+    for number, (first, last) in enumerate(spans):
         middle = first + np.linspace(MIDDLE[0], MIDDLE[1], 16) * (last - first)
-        pitch = float(np.median(_feet(body, found, middle).pitch[number]))
-        slot = len(ROOT) + body.joint_index(f"{side}_ankle_dorsiflexion")
-        found[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
+        pitch = float(np.median(_feet(body, level, middle).pitch[number]))
+        slot = len(ROOT) + body.joint_index(f"{SIDES[number]}_ankle_dorsiflexion")
+        level[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
     stances = [
-        _feet(body, found, np.linspace(spans[side][0], spans[side][1], SAMPLES)).clearance[number]
-        for number, side in enumerate(SIDES)
+        _feet(body, level, np.linspace(first, last, 64)).clearance[number]
+        for number, (first, last) in enumerate(spans)
     ]
-    found[0, _HEIGHT] -= np.median(np.concatenate(stances))
-    return found
+    level[0, _HEIGHT] -= np.median(np.concatenate(stances))
+    return level
 
 
 def on_the_floor(
@@ -246,7 +246,7 @@ def on_the_floor(
     (left_on, left_off), (right_on, right_off) = (
         _standing(_feet(body, coefficients, phase).clearance[number], phase)
         for number, phase in enumerate(
-            np.linspace(first, last, 4 * SAMPLES + 1) for first, last in ((landing, 1.0), (other, off))
+            np.linspace(first, last, 257) for first, last in ((landing, 1.0), (other, off))
         )
     )
     earlier = 1.0 - left_off
@@ -263,9 +263,8 @@ def _standing(clearance: FloatArray, phase: FloatArray) -> tuple[float, float]:
 
 def _feet(body: BodyModel, coefficients: FloatArray, phase: FloatArray) -> FootPlacement:
     """(2, n) feet of a cycle at phases, as if the walker were on the spot."""
-    signals = fourier_basis(phase, (len(coefficients) - 1) // 2) @ coefficients
+    signals, angles = _signals(body, coefficients, phase)
     place = np.zeros((len(phase), 3))
     place[:, 2] = signals[:, _HEIGHT]
     pelvis = rotations(signals[:, 5], signals[:, 4], signals[:, 3])
-    angles = np.clip(signals[:, len(ROOT) :], body.lower, body.upper)
     return FootPlacement.of_foot(Sole.of_body(body), *LegKinematics(body).feet(pelvis, place, angles))

@@ -1,7 +1,7 @@
 """Whole-body walks along paths: a recorded way of walking on a planned way over the floor.
 
-Also here. How far standing feet slide. Walking under directives: velocities in, postures out, frame by frame
-([Truong2010]_ chapter 6).
+A walk follows a whole path at once, or directives frame by frame: velocities in, postures out ([Truong2010]_
+chapter 6).
 """
 
 from collections.abc import Sequence
@@ -12,24 +12,23 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
-from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.reconstruction.anatomy import SIDES
 from manikin.walking.gait.blend import Blend, Gait, travelled
+from manikin.walking.gait.cycles import sole_points
 from manikin.walking.gait.motion_library import MotionLibrary, load_library, reference_body
-from manikin.walking.gait.stance_foot import FootState, Legs, Sole, borders, corrected, poses, put_in_place
+from manikin.walking.gait.stance_foot import FootState, Legs, borders, corrected, poses, put_in_place
 from manikin.walking.path.route import WalkRoute
 from manikin.walking.path.walking_model import to_world
 from manikin.walking.path.walking_path import WalkingPath
 
 
 def stance_slides(body: BodyModel, q: FloatArray, standing: NDArray[np.bool_]) -> FloatArray:
-    """Largest displacement over the floor in every stance of either foot [m].
+    """(stances,) largest displacements over the floor in every stance of either foot [m].
 
     From frame to frame, that of the lower end of the sole, heel or ball of the foot, is added up: a foot that
     rolls over its ends does not slide.
@@ -38,44 +37,34 @@ def stance_slides(body: BodyModel, q: FloatArray, standing: NDArray[np.bool_]) -
         body: A human.
         q: (n, nq) postures.
         standing: (2, n) whether the left and the right foot stand.
-
-    Returns:
-        (stances,).
     """
-    found = []
-    sole = Sole.of_body(body)
-    pelvis = Rotation.from_quat(q[:, 3:7]).as_matrix()
-    feet = LegKinematics(body).feet(pelvis, q[:, :3], q[:, 7:])
-    for foot, ankle, stands in zip(*feet, standing, strict=True):
-        below = ankle - sole.depth * foot[:, :, 2]
-        ends = np.stack([below + end * foot[:, :, 0] for end in (sole.heel, sole.ball)], axis=1)
+    slides = []
+    for points, stands in zip(sole_points(body, q).values(), standing, strict=True):
+        ends = np.stack(points, axis=1)
         moved = np.diff(ends[..., :2], axis=0)
         lower = (ends[1:, :, 2] + ends[:-1, :, 2]).argmin(axis=1)
         moved = moved[np.arange(len(lower)), lower]
         for first, last in pairwise(borders(stands)):
             if stands[first] and last - first > 1:
                 way = np.cumsum(moved[first : last - 1], axis=0)
-                found.append(float(np.hypot(*way.T).max()))
-    return np.array(found)
+                slides.append(float(np.hypot(*way.T).max()))
+    return np.array(slides)
 
 
 FIRST_PHASE = 0.97
-"""Of a walk that begins: just before the left toe-off."""
+"""Phase at which a walk begins: just before the left toe-off."""
 
 ACCELERATION = (2.0, 1.5, 4.0)
 """Largest rates of the velocities, forward, left [m/s^2] and angular [rad/s^2]; our choice, brisk."""
 
 LONGEST_STEP = 0.1
-"""Of the time [s]; a foot's swing has some frames at least."""
-
-PREDICTED = 8
-"""Instants of the next stance whose mean a foot steps to."""
+"""Longest time step [s]; the swing of a foot has some frames at least."""
 
 IN_PLACE = 0.005
-"""A foot is in place for standing when it is corrected by less [m, and rad at this many metres]."""
+"""A foot is in place for standing when it is corrected by less than this [m], and ten times this [rad]."""
 
 RISE_TIME = 0.15
-"""In which the pelvis comes up again after it sank for a leg to reach its foot [s]."""
+"""Time constant of the pelvis' rise after it sank for a leg to reach its foot [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +89,7 @@ class WalkFrame:
 
 
 class WalkController:
-    """A person who walks as told, from standing.
+    """A person who walks under directives, from standing.
 
     The velocities follow the directive with limited accelerations; the phase of the cycle goes on when the
     directive changes, ``p + dt / T`` with the duration T of the new blend ([Truong2010]_ 6.6.2). A directive
@@ -159,21 +148,18 @@ class WalkController:
             change = np.clip(change, -dt * self._limit, dt * self._limit)
             blend = self._gait.blend((self._velocity + change)[None])
         before, self._velocity = self._velocity, blend.velocity[0]
-        self._advance(dt, 0.5 * (before + self._velocity))
+        moved = travelled(0.5 * (before + self._velocity), np.array(dt))
+        self._place = self._place + to_world(self._place[2], moved)
         if not self._rests(asked):
             self._phase = (self._phase + dt / float(self._gait.period(blend)[0])) % 1.0
         return self._frame(blend, dt, _notice(wanted, asked))
 
     def _blend_of(self, wanted: FloatArray) -> Blend:
-        """Of the directive, which mostly is that of the step before."""
+        """Blend of the directive, which mostly is that of the step before."""
         key = wanted.tobytes()
         if self._asked is None or self._asked[0] != key:
             self._asked = (key, self._gait.blend(wanted[None]))
         return self._asked[1]
-
-    def _advance(self, dt: float, velocity: FloatArray) -> None:
-        moved = travelled(velocity, np.array(dt))
-        self._place = self._place + to_world(self._place[2], moved)
 
     def _rests(self, asked: Blend) -> bool:
         """Whether nothing is asked for and both feet stand in place."""
@@ -204,15 +190,15 @@ class WalkController:
         return WalkFrame(q[0], self._place, self._velocity, self._phase, (left, right), notice)
 
     def _next_offset(self, blend: Blend, foot: int, events: FloatArray) -> FloatArray:
-        """Correction at landing that puts the foot at the mean of where the gait has it in its stance."""
-        landing, off, other = events
+        """Correction at landing that puts the foot at the mean of its poses in the next stance."""
+        count, (landing, off, other) = 8, events
         first, last = (landing, 1.0) if foot == 0 else (other + 1.0, off + 1.0)
         ahead = (first - self._phase) % 1.0
-        phase = self._phase + np.linspace(ahead, ahead + last - first, PREDICTED)
+        phase = self._phase + np.linspace(ahead, ahead + last - first, count)
         time = (phase - self._phase) * self._gait.period(blend)[0]
-        moved = travelled(np.broadcast_to(blend.velocity[0], (PREDICTED, 3)), time)
+        moved = travelled(np.broadcast_to(blend.velocity[0], (count, 3)), time)
         place = self._place + to_world(self._place[2], moved)
-        same = np.zeros(PREDICTED, dtype=np.int64)
+        same = np.zeros(count, dtype=np.int64)
         several = Blend(blend.cycles[same], blend.weights[same], blend.velocity[same], blend.outside[same])
         path = poses(self._legs.feet(self._gait.frames(several, phase, place)))[foot]
         return path.mean(axis=0) - path[0]
@@ -232,10 +218,10 @@ RATE = 60.0
 """Frames per second [Hz]."""
 
 LONGEST_END = 1.5
-"""Within which the last step ends [s]."""
+"""Longest time from the end of the path to the end of the last step [s]."""
 
 STANDING_TIME = 0.2
-"""For which the body stands at the end [s]."""
+"""Time of standing at the end [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,15 +229,15 @@ class Walk:
     """A walk of a body, sampled evenly.
 
     Attributes:
-        body: Who walks.
+        body: The walking body.
         time: (n,) [s].
         q: (n, nq) postures.
         place: (n, 3) x, y [m], heading [rad] of the path.
         support: (n, 2) whether the left and the right foot stand.
         outside: (n,) whether the path is faster there than any walk of the library: legs move as in
             the nearest one, in time with the path.
-        slides_before: Slide of each stance as the blended cycles have it [m].
-        slides: The same with the feet put in place [m].
+        slides_before: (stances,) slides of the feet in the blended cycles [m].
+        slides: (stances,) slides with the feet put in place [m].
     """
 
     body: BodyModel
@@ -269,7 +255,7 @@ class Walk:
 
     @property
     def notice(self) -> str | None:
-        """Says so where the path is faster than any walk of the library; None if it nowhere is."""
+        """Where the path is faster than any walk of the library; None if it nowhere is."""
         if not self.outside.any():
             return None
         first = self.time[int(np.argmax(self.outside))]
@@ -285,7 +271,7 @@ class Walk:
 
     @cached_property
     def motion(self) -> Motion:
-        """With velocities, centre of mass and angular momentum; torques, forces and margin are NaN."""
+        """The motion with velocities, CoM and angular momentum; torques, forces and margin are NaN."""
         body, model = self.body, self.body.pinocchio
         n, dt = len(self.time), float(self.time[1] - self.time[0])
         steps = np.array([pin.difference(model, a, b) for a, b in zip(self.q[:-1], self.q[1:], strict=True)])
@@ -324,7 +310,7 @@ def walk_along(
         body: A human; that of the library if omitted.
         library: Cycles; those that come with this package if omitted.
         rate: Frames per second [Hz], 20 to 1000.
-        height: Of the floor [m].
+        height: Height of the floor [m].
 
     Raises:
         InputError: If the path is none, failed, or the rate is not usable.
@@ -345,7 +331,8 @@ def walk_along(
     phase = FIRST_PHASE + np.concatenate([[0.0], np.cumsum(0.5 * (steps[1:] + steps[:-1]))])
     frames = gait.frames(blend, phase, place)
     swing = frames.swing()
-    end = _last_frame(swing, time, path.duration)
+    both = np.flatnonzero((swing < 0.0).all(axis=0) & (time >= path.duration))
+    end = int(both[0]) if both.size else len(time) - 1
     swing[:, end:] = -1.0
     q, _ = legs.reached(frames, put_in_place(legs.feet(frames), swing))
     q[:, 2] += finite_number(height, "height of the floor [m]")
@@ -355,9 +342,3 @@ def walk_along(
         body, time[kept], q[kept], place[kept], support.T, blend.outside[kept],
         stance_slides(body, frames.q[kept], support), stance_slides(body, q[kept], support),
     )  # fmt: skip
-
-
-def _last_frame(swing: FloatArray, time: FloatArray, arrival: float) -> int:
-    """First frame after the arrival with both feet on the floor."""
-    both = np.flatnonzero((swing < 0.0).all(axis=0) & (time >= arrival))
-    return int(both[0]) if both.size else len(time) - 1

@@ -1,12 +1,10 @@
-"""Building the motion library from recordings ([Truong2010]_ 6.4).
-
-Also here. Which parts of which recordings a motion library is built from.
-"""
+"""Building the motion library from windows of recordings ([Truong2010]_ 6.4)."""
 
 import csv
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +23,7 @@ from manikin.walking.gait.follow_path import stance_slides
 from manikin.walking.gait.motion_library import ROOT, STAND, MotionLibrary, leg_length, reference_body
 
 TABLE = "clips_locomotion.csv"
-"""Names the windows to use: columns class, file, first_frame0, end_frame0, in the folder of recordings."""
-
-IDLE = "idle"
-"""Class of the windows in which a person stands."""
+"""Table of the windows in the folder of recordings: columns class, file, first_frame0, end_frame0."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +31,9 @@ class Window:
     """A part of a recording to take a cycle from.
 
     Attributes:
-        kind: Its class.
+        kind: Class of the motion.
         file: The recording, below the folder.
-        first: Frame.
+        first: First frame.
         last: Frame after the last one.
     """
 
@@ -61,15 +56,15 @@ def read_windows(folder: Path) -> list[Window]:
         rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{table} cannot be read: {error}; valid: a table in UTF-8") from None
-    found = []
+    windows = []
     for number, row in enumerate(rows, 2):
         try:
-            found.append(_window(row))
+            windows.append(_window(row))
         except (KeyError, TypeError, ValueError, AttributeError):
             raise InputError(
                 f"{table} line {number} is not usable; valid: class, file, first_frame0, end_frame0"
             ) from None
-    return found
+    return windows
 
 
 def _window(row: dict[str, str]) -> Window:
@@ -77,13 +72,11 @@ def _window(row: dict[str, str]) -> Window:
     first, last = int(row["first_frame0"]), int(row["end_frame0"])
     if not 0 <= first < last:
         raise ValueError
-    return Window(STAND if kind == IDLE else kind, row["file"], first, last)
+    return Window(STAND if kind == "idle" else kind, row["file"], first, last)
 
-
-RECORDINGS = "mocap"
 
 SAMPLES = 64
-"""Of a cycle, before its Fourier coefficients are taken."""
+"""Samples of a cycle, before its Fourier coefficients are taken."""
 
 ACKNOWLEDGEMENTS = {
     "cmu": "The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -91,16 +84,13 @@ ACKNOWLEDGEMENTS = {
     "accad": "Motion capture data: ACCAD / The Ohio State University, Open Motion Project, "
     "CC BY 3.0 Unported.",
 }
-"""By the beginning of a recording's folder."""
+"""Sources by the beginning of a recording's folder."""
 
 NOT_CLOSED = np.deg2rad(15.0)
 """Root mean square difference of the hinges between both ends of a cycle; more is no cycle [rad]."""
 
 MOST_SLIDE = 0.3
-"""A cycle in which a standing foot slides by more has its landings or toe-offs found wrongly [m]."""
-
-USUAL_PERIOD, USUAL_EVENTS = 1.1, (0.4, 0.5, -0.1)
-"""Of standing, which has no cycle of its own: those of a slow walk, in which feet can be put in place."""
+"""A cycle in which a standing foot slides by more has its landings or toe-offs detected wrongly [m]."""
 
 NEAR = 0.05
 """Cycles nearer to another one than this are left out [m/s]; people differ, and blends would flicker."""
@@ -119,10 +109,10 @@ class _Person:
 
 @dataclass(frozen=True, eq=False)
 class LibraryBuild:
-    """A library and what was not used for it.
+    """A library and the windows that were not used for it.
 
     Attributes:
-        library: With the mirror images.
+        library: The library with the mirror images.
         without_cycle: Windows in which no cycle was found, or none that closes and whose feet stand.
         near_others: Windows whose cycle is as fast as one that was taken.
     """
@@ -138,15 +128,15 @@ def build_library(
     """Read, reconstruct and cut the recordings of a folder, and add the mirror images.
 
     Args:
-        folder: With :data:`TABLE` and, in ``mocap``, the recordings.
-        report: Told the share that is done and the window.
+        folder: Folder with :data:`TABLE` and, in ``mocap``, the recordings.
+        report: Called with the share that is done and the file of the window.
 
     Raises:
         InputError: If a file is not usable, or no window holds a cycle.
     """
     body, windows = reference_body(), read_windows(folder)
-    person = cache(lambda file: _person(body, folder / RECORDINGS / file))
-    found: list[tuple[Window, MotionLibrary]] = []
+    person = cache(lambda file: _person(body, folder / "mocap" / file))
+    cycles: list[tuple[Window, MotionLibrary]] = []
     without: list[Window] = []
     for number, window in enumerate(windows):
         report(number / len(windows), window.file)
@@ -154,16 +144,17 @@ def build_library(
         if cycle is None or _slide(body, cycle) > MOST_SLIDE:
             without.append(window)
         else:
-            found.append((window, cycle))
-    report(1.0, f"{len(found)} cycles")
-    if not found:
+            cycles.append((window, cycle))
+    report(1.0, f"{len(cycles)} cycles")
+    if not cycles:
         raise InputError(f"{folder / TABLE} names no window with a whole cycle")
-    ordered = _by_person(found)
+    counts = Counter(_person_of(window) for window, _ in cycles)
+    ordered = sorted(cycles, key=lambda pair: -counts[_person_of(pair[0])])
     persons = [_person_of(window) for window, _ in ordered]
     alike = as_one_person(body, [cycle for _, cycle in ordered], persons)
     level = [_levelled(body, _symmetric(body, cycle)) for cycle in alike]
     kept = _apart(level)
-    library = _with_mirror_images(body, _joined([level[i] for i in kept]))
+    library = _joined(body, [level[i] for i in kept])
     near = tuple(window for i, (window, _) in enumerate(ordered) if i not in kept)
     return LibraryBuild(library, tuple(without), near)
 
@@ -172,9 +163,9 @@ def _person(body: BodyModel, file: Path) -> _Person:
     recording = read_recording(file)
     if not isinstance(recording, Recording):
         raise InputError(f"{file} holds no skeleton; valid: BVH or AMC")
-    found = reconstruct(recording)
-    q = np.array(found.q)
-    q[:, :3] *= leg_length(body) / leg_length(found.body)
+    reconstruction = reconstruct(recording)
+    q = np.array(reconstruction.q)
+    q[:, :3] *= leg_length(body) / leg_length(reconstruction.body)
     return _Person(q, recording.rate)
 
 
@@ -229,35 +220,35 @@ def _coded(
     events = np.array([cut.landing - cut.start, cut.other_off - cut.start, cut.other_landing - cut.start])
     events = events / cut.period
     if cut.foot == "right":
-        # Begun at the right toe-off: the other foot's is the left one's, and becomes the begin.
+        # Begun at the right toe-off: that of the other foot is the left one, which becomes the begin.
         strike, off, other = events
         coefficients = shifted(coefficients, off)
         events = np.array([other + 1.0 - off, 1.0 - off, strike - off])
     first, last = (round(instant * rate) for instant in (cut.start, cut.end))
     name = f"{Path(window.file).stem} {first}-{last}"
-    return _one(body, window, name, steady.velocity, cut.period, events, coefficients)
+    return _one_cycle(body, window, name, steady.velocity, cut.period, events, coefficients)
 
 
 def _slide(body: BodyModel, cycle: MotionLibrary) -> float:
     """Largest slide of a standing foot in some steps of a single cycle [m]."""
     phase, period = np.arange(3 * SAMPLES + 1) / SAMPLES, cycle.periods[0]
-    one, n = np.zeros((len(phase), 1), dtype=np.int64), len(phase)
+    n = len(phase)
     velocity = np.tile(cycle.velocities, (n, 1))
-    blend = Blend(one, np.ones((n, 1)), velocity, np.zeros(n, dtype=np.bool_))
+    blend = Blend(np.zeros((n, 1), np.int64), np.ones((n, 1)), velocity, np.zeros(n, dtype=np.bool_))
     frames = Gait(cycle, body).frames(blend, phase, travelled(velocity, phase * period))
     return float(stance_slides(body, frames.q, frames.swing() < 0.0).max())
 
 
 def _standing(body: BodyModel, window: Window, person: _Person) -> MotionLibrary:
-    """The mean posture of a window, symmetric."""
+    """The mean posture of a window, with the period and events of a slow walk to put feet in place."""
     values = _signals(tilted(body, person.q[window.first : window.last])).mean(axis=0)
     values[[0, 1, 5]] = 0.0
     coefficients = fourier_coefficients(np.tile(values, (SAMPLES, 1)))
     name = f"{Path(window.file).stem} {window.first}-{window.last}"
-    return _one(body, window, name, np.zeros(3), USUAL_PERIOD, np.array(USUAL_EVENTS), coefficients)
+    return _one_cycle(body, window, name, np.zeros(3), 1.1, np.array([0.4, 0.5, -0.1]), coefficients)
 
 
-def _one(
+def _one_cycle(
     body: BodyModel, window: Window, name: str, velocity: FloatArray, period: float, events: FloatArray,
     coefficients: FloatArray,
 ) -> MotionLibrary:  # fmt: skip
@@ -269,7 +260,7 @@ def _one(
 
 
 def _person_of(window: Window) -> str:
-    """By the begin of the file's name, as both collections have it."""
+    """Name of the person by the begin of the file's name, as both collections have it."""
     return Path(window.file).stem.split("_")[0]
 
 
@@ -278,13 +269,6 @@ def _levelled(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
     level = levelled(body, spread(body, cycle.coefficients[0]), cycle.events[0])
     coefficients, events = on_the_floor(body, level, cycle.events[0])
     return replace(cycle, coefficients=levelled(body, coefficients, events)[None], events=events[None])
-
-
-def _by_person(found: list[tuple[Window, MotionLibrary]]) -> list[tuple[Window, MotionLibrary]]:
-    """Those of whom there are most cycles first, by the begin of the file's name."""
-    persons = [_person_of(window) for window, _ in found]
-    order = sorted(range(len(found)), key=lambda i: (-persons.count(persons[i]), i))
-    return [found[i] for i in order]
 
 
 def _symmetric(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
@@ -303,7 +287,7 @@ def _symmetric(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
 
 
 def _apart(cycles: list[MotionLibrary]) -> list[int]:
-    """Cycles that are not near to one before."""
+    """Indices of the cycles that are not near to one before."""
     scale, kept = np.array([1.0, 1.0, TURN_RADIUS]), list[int]()
     for i, cycle in enumerate(cycles):
         away = [np.linalg.norm((cycle.velocities - cycles[j].velocities) * scale) for j in kept]
@@ -312,17 +296,9 @@ def _apart(cycles: list[MotionLibrary]) -> list[int]:
     return kept
 
 
-def _joined(cycles: list[MotionLibrary]) -> MotionLibrary:
-    found = cycles[0]
-    for cycle in cycles[1:]:
-        found = found.with_cycles(cycle)
-    thanks = tuple(dict.fromkeys(text for cycle in cycles for text in cycle.acknowledgements))
-    return MotionLibrary(
-        found.names, found.kinds, found.velocities, found.periods, found.events, found.coefficients,
-        found.joint_names, found.leg, thanks,
-    )  # fmt: skip
-
-
-def _with_mirror_images(body: BodyModel, library: MotionLibrary) -> MotionLibrary:
+def _joined(body: BodyModel, cycles: list[MotionLibrary]) -> MotionLibrary:
+    """One library of cycles and, of those that are not symmetric, the mirror images."""
+    thanks = dict.fromkeys(text for cycle in cycles for text in cycle.acknowledgements)
+    library = replace(reduce(MotionLibrary.with_cycles, cycles), acknowledgements=tuple(thanks))
     sided = [i for i, kind in enumerate(library.kinds) if kind not in SYMMETRIC]
     return library.with_cycles(library.chosen(sided).mirrored(body)) if sided else library

@@ -1,11 +1,11 @@
-"""The motion library: walking cycles of one body, by forward, left and angular velocity.
+"""The motion library: walking cycles of one body by velocity, and its file.
 
-Also here. The motion library as a file: coefficients in NumPy's ``.npz``, without pickled objects.
+The file holds Fourier coefficients in NumPy's ``.npz``, without pickled objects.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import cache, cached_property
+from dataclasses import dataclass, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, Self
@@ -22,22 +22,21 @@ from manikin.runtime.files import atomic_path
 
 MIRRORED = " mirrored"
 
-
 ROOT = ("ahead", "left", "height", "roll", "pitch", "yaw")
-"""Signals of the root: its error around the line or circle, and its height [m]; its turns, yaw being the
-error of the heading [rad]. The hinges' angles follow."""
+"""Signals of the root: error around the line or circle and height [m]; turns, with the error of the heading
+as yaw [rad]. The angles of the hinges follow."""
 
 _ROOT_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 REFERENCE_STATURE = 1.75
-"""Of the body that all cycles are kept for [m]."""
+"""Stature of the reference body [m]."""
 
 STAND = "stand"
 
 
 @cache
 def reference_body() -> BodyModel:
-    """The human that all cycles are kept for."""
+    """The human whose hinges and leg length the cycles have."""
     return human(REFERENCE_STATURE)
 
 
@@ -55,16 +54,16 @@ class MotionLibrary:
     that blends of postures within the ranges are within the ranges, without leaps.
 
     Attributes:
-        names: Of the cycles, ``FILE first-last``, with ``mirrored`` for the mirror images.
+        names: Names of the cycles, ``FILE first-last``, with ``mirrored`` for the mirror images.
         kinds: Class of each, such as ``"walk straight"``.
         velocities: (c, 3) forward, left [m/s], angular [rad/s].
         periods: (c,) durations [s].
         events: (c, 3) phases at which the left foot lands, the right one leaves the floor, and the right one
             landed before: below 0 where it did so before the cycle's begin.
         coefficients: (c, 2 k + 1, s) Fourier coefficients of the signals: :data:`ROOT`, then the hinges.
-        joint_names: Of the hinges.
-        leg: Leg length of the body they are for [m].
-        acknowledgements: Of those who recorded the motions.
+        joint_names: Names of the hinges.
+        leg: Leg length of the reference body [m].
+        acknowledgements: Sources of the recordings.
     """
 
     names: tuple[str, ...]
@@ -92,14 +91,8 @@ class MotionLibrary:
         if c == 0 or self.periods.min() <= 0.0 or not self.leg > 0.0:
             raise InputError("motion library has no cycle, or no duration or leg length; valid: all > 0")
         landing, off, other = self.events.T
-        if not np.all(
-            (landing > 0.0)
-            & (landing < 1.0)
-            & (off > 0.0)
-            & (off < 1.0)
-            & (other < off)
-            & (other > off - 1.0)
-        ):
+        ordered = (landing > 0.0) & (landing < 1.0) & (off > 0.0) & (off < 1.0)
+        if not np.all(ordered & (other < off) & (other > off - 1.0)):
             raise InputError(
                 "motion library has events out of order; valid: 0 < landing, off < 1, other before off"
             )
@@ -109,70 +102,46 @@ class MotionLibrary:
 
     @property
     def harmonics(self) -> int:
-        """Of every signal."""
+        """Number of harmonics of every signal."""
         return (self.coefficients.shape[1] - 1) // 2
-
-    @cached_property
-    def hinges(self) -> slice:
-        """Where the hinges' angles are among the signals."""
-        return slice(len(ROOT), None)
-
-    def index(self, name: str) -> int:
-        """Place of a cycle.
-
-        Raises:
-            InputError: If there is none of that name.
-        """
-        if name not in self.names:
-            raise InputError(f"motion library has no cycle {name!r}; valid: {', '.join(self.names)}")
-        return self.names.index(name)
 
     def chosen(self, indices: Sequence[int] | NDArray[np.integer]) -> Self:
         """The library of some of its cycles."""
-        of_cycles = ("velocities", "periods", "events", "coefficients")
-        given = {field.name: getattr(self, field.name) for field in fields(self)}
-        given |= {name: given[name][list(indices)] for name in of_cycles}
-        given |= {name: tuple(given[name][i] for i in indices) for name in ("names", "kinds")}
-        return type(self)(**given)
+        return replace(
+            self,
+            **{name: getattr(self, name)[list(indices)] for name in _SERIES},
+            **{name: tuple(getattr(self, name)[i] for i in indices) for name in ("names", "kinds")},
+        )
 
     def mirrored(self, body: BodyModel) -> Self:
-        """The library of the mirror images, which begin at the left toe-off again.
-
-        Args:
-            body: Whose hinges they are.
-        """
+        """The library of the mirror images, which begin at the left toe-off again; of the body's hinges."""
         indices, factors = mirrored_hinges(body)
-        hinges = self.hinges
+        hinges = slice(len(ROOT), None)
         coefficients = np.array(self.coefficients)
         coefficients[:, :, : len(ROOT)] *= _ROOT_MIRROR
         coefficients[:, :, hinges] = factors * self.coefficients[:, :, hinges][:, :, indices]
         strike, off, other = self.events.T
         coefficients = np.array([shifted(c, p) for c, p in zip(coefficients, off, strict=True)])
-        given = {field.name: getattr(self, field.name) for field in fields(self)}
-        given |= {
-            "names": tuple(f"{name} mirrored" for name in self.names),
-            "velocities": self.velocities * [1.0, -1.0, -1.0],
-            "events": np.column_stack([other + 1.0 - off, 1.0 - off, strike - off]),
-            "coefficients": coefficients,
-        }
-        return type(self)(**given)
+        return replace(
+            self,
+            names=tuple(name + MIRRORED for name in self.names),
+            velocities=self.velocities * [1.0, -1.0, -1.0],
+            events=np.column_stack([other + 1.0 - off, 1.0 - off, strike - off]),
+            coefficients=coefficients,
+        )
 
     def with_cycles(self, other: "MotionLibrary") -> Self:
         """Both libraries in one."""
-        given = {field.name: getattr(self, field.name) for field in fields(self)}
-        for name in ("velocities", "periods", "events", "coefficients"):
-            given[name] = np.concatenate([getattr(self, name), getattr(other, name)])
-        for name in ("names", "kinds"):
-            given[name] = getattr(self, name) + getattr(other, name)
-        return type(self)(**given)
+        series = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _SERIES}
+        return replace(self, names=self.names + other.names, kinds=self.kinds + other.kinds, **series)
 
+
+_SERIES = ("velocities", "periods", "events", "coefficients")
 
 FORMAT = "manikin motion library 1"
 
-SHIPPED = "walking_library.npz"
-
 LARGEST = 50_000_000
-"""Of a file that is read [bytes]."""
+"""Largest file that is read [bytes]."""
 
 _ARRAYS = {"velocities": 2, "periods": 1, "events": 2, "coefficients": 3, "leg": 0}
 _WORDS = {"format": 0, "names": 1, "kinds": 1, "joint_names": 1, "acknowledgements": 1}
@@ -183,12 +152,8 @@ def save_library(library: MotionLibrary, path: str | Path) -> None:
 
     The coefficients are rounded to single precision, some 1e-7 rad.
 
-    Args:
-        library: Cycles.
-        path: File to write, ``.npz``.
-
     Raises:
-        InputError: If it cannot be written.
+        InputError: If the file (``.npz``) cannot be written.
     """
     kept = [i for i, name in enumerate(library.names) if not name.endswith(MIRRORED)]
     sided = np.array([library.names[i] + MIRRORED in library.names for i in kept])
@@ -197,9 +162,7 @@ def save_library(library: MotionLibrary, path: str | Path) -> None:
         "names": np.array([library.names[i] for i in kept]),
         "kinds": np.array([library.kinds[i] for i in kept]),
         "sided": sided,
-        "velocities": library.velocities[kept],
-        "periods": library.periods[kept],
-        "events": library.events[kept],
+        **{name: getattr(library, name)[kept] for name in _SERIES},
         "coefficients": library.coefficients[kept].astype(np.float32),
         "joint_names": np.array(library.joint_names),
         "leg": np.array(library.leg),
@@ -221,14 +184,12 @@ def load_library(path: str | Path | None = None) -> MotionLibrary:
     Raises:
         InputError: If it is no such file, or what it holds does not fit together.
     """
-    if path is None:
-        return _shipped()
-    return _read(Path(path))
+    return _shipped() if path is None else _read(Path(path))
 
 
 @cache
 def _shipped() -> MotionLibrary:
-    with resources.as_file(resources.files("manikin.walking") / "data" / SHIPPED) as file:
+    with resources.as_file(resources.files("manikin.walking") / "data" / "walking_library.npz") as file:
         return _read(file)
 
 
@@ -267,23 +228,18 @@ def _library(file: Path, given: dict[str, Any]) -> MotionLibrary:
     sided, names = given["sided"], tuple(given["names"].tolist())
     if len(sided) != len(names) or len(set(names)) != len(names):
         raise InputError(f"{file} names are not unique, or their number is not that of 'sided'")
-    body = _body(file, tuple(given["joint_names"].tolist()))
+    body = reference_body()
+    if tuple(given["joint_names"].tolist()) != body.joint_names:
+        raise InputError(
+            f"{file} is for other hinges than those of our human; valid: a library of this version"
+        )
     try:
         library = MotionLibrary(
-            names, tuple(given["kinds"].tolist()), given["velocities"], given["periods"], given["events"],
-            given["coefficients"], body.joint_names, float(given["leg"]),
-            tuple(given["acknowledgements"].tolist()),
+            names, tuple(given["kinds"].tolist()), joint_names=body.joint_names, leg=float(given["leg"]),
+            acknowledgements=tuple(given["acknowledgements"].tolist()),
+            **{name: given[name] for name in _SERIES},
         )  # fmt: skip
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
     chosen = np.flatnonzero(sided)
     return library.with_cycles(library.chosen(chosen).mirrored(body)) if len(chosen) else library
-
-
-def _body(file: Path, joint_names: tuple[str, ...]) -> BodyModel:
-    body = reference_body()
-    if joint_names != body.joint_names:
-        raise InputError(
-            f"{file} is for other hinges than those of our human; valid: a library of this version"
-        )
-    return body

@@ -4,9 +4,6 @@ The thesis leaves this open (6.8). Blended cycles let the standing foot slide, f
 fit the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
 from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the
 next. Legs follow by inverse kinematics in closed form.
-
-Also here. One foot as time goes on: where it stands, and what its next step will be corrected by. A foot on
-or over the floor: where its sole is, and over which end it rolls.
 """
 
 from dataclasses import dataclass, replace
@@ -23,19 +20,16 @@ from manikin.numerics.spatial import FloatArray, dot, rotations
 from manikin.recordings.reconstruction.anatomy import SIDES
 from manikin.walking.gait.blend import GaitFrames
 
-LATE = 0.5
-"""A foot that is found swinging after this share of the swing keeps its correction: it stood a moment ago."""
-
 
 @dataclass(eq=False)
 class FootState:
-    """What a controller knows of a foot from one instant to the next.
+    """State of a foot from one instant to the next; corrections are added to the pose that the gait has.
 
     Attributes:
         pose: (3,) x, y [m], yaw [rad] where it stands.
-        offset: (3,) of the last instant.
-        before: (3,) at the begin of the swing.
-        after: (3,) aimed at for the end of the swing.
+        offset: (3,) correction of the last instant.
+        before: (3,) correction at the begin of the swing.
+        after: (3,) correction aimed at for the end of the swing.
         standing: Whether it stood.
     """
 
@@ -47,21 +41,24 @@ class FootState:
 
     @classmethod
     def at(cls, pose: FloatArray) -> "FootState":
-        """Standing somewhere."""
+        """A foot that stands at a pose (3,)."""
         return cls(pose, np.zeros(3), np.zeros(3), np.zeros(3))
 
     def lifted(self, swing: float, target: FloatArray) -> None:
-        """Begin a swing towards a correction."""
+        """Begin a swing towards a correction (3,).
+
+        After half of the swing the foot keeps its correction: it stood a moment ago.
+        """
         self.standing = False
         self.before = self.offset
-        self.after = self.offset if swing > LATE else target
+        self.after = self.offset if swing > 0.5 else target
 
     def update(self, wanted: FloatArray, swing: float) -> None:
         """Go on to the next instant.
 
         Args:
             wanted: (3,) x, y [m], yaw [rad] where the gait has the foot.
-            swing: How far it has swung, -1 while it stands.
+            swing: Share of the swing [-], -1 while it stands.
         """
         if swing >= 0.0:
             share = float(smooth_step(np.array(swing)))
@@ -83,12 +80,12 @@ class Sole:
     """Points of either sole of a human in the foot's frame.
 
     Attributes:
-        centre: Of the whole sole ahead of the ankle [m].
-        heel: Rear end, behind the ankle [m].
+        centre: Middle of the whole sole, ahead of the ankle [m].
+        heel: Rear end, ahead of the ankle (negative) [m].
         ball: Line of the toe hinges, ahead of the ankle [m].
-        toes: From there to the front end [m].
-        depth: Below the ankle [m].
-        half_width: [m].
+        toes: Distance from there to the front end [m].
+        depth: Depth below the ankle [m].
+        half_width: Half of the width [m].
     """
 
     centre: float
@@ -100,11 +97,7 @@ class Sole:
 
     @classmethod
     def of_body(cls, body: BodyModel) -> Self:
-        """Sole of a human.
-
-        Raises:
-            BodyError: If the body has no measured soles.
-        """
+        """Sole of a human; a body without measured soles is refused."""
         if body.sole_length is None or body.sole_width is None:
             raise BodyError(f"body {body.name!r} has no soles; valid: a human")
         centre = body.effector("left_foot").translation
@@ -117,7 +110,7 @@ class Sole:
 
 @dataclass(frozen=True, eq=False)
 class FootPlacement:
-    """Feet by the place of the sole on the floor, as if it were put flat over the end it stands on.
+    """Feet by the pose of the sole on the floor, as if it were put flat over the end it stands on.
 
     A foot that rolls from heel to ball without sliding keeps its ``point``: with its toes up it turns about
     the heel, with its heel up about the ball.
@@ -138,7 +131,7 @@ class FootPlacement:
 
     @classmethod
     def of_foot(cls, sole: Sole, foot: FloatArray, ankle: FloatArray) -> Self:
-        """Of feet with orientations (..., 3, 3), foot to world, and origins (..., 3) [m]."""
+        """Placements of feet with orientations (..., 3, 3), foot to world, and origins (..., 3) [m]."""
         yaw = np.arctan2(foot[..., 1, 0], foot[..., 0, 0])
         pitch = -np.arcsin(np.clip(foot[..., 2, 0], -1.0, 1.0))
         roll = np.arctan2(foot[..., 2, 1], foot[..., 2, 2])
@@ -167,9 +160,7 @@ class FootPlacement:
 
 def _flat(sole: Sole, pivot: FloatArray, yaw: FloatArray) -> FloatArray:
     """(..., 2) from the pivot to the middle of the flat sole [m]."""
-    found = np.empty((*yaw.shape, 2))
-    found[..., 0], found[..., 1] = np.cos(yaw), np.sin(yaw)
-    return (sole.centre - pivot)[..., None] * found
+    return (sole.centre - pivot)[..., None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
 
 
 def _edge(sole: Sole, pitch: FloatArray, roll: FloatArray) -> FloatArray:
@@ -184,7 +175,7 @@ LEAVING, LANDING = 0.2, 0.2
 """Shares of the swing in which a foot leaves, and in which it reaches, the floor."""
 
 LIFT = 0.15
-"""A foot is lifted by at least this share of the distance by which its step is corrected."""
+"""Least lift of a foot, as a share of the distance by which its step is corrected [-]."""
 
 STRAIGHTENING = 2.5
 """Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
@@ -194,13 +185,10 @@ HEEL_UP = np.deg2rad(20.0)
 """A standing foot with its heel up by this rolls on for its leg, with less heel the less so [rad]."""
 
 OFF_FLOOR = 0.05
-"""A foot higher than this does not [m]."""
+"""A foot higher than this does not roll on [m]."""
 
 MOST_HEEL = np.deg2rad(20.0)
-"""By how much it rolls on at most [rad]."""
-
-YIELDS = 2
-"""How often feet yield to joints at the ends of their ranges."""
+"""Largest pitch by which it rolls on [rad]."""
 
 _YIELDING = ("hip_rotation", "ankle_dorsiflexion", "ankle_inversion")
 
@@ -223,28 +211,28 @@ class Legs:
         self._lumbar = body.joint_index("lumbar_flexion")
 
     def feet(self, frames: GaitFrames) -> FootPlacement:
-        """Where the gait has the feet, (2, n)."""
+        """(2, n) placements of the feet in the gait."""
         return FootPlacement.of_foot(self._sole, *self._legs.feet(frames.pelvis, frames.place, frames.angles))
 
     def reached(
         self, frames: GaitFrames, feet: FootPlacement, least: FloatArray | float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        """Postures with the feet where they shall be.
+        """Postures with the feet at given placements.
 
         The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough.
         A foot whose ankle turns no further rolls over its edge, heel or ball.
 
         Args:
-            frames: Of n instants of the gait.
-            feet: (2, n) where the feet shall be.
-            least: By how much the pelvis sinks at least [m].
+            frames: n instants of the gait.
+            feet: (2, n) placements of the feet.
+            least: Least sinking of the pelvis [m].
 
         Returns:
-            Postures (n, nq) and by how much the pelvis sinks (n,) [m].
+            Postures (n, nq) and sinking of the pelvis (n,) [m].
         """
         angles = frames.angles
         feet = self._with_heels_up(frames, feet)
-        for last in (False,) * YIELDS + (True,):
+        for last in (False, False, True):
             angles, sink = self._legs_to(frames, feet, angles, least)
             excess = angles - np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
             excess[:, self._hips] = 0.0
@@ -280,7 +268,7 @@ class Legs:
     def _legs_to(
         self, frames: GaitFrames, feet: FootPlacement, angles: FloatArray, least: FloatArray | float
     ) -> tuple[FloatArray, FloatArray]:
-        """Angles (n, h), within the limits or not, and by how much the pelvis sinks (n,) [m]."""
+        """Angles (n, h), within the limits or not, and sinking of the pelvis (n,) [m]."""
         foot, ankle = feet.to_foot(self._sole)
         hips = self._legs.hips(frames.pelvis, frames.place)
         away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
@@ -329,10 +317,10 @@ def corrected(
     """Feet moved by their corrections, on the floor where they stand.
 
     Args:
-        wanted: (...) as the gait has them.
-        swing: (...) how far they have swung, -1 while they stand.
+        wanted: (...) placements in the gait.
+        swing: (...) shares of the swing [-], -1 while they stand.
         offset: (..., 3) x, y [m] and yaw [rad] to add.
-        distance: (...) by how much the whole step is corrected [m].
+        distance: (...) correction of the whole step [m].
     """
     standing = swing < 0.0
     up = np.where(standing, 0.0, smooth_step(swing / LEAVING) * smooth_step((1.0 - swing) / LANDING))
@@ -348,9 +336,7 @@ def corrected(
 
 def poses(feet: FootPlacement) -> FloatArray:
     """(..., n, 3) x, y [m] and yaw [rad] of feet at n instants, the yaw continuous."""
-    found = np.empty((*feet.yaw.shape, 3))
-    found[..., :2], found[..., 2] = feet.point, np.unwrap(feet.yaw)
-    return found
+    return np.concatenate([feet.point, np.unwrap(feet.yaw)[..., None]], axis=-1)
 
 
 def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
@@ -359,8 +345,8 @@ def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
     In the first stance they are where they were at the start, in the last one where they come to rest.
 
     Args:
-        wanted: (2, n) as the gait has them.
-        swing: (2, n) how far they have swung, -1 while they stand.
+        wanted: (2, n) placements in the gait.
+        swing: (2, n) shares of the swing [-], -1 while they stand.
     """
     both = [_steps(path, share) for path, share in zip(poses(wanted), swing, strict=True)]
     offset, distance = (np.array(values) for values in zip(*both, strict=True))
@@ -368,7 +354,7 @@ def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
 
 
 def _steps(path: FloatArray, swing: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Corrections (n, 3) of one foot, and by how much each step is corrected (n,) [m]."""
+    """Corrections (n, 3) of one foot, and the correction of the whole step at each instant (n,) [m]."""
     n, standing = len(swing), swing < 0.0
     spans = list(pairwise(borders(standing)))
     offset, distance = np.zeros((n, 3)), np.zeros(n)

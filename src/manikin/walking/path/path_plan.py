@@ -1,7 +1,7 @@
 """Finding walking paths: the criterion minimised from several guesses, around obstacles as well.
 
-Also here. Initial guesses of a walking path: straight, turned, and around what is in the way. Ways between
-resting obstacles, searched on a grid to guess paths from, or to tell that there is none.
+Guesses are straight, turned, or go around what is in the way. Ways between resting obstacles are searched on
+a grid, to guess paths from or to tell that there is none.
 """
 
 import itertools
@@ -31,13 +31,7 @@ GUESSES = ("straight", "turning", "other first turn", "other last turn")
 so with one of the turns the other way round, where that turn is nearly half a turn."""
 
 _HALF_TURN = np.radians(150.0)
-"""Turns from which the other way round is tried as well [rad]."""
-
-_ASIDE = 0.1
-"""Room that a detour leaves beside an obstacle [m]."""
-
-_MANY = 2
-"""Of more obstacles in the way than this, all are passed on one side or all on the other."""
+"""Least turn for which the other way round is tried as well [rad]."""
 
 
 def wrap(angle: float) -> float:
@@ -46,7 +40,7 @@ def wrap(angle: float) -> float:
 
 
 def kinds_of_guesses(start: FloatArray, goal: FloatArray) -> list[str]:
-    """Those of :data:`GUESSES` that make sense between two places (3,) x, y [m], heading [rad]."""
+    """Those of :data:`GUESSES` that are worth trying between two places (3,) x, y [m], heading [rad]."""
     turns = zip(GUESSES[2:], _turns(start, goal), strict=True)
     return [*GUESSES[:2], *(kind for kind, turn in turns if abs(turn) >= _HALF_TURN)]
 
@@ -57,7 +51,7 @@ def guess_path(
     """Control points of a guess; the last one's heading may differ from the goal's by whole turns.
 
     Args:
-        structure: Of the programme.
+        structure: Structure of the programme.
         kind: One of :data:`GUESSES`.
         start: (3,) x, y [m], heading [rad].
         goal: (3,) x, y [m], heading [rad].
@@ -82,11 +76,6 @@ def guess_path(
     return np.column_stack([xy, heading])
 
 
-def guess_duration(objective: WalkObjective, start: FloatArray, goal: FloatArray) -> float:
-    """A duration somewhat above that of a straight walk [s]."""
-    return 1.3 * objective.straight_duration(max(float(np.hypot(*(goal[:2] - start[:2]))), 0.3))
-
-
 def detours(
     obstacles: Sequence[WalkObstacle],
     times: Sequence[float],
@@ -97,38 +86,27 @@ def detours(
     """Ways around obstacles, each a list of places to pass in order [m].
 
     Args:
-        obstacles: Those in the way.
-        times: When the walker is nearest to each [s].
-        walker: Who must fit beside them.
+        obstacles: Obstacles in the way; of more than two, all are passed on the same side.
+        times: Instants at which the walker is nearest to each [s].
+        walker: Extent of the walker.
         start: (3,) x, y [m], heading [rad].
         goal: (3,) x, y [m], heading [rad].
     """
     along = (goal[:2] - start[:2]) / np.hypot(*(goal[:2] - start[:2]))
     left = np.array([-along[1], along[0]])
     centres = [
-        one.corners.mean(axis=0) + one.displacement(t) for one, t in zip(obstacles, times, strict=True)
+        item.corners.mean(axis=0) + item.displacement(t) for item, t in zip(obstacles, times, strict=True)
     ]
     order = np.argsort([centre @ along for centre in centres])
     count = len(obstacles)
-    sides = (
-        itertools.product((1.0, -1.0), repeat=count)
-        if count <= _MANY
-        else ((s,) * count for s in (1.0, -1.0))
-    )
-    for choice in sides:
-        via = [
-            centres[i] + choice[i] * (obstacles[i].reach + walker.width / 2 + _ASIDE) * left for i in order
-        ]
-        if not _blocked(via, obstacles, walker):
+    resting = [item for item in obstacles if not item.moves]
+    both = (1.0, -1.0)
+    for choice in itertools.product(both, repeat=count) if count <= 2 else [(s,) * count for s in both]:
+        # A detour leaves 0.1 m beside an obstacle.
+        via = [centres[i] + choice[i] * (obstacles[i].reach + walker.width / 2 + 0.1) * left for i in order]
+        points, now = np.array(via)[:, None, :], np.zeros(count)
+        if not any(np.any(item.distance(points, now) < walker.depth / 2) for item in resting):
             yield via
-
-
-def turned_between(points: FloatArray, turn: float) -> FloatArray:
-    """(n, 3) control points whose headings differ by ``turn`` [rad] on the way, to pass between obstacles."""
-    share = np.linspace(0.0, 1.0, len(points))
-    turned = points.copy()
-    turned[:, 2] += turn * _smooth(share / 0.3) * _smooth((1.0 - share) / 0.3)
-    return turned
 
 
 def _turns(start: FloatArray, goal: FloatArray) -> tuple[float, float]:
@@ -141,52 +119,33 @@ def _other_way(turn: float) -> float:
     return turn - 2.0 * np.pi if turn > 0.0 else turn + 2.0 * np.pi
 
 
-def _blocked(via: Sequence[FloatArray], obstacles: Sequence[WalkObstacle], walker: Walker) -> bool:
-    """Whether a place to pass is in an obstacle that rests."""
-    resting = [one for one in obstacles if not one.moves]
-    points = np.array(via)[:, None, :]
-    return any(bool(np.any(one.distance(points, np.zeros(len(via))) < walker.depth / 2)) for one in resting)
-
-
 def _smooth(share: FloatArray) -> FloatArray:
     """``3 s^2 - 2 s^3``, from 0 to 1 and at rest at both ends."""
     s = np.clip(share, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
-_CELL = 0.05
-"""Side of a cell [m], where that makes no more than :data:`_CELLS` along the longer side."""
-
-_CELLS = 160
-
-_BESIDE = 1.0
-"""Room around everything in which ways are searched [m]."""
-
-_STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
-
-
 class Grid:
     """The floor around start, goal and resting obstacles in square cells.
 
-    Args:
-        obstacles: Those that do not move are taken.
-        start: (3,) x, y [m], heading [rad].
-        goal: (3,) x, y [m], heading [rad].
+    Cells have sides of 5 cm, or a 160th of the longer side of the grid if that is more; ways are searched up
+    to 1 m beyond everything.
     """
 
     def __init__(self, obstacles: Sequence[WalkObstacle], start: FloatArray, goal: FloatArray) -> None:
-        resting = [one for one in obstacles if not one.moves]
+        """Lay out the cells from the resting ones of the obstacles and (3,) x, y [m], heading [rad]."""
+        resting = [item for item in obstacles if not item.moves]
         ends = np.vstack([start[:2], goal[:2]])
         corners = [
-            one.corners + one.displacements[0] + sign * one.radius for one in resting for sign in (-1, 1)
+            item.corners + item.displacements[0] + sign * item.radius for item in resting for sign in (-1, 1)
         ]
         points = np.vstack([ends, *corners])
-        self._low, high = points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE
-        self._cell = max(_CELL, float((high - self._low).max()) / _CELLS)
+        self._low, high = points.min(axis=0) - 1.0, points.max(axis=0) + 1.0
+        self._cell = max(0.05, float((high - self._low).max()) / 160)
         self._shape = tuple(np.ceil((high - self._low) / self._cell).astype(int) + 1)
         rows, columns = np.indices(self._shape)
         self._centres = self._low + self._cell * np.column_stack([rows.ravel(), columns.ravel()])
-        rooms = [one.distance(self._centres[:, None], np.zeros(1))[:, 0] for one in resting]
+        rooms = [item.distance(self._centres[:, None], np.zeros(1))[:, 0] for item in resting]
         self._room = np.min(rooms, axis=0) if rooms else np.full(len(self._centres), np.inf)
         self._ends = [int(np.argmin(np.linalg.norm(self._centres - end, axis=1))) for end in ends]
 
@@ -208,7 +167,7 @@ class Grid:
         free[self._ends] = True
         index = np.arange(free.size).reshape(self._shape)
         firsts, seconds, lengths = [], [], []
-        for dx, dy in _STEPS:
+        for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
             a = index[: self._shape[0] - dx, max(0, -dy) : self._shape[1] - max(0, dy)].ravel()
             b = a + dx * self._shape[1] + dy
             both = free[a] & free[b]
@@ -227,7 +186,7 @@ class Grid:
 
 
 GRID, GOAL_GRID = 6, 9
-"""Decimals of the obstacles that ways are sought around [m], as exact as floor plans; and of their goal."""
+"""Decimals to which coordinates of obstacles [m], as exact as floor plans, and of goals are rounded."""
 
 NEAREST, FARTHEST = 0.01, 100.0
 """Distances from start to goal that can be asked [m]; at none, the direction of the goal has no value."""
@@ -256,9 +215,9 @@ def walking_path(
     Args:
         start: (3,) x, y [m], heading [rad], counter-clockwise from x.
         goal: (3,) x, y [m], heading [rad], 0.01 to 100 m from the start.
-        objective: The cost; :data:`LITERAL_ORDER` is the other reading of (5.8).
-        obstacles: To be kept away from, at rest or moving.
-        walker: The body's extent, used with obstacles only.
+        objective: Cost to be minimised; :data:`LITERAL_ORDER` is the other reading of (5.8).
+        obstacles: Obstacles to keep away from, at rest or moving.
+        walker: Extent of the body, used with obstacles only.
         room: Distance to keep from obstacles [m].
         max_speed: Limit of the speed over the floor [m/s]. Without one, far goals are run to: the cost of
             the thesis grows with accelerations, not with speeds.
@@ -267,7 +226,7 @@ def walking_path(
         like: A path to start from instead of the guesses, such as that of a neighbouring goal.
 
     Returns:
-        The path. If there is none it says so in ``failure`` and holds the nearest attempt.
+        The path, or the nearest attempt with its ``failure``.
 
     Raises:
         InputError: If an argument is not usable, or start or goal are in an obstacle.
@@ -301,11 +260,11 @@ def walking_paths(
 
     Args:
         start: (3,) x, y [m], heading [rad].
-        goals: (k, 3) of the same.
-        objective: The cost.
-        workers: Processes. They are started afresh, which takes longer than a hundred goals without obstacles
-            do; and a script must ask for more than one under ``if __name__ == "__main__"``.
-        options: Of :func:`walking_path`.
+        goals: (k, 3) x, y [m], heading [rad].
+        objective: Cost to be minimised.
+        workers: Number of processes. They are started afresh, which takes longer than 100 goals without
+            obstacles.
+        options: Further arguments of :func:`walking_path`.
 
     Raises:
         InputError: As :func:`walking_path`, before anything is computed where that is possible.
@@ -313,9 +272,9 @@ def walking_paths(
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise InputError(f"workers is {workers!r}; valid: an integer >= 1")
     wanted = [frozen_array(goal, f"walking goal {i} [m, m, rad]", (3,)) for i, goal in enumerate(goals)]
-    one = partial(_one, start, objective, options)
-    found = dict(side_by_side(one, wanted, workers, "walking paths"))
-    return [found[number] for number in range(len(wanted))]
+    work = partial(_path_to, start, objective, options)
+    paths = dict(side_by_side(work, wanted, workers, "walking paths"))
+    return [paths[number] for number in range(len(wanted))]
 
 
 def _check(task: WalkingTask) -> None:
@@ -324,19 +283,22 @@ def _check(task: WalkingTask) -> None:
         raise InputError(
             f"walking goal is {distance:g} m from the start; valid: {NEAREST:g} to {FARTHEST:g} m"
         )
-    resting = [one for one in task.obstacles if not one.moves]
-    for name, place, there in (("start", task.start, task.obstacles), ("goal", task.goal, resting)):
-        for one, left in zip(there, clearance(there, task.walker, place[None], np.zeros(1))[0], strict=True):
+    resting = [item for item in task.obstacles if not item.moves]
+    for name, place, obstacles in (("start", task.start, task.obstacles), ("goal", task.goal, resting)):
+        distances = clearance(obstacles, task.walker, place[None], np.zeros(1))[0]
+        for obstacle, left in zip(obstacles, distances, strict=True):
             if left < task.room:
                 raise InputError(
-                    f"walking {name} leaves {left:.3g} m to obstacle {one.name!r}; "
+                    f"walking {name} leaves {left:.3g} m to obstacle {obstacle.name!r}; "
                     f"valid: at least {task.room:g} m"
                 )
 
 
 def _guesses(task: WalkingTask) -> Iterator[Guess]:
     structure = programme_of(replace(task, obstacles=())).structure
-    duration = guess_duration(task.objective, task.start, task.goal)
+    # Somewhat above that of a straight walk.
+    distance = float(np.hypot(*(task.goal[:2] - task.start[:2])))
+    duration = 1.3 * task.objective.straight_duration(max(distance, 0.3))
     for kind in kinds_of_guesses(task.start, task.goal):
         yield Guess(kind, guess_path(structure, kind, task.start, task.goal), duration)
 
@@ -352,9 +314,9 @@ def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
     transform_start_to_world = PlanarTransform(x, y, math.degrees(heading))
     transform_world_to_start = transform_start_to_world.inverse
     from_start = _from_start(task, transform_world_to_start)
-    blocking = [one for one, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]
-    found = _on_ways(from_start, _in_frame(kept, from_start, transform_world_to_start, GRID), blocking)
-    return _in_frame(found, task, transform_start_to_world)
+    blocking = [item for item, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]
+    best = _on_ways(from_start, _in_frame(kept, from_start, transform_world_to_start, GRID), blocking)
+    return _in_frame(best, task, transform_start_to_world)
 
 
 def _on_ways(task: WalkingTask, free: WalkingPath, blocking: Sequence[WalkObstacle]) -> WalkingPath:
@@ -376,14 +338,14 @@ def _from_start(task: WalkingTask, transform_world_to_start: PlanarTransform) ->
         task,
         start=np.zeros(3),
         goal=np.append(goal, task.goal[2] - task.start[2]).round(GOAL_GRID),
-        obstacles=tuple(one.moved(transform_world_to_start, GRID) for one in task.obstacles),
+        obstacles=tuple(item.moved(transform_world_to_start, GRID) for item in task.obstacles),
     )
 
 
 def _in_frame(
     path: WalkingPath, task: WalkingTask, transform: PlanarTransform, decimals: int | None = None
 ) -> WalkingPath:
-    """A path in the frame of another task, whose places are those of its own after a transform."""
+    """A path in the frame of another task, whose places are moved by a transform."""
     points = path.spline.control_points
     moved = np.column_stack([transform.points(points[:, :2]), points[:, 2] + transform.yaw])
     duration = path.duration
@@ -400,8 +362,10 @@ def _way_guesses(task: WalkingTask, free: WalkingPath, ways: Mapping[str, FloatA
         points = guess_path(structure, "turning", task.start, task.goal, list(way))
         yield Guess(name, points, 1.2 * free.duration)
         if name == "narrow way":
+            share = np.linspace(0.0, 1.0, len(points))
             for side, turn in (("left", -np.pi / 2), ("right", np.pi / 2)):
-                turned = turned_between(points, turn)
+                turned = points.copy()
+                turned[:, 2] += turn * _smooth(share / 0.3) * _smooth((1.0 - share) / 0.3)
                 yield Guess(f"{name}, {side} shoulder first", turned, 1.2 * free.duration)
 
 
@@ -418,12 +382,12 @@ def _detour_guesses(
     for number, via in enumerate(detours(blocking, nearest, task.walker, task.start, task.goal)):
         way = guess_path(structure, "turning", task.start, task.goal, via)
         yield Guess(f"detour {number}", way, 1.2 * free.duration)
-    if any(one.moves for one in blocking):
+    if any(item.moves for item in blocking):
         for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
             yield Guess(name, free.spline.control_points, factor * free.duration)
 
 
-def _one(
+def _path_to(
     start: ArrayLike, objective: WalkObjective, options: dict[str, Any], goal: FloatArray
 ) -> WalkingPath:
     return walking_path(start, goal, objective, **options)

@@ -20,13 +20,7 @@ from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
 from manikin.walking.path.walk_obstacles import WalkObstacle
 
 DEGREE = 4
-"""Of the spline: continuous rates of the accelerations."""
-
-GAUSS_POINTS = 3
-"""Points of each piece at which the integrands are taken."""
-
-SAMPLES = 3
-"""Instants of each piece at which obstacles and speed are looked at."""
+"""Degree of the spline: continuous rates of the accelerations."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +28,8 @@ class PathStructure:
     """What the programme's expressions depend on; numbers are its parameters.
 
     Attributes:
-        pieces: Of the spline.
-        obstacles: Number of corners and of instants of each obstacle.
+        pieces: Number of pieces of the spline.
+        obstacles: Numbers of corners and of instants of each obstacle.
         discs: Number of discs of the walker.
         limited_speed: Whether the speed is limited.
     """
@@ -47,18 +41,13 @@ class PathStructure:
 
     @property
     def knots(self) -> FloatArray:
-        """Of the spline, over [0, 1]."""
+        """(n,) knots of the spline over [0, 1]."""
         return clamped_knots(DEGREE, np.linspace(0.0, 1.0, self.pieces + 1))
 
     @property
-    def inner_points(self) -> int:
-        """Number of control points that are unknown: two at either end follow from place and velocity."""
-        return self.pieces + DEGREE - 4
-
-    @property
     def sample_shares(self) -> FloatArray:
-        """Shares of the duration at which obstacles and speed are looked at, without the start."""
-        return np.linspace(0.0, 1.0, SAMPLES * self.pieces + 1)[1:]
+        """Shares of the duration at which obstacles and speed are checked, three per piece."""
+        return np.linspace(0.0, 1.0, 3 * self.pieces + 1)[1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +55,7 @@ class PathProgram:
     """The compiled programme.
 
     Attributes:
-        structure: What it was built for.
+        structure: What its expressions depend on.
         symbols: CasADi's ``x``, ``p``, ``f`` and ``g`` with ``terms``, (5, 1) integrals of the terms.
         parameters: Names and shapes of the parameters, in order.
         rows: Number of rows of each group of constraints, in order: one group per obstacle, then the speed.
@@ -97,14 +86,6 @@ class PathProgram:
         }
         problem = {name: self.symbols[name] for name in ("x", "p", "f", "g")}
         return ca.nlpsol("walking_path", "ipopt", problem, options)
-
-    @cached_property
-    def sensitivities(self) -> ca.Function:
-        """Of unknowns and parameters: Hessian of the objective and (unknowns, 5) slopes of the terms."""
-        x, terms = self.symbols["x"], self.symbols["terms"]
-        hessian, _ = ca.hessian(self.symbols["f"], x)
-        slopes = ca.jacobian(terms, x).T
-        return ca.Function("sensitivities", [x, self.symbols["p"]], [ca.densify(hessian), ca.densify(slopes)])
 
     def pack_parameters(self, values: dict[str, Any]) -> FloatArray:
         """Parameter vector from arrays by name."""
@@ -142,22 +123,20 @@ def obstacle_parameters(index: int, obstacle: WalkObstacle) -> dict[str, FloatAr
     }
 
 
-class _Builder:
-    """Collects parameters while the programme is written."""
-
-    def __init__(self) -> None:
-        self.parameters: dict[str, ca.SX] = {}
+class _Parameters(dict[str, ca.SX]):
+    """Parameters by name, collected while the programme is written."""
 
     def __call__(self, name: str, rows: int, columns: int = 1) -> ca.SX:
-        self.parameters[name] = ca.SX.sym(name, rows, columns)
-        return self.parameters[name]
+        self[name] = ca.SX.sym(name, rows, columns)
+        return self[name]
 
 
 @lru_cache(maxsize=32)
 def transcribe(structure: PathStructure) -> PathProgram:
     """Write the programme of a structure; cached."""
-    parameter = _Builder()
-    inner = ca.SX.sym("C", structure.inner_points, 3)
+    parameter = _Parameters()
+    # Two control points at either end follow from place and velocity.
+    inner = ca.SX.sym("C", structure.pieces + DEGREE - 4, 3)
     log_duration = ca.SX.sym("log_T")
     duration = ca.exp(log_duration)
     start, goal = parameter("start", 1, 3), parameter("goal", 1, 3)
@@ -171,12 +150,12 @@ def transcribe(structure: PathStructure) -> PathProgram:
         rows.append(_speed_rows(structure, points, duration, parameter("max_speed", 1)))
     symbols = {
         "x": ca.vertcat(ca.vec(inner), log_duration),
-        "p": ca.vertcat(*[ca.vec(p) for p in parameter.parameters.values()]),
+        "p": ca.vertcat(*[ca.vec(p) for p in parameter.values()]),
         "f": objective,
         "g": ca.vertcat(*rows),
         "terms": terms,
     }
-    shapes = tuple((name, p.shape) for name, p in parameter.parameters.items())
+    shapes = tuple((name, p.shape) for name, p in parameter.items())
     return PathProgram(structure, symbols, shapes, tuple(row.numel() for row in rows))
 
 
@@ -187,8 +166,8 @@ def _basis(structure: PathStructure, shares: FloatArray, derivative: int = 0) ->
 
 
 def _terms(structure: PathStructure, points: ca.SX, duration: ca.SX, goal: ca.SX, fade: ca.SX) -> ca.SX:
-    """(5, 1) integrals of (5.6) without their weights, in the order of ``objective.TERMS``."""
-    roots, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    """(5, 1) integrals of (5.6) without their weights, by three Gauss points per piece."""
+    roots, weights = np.polynomial.legendre.leggauss(3)
     shares = ((np.arange(structure.pieces)[:, None] + (roots + 1.0) / 2.0) / structure.pieces).ravel()
     part = duration * ca.DM(np.tile(weights / 2.0 / structure.pieces, structure.pieces))
     place = _basis(structure, shares) @ points
@@ -207,7 +186,7 @@ def _terms(structure: PathStructure, points: ca.SX, duration: ca.SX, goal: ca.SX
 
 
 def _obstacle_rows(
-    structure: PathStructure, points: ca.SX, duration: ca.SX, parameter: _Builder
+    structure: PathStructure, points: ca.SX, duration: ca.SX, parameter: _Parameters
 ) -> list[ca.SX]:
     """Distances of the walker's discs to each obstacle, less what they must be [m]."""
     if not structure.obstacles:

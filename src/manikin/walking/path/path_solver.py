@@ -12,31 +12,10 @@ from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_model import to_world
 from manikin.walking.path.walking_path import TOLERANCE, WalkingPath, WalkingTask
 
-_ROUNDS = 4
-"""Solutions whose room between the samples of the programme is made up for."""
-
-_SHORT = 10.0
-"""Distance up to which twenty pieces are enough [m]."""
-
-_FINER = (3, 9)
-"""Factors of the number of pieces that are tried where these are too few."""
-
-_COST_TOLERANCE = 1e-3
-"""Share of the cost by which the programme's sum may be wrong."""
-
-_CHECKED = 600
-"""Number of intervals of the sum that checks it."""
-
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """Where the solver starts.
-
-    Attributes:
-        name: Of the guess.
-        points: (n, 3) control points.
-        duration: [s].
-    """
+    """A named starting point of the solver: (n, 3) control points [m, m, rad] and a duration [s]."""
 
     name: str
     points: FloatArray
@@ -46,15 +25,13 @@ class Guess:
 def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
     """The compiled programme of a task, shared by all tasks of the same structure.
 
-    Args:
-        task: What is asked.
-        finer: Factor of the number of pieces.
+    It has 20 pieces up to 10 m and 40 beyond, times ``finer``.
     """
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
     return transcribe(
         PathStructure(
-            pieces=finer * (20 if distance <= _SHORT else 40),
-            obstacles=tuple((len(one.corners), len(one.times)) for one in task.obstacles),
+            pieces=finer * (20 if distance <= 10.0 else 40),
+            obstacles=tuple((len(item.corners), len(item.times)) for item in task.obstacles),
             discs=len(task.walker.offsets) if task.obstacles else 1,
             limited_speed=task.max_speed is not None,
         )
@@ -65,7 +42,7 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
     """Parameters of the programme by name.
 
     Args:
-        task: What is asked.
+        task: Task of the path.
         tightening: (obstacles + 1,) further distance to keep at the samples [m], and further below the speed
             limit [m/s].
         turned_goal: (3,) the goal, its heading by whole turns as the guess arrives.
@@ -90,17 +67,17 @@ def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
     """Optimise from one guess, again with more room where the path between the samples had too little.
 
     Args:
-        task: What is asked.
-        guess: With as many control points as the programme has.
+        task: Task of the path.
+        guess: Start of the solver, with as many control points as the programme has.
         finer: Factor of the number of pieces.
 
     Returns:
-        What the solver ended with; ``failure`` says if that is not a solution.
+        The last iterate; ``failure`` says if that is not a solution.
     """
     programme = programme_of(task, finer)
     tightening = np.zeros(len(task.obstacles) + 1)
     unknowns = programme.pack(guess.points, guess.duration)
-    for _ in range(_ROUNDS):
+    for _ in range(4):
         values = parameters_of(task, tightening, guess.points[-1])
         parameters, bounds = programme.pack_parameters(values), np.zeros(sum(programme.rows))
         solution = programme.solver(x0=unknowns, p=parameters, lbg=bounds)
@@ -124,13 +101,12 @@ def sharpened(path: WalkingPath) -> WalkingPath:
     Pieces are too coarse where much happens on little of the way: goals a few centimetres away, long walks
     whose goal term fades late, extreme weights.
     """
-    for finer in _FINER:
-        dense = float(path.task.objective.weights @ path.term_integrals(_CHECKED))
-        if not path.succeeded or abs(dense / path.cost - 1.0) <= _COST_TOLERANCE:
+    for finer in (3, 9):
+        dense = float(path.task.objective.weights @ path.term_integrals(600))
+        if not path.succeeded or abs(dense / path.cost - 1.0) <= 1e-3:
             break
         guess = Guess(path.guess, *bent(path, path.task, finer))
-        found = solve(path.task, guess, finer)
-        path = replace(found, others=path.others)
+        path = replace(solve(path.task, guess, finer), others=path.others)
     return path
 
 
@@ -138,11 +114,9 @@ def bent(path: WalkingPath, task: WalkingTask, finer: int = 1) -> tuple[FloatArr
     """Control points and duration of a path, its ends moved to those of another task."""
     structure = programme_of(replace(task, obstacles=()), finer).structure
     share = np.linspace(0.0, 1.0, structure.pieces + 4)[:, None]
-    points = (
-        path.spline(share[:, 0])
-        if len(path.spline.control_points) != len(share)
-        else path.spline.control_points
-    )
+    points = path.spline.control_points
+    if len(points) != len(share):
+        points = path.spline(share[:, 0])
     goal = task.goal.copy()
     goal[2] += 2.0 * np.pi * np.round((points[-1, 2] - goal[2]) / (2.0 * np.pi))
     moved = points + (1.0 - share) * (task.start - points[0]) + share * (goal - points[-1])
@@ -164,12 +138,13 @@ def lacking(path: WalkingPath) -> FloatArray:
 
 
 def cheapest(paths: Sequence[WalkingPath]) -> WalkingPath:
-    """The cheapest of those that are solutions, or else any that is nearest to one."""
-    found = [path for path in paths if path.succeeded]
-    best = (
-        min(found, key=lambda path: path.cost) if found else min(paths, key=lambda path: lacking(path).max())
-    )
-    return replace(best, others={path.guess: path.cost for path in found})
+    """The cheapest of those that are solutions, or else the one that is nearest to a solution."""
+    solutions = [path for path in paths if path.succeeded]
+    if solutions:
+        best = min(solutions, key=lambda path: path.cost)
+    else:
+        best = min(paths, key=lambda path: lacking(path).max())
+    return replace(best, others={path.guess: path.cost for path in solutions})
 
 
 def _refused(path: WalkingPath, short: FloatArray) -> WalkingPath:

@@ -1,7 +1,4 @@
-"""A route: walking paths one after the other, past waypoints, with turns on the spot and waits.
-
-Also here. Turning on the spot: what the criterion gives where the goal is where the walker stands.
-"""
+"""A route: walking paths one after the other, past waypoints, with turns on the spot and waits."""
 
 import itertools
 from collections.abc import Sequence
@@ -18,11 +15,11 @@ from manikin.numerics.spline import BSpline
 from manikin.walking.path.path_plan import NEAREST, walking_path
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
 from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective, to_body
-from manikin.walking.path.walking_path import SAMPLING, WalkingPath, WalkingTask
+from manikin.walking.path.walking_path import SAMPLING, SampledWalk, WalkingPath, WalkingTask
 from manikin.walking.segments.segmentation import PathSegments, ShoulderPaths, segment_path
 
 SMALLEST = 1e-6
-"""Turns by less are none [rad]."""
+"""Least turn that counts as one [rad]."""
 
 
 def spot_turn(task: WalkingTask) -> WalkingPath:
@@ -30,23 +27,16 @@ def spot_turn(task: WalkingTask) -> WalkingPath:
 
     Without a way to go the criterion ([Truong2010]_ 5.6) is ``a0 T + a3 int u_angular^2``. The cheapest turn
     by ``D`` in the time ``T`` is the cubic ``D (3 s^2 - 2 s^3)``, for ``12 D^2 / T^3``, so that ``T^4 = 36 a3
-    D^2 / a0``. Obstacles are not looked at.
-
-    Args:
-        task: Its goal is where it starts, but for the heading.
+    D^2 / a0``. The task's goal is its start but for the heading; obstacles are not considered.
     """
     turn = float(np.angle(np.exp(1j * (task.goal[2] - task.start[2]))))
     weights = task.objective
     duration = (36.0 * weights.angular * max(abs(turn), SMALLEST) ** 2 / weights.time) ** 0.25
     cost = weights.time * duration + weights.angular * 12.0 * turn**2 / duration**3
-    return WalkingPath(task, _cubic(task.start, turn), duration, cost, "turn on the spot", 0)
-
-
-def _cubic(start: FloatArray, turn: float) -> BSpline:
-    """x, y and heading over the share of the duration, as a single piece of third degree."""
-    points = np.tile(start, (4, 1))
+    points = np.tile(task.start, (4, 1))
     points[2:, 2] += turn
-    return BSpline(3, np.repeat([0.0, 1.0], 4), points)
+    cubic = BSpline(3, np.repeat([0.0, 1.0], 4), points)
+    return WalkingPath(task, cubic, duration, cost, "turn on the spot", 0)
 
 
 OVERLOOKED = 1e-3
@@ -55,12 +45,12 @@ OVERLOOKED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Waypoint:
-    """Where a route goes.
+    """A place that a route passes or stops at.
 
     Attributes:
         place: (3,) x, y [m], heading [rad].
-        speed: With which it is passed, towards the place after it [m/s]; 0 for a stop.
-        wait: Time for which the walker stands there [s]; only after a stop.
+        speed: Speed of passing it, towards the place after it [m/s]; 0 for a stop.
+        wait: Time of standing there [s]; only after a stop.
     """
 
     place: FloatArray
@@ -79,13 +69,13 @@ class Waypoint:
 
 
 @dataclass(frozen=True, eq=False)
-class WalkRoute:
+class WalkRoute(SampledWalk):
     """Walking paths joined at waypoints, continuous in place and velocity.
 
     Attributes:
         legs: In order; each starts where and as fast as the one before ends.
         waits: (legs + 1,) times of standing before each leg and after the last [s].
-        blocked: Who comes too near where the walker stands or turns on the spot, or None.
+        blocked: Which obstacle comes too near where the walker stands or turns on the spot, or None.
     """
 
     legs: tuple[WalkingPath, ...]
@@ -100,14 +90,9 @@ class WalkRoute:
 
     @property
     def failure(self) -> str | None:
-        """Why a leg is no solution of its task, or there is no room to stand, or None."""
+        """Why a leg is no solution of its task, or there is no room to stand; None for a success."""
         broken = [(i, leg.failure) for i, leg in enumerate(self.legs) if leg.failure is not None]
         return f"leg {broken[0][0] + 1} of the way: {broken[0][1]}" if broken else self.blocked
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether every leg is a solution of its task, with room where the walker stands."""
-        return self.failure is None
 
     @cached_property
     def begins(self) -> tuple[float, ...]:
@@ -119,41 +104,19 @@ class WalkRoute:
 
     @cached_property
     def duration(self) -> float:
-        """With all waits [s]."""
+        """Duration with all waits [s]."""
         return self.begins[-1] + self.legs[-1].duration + self.waits[-1]
 
     @cached_property
     def cost(self) -> float:
-        """Of all legs, and the time of all waits."""
+        """Cost of all legs and of the time of all waits [-]."""
         weights = self.legs[0].task.objective
         return float(sum(leg.cost for leg in self.legs) + weights.time * sum(self.waits))
 
     @cached_property
     def length(self) -> float:
-        """Of the way over the floor [m]."""
+        """Length of the way over the floor [m]."""
         return float(sum(leg.length for leg in self.legs))
-
-    @cached_property
-    def time(self) -> FloatArray:
-        """(n,) instants at an even rate, at most ``SAMPLING`` apart [s]."""
-        return frozen_array(
-            np.linspace(0.0, self.duration, int(np.ceil(self.duration / SAMPLING)) + 1), "time"
-        )
-
-    @cached_property
-    def place(self) -> FloatArray:
-        """(n, 3) x, y [m] and heading [rad], continuous."""
-        return frozen_array(self.place_at(self.time), "place")
-
-    @cached_property
-    def velocity(self) -> FloatArray:
-        """(n, 3) forward, left [m/s] and angular velocity [rad/s]."""
-        return frozen_array(self.motion_at(self.time)[0], "velocity")
-
-    @property
-    def heading(self) -> FloatArray:
-        """(n,) [rad], continuous."""
-        return self.place[:, 2]
 
     def place_at(self, time: ArrayLike) -> FloatArray:
         """(..., 3) x, y [m] and heading [rad] at (...) instants; before and after, those of the ends."""
@@ -175,22 +138,17 @@ class WalkRoute:
         return velocity, acceleration
 
     def segments(self) -> PathSegments:
-        """Where the walker goes ahead and where not ([Truong2010]_ Function 1)."""
-        return segment_path(ShoulderPaths.of_places(self.place, (len(self.time) - 1) / self.duration))
+        """Holonomic, nonholonomic and standing stretches ([Truong2010]_ Function 1)."""
+        return segment_path(ShoulderPaths.of_walk(self))
 
     def as_obstacle(self, name: str, radius: float) -> WalkObstacle:
-        """What others have to keep away from: a disc that goes along this route.
-
-        Args:
-            name: What messages call it.
-            radius: Of the disc [m].
-        """
+        """A disc of a radius [m] that goes along this route, for others to keep away from."""
         times = np.linspace(0.0, self.duration, int(np.ceil(self.duration / 0.1)) + 1)
         return WalkObstacle.moving_disc(name, times, self.place_at(times)[:, :2], radius)
 
     @cached_property
     def _whole_turns(self) -> tuple[float, ...]:
-        """What makes the headings of the legs continuous: each may end whole turns from its goal's [rad]."""
+        """Whole turns added to the headings of each leg to make them continuous [rad]."""
         turns = [0.0]
         for before, after in itertools.pairwise(self.legs):
             gap = before.heading[-1] - after.heading[0]
@@ -216,18 +174,17 @@ def walking_route(
 
     Args:
         start: (3,) x, y [m], heading [rad]; at rest.
-        waypoints: Where to go; the last one is a stop.
-        objective: The cost.
-        obstacles: To be kept away from; those that move do so on the clock of the route.
-        walker: The body's extent, used with obstacles only.
+        waypoints: Places to pass or stop at; the last one is a stop.
+        objective: Cost to be minimised.
+        obstacles: Obstacles to keep away from; those that move do so on the clock of the route.
+        walker: Extent of the body, used with obstacles only.
         room: Distance to keep from obstacles [m].
         max_speed: Limit of the speed over the floor [m/s].
         wait: Time of standing at the start [s].
 
     Returns:
-        The route, up to the first leg that has no solution, which then is the last one. Where the walker
-        stands, from the wait at the start on, or turns on the spot, obstacles that move may come too near:
-        then it is ``blocked``.
+        The route, up to the first leg that has no solution. It is ``blocked`` where moving obstacles come
+        too near while the walker stands or turns on the spot.
 
     Raises:
         InputError: If an argument is not usable, the last waypoint is no stop, one is in an obstacle, or one
@@ -249,13 +206,13 @@ def walking_route(
             raise InputError(f"{where} is passed with {waypoint.speed:g} m/s; valid: at most {limit:g} m/s")
         after = waypoints[number + 1].place if waypoint.speed > 0.0 else waypoint.place
         goal_velocity = _passing(waypoint, after, where)
-        still = [_later(one, clock) for one in obstacles]
+        still = [_later(item, clock) for item in obstacles]
         lack = room - float(clearance(still, walker, place[None], np.zeros(1)).min(initial=np.inf))
         if legs and lack > OVERLOOKED:
             break
         if not legs and clock > 0.0 and lack > OVERLOOKED:
-            # Somebody came during the wait: the first leg is found without them, and the route is blocked.
-            still = [one for one in still if not one.moves]
+            # An obstacle came during the wait: the first leg is found without it, and the route is blocked.
+            still = [item for item in still if not item.moves]
         apart = float(np.hypot(*(waypoint.place - place)[:2]))
         turn = abs(float(np.angle(np.exp(1j * (waypoint.place[2] - place[2])))))
         if apart >= NEAREST:
@@ -277,7 +234,7 @@ def walking_route(
             break
         clock += leg.duration + waypoint.wait
         place, velocity = leg.task.goal, goal_velocity
-    waits = (wait, *(one.wait for one in waypoints[: len(legs)]))
+    waits = (wait, *(item.wait for item in waypoints[: len(legs)]))
     route = WalkRoute(tuple(legs), waits)
     return replace(route, blocked=_blocked(route, obstacles, walker, room)) if route.succeeded else route
 
@@ -285,7 +242,7 @@ def walking_route(
 def _walked(
     where: str, start: FloatArray, goal: FloatArray, objective: WalkObjective, **options: Any
 ) -> WalkingPath:
-    """A walking path whose messages say which waypoint it leads to."""
+    """A walking path whose error messages name its waypoint."""
     try:
         return walking_path(start, goal, objective, **options)
     except InputError as error:
@@ -293,8 +250,8 @@ def _walked(
 
 
 def _blocked(route: WalkRoute, obstacles: Sequence[WalkObstacle], walker: Walker, room: float) -> str | None:
-    """Who first comes too near on the whole route and, as long as anything moves, after it."""
-    end = max([route.duration, *(float(one.times[-1]) for one in obstacles if one.moves)])
+    """Which obstacle first comes too near on the whole route and, as long as anything moves, after it."""
+    end = max([route.duration, *(float(item.times[-1]) for item in obstacles if item.moves)])
     time = np.linspace(0.0, end, int(np.ceil(end / SAMPLING)) + 1)
     left = clearance(obstacles, walker, route.place_at(time), time)
     if not np.any(left < room - OVERLOOKED):

@@ -1,7 +1,4 @@
-"""What a walker goes around: discs and convex polygons on the floor, at rest or on given tracks.
-
-Also here. What of a scene is in a walker's way: its obstacles seen from above.
-"""
+"""Obstacles of a walker: discs and convex polygons on the floor, at rest or on given tracks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +33,7 @@ class Walker:
 
     @property
     def offsets(self) -> tuple[float, ...]:
-        """Places of the discs' centres along the body's y [m]."""
+        """Coordinates of the discs' centres along the body's y [m]."""
         side = (self.width - self.depth) / 2
         return (0.0,) if side == 0.0 else (-side, 0.0, side)
 
@@ -51,12 +48,11 @@ class WalkObstacle:
     """A convex polygon grown by a radius; a disc is a single corner with a radius.
 
     Attributes:
-        name: What messages call it.
+        name: Name in messages.
         corners: (v, 2) counter-clockwise, in the world at rest [m].
         radius: Distance by which it is grown [m].
         times: (k,) instants of its track, increasing [s]; the walk starts at 0.
-        displacements: (k, 2) how far it has moved then [m]; in between it moves uniformly, before and after
-            it rests.
+        displacements: (k, 2) displacements then [m]; uniform motion in between, rest before and after.
     """
 
     name: str
@@ -139,18 +135,10 @@ class WalkObstacle:
         return np.stack([np.interp(t, self.times, self.displacements[:, i]) for i in range(2)], axis=-1)
 
     def distance(self, points: FloatArray, time: FloatArray) -> FloatArray:
-        """Signed distance of points, negative inside.
-
-        Args:
-            points: (n, k, 2) [m].
-            time: (n,) [s].
-
-        Returns:
-            (n, k) [m].
-        """
+        """(n, k) signed distances of points (n, k, 2) at (n,) times [s], negative inside [m]."""
         p = points - self.displacement(time)[:, None, :]
         squares, inside = [], []
-        for start, edge, normal in zip(self.corners, self._edges, self._normals, strict=True):
+        for start, edge, normal in zip(self.corners, *self._edges, strict=True):
             offset = p - start
             along = np.clip(offset @ edge / max(float(edge @ edge), 1e-300), 0.0, 1.0)
             squares.append(np.sum((offset - along[..., None] * edge) ** 2, axis=-1))
@@ -160,15 +148,11 @@ class WalkObstacle:
         return np.where(enclosed, depth, outside) - self.radius
 
     @property
-    def _edges(self) -> FloatArray:
-        return np.roll(self.corners, -1, axis=0) - self.corners
-
-    @property
-    def _normals(self) -> FloatArray:
-        """(v, 2) outward unit normals of the edges."""
-        edges = self._edges
+    def _edges(self) -> tuple[FloatArray, FloatArray]:
+        """(v, 2) edges [m] and their outward unit normals."""
+        edges = np.roll(self.corners, -1, axis=0) - self.corners
         lengths = np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-300)
-        return np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths
+        return edges, np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths
 
 
 def clearance(
@@ -176,9 +160,11 @@ def clearance(
 ) -> FloatArray:
     """(n, m) distance of the walker at (n, 3) places and (n,) times to each obstacle [m]."""
     centres = walker.centres(place)
+    if not obstacles:
+        return np.zeros((len(place), 0))
     return np.column_stack([
-        one.distance(centres, time).min(axis=1) - walker.depth / 2 for one in obstacles
-    ]) if obstacles else np.zeros((len(place), 0))  # fmt: skip
+        item.distance(centres, time).min(axis=1) - walker.depth / 2 for item in obstacles
+    ])  # fmt: skip
 
 
 def _convex(corners: FloatArray, where: str) -> FloatArray:
@@ -197,21 +183,21 @@ def _convex(corners: FloatArray, where: str) -> FloatArray:
 
 
 STEPPED_ON = 0.02
-"""Height above the floor up to which things are walked over [m]."""
+"""Height above the floor up to which obstacles are stepped over [m]."""
 
 CORNERS = 12
-"""Of an outline at most; rounder ones are enclosed in one of so many, since every corner costs time."""
+"""Most corners of an outline; rounder ones are enclosed in one of so many, since every corner costs time."""
 
 
 def floor_plan(scene: Scene, height: float) -> tuple[WalkObstacle, ...]:
     """Discs and convex polygons that a body of a height has to walk around.
 
-    Obstacles are seen as the convex hulls of their outlines from above, whole, even where only a part of
-    them is in the way. What hangs above the head and what lies flat on the floor are left out.
+    Each is the convex hull of an obstacle seen from above, even where only a part of the obstacle is in the
+    way. What hangs above the head and what lies flat on the floor are left out.
 
     Args:
-        scene: With a level floor.
-        height: Of the body [m].
+        scene: Scene with a level floor.
+        height: Height of the body [m].
 
     Raises:
         InputError: If the scene has no floor, or an endless obstacle other than a level one below it.
@@ -220,9 +206,9 @@ def floor_plan(scene: Scene, height: float) -> tuple[WalkObstacle, ...]:
         raise InputError("scene has no floor; valid: floor_height_m, to walk on")
     low, high = scene.floor_height + STEPPED_ON, scene.floor_height + height
     return tuple(
-        _outline(one)
-        for one in scene
-        if not _is_floor(one, low) and one.bounds[1][2] > low and one.bounds[0][2] < high
+        _outline(item)
+        for item in scene
+        if not _is_floor(item, low) and item.bounds[1][2] > low and item.bounds[0][2] < high
     )
 
 

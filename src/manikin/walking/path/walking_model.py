@@ -1,14 +1,14 @@
 """The unified walking model: a body on the floor that goes forward, sideways and turns ([Truong2010]_ 5.3).
 
 The thesis counts the lateral velocity to the right (5.5) and orders its state ``(x, y, theta, v_f, omega,
-v_l)``. Everywhere in this project left is positive, and lateral comes before angular:
-:func:`state_from_thesis` and :func:`state_to_thesis` are the only door between the two.
+v_l)``. Everywhere in this project left is positive, and lateral comes before angular.
 
-Also here. What a walk costs: time, accelerations and looking away from the goal ([Truong2010]_ 5.4-5.5). The
-targets of the thesis' experiment and of its tests ([Truong2010]_ 4.3.3, 5.5.2).
+A walk costs time, accelerations and looking away from the goal ([Truong2010]_ 5.4-5.5).
 """
 
-from dataclasses import dataclass, fields
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,9 +19,6 @@ from manikin.numerics.spatial import FloatArray, finite_number
 TERMS = ("time", "forward", "lateral", "angular", "goal")
 """Names of the five terms, in the order of every vector of them."""
 
-HOLONOMIC_ZONE = 0.5
-"""Nearer goals are reached by stepping, without a look along the way [m] ([Truong2010]_ 4.6, Fig. 4.23)."""
-
 
 @dataclass(frozen=True)
 class WalkObjective:
@@ -30,8 +27,8 @@ class WalkObjective:
     ``psi`` is the direction of the goal from the body's heading, in (-pi, pi] (5.7). At the goal it has no
     value, and the thesis does not say what it does there. Here it fades with the distance ``r`` of the goal
     as ``w = r^2 / (r^2 + goal_fade^2)``. The default lets the direction go within the radius in which the
-    thesis' subjects stepped sideways without turning (4.6); a fade of a few centimetres gives the criterion
-    as it is printed, under which a goal half a metre aside is approached in an arc.
+    thesis' subjects stepped sideways without turning (4.6, Fig. 4.23); a fade of a few centimetres gives the
+    criterion as it is printed, under which a goal half a metre aside is approached in an arc.
 
     The defaults are the numbers of (5.8) in the order of the text of 5.5.1: lateral accelerations cost about
     1.5 times what forward ones do, angular ones less. Read literally, (5.5) and (5.8) swap the two:
@@ -51,17 +48,13 @@ class WalkObjective:
     lateral: float = 1.7
     angular: float = 0.7
     goal: float = 5.2
-    goal_fade: float = HOLONOMIC_ZONE
+    goal_fade: float = 0.5
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name = field.name.replace("_", " ")
-            value = getattr(self, field.name)
-            if field.name == "goal":
-                number = finite_number(value, f"walking weight {name}", at_least=0.0)
-            else:
-                number = finite_number(value, f"walking weight {name}", above=0.0)
-            object.__setattr__(self, field.name, number)
+        for name, value in vars(self).items():
+            where, least = f"walking weight {name.replace('_', ' ')}", 0.0 if name == "goal" else None
+            number = finite_number(value, where, at_least=least, above=0.0 if least is None else None)
+            object.__setattr__(self, name, number)
 
     @property
     def weights(self) -> FloatArray:
@@ -118,9 +111,6 @@ START = (0.0, 0.0, float(np.pi / 2))
 TEST_TARGETS = ((1.0, 0.0, 0.0), (-1.0, 1.0, float(np.pi / 4)))
 """Targets on which the thesis tests its cost ([Truong2010]_ 5.5.2)."""
 
-_ACROSS = (0.5, 1.0, 2.0, 3.0)
-_ALONG = (-1.0, 0.0, 0.5, 1.0)
-
 
 def experiment_targets() -> FloatArray:
     """106 targets like those of the experiment ([Truong2010]_ 4.3.3).
@@ -134,7 +124,7 @@ def experiment_targets() -> FloatArray:
         (106, 3) x, y [m], heading [rad], in [0, 2 pi).
     """
     targets = []
-    for number, (x, y) in enumerate((x, y) for x in _ACROSS for y in _ALONG):
+    for number, (x, y) in enumerate(itertools.product((0.5, 1.0, 2.0, 3.0), (-1.0, 0.0, 0.5, 1.0))):
         headings = [(3 * number + step) % 8 for step in ((0, 2, 4, 6) if number % 3 == 0 else (0, 3, 5))]
         for heading in headings[: 4 if number < 15 else 3]:
             angle = heading * np.pi / 4
@@ -142,19 +132,13 @@ def experiment_targets() -> FloatArray:
     return np.array(targets)
 
 
-STATE = ("x", "y", "heading", "forward", "left", "angular")
-"""Order of a state: place [m] and heading [rad] in the world, velocities in the body frame [m/s, rad/s]."""
-
-CONTROL = ("forward", "left", "angular")
-"""Order of velocities and accelerations: along the body's x [m/s^2], its y [m/s^2], about z [rad/s^2]."""
-
-
 def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
     """Rate of a state under accelerations ([Truong2010]_ 5.5, with left positive).
 
     Args:
-        state: (..., 6) in the order of :data:`STATE`.
-        control: (..., 3) accelerations in the order of :data:`CONTROL`: rates of the body's own velocities.
+        state: (..., 6) x, y [m], heading [rad], forward and left velocity [m/s], angular velocity [rad/s].
+        control: (..., 3) forward and left acceleration [m/s^2], angular acceleration [rad/s^2]: the rates of
+            the body velocities.
 
     Returns:
         (..., 6).
@@ -164,6 +148,31 @@ def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
     rate[..., :3] = to_world(z[..., 2], z[..., 3:])
     rate[..., 3:] = u
     return rate
+
+
+def runge_kutta(
+    derivative: Callable[[FloatArray, FloatArray], FloatArray],
+    state: FloatArray,
+    controls: FloatArray,
+    step: float | FloatArray,
+) -> FloatArray:
+    """(n + 1, ...) states after every step by the classical rule of fourth order.
+
+    Args:
+        derivative: Rate of a state under a control.
+        state: (...) at the start.
+        controls: (2 n + 1, ...) at the ends and the middle of every step.
+        step: Length of a step, a number or of a shape that multiplies states.
+    """
+    states = [state]
+    for i in range(0, len(controls) - 1, 2):
+        first = derivative(state, controls[i])
+        second = derivative(state + step / 2 * first, controls[i + 1])
+        third = derivative(state + step / 2 * second, controls[i + 1])
+        fourth = derivative(state + step * third, controls[i + 2])
+        state = state + step / 6 * (first + 2 * second + 2 * third + fourth)
+        states.append(state)
+    return np.array(states)
 
 
 def to_world(heading: ArrayLike, velocity: ArrayLike) -> FloatArray:
@@ -196,25 +205,13 @@ def body_motion(place: ArrayLike, rate: ArrayLike, second: ArrayLike) -> tuple[F
         second: (..., 3) second derivatives.
 
     Returns:
-        (..., 3) velocities and (..., 3) accelerations in the order of :data:`CONTROL`.
+        (..., 3) forward, left and angular velocities, and (..., 3) accelerations.
     """
     heading = _last(place, 3, "place")[..., 2]
     velocity, acceleration = to_body(heading, rate), to_body(heading, second)
     acceleration[..., 0] += velocity[..., 2] * velocity[..., 1]
     acceleration[..., 1] -= velocity[..., 2] * velocity[..., 0]
     return velocity, acceleration
-
-
-def state_from_thesis(state: ArrayLike) -> FloatArray:
-    """(..., 6) state of a (..., 6) state ``(x, y, theta, v_f, omega, v_l)`` of [Truong2010]_ 5.5."""
-    z = _last(state, 6, "state of the thesis")
-    return np.concatenate([z[..., :4], -z[..., 5:6], z[..., 4:5]], axis=-1)
-
-
-def state_to_thesis(state: ArrayLike) -> FloatArray:
-    """(..., 6) state ``(x, y, theta, v_f, omega, v_l)`` of [Truong2010]_ 5.5 of a (..., 6) state."""
-    z = _last(state, 6, "walking state")
-    return np.concatenate([z[..., :4], z[..., 5:6], -z[..., 4:5]], axis=-1)
 
 
 def _last(value: ArrayLike, size: int, name: str) -> FloatArray:

@@ -1,9 +1,11 @@
 """A walking path: where a walker is and how it moves from start to goal, with its cost and residuals."""
 
 import itertools
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.numerics.spatial import FloatArray
 from manikin.numerics.spline import BSpline
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
-from manikin.walking.path.walking_model import TERMS, WalkObjective, body_motion, cost_rates, state_derivative
+from manikin.walking.path.walking_model import (
+    TERMS,
+    WalkObjective,
+    body_motion,
+    cost_rates,
+    runge_kutta,
+    state_derivative,
+)
 
 SAMPLING = 0.01
 """Longest step between the instants of the arrays [s]."""
@@ -22,20 +31,19 @@ TOLERANCE = 1e-4
 HOLONOMIC_ANGLE = np.radians(15.0)
 """Angle between heading and motion from which a motion is holonomic [rad] ([Truong2010]_ 4.2.1)."""
 
-_SUBSTEPS = 4
 _DENSE = 4000
 
 
 @dataclass(frozen=True)
 class WalkingResiduals:
-    """Largest violations, measured without the solver.
+    """Largest violations of a task by a path, measured without the solver.
 
     Attributes:
         position: Between the path and the model (5.5) under its accelerations, and at the goal [m].
         heading: The same [rad]; a goal is met up to whole turns.
-        velocity: The same, of forward and lateral velocity, and of the velocities asked at the ends [m/s].
-        angular: The same, of the angular velocity [rad/s].
-        cost: Between the solver's cost and that of a sum over many more instants, as a share.
+        velocity: The same of forward and lateral velocity, and of those asked at the ends [m/s].
+        angular: The same of the angular velocity [rad/s].
+        cost: Between the solver's cost and that of a sum over many more instants, as a share [-].
         penetration: Lack of room beside obstacles, negative where there is more [m]; -inf without obstacles.
         overspeed: Speed beyond its limit [m/s]; -inf without a limit.
     """
@@ -50,22 +58,19 @@ class WalkingResiduals:
 
     def within(self, tolerance: float = TOLERANCE) -> bool:
         """Whether none but ``cost`` exceeds the tolerance."""
-        values = (
-            self.position, self.heading, self.velocity, self.angular, self.penetration, self.overspeed,
-        )  # fmt: skip
-        return all(value <= tolerance for value in values)
+        return all(value <= tolerance for name, value in vars(self).items() if name != "cost")
 
 
 @dataclass(frozen=True, eq=False)
 class WalkingTask:
-    """What is asked of a walk.
+    """Start, goal and constraints of a walk.
 
     Attributes:
         start: (3,) x, y [m], heading [rad].
         goal: (3,) x, y [m], heading [rad].
-        objective: Its cost.
-        obstacles: To be kept away from.
-        walker: Its extent.
+        objective: Cost to be minimised.
+        obstacles: Obstacles to keep away from.
+        walker: Extent of the walker.
         room: Distance to keep from obstacles [m].
         max_speed: Limit of the speed over the floor [m/s], or None.
         start_velocity: (3,) forward, left [m/s], angular [rad/s].
@@ -83,29 +88,19 @@ class WalkingTask:
     goal_velocity: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class WalkingPath:
-    """The best path found for a task; x forward, y left, headings counter-clockwise from the world's x.
+class SampledWalk(ABC):
+    """Series of a walk at even instants, at most :data:`SAMPLING` apart, from its functions of time."""
 
-    Attributes:
-        task: What was asked.
-        spline: x, y [m] and heading [rad] over the share of the duration, [0, 1].
-        duration: Free end time T [s].
-        cost: Of the objective.
-        guess: Which initial guess led to it.
-        iterations: Of the solver, from that guess.
-        failure: Why it is not a solution, or None. Then the path is the nearest attempt.
-        others: Cost reached from every guess that converged, by its name.
-    """
-
-    task: WalkingTask
-    spline: BSpline
     duration: float
-    cost: float
-    guess: str
-    iterations: int
-    failure: str | None = None
-    others: Mapping[str, float] = field(default_factory=dict)
+    failure: str | None
+
+    @abstractmethod
+    def place_at(self, time: ArrayLike) -> FloatArray:
+        """(..., 3) x, y [m] and heading [rad] at (...) instants [s]."""
+
+    @abstractmethod
+    def motion_at(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """(..., 3) velocities and (..., 3) accelerations of the body at (...) instants [s]."""
 
     @property
     def succeeded(self) -> bool:
@@ -114,8 +109,23 @@ class WalkingPath:
 
     @cached_property
     def time(self) -> FloatArray:
-        """(n,) instants of the arrays, at most :data:`SAMPLING` apart [s]."""
+        """(n,) instants of the series [s]."""
         return _frozen(np.linspace(0.0, self.duration, int(np.ceil(self.duration / SAMPLING)) + 1))
+
+    @cached_property
+    def place(self) -> FloatArray:
+        """(n, 3) x, y [m], heading [rad], continuous."""
+        return _frozen(self.place_at(self.time))
+
+    @cached_property
+    def velocity(self) -> FloatArray:
+        """(n, 3) forward, left [m/s] and angular velocity [rad/s]."""
+        return _frozen(self.motion_at(self.time)[0])
+
+    @cached_property
+    def acceleration(self) -> FloatArray:
+        """(n, 3) rates of the velocities: the controls of (5.5), the lateral one to the left."""
+        return _frozen(self.motion_at(self.time)[1])
 
     @property
     def x(self) -> FloatArray:
@@ -132,30 +142,40 @@ class WalkingPath:
         """(n,) [rad], continuous."""
         return self.place[:, 2]
 
-    @cached_property
-    def place(self) -> FloatArray:
-        """(n, 3) x, y [m], heading [rad]."""
-        return _frozen(self.place_at(self.time))
 
-    @cached_property
-    def velocity(self) -> FloatArray:
-        """(n, 3) forward, left [m/s] and angular velocity [rad/s]."""
-        return _frozen(self.motion_at(self.time)[0])
+@dataclass(frozen=True, eq=False)
+class WalkingPath(SampledWalk):
+    """The best path found for a task; x forward, y left, headings counter-clockwise from the world's x.
 
-    @cached_property
-    def acceleration(self) -> FloatArray:
-        """(n, 3) rates of the velocities: the controls of (5.5), the lateral one to the left."""
-        return _frozen(self.motion_at(self.time)[1])
+    Attributes:
+        task: What was asked.
+        spline: x, y [m] and heading [rad] over the share of the duration, [0, 1].
+        duration: Free end time T [s].
+        cost: Of the objective [-].
+        guess: Name of the initial guess that led to it.
+        iterations: Iterations of the solver from that guess.
+        failure: Why it is not a solution, or None. Then the path is the nearest attempt.
+        others: Cost reached from every guess that converged, by its name.
+    """
+
+    task: WalkingTask
+    spline: BSpline
+    duration: float
+    cost: float
+    guess: str
+    iterations: int
+    failure: str | None = None
+    others: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def length(self) -> float:
-        """Of the way over the floor [m]."""
+        """Length of the way over the floor [m]."""
         speed = np.hypot(*self._dense.velocity[:, :2].T)
         return float(np.trapezoid(speed, self._dense.time))
 
     @cached_property
     def cost_terms(self) -> dict[str, float]:
-        """Weighted terms of the cost by name, each a sum over many instants."""
+        """Weighted terms of the cost by name [-], each a sum over many instants."""
         values = self.task.objective.weights * self.term_integrals()
         return dict(zip(TERMS, values.tolist(), strict=True))
 
@@ -179,11 +199,11 @@ class WalkingPath:
 
     def place_at(self, time: ArrayLike) -> FloatArray:
         """(..., 3) x, y [m] and heading [rad] at (...) times within the walk [s]."""
-        return self.spline(self._share(time))
+        return self.spline(np.asarray(time, dtype=np.float64) / self.duration)
 
     def motion_at(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """(..., 3) velocities and (..., 3) accelerations of the body at (...) times within the walk [s]."""
-        share = self._share(time)
+        share = np.asarray(time, dtype=np.float64) / self.duration
         rate, second = self.spline(share, 1) / self.duration, self.spline(share, 2) / self.duration**2
         return body_motion(self.spline(share), rate, second)
 
@@ -217,22 +237,11 @@ class WalkingPath:
 
     def _integrated(self) -> FloatArray:
         """(n, 6) states of the model (5.5) from the start, by Runge and Kutta's rule between the instants."""
-        step = (self.time[1] - self.time[0]) / _SUBSTEPS
-        halves = np.linspace(0.0, self.duration, 2 * _SUBSTEPS * (len(self.time) - 1) + 1)
+        step = (self.time[1] - self.time[0]) / 4
+        halves = np.linspace(0.0, self.duration, 8 * (len(self.time) - 1) + 1)
         control = self.motion_at(halves)[1]
         state = np.concatenate([self.task.start, self.task.start_velocity])
-        states = [state]
-        for i in range(0, len(halves) - 1, 2):
-            first = state_derivative(state, control[i])
-            second = state_derivative(state + step / 2 * first, control[i + 1])
-            third = state_derivative(state + step / 2 * second, control[i + 1])
-            fourth = state_derivative(state + step * third, control[i + 2])
-            state = state + step / 6 * (first + 2 * second + 2 * third + fourth)
-            states.append(state)
-        return np.array(states[::_SUBSTEPS])
-
-    def _share(self, time: ArrayLike) -> FloatArray:
-        return np.asarray(time, dtype=np.float64) / self.duration
+        return runge_kutta(state_derivative, state, control, step)[::4]
 
     @cached_property
     def _dense(self) -> "_Dense":
@@ -243,8 +252,7 @@ class WalkingPath:
         return _Dense(time, self.place_at(time), *self.motion_at(time))
 
 
-@dataclass(frozen=True, eq=False)
-class _Dense:
+class _Dense(NamedTuple):
     """A path at many instants."""
 
     time: FloatArray
@@ -254,14 +262,10 @@ class _Dense:
 
 
 def walked(path: WalkingPath, least: float = 0.03) -> Sequence[tuple[str, float, float]]:
-    """Stretches of a path that are holonomic or not, by the angle between heading and motion alone.
+    """Kind (``"holonomic"``, ``"nonholonomic"``), begin and end [s] of the stretches of a path, in order.
 
-    Args:
-        path: A walk.
-        least: Shorter stretches, as a share of the duration, count to the one before [-].
-
-    Returns:
-        Kind, ``"holonomic"`` or ``"nonholonomic"``, begin and end [s] of each, in order.
+    They are told apart by the angle between heading and motion alone. Stretches shorter than ``least``, as a
+    share of the duration, count to the one before [-].
     """
     kinds, times = path.holonomic, path.time
     borders = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), len(kinds) - 1]

@@ -1,7 +1,7 @@
 """Nine categories of goals, and how walks to them begin, end and differ ([Truong2010]_ 4.4, 4.5.1).
 
-Also here. How alike several walks to one goal are, and how long their holonomic ends are ([Truong2010]_ 4.4,
-4.5). The zone of goals near the start that are walked to without a nonholonomic part ([Truong2010]_ 4.6).
+Walks to one goal are compared by their deviation from the mean and the lengths of their holonomic ends (4.4,
+4.5); goals near the start that are reached without a nonholonomic part make up a zone (4.6).
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,12 +26,12 @@ from manikin.walking.segments.segmentation import (
 
 @dataclass(frozen=True)
 class HolonomicEnds:
-    """Lengths of the way before and after what is nonholonomic ([Truong2010]_ 4.9).
+    """Lengths of the way before and after the nonholonomic part ([Truong2010]_ 4.9).
 
     Attributes:
         from_origin: PLO, from the origin to the end of the first holonomic part [m].
         to_goal: PLG, from the beginning of the last holonomic part to the goal [m].
-        length: Of the whole way [m].
+        length: Length of the whole way [m].
     """
 
     from_origin: float
@@ -39,7 +39,7 @@ class HolonomicEnds:
     length: float
 
 
-def holonomic_ends(found: PathSegments) -> HolonomicEnds:
+def holonomic_ends(walk: PathSegments) -> HolonomicEnds:
     """Integrate the speed of the shoulders' middle up to the first nonholonomic frame, and from the last one.
 
     The print's sum (4.10) counts its points otherwise than its step; this is the trapezoidal rule between all
@@ -47,12 +47,12 @@ def holonomic_ends(found: PathSegments) -> HolonomicEnds:
     lengths are that of the whole way.
 
     Args:
-        found: A segmented walk, better off-line: a single nonholonomic frame ends the first part.
+        walk: A segmented walk, better off-line: a single nonholonomic frame ends the first part.
     """
-    paths = found.paths
+    paths = walk.paths
     rates = np.asarray(np.gradient(paths.middle, 1.0 / paths.rate, axis=0))
     speed = np.hypot(rates[:, 0], rates[:, 1])
-    ahead = np.flatnonzero(found.labels == NONHOLONOMIC)
+    ahead = np.flatnonzero(walk.labels == NONHOLONOMIC)
     if ahead.size:
         first, after = int(ahead[0]), min(int(ahead[-1]) + 1, len(speed) - 1)
     else:
@@ -115,18 +115,15 @@ def path_deviation(walks: Sequence[ShoulderPaths]) -> PathDeviation:
 
 
 THESIS_RADIUS = THESIS_RULE.diagonal_step
-"""Of the zone that the thesis proposes from its recordings [m] ([Truong2010]_ Fig. 4.23)."""
+"""Radius of the zone that the thesis proposes from its recordings [m] ([Truong2010]_ Fig. 4.23)."""
 
-STRAIGHT = float(np.radians(22.5))
-"""Goals less far from straight ahead are left out [rad]: people walk to them straight."""
-
-LARGEST_TURN = float(np.radians(22.5))
-"""Goals with a larger turn are left out [rad]: to them one of the other seven headings is nearer."""
+HALF_EIGHTH = float(np.radians(22.5))
+"""Half of the angle between two of the eight final headings [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class HolonomicZone:
-    """Goals and how holonomic the walks to them are.
+    """k goals and how holonomic the walks to them are.
 
     Attributes:
         goals: (k, 3) ahead, left [m], turn in (-pi, pi] [rad], in the frame of the start.
@@ -140,7 +137,7 @@ class HolonomicZone:
 
     @property
     def distances(self) -> FloatArray:
-        """(k,) from the start [m]."""
+        """(k,) distances from the start [m]."""
         return np.hypot(self.goals[:, 0], self.goals[:, 1])
 
     @property
@@ -159,12 +156,7 @@ class HolonomicZone:
         return float(np.max(self.distances[self.considered & self.whole], initial=0.0))
 
     def radius_towards(self, low: float, high: float) -> float:
-        """Radius for the goals of a sector.
-
-        Args:
-            low: Smallest angle of the sector to either side of straight ahead [rad].
-            high: Largest angle [rad].
-        """
+        """Radius for the goals between two angles to either side of straight ahead [rad], in metres."""
         aside = np.abs(np.arctan2(self.goals[:, 1], self.goals[:, 0]))
         return self._radius(self.considered & (aside >= low) & (aside <= high))
 
@@ -179,12 +171,13 @@ def holonomic_zone(
     walks: Sequence[PathSegments],
     start: ArrayLike = START,
     *,
-    largest_turn: float = LARGEST_TURN,
+    largest_turn: float = HALF_EIGHTH,
 ) -> HolonomicZone:
     """The zone around a start in which goals are reached holonomically, from segmented walks.
 
-    As in the thesis, goals behind the start are not considered, nor those straight ahead, to which people
-    just walk. The thesis says that large turns prevent a single step, but not from which on.
+    As in the thesis, goals behind the start are not considered, nor those within :data:`HALF_EIGHTH` of
+    straight ahead, to which people just walk. The thesis says that large turns prevent a single step, but
+    not from which on.
 
     Args:
         goals: (k, 3) x, y [m], heading [rad] of every walk's goal.
@@ -205,7 +198,7 @@ def holonomic_zone(
         shares.append(1.0 if ahead == 0.0 and aside > 0.0 else aside / max(1e-9, aside + ahead))
     angle = np.abs(np.arctan2(seen[:, 1], seen[:, 0]))
     considered = (
-        (angle >= STRAIGHT - 1e-9) & (angle <= np.pi / 2 + 1e-9) & (np.abs(seen[:, 2]) <= largest_turn)
+        (angle >= HALF_EIGHTH - 1e-9) & (angle <= np.pi / 2 + 1e-9) & (np.abs(seen[:, 2]) <= largest_turn)
     )
     return HolonomicZone(
         frozen_array(seen, "goals of the zone"), frozen_array(shares, "shares of the zone"), considered
@@ -221,9 +214,6 @@ _BEARINGS_DEG = {"F": (30.0, 45.0, 60.0), "S": (90.0,), "B": (120.0, 135.0, 150.
 
 BESIDE = 0.25
 """Goals less far ahead or behind are at the side [m]: half of the distance to the next row of goals."""
-
-NEAR_HEADING = float(np.radians(22.5))
-"""Final headings less far from that of a category belong to it [rad]: half of the angle between two."""
 
 
 def seen_from(goals: ArrayLike, start: ArrayLike = START) -> FloatArray:
@@ -259,7 +249,7 @@ def category_of(goal: ArrayLike, start: ArrayLike = START) -> str | None:
     zone = "F" if ahead >= BESIDE else "B" if ahead <= -BESIDE else "S"
     heading = np.pi / 2 + (-turn if left > 1e-9 else turn)
     for name, degrees in HEADINGS_DEG.items():
-        if name[2] == zone and abs(np.angle(np.exp(1j * (heading - np.radians(degrees))))) < NEAR_HEADING:
+        if name[2] == zone and abs(np.angle(np.exp(1j * (heading - np.radians(degrees))))) < HALF_EIGHTH:
             return name
     return None
 
@@ -287,10 +277,10 @@ def category_goals(distance: float) -> list[tuple[str, FloatArray]]:
 
 @dataclass(frozen=True)
 class CategorySpread:
-    """Of lengths of several walks.
+    """Spread of a length over several walks.
 
     Attributes:
-        mean: [m].
+        mean: Mean length [m].
         average_deviation: AD, mean distance from the mean [m].
         largest_deviation: MD, largest distance from the mean [m].
     """
@@ -301,20 +291,20 @@ class CategorySpread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> "CategorySpread":
-        """Of at least one value."""
+        """Spread of at least one value [m]."""
         away = np.abs(np.asarray(values) - np.mean(values))
         return cls(float(np.mean(values)), float(np.mean(away)), float(np.max(away)))
 
 
 @dataclass(frozen=True)
 class CategoryStatistics:
-    """Walks to the goals of one category.
+    """Statistics of walks to the goals of one category.
 
     Attributes:
         goals: Number of goals.
         walks: Number of walks.
-        from_origin: PLO.
-        to_goal: PLG.
+        from_origin: Spread of PLO.
+        to_goal: Spread of PLG.
         patterned: Share of the walks that are holonomic, then nonholonomic, then holonomic [-].
         holonomic: Mean share of the moving frames that are holonomic [-].
         average_deviation: ATD, the mean of the goals with several walks [m]; None if there is none.
@@ -350,29 +340,28 @@ def category_statistics(
         InputError: If a goal has no walk.
     """
     groups: dict[str, list[Sequence[ShoulderPaths]]] = {name: [] for name in HEADINGS_DEG}
-    for goal, found in walks:
-        if not found:
+    for goal, several in walks:
+        if not several:
             raise InputError(f"goal {np.asarray(goal).tolist()} has no walk; valid: at least one")
         name = category_of(goal, start)
         if name is not None:
-            groups[name].append(found)
+            groups[name].append(several)
     return {name: _statistics(group, rule) for name, group in groups.items() if group}
 
 
 def _statistics(group: Sequence[Sequence[ShoulderPaths]], rule: SegmentationRule) -> CategoryStatistics:
     segmented = [segment_path(walk, rule) for walks in group for walk in walks]
-    ends = [holonomic_ends(one) for one in segmented]
-    shares = [
-        one.share(HOLONOMIC) / max(1e-9, one.share(HOLONOMIC) + one.share(NONHOLONOMIC)) for one in segmented
-    ]
+    ends = [holonomic_ends(walk) for walk in segmented]
+    aside, ahead = ([walk.share(kind) for walk in segmented] for kind in (HOLONOMIC, NONHOLONOMIC))
+    shares = [a / max(1e-9, a + b) for a, b in zip(aside, ahead, strict=True)]
     spreads = [path_deviation(walks) for walks in group if len(walks) > 1]
     return CategoryStatistics(
         goals=len(group),
         walks=len(segmented),
-        from_origin=CategorySpread.of([one.from_origin for one in ends]),
-        to_goal=CategorySpread.of([one.to_goal for one in ends]),
-        patterned=float(np.mean([one.pattern == "H-N-H" for one in segmented])),
+        from_origin=CategorySpread.of([item.from_origin for item in ends]),
+        to_goal=CategorySpread.of([item.to_goal for item in ends]),
+        patterned=float(np.mean([walk.pattern == "H-N-H" for walk in segmented])),
         holonomic=float(np.mean(shares)),
-        average_deviation=float(np.mean([one.average for one in spreads])) if spreads else None,
-        largest_deviation=max(one.largest for one in spreads) if spreads else None,
+        average_deviation=float(np.mean([item.average for item in spreads])) if spreads else None,
+        largest_deviation=max(item.largest for item in spreads) if spreads else None,
     )

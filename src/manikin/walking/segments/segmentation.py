@@ -7,9 +7,6 @@ them moves within 15 degrees of the body's heading. So the inner shoulder of a t
 On-line that is all, known one half step of the tangent later. Off-line, three things are added: the paths are
 low-passed, short holonomic intervals between nonholonomic ones are examined as noise, and single steps that
 are straight to the eye are told apart from flat diagonal steps.
-
-Also here. Where the two shoulders of a walker go over the floor: the body's heading and each shoulder's
-direction.
 """
 
 import itertools
@@ -27,7 +24,7 @@ from manikin.numerics.signals import SHARES, low_passed
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.anatomy import SIDES, segment_joint
-from manikin.walking.path.walking_path import WalkingPath
+from manikin.walking.path.walking_path import SampledWalk
 
 BREADTH = 0.36
 """Between the shoulder joints of a walker who has a path only [m]."""
@@ -73,7 +70,7 @@ class ShoulderPaths:
 
     @classmethod
     def of_recording(cls, recording: Recording) -> Self:
-        """Joints of the upper arms of a recorded person.
+        """Shoulder joints of a recorded person.
 
         Raises:
             InputError: If the recording has no such joints, or fewer than three frames.
@@ -84,26 +81,18 @@ class ShoulderPaths:
         return cls(left, right, recording.rate)
 
     @classmethod
-    def of_walk(cls, path: WalkingPath, breadth: float = BREADTH) -> Self:
-        """Shoulders on the left and on the right of a path.
-
-        Args:
-            path: A walk.
-            breadth: Between the shoulders [m].
-
-        Raises:
-            InputError: If the breadth is not positive.
-        """
+    def of_walk(cls, path: SampledWalk, breadth: float = BREADTH) -> Self:
+        """Shoulders on both sides of a path, ``breadth`` [m] apart, see :meth:`of_places`."""
         return cls.of_places(path.place, (len(path.time) - 1) / path.duration, breadth)
 
     @classmethod
     def of_places(cls, place: ArrayLike, rate: float, breadth: float = BREADTH) -> Self:
-        """Shoulders on the left and on the right of places.
+        """Shoulders on both sides of places.
 
         Args:
             place: (n, 3) x, y [m], heading [rad].
             rate: Places per second [Hz].
-            breadth: Between the shoulders [m].
+            breadth: Distance between the shoulders [m].
 
         Raises:
             InputError: If the breadth is not positive, or there are fewer than three places.
@@ -148,7 +137,7 @@ class ShoulderPaths:
         return (self.points[after] - self.points[before]) * (self.rate / (after - before))[:, None, None]
 
     def low_passed(self, cutoff: float) -> "ShoulderPaths":
-        """The same without fast changes: Butterworth of second order, forward and backward.
+        """The paths without fast changes: Butterworth of second order, forward and backward.
 
         [Truong2010]_ 4.3.4 filters with a "normalized cutoff frequency 0.5 Hz"; read as a share of the
         Nyquist frequency, 25 Hz at its 100 Hz. The order is not given there.
@@ -194,7 +183,7 @@ Labels = NDArray[np.str_]
 
 @dataclass(frozen=True)
 class SegmentationRule:
-    """Thresholds. Those that the thesis gives are the defaults; it is silent about the others.
+    """Thresholds of the segmentation; those that the thesis gives are the defaults.
 
     Attributes:
         tolerance: Angle between heading and a shoulder's motion below which a frame is nonholonomic [rad];
@@ -231,21 +220,20 @@ class SegmentationRule:
     def __post_init__(self) -> None:
         where = "segmentation rule"
         finite_number(self.tolerance, f"{where} tolerance [rad]", above=0.0, at_most=np.pi)
-        finite_number(self.half_step, f"{where} half_step [s]", at_least=0.0)
-        finite_number(self.standing_speed, f"{where} standing_speed [m/s]", at_least=0.0)
-        finite_number(self.noise, f"{where} noise [s]", at_least=0.0)
-        finite_number(self.diagonal_step, f"{where} diagonal_step [m]", at_least=0.0)
+        units = {"half_step": "s", "standing_speed": "m/s", "noise": "s", "diagonal_step": "m"}
+        for name, unit in units.items():
+            finite_number(getattr(self, name), f"{where} {name} [{unit}]", at_least=0.0)
         if self.cutoff is not None:
             finite_number(self.cutoff, f"{where} cutoff [-]", above=0.0, at_most=0.99)
         if self.boundary is not None:
             finite_number(self.boundary, f"{where} boundary [rad]", above=0.0, at_most=np.pi)
 
     def frames(self, rate: float) -> int:
-        """Half step of the tangent in frames, at least one."""
+        """Half step of the tangent at a rate [Hz], in frames, at least one."""
         return max(1, round(self.half_step * rate))
 
     def ahead(self, angles: FloatArray) -> NDArray[np.bool_]:
-        """(...) whether one of the shoulders goes ahead by its deviation, (..., 2) [rad]."""
+        """(...) whether one of the shoulders goes ahead, by (..., 2) deviations [rad]."""
         away = np.abs(angles)
         return np.any((np.minimum(away, np.pi - away) if self.either_way else away) < self.tolerance, axis=-1)
 
@@ -255,7 +243,7 @@ THESIS_RULE = SegmentationRule()
 
 @dataclass(frozen=True)
 class PathSegment:
-    """A stretch of one kind.
+    """A stretch of a walk of one kind.
 
     Attributes:
         kind: One of :data:`KINDS`.
@@ -273,7 +261,7 @@ class PathSegments:
     """A walk cut into holonomic, nonholonomic and standing stretches.
 
     Attributes:
-        paths: The shoulders that were looked at, low-passed where the rule says so.
+        paths: The shoulders that were judged, low-passed where the rule says so.
         labels: (n,) one of :data:`KINDS` per frame.
         deviations: (n, 2) heading less direction of the left and the right shoulder [rad]; NaN at rest.
         segments: Stretches in order, without gaps.
@@ -287,7 +275,7 @@ class PathSegments:
     @property
     def pattern(self) -> str:
         """Kinds of the moving stretches in order: ``H-N-H`` is holonomic, nonholonomic, holonomic."""
-        moving = (one.kind for one in self.segments if one.kind != STANDING)
+        moving = (item.kind for item in self.segments if item.kind != STANDING)
         return "-".join(kind[0].upper() for kind, _ in itertools.groupby(moving))
 
     def share(self, kind: str) -> float:
@@ -315,7 +303,7 @@ def segment_path(
 
     Args:
         paths: Both shoulders.
-        rule: Thresholds.
+        rule: Thresholds of the segmentation.
         online: Function 1 alone, as :class:`OnlineSegmentation` gives it frame by frame.
     """
     if not online and rule.cutoff is not None:
@@ -420,10 +408,10 @@ def _smoothed(angles: FloatArray, cutoff: float) -> FloatArray:
 
 def _with_diagonal_steps(labels: Labels, paths: ShoulderPaths, rule: SegmentationRule) -> Labels:
     """Labels with single steps made holonomic that keep the heading and go obliquely to it."""
-    found = labels.copy()
+    stepped = labels.copy()
     runs = list(_runs(labels))
     if rule.boundary is None:
-        return found
+        return stepped
     for (before, *_), (kind, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
         if not (before == after == STANDING and kind == NONHOLONOMIC):
             continue
@@ -434,14 +422,14 @@ def _with_diagonal_steps(labels: Labels, paths: ShoulderPaths, rule: Segmentatio
             continue
         aside = np.arctan2(way[1], way[0]) - paths.heading[start]
         if abs(turned) < rule.boundary <= abs(np.arctan2(np.sin(aside), np.cos(aside))):
-            found[first:stop] = HOLONOMIC
-    return found
+            stepped[first:stop] = HOLONOMIC
+    return stepped
 
 
 def _runs(values: NDArray[np.generic]) -> Iterator[tuple[object, int, int]]:
     """Value, first index and the one after the last, of stretches of equal values."""
-    borders = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
-    for first, stop in itertools.pairwise(borders):
+    changes = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
+    for first, stop in itertools.pairwise(changes):
         yield values[first].item(), first, stop
 
 

@@ -1,8 +1,7 @@
 """The space of goals cut into slices of one final heading, and each slice into cells of one word.
 
-Also here. Goals for which the best paths are found: places on a grid, and final headings. Slices of the
-partition, several at once, each in a process beside this one. Goals on the border of cells, where two
-different paths cost the same ([Truong2010]_ Fig. 3.7).
+The goals are places on a grid with final headings ([Truong2010]_ 3.3). On the border of two cells two
+different paths to one goal may cost the same (Fig. 3.7).
 """
 
 from collections import Counter
@@ -22,21 +21,18 @@ from manikin.walking.words.word_path import THESIS_WORDS, WordPath, words_of
 from manikin.walking.words.word_program import Goals, Minima, minimise, quadrature, squares
 from manikin.walking.words.word_solver import FARTHEST, NEAREST, WordResiduals, cheapest, guesses, residuals
 
-HEADING_STEP = 10
-"""Between slices [deg] ([Truong2010]_ 3.3)."""
-
-HEADINGS = tuple(range(0, 360, HEADING_STEP))
-"""Of the 36 slices [deg]."""
+HEADINGS = tuple(range(0, 360, 10))
+"""Final headings of the 36 slices [deg] ([Truong2010]_ 3.3)."""
 
 
 @dataclass(frozen=True)
 class WordGrid:
-    """Places of the goals of every slice; the thesis' by default ([Truong2010]_ 3.3).
+    """Places of the goals of every slice; those of the thesis by default ([Truong2010]_ 3.3).
 
     Attributes:
         x: Smallest and largest x, to the right of the start [m].
         y: Smallest and largest y, ahead of the start [m].
-        step: Between neighbours [m].
+        step: Distance between neighbours [m].
     """
 
     x: tuple[float, float] = (-2.0, 2.0)
@@ -92,7 +88,6 @@ class WordGrid:
 
 THESIS_GRID = WordGrid()
 
-
 SAME_COST = 1e-9
 """Share of the cost up to which two paths cost the same."""
 
@@ -108,8 +103,6 @@ class EqualPaths:
     """Two paths to one goal that cost the same.
 
     Attributes:
-        first: One of them.
-        second: The other.
         apart: Largest distance between them at equal shares of their lengths [m].
     """
 
@@ -133,10 +126,10 @@ def bent_to(path: WordPath, goal: FloatArray) -> WordPath | None:
     shape, cost, length = path.shape[None], path.cost, path.length
     for share in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         end = path.goal + share * (goal - path.goal)
-        found = minimise(Goals.of(path.start, end[None]), shape)
-        if not found.found[0]:
+        minima = minimise(Goals.of(path.start, end[None]), shape)
+        if not minima.found[0]:
             return None
-        shape, cost, length = found.shapes, float(found.cost[0]), float(found.length[0])
+        shape, cost, length = minima.shapes, float(minima.cost[0]), float(minima.length[0])
     return WordPath(path.start, np.array(goal), shape[0], length, cost)
 
 
@@ -153,8 +146,8 @@ def equal_paths(one: WordPath, other: WordPath) -> EqualPaths:
     whole = 2.0 * np.pi * np.round((other.goal[2] - one.goal[2]) / (2.0 * np.pi))
     lift = np.array([0.0, 0.0, whole])
     for bending, best, raised in ((one, other, -lift), (other, one, lift)):
-        there = bent_to(bending, best.goal + raised)
-        if there is None or there.cost < best.cost * (1.0 + _TWO_BRANCHES):
+        bent = bent_to(bending, best.goal + raised)
+        if bent is None or bent.cost < best.cost * (1.0 + _TWO_BRANCHES):
             raise InputError(
                 "two paths of words are of one branch, or one ends between their goals; "
                 "valid: best paths to neighbours that are of two branches"
@@ -187,10 +180,10 @@ class WordSlice:
     """Best paths to all places of a grid with one final heading; row by row, n places.
 
     Attributes:
-        grid: Of the places.
+        grid: Places of the goals.
         heading_deg: Final heading modulo whole turns [deg].
         turns: (n,) final less initial heading of the path [rad].
-        shapes: (n, degree) of the paths.
+        shapes: (n, degree) coefficients of the paths' headings [rad].
         lengths: (n,) of the paths [m].
         costs: (n,) of the paths [m]; infinite where none was found.
     """
@@ -225,11 +218,11 @@ class WordSlice:
         return WordPath(_START, self.goals[i], self.shapes[i], float(self.lengths[i]), float(self.costs[i]))
 
     def residuals(self) -> WordResiduals:
-        """Of all its paths, measured afresh."""
+        """Residuals of all its paths, measured without the solver."""
         return residuals(_START, self.goals, self.shapes, self.lengths)
 
     def missed(self) -> float:
-        """How far paths end from their goals, or their costs are from those given; largest [m] or [rad]."""
+        """Largest distance of a path's end from its goal, or of its cost from that given [m or rad]."""
         b, lengths = self.shapes, self.lengths[:, None]
         turned, weights = quadrature(b.shape[1])
         heading = START[2] + b @ turned.T
@@ -248,12 +241,8 @@ class WordSlice:
         """
         rows, columns = self.grid.shape
         index = np.arange(rows * columns).reshape(rows, columns)
-        pairs = np.vstack(
-            [
-                np.column_stack([index[:, :-1].ravel(), index[:, 1:].ravel()]),
-                np.column_stack([index[:-1].ravel(), index[1:].ravel()]),
-            ]
-        )
+        sides = ((index[:, :-1], index[:, 1:]), (index[:-1], index[1:]))
+        pairs = np.vstack([np.column_stack([a.ravel(), b.ravel()]) for a, b in sides])
         apart = self._costlier(pairs[:, 0], pairs[:, 1]) & self._costlier(pairs[:, 1], pairs[:, 0])
         return [(divmod(int(a), columns), divmod(int(b), columns)) for a, b in pairs[apart]]
 
@@ -271,7 +260,7 @@ def solve_slice(heading_deg: float, grid: WordGrid = THESIS_GRID) -> WordSlice:
 
     Args:
         heading_deg: Final heading, 90 is that of the start [deg].
-        grid: Of the places.
+        grid: Places of the goals.
 
     Raises:
         InputError: If a place was not reached by any guess.
@@ -288,7 +277,7 @@ def solve_slice(heading_deg: float, grid: WordGrid = THESIS_GRID) -> WordSlice:
 
 
 def _from_neighbours(grid: WordGrid, turned: FloatArray, best: Minima) -> tuple[FloatArray, Minima]:
-    """Minima improved by those of neighbours."""
+    """Minima improved by bending the paths of neighbours."""
     turned, shapes = turned.copy(), best.shapes.copy()
     cost, length = best.cost.copy(), best.length.copy()
     rows, columns = grid.shape
@@ -296,10 +285,9 @@ def _from_neighbours(grid: WordGrid, turned: FloatArray, best: Minima) -> tuple[
     for _ in range(rows + columns):
         improved = False
         for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            here, there = index, np.roll(index, shift, axis)
             keep = (slice(None), slice(1, None) if shift > 0 else slice(None, -1))
             inside = keep if axis == 1 else keep[::-1]
-            to, by = here[inside].ravel(), there[inside].ravel()
+            to, by = index[inside].ravel(), np.roll(index, shift, axis)[inside].ravel()
             ends = turned[to].copy()
             ends[:, 2] = turned[by, 2]
             bent = minimise(Goals.of(_START, ends), shapes[by])
@@ -315,15 +303,13 @@ def _from_neighbours(grid: WordGrid, turned: FloatArray, best: Minima) -> tuple[
 
 def count_words(slices: Iterable[WordSlice]) -> dict[str, int]:
     """Number of places of each word: those of the thesis in its order, then others by their number."""
-    counted = Counter(str(word) for one in slices for word in one.words.ravel())
-    others = sorted(
-        (word for word in counted if word not in THESIS_WORDS), key=lambda word: (-counted[word], word)
-    )
+    counted = Counter(str(word) for part in slices for word in part.words.ravel())
+    others = sorted(counted.keys() - set(THESIS_WORDS), key=lambda word: (-counted[word], word))
     return {word: counted[word] for word in (*THESIS_WORDS, *others)}
 
 
 def shares(counts: Mapping[str, int]) -> dict[str, float]:
-    """Share of each word."""
+    """Share of each word [-]."""
     total = max(1, sum(counts.values()))
     return {word: number / total for word, number in counts.items()}
 
@@ -335,7 +321,7 @@ def solve_slices(
 
     Args:
         headings_deg: Final heading of each [deg].
-        grid: Of the places.
+        grid: Places of the goals.
         jobs: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
 
     Yields:
@@ -347,5 +333,5 @@ def solve_slices(
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; valid: at least 1")
-    for _, found in side_by_side(partial(solve_slice, grid=grid), headings_deg, jobs, "words"):
-        yield found
+    for _, solved in side_by_side(partial(solve_slice, grid=grid), headings_deg, jobs, "words"):
+        yield solved

@@ -7,12 +7,11 @@ direction :math:`\beta`, with :math:`p = \int \cos(\varphi - \beta)` and :math:`
 \beta)`, the length is :math:`D / p`, and what is left is
 
 .. math:: \min_b \; J = D / p + (p / D)^3 \sum_i b_i^2 / (2 i + 1) \quad \text{subject to} \quad q = 0.
-
-Also here. Polynomials for the heading of a path whose curvature is zero at both ends.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Legendre
@@ -22,9 +21,6 @@ from manikin.numerics.spatial import FloatArray
 
 DEGREE = 20
 """Highest degree of the derivative of the curvature; 32 changes no word of the grid, no cost by 1e-9 m."""
-
-_NODES = 48
-"""Of the quadrature along the path."""
 
 
 def basis(share: FloatArray, integrals: int, degree: int = DEGREE) -> FloatArray:
@@ -37,20 +33,19 @@ def basis(share: FloatArray, integrals: int, degree: int = DEGREE) -> FloatArray
         integrals: How often they are integrated.
         degree: The highest.
     """
-    columns = [_integrated(number, integrals)(share) for number in range(1, degree + 1)]
-    return np.column_stack(columns)
+    return np.column_stack([_integrated(number, integrals)(share) for number in range(1, degree + 1)])
 
 
 @cache
 def _integrated(number: int, integrals: int) -> Legendre:
-    one = Legendre.basis(number, domain=[0.0, 1.0])
-    return one.integ(integrals, lbnd=0.0) if integrals else one
+    polynomial = Legendre.basis(number, domain=[0.0, 1.0])
+    return polynomial.integ(integrals, lbnd=0.0) if integrals else polynomial
 
 
 @cache
 def quadrature(degree: int = DEGREE) -> tuple[FloatArray, FloatArray]:
     """(m, degree) twice integrated polynomials at the nodes of Gauss' rule on [0, 1], and (m,) weights."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(48)
     return basis((nodes + 1.0) / 2.0, 2, degree), weights / 2.0
 
 
@@ -60,23 +55,20 @@ def squares(degree: int = DEGREE) -> FloatArray:
 
 
 TOLERANCE = 1e-11
-"""Of the direction in which a path ends [rad], and of the cost's gradient, as a share of its scale."""
+"""Error of the direction in which a path ends [rad], and of the cost's gradient, as a share of its scale."""
 
 _LEAST = 0.02
 """Smallest p, the share of the way that leads to the goal."""
 
-_ITERATIONS = 120
-_MOST_DAMPED = 1e8
-
 
 @dataclass(frozen=True, eq=False)
 class Goals:
-    """Goals as the programmes see them, each with a turn to it.
+    """k goals in polar coordinates about the start, each with the turn that the path to it makes.
 
     Attributes:
         distance: (k,) from the start [m].
         direction: (k,) of the goal from the heading at the start [rad].
-        turn: (k,) final less initial heading, whole turns counted [rad].
+        turn: (k,) final less initial heading, with whole turns [rad].
     """
 
     distance: FloatArray
@@ -85,21 +77,12 @@ class Goals:
 
     @classmethod
     def of(cls, start: FloatArray, goals: FloatArray) -> "Goals":
-        """Goals as seen from a start; the heading of each tells its whole turns too.
-
-        Args:
-            start: (3,) x, y [m], heading [rad].
-            goals: (k, 3) x, y [m], heading [rad].
-        """
-        way = goals[:, :2] - start[:2]
-        return cls(
-            np.hypot(way[:, 0], way[:, 1]),
-            np.arctan2(way[:, 1], way[:, 0]) - start[2],
-            goals[:, 2] - start[2],
-        )
+        """Goals (k, 3) seen from a start (3,), both x, y [m] and heading with whole turns [rad]."""
+        x, y = (goals[:, :2] - start[:2]).T
+        return cls(np.hypot(x, y), np.arctan2(y, x) - start[2], goals[:, 2] - start[2])
 
     def __getitem__(self, index: object) -> "Goals":
-        """Some of them, in the manner of numpy."""
+        """Some of the goals, by numpy's indexing."""
         return Goals(self.distance[index], self.direction[index], self.turn[index])  # type: ignore[index]
 
     def __len__(self) -> int:
@@ -108,12 +91,12 @@ class Goals:
 
 @dataclass(frozen=True, eq=False)
 class Minima:
-    """What became of a batch.
+    """Local minima of a batch of k programmes.
 
     Attributes:
         shapes: (k, degree) coefficients b of the headings [rad].
-        cost: (k,) J; infinite where no minimum was reached.
-        length: (k,) of the path [m].
+        cost: (k,) J [m]; infinite where no minimum was reached.
+        length: (k,) lengths of the paths [m].
     """
 
     shapes: FloatArray
@@ -126,22 +109,14 @@ class Minima:
         return np.isfinite(self.cost)
 
 
-@dataclass(frozen=True, eq=False)
-class _Values:
-    """Cost and constraint of a batch with their first derivatives, and the parts of the second ones."""
+class _Values(NamedTuple):
+    """Cost and constraint of a batch with their first derivatives, and whether p is large enough."""
 
     cost: FloatArray
     q: FloatArray
     gradient: FloatArray
     q_gradient: FloatArray
     valid: NDArray[np.bool_]
-
-
-def with_turn(shapes: FloatArray, goals: Goals) -> FloatArray:
-    """Shapes whose first coefficient is that of the goals' turns."""
-    shapes = shapes.copy()
-    shapes[:, 0] = -6.0 * goals.turn
-    return shapes
 
 
 def minimise(goals: Goals, shapes: FloatArray) -> Minima:
@@ -152,16 +127,17 @@ def minimise(goals: Goals, shapes: FloatArray) -> Minima:
     constraint: so it is a strict local minimum.
 
     Args:
-        goals: (k) goals.
-        shapes: (k, degree) where to begin; the first coefficient is set.
+        goals: Goals and turns, k of them.
+        shapes: (k, degree) where to begin; the first coefficient is set from the turns.
     """
-    shapes = with_turn(shapes, goals)
+    shapes = shapes.copy()
+    shapes[:, 0] = -6.0 * goals.turn
     cost, length = np.full(len(goals), np.inf), np.full(len(goals), np.nan)
     active = np.arange(len(goals))
     damping = np.full(len(goals), 1e-2)
     values = _values(goals, shapes)
     active, values = active[values.valid], _only(values, values.valid)
-    for _ in range(_ITERATIONS):
+    for _ in range(120):
         if not len(active):
             break
         some, b = goals[active], shapes[active]
@@ -171,7 +147,7 @@ def minimise(goals: Goals, shapes: FloatArray) -> Minima:
             good = done.copy()
             good[done] = _definite(hessian[done], values.q_gradient[done])
             cost[active[good]] = values.cost[good]
-            length[active[good]] = _length(some[good], b[good])
+            length[active[good]] = some[good].distance / _integrals(some[good], b[good])[0].sum(axis=1)
         trial = b + step
         tried = _values(some, trial)
         penalty = 1.5 * np.abs(multiplier) + 1e-3
@@ -181,7 +157,7 @@ def minimise(goals: Goals, shapes: FloatArray) -> Minima:
         values = _either(better, tried, values)
         damping[active] = np.where(better, damping[active] * 0.15, np.maximum(damping[active], 1e-4) * 8.0)
         damping[active] = np.where(damping[active] < 1e-6, 0.0, damping[active])
-        going_on = ~done & (damping[active] < _MOST_DAMPED)
+        going_on = ~done & (damping[active] < 1e8)
         active, values = active[going_on], _only(values, going_on)
     return Minima(shapes, cost, length)
 
@@ -191,10 +167,6 @@ def _integrals(goals: Goals, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     turned, weights = quadrature(b.shape[1])
     angle = b @ turned.T - goals.direction[:, None]
     return np.cos(angle) * weights, np.sin(angle) * weights
-
-
-def _length(goals: Goals, b: FloatArray) -> FloatArray:
-    return goals.distance / _integrals(goals, b)[0].sum(axis=1)
 
 
 def _values(goals: Goals, b: FloatArray) -> _Values:
@@ -220,18 +192,18 @@ def _step(
     size, n = values.gradient.shape
     normal = values.q_gradient
     now = -np.einsum("ki,ki->k", values.gradient, normal) / np.einsum("ki,ki->k", normal, normal)
-    hessian, own = _hessian(goals, b, now)
+    hessian, diagonal = _hessian(goals, b, now)
     index = np.arange(n)
     system = np.zeros((size, n + 1, n + 1))
     system[:, :n, :n] = hessian
-    system[:, index, index] += damping[:, None] * own
+    system[:, index, index] += damping[:, None] * diagonal
     system[:, :n, n] = system[:, n, :n] = normal
     right = np.concatenate([-values.gradient, -values.q[:, None]], axis=1)
     solved = _solved(system, right)
     step = np.concatenate([np.zeros((size, 1)), solved[:, :n]], axis=1)
     # Coefficients of higher degrees bend less: compare gradients in the measure of the cost itself.
     rest = np.abs(values.gradient + now[:, None] * normal)
-    residual: FloatArray = np.max(rest / np.sqrt(own), axis=1) / np.sqrt(values.cost)
+    residual: FloatArray = np.max(rest / np.sqrt(diagonal), axis=1) / np.sqrt(values.cost)
     return step, solved[:, n], residual, hessian
 
 
@@ -262,10 +234,10 @@ def _hessian(goals: Goals, b: FloatArray, multiplier: FloatArray) -> tuple[Float
     hessian += bend[:, None, None] * p_gradient[:, :, None] * p_gradient[:, None, :]
     crossed = mixed[:, :, None] * p_gradient[:, None, :]
     hessian += crossed + crossed.transpose(0, 2, 1)
-    own = np.asarray(2.0 * cubed[:, None] * weights[1:], np.float64)
+    diagonal = np.asarray(2.0 * cubed[:, None] * weights[1:], np.float64)
     index = np.arange(degree - 1)
-    hessian[:, index, index] += own
-    return hessian, own
+    hessian[:, index, index] += diagonal
+    return hessian, diagonal
 
 
 @cache
@@ -286,13 +258,10 @@ def _definite(hessian: FloatArray, normal: FloatArray) -> NDArray[np.bool_]:
 
 
 def _only(values: _Values, index: NDArray[np.bool_]) -> _Values:
-    return replace(values, **{name: getattr(values, name)[index] for name in values.__dataclass_fields__})
+    return _Values._make(part[index] for part in values)
 
 
 def _either(better: NDArray[np.bool_], one: _Values, other: _Values) -> _Values:
-    """One where it is better, and else the other."""
-    parts = {name: (getattr(one, name), getattr(other, name)) for name in one.__dataclass_fields__}
-    chosen = {
-        name: np.where(better if a.ndim == 1 else better[:, None], a, b) for name, (a, b) in parts.items()
-    }
-    return replace(one, **chosen)
+    """The first where it is better, and else the other."""
+    pairs = zip(one, other, strict=True)
+    return _Values._make(np.where(better if a.ndim == 1 else better[:, None], a, b) for a, b in pairs)

@@ -17,15 +17,14 @@ scale.
 
 Headings are the same modulo :math:`2 \pi`. Considered are all turns of at most one whole turn to either side.
 
-Also here. Whether paths meet their goals and the necessary conditions of optimality, measured without the
-solver.
-
-For :math:`\int (1 + u_2^2)` Pontryagin's principle says :math:`u_2 = p_\kappa / 2`, :math:`\dot p_\kappa =
--p_\varphi`, :math:`\dot p_\varphi = p_x \sin\varphi - p_y \cos\varphi` with constant :math:`p_x, p_y`, and a
-Hamiltonian that is zero since the length is free. So :math:`-2 \ddot u_2` must be a combination of
-:math:`\sin\varphi` and :math:`\cos\varphi`.
+:func:`residuals` measures without the solver whether paths meet their goals and the necessary conditions of
+optimality. For :math:`\int (1 + u_2^2)` Pontryagin's principle says :math:`u_2 = p_\kappa / 2`,
+:math:`\dot p_\kappa = -p_\varphi`, :math:`\dot p_\varphi = p_x \sin\varphi - p_y \cos\varphi` with constant
+:math:`p_x, p_y`, and a Hamiltonian that is zero since the length is free. So :math:`-2 \ddot u_2` must be a
+combination of :math:`\sin\varphi` and :math:`\cos\varphi`.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -35,7 +34,7 @@ from scipy.interpolate import CubicSpline
 
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, frozen_array
-from manikin.walking.path.walking_model import START
+from manikin.walking.path.walking_model import START, runge_kutta
 from manikin.walking.words.word_path import WordPath
 from manikin.walking.words.word_program import DEGREE, Goals, Minima, basis, minimise, quadrature
 
@@ -73,7 +72,8 @@ def residuals(start: FloatArray, goals: FloatArray, shapes: FloatArray, lengths:
     """
     share = np.linspace(0.0, 1.0, 2 * _STEPS + 1)
     rates = shapes @ basis(share, 0, shapes.shape[1]).T / lengths[:, None] ** 2
-    states = _integrated(start, rates, lengths)
+    state = np.tile(np.append(start, 0.0), (len(lengths), 1))
+    states = runge_kutta(_derivative, state, rates.T, (lengths / _STEPS)[:, None])
     missed = np.abs(states[-1, :, :3] - goals)
     adjoint, hamiltonian = _adjoint(states, rates[:, ::2], lengths)
     return WordResiduals(
@@ -81,22 +81,9 @@ def residuals(start: FloatArray, goals: FloatArray, shapes: FloatArray, lengths:
     )
 
 
-def _integrated(start: FloatArray, rates: FloatArray, lengths: FloatArray) -> FloatArray:
-    """(n, k, 4) states of the system under u2 given at every half step."""
-
-    def derivative(state: FloatArray, control: FloatArray) -> FloatArray:
-        return np.stack([np.cos(state[:, 2]), np.sin(state[:, 2]), state[:, 3], control], axis=1)
-
-    state = np.tile(np.append(start, 0.0), (len(lengths), 1))
-    step, states = (lengths / _STEPS)[:, None], [state]
-    for i in range(0, 2 * _STEPS, 2):
-        first = derivative(state, rates[:, i])
-        second = derivative(state + step / 2 * first, rates[:, i + 1])
-        third = derivative(state + step / 2 * second, rates[:, i + 1])
-        fourth = derivative(state + step * third, rates[:, i + 2])
-        state = state + step / 6 * (first + 2 * second + 2 * third + fourth)
-        states.append(state)
-    return np.array(states)
+def _derivative(state: FloatArray, control: FloatArray) -> FloatArray:
+    """(k, 4) rates of (k, 4) states of the system (3.2) under (k,) u2."""
+    return np.stack([np.cos(state[:, 2]), np.sin(state[:, 2]), state[:, 3], control], axis=1)
 
 
 def _adjoint(states: FloatArray, rates: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -110,7 +97,9 @@ def _adjoint(states: FloatArray, rates: FloatArray, lengths: FloatArray) -> tupl
         x, y, way, rate = x - x[0], y - y[0], np.linspace(0.0, length, len(x)), rates[k]
         none, ones = np.zeros_like(way), np.ones_like(way)
         # Columns: p_kappa(0), p_phi(0), p_x, p_y.
-        p_curvature = np.column_stack([ones, -way, -_primitive(y, way), _primitive(x, way)])
+        # Integrals from the start by a rule of fourth order.
+        x_primitive, y_primitive = (CubicSpline(way, line).antiderivative()(way) for line in (x, y))
+        p_curvature = np.column_stack([ones, -way, -y_primitive, x_primitive])
         moving = np.column_stack(
             [none, curvature, np.cos(heading) + y * curvature, np.sin(heading) - x * curvature]
         )
@@ -123,19 +112,8 @@ def _adjoint(states: FloatArray, rates: FloatArray, lengths: FloatArray) -> tupl
     return misfit, largest
 
 
-def _primitive(values: FloatArray, way: FloatArray) -> FloatArray:
-    """Integral from the start at every instant, by a rule of fourth order."""
-    return CubicSpline(way, values).antiderivative()(way)
-
-
 NEAREST, FARTHEST = 0.5, 15.0
 """Distances of goals that can be asked [m]; farther away the polynomials do not resolve the ends of paths."""
-
-SECOND = (-2.0, -1.0, 0.0, 1.0, 2.0)
-"""Turns aside and back of the guesses [rad]: the largest heading of the second polynomial."""
-
-THIRD = (-1.2, 0.0, 1.2)
-"""The same of the third polynomial [rad]."""
 
 _CHEAPER = 1e-9
 """Share of the cost by which another path must be cheaper to be taken instead."""
@@ -171,17 +149,13 @@ def word_paths(goals: ArrayLike, start: ArrayLike = START) -> list[WordPath]:
 
 
 def word_path(goal: ArrayLike, start: ArrayLike = START) -> WordPath:
-    """Best path to one goal, see :func:`word_paths`.
-
-    Raises:
-        InputError: If an argument is not usable, or no guess led to a path.
-    """
+    """Best path to one goal (3,), see :func:`word_paths`."""
     return word_paths([frozen_array(goal, "goal of a word [m, m, rad]", (3,))], start)[0]
 
 
 def guesses() -> list[tuple[float, ...]]:
-    """Largest headings of the free polynomials of every guess [rad]."""
-    return [(second, third) for second in SECOND for third in THIRD]
+    """Largest headings of the second and third polynomial of every guess [rad]: turns aside and back."""
+    return list(itertools.product((-2.0, -1.0, 0.0, 1.0, 2.0), (-1.2, 0.0, 1.2)))
 
 
 def cheapest(
@@ -192,7 +166,7 @@ def cheapest(
     Args:
         start: (3,) x, y [m], heading [rad].
         goals: (k, 3) the same, modulo whole turns.
-        amplitudes: Of each guess, largest headings of the free polynomials in order [rad].
+        amplitudes: Largest headings of the free polynomials of each guess, in order [rad].
 
     Returns:
         (k, 3) goals with the turns of their paths, and the paths.
@@ -203,16 +177,16 @@ def cheapest(
     for some, ends in _turns(start, goals):
         asked = Goals.of(start, ends)
         for guess in amplitudes:
-            found = minimise(asked, np.tile(guessed_shape(guess), (len(ends), 1)))
-            better = found.cost < cost[some] - _CHEAPER * found.length
+            minima = minimise(asked, np.tile(guessed_shape(guess), (len(ends), 1)))
+            better = minima.cost < cost[some] - _CHEAPER * minima.length
             chosen = some[better]
-            turned[chosen], shapes[chosen] = ends[better], found.shapes[better]
-            cost[chosen], length[chosen] = found.cost[better], found.length[better]
+            turned[chosen], shapes[chosen] = ends[better], minima.shapes[better]
+            cost[chosen], length[chosen] = minima.cost[better], minima.length[better]
     return turned, Minima(shapes, cost, length)
 
 
 def guessed_shape(amplitudes: Sequence[float]) -> FloatArray:
-    """(degree,) coefficients of a heading whose polynomials have these largest values [rad]."""
+    """(degree,) coefficients of a heading whose free polynomials have these largest values [rad]."""
     shape = np.zeros(DEGREE)
     free = slice(1, 1 + len(amplitudes))
     shape[free] = np.asarray(amplitudes) / np.abs(quadrature()[0]).max(axis=0)[free]
@@ -220,7 +194,7 @@ def guessed_shape(amplitudes: Sequence[float]) -> FloatArray:
 
 
 def _turns(start: FloatArray, goals: FloatArray) -> Iterator[tuple[NDArray[np.intp], FloatArray]]:
-    """Indices of goals, and the goals with a heading at most a whole turn from the start's."""
+    """Indices of goals, and the goals whose headings differ by at most a whole turn from the start's."""
     turn = np.mod(goals[:, 2] - start[2], 2.0 * np.pi)
     for whole in (0, -1, 1):
         some = np.flatnonzero(np.abs(turn + 2.0 * np.pi * whole) <= 2.0 * np.pi + 1e-9)

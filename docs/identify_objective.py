@@ -1,18 +1,20 @@
-"""Which cost explains recorded walks: the weights of the criterion from several of them at once.
+"""The weights of the walking criterion that explain several recorded walks best ([Truong2010]_ 5.5.1).
 
 The thesis solves this as a bilevel problem without saying how ([Truong2010]_ 5.2, 5.5.1). Here the outer
 level is a least-squares fit over the logarithms of the weights, and the inner one the programme of the paths.
 How an optimal path moves with a weight follows from the implicit function theorem on its stationarity,
 ``dz/da_i = - (d^2 J / dz^2)^-1 dJ_i/dz``, so the outer slopes are exact and cost one linear system.
 
-Also here. Recorded walks as the criterion sees them: places and headings of a body, without the sway of its
-steps.
+A recorded walk is seen as the criterion sees it: the places and headings of a body without the sway of its
+steps (:func:`recorded_walk`). ``docs/inverse.py`` applies both to recordings.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
@@ -290,7 +292,7 @@ class _Fit:
         path = WalkingPath(
             task, spline, duration, float(solution["f"]), "recording", int(stats["iter_count"])
         )
-        hessian, terms = (np.asarray(m) for m in programme.sensitivities(self._unknowns, parameters))
+        hessian, terms = (np.asarray(m) for m in _sensitivities(programme)(self._unknowns, parameters))
         moved = -np.linalg.solve(hessian, terms[:, 1:] * objective.weights[1:])
         return _Match(path, self._errors(path), self._place_slopes(path) @ moved)
 
@@ -321,6 +323,16 @@ class _Fit:
             slopes[:, axis, axis * count : (axis + 1) * count] = scale * basis
             slopes[:, axis, -1] = scale * (later[:, axis] + ends[:, axis])
         return slopes.reshape(3 * len(share), -1)
+
+
+@cache
+def _sensitivities(programme: PathProgram) -> ca.Function:
+    """Of unknowns and parameters: Hessian of the objective and (unknowns, 5) slopes of the terms."""
+    x, terms = programme.symbols["x"], programme.symbols["terms"]
+    hessian, _ = ca.hessian(programme.symbols["f"], x)
+    slopes = ca.jacobian(terms, x).T
+    outputs = [ca.densify(hessian), ca.densify(slopes)]
+    return ca.Function("sensitivities", [x, programme.symbols["p"]], outputs)
 
 
 def task_of(walk: RecordedWalk, objective: WalkObjective) -> WalkingTask:

@@ -1,6 +1,8 @@
 """Words of three clothoid arcs: they lead to the goal, and are extremal or not."""
 
 import itertools
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
-from manikin.walking.words.word_path import clothoid_words
+
+sys.path.append(str(Path(__file__).parents[3] / "docs"))
+
+from clothoid_words import clothoid_words
 
 
 @settings(max_examples=10)
