@@ -5,7 +5,7 @@
     DIR/scenario.yaml      the scenario with every default and override, ready to run again
     DIR/stages/*.json      what each stage found, written as soon as it is known
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
-    DIR/motion-NAME.h5     planned motion of somebody else who walks there
+    DIR/motion-NAME.h5     planned motion of another walker
     DIR/summary.json       written when every stage is done
     DIR/report.html        verdict, requirements, figures and numbers in one page that needs no other file
     DIR/motion.bvh         drawn from the files above, for animation programs
@@ -232,7 +232,7 @@ def _check_is_run(folder: Path) -> None:
 
 
 def _read_walks(folder: Path) -> dict[str, FloatArray]:
-    """Routes over the floor, (n, 4) each; none where nobody walks."""
+    """Routes over the floor, (n, 4) each; empty without a walk."""
     path = folder / STAGES / f"{WALK_PATHS}.json"
     with _undamaged(path):
         return {
