@@ -66,7 +66,6 @@ def crop(
     """Cut a reconstruction and its supports, so that the first instant left is 0 on both clocks.
 
     Args:
-        found: The postures.
         supports: Found from all of them.
         start: On the clock of the supports [s].
         end: The last instant left [s].
@@ -81,11 +80,11 @@ def crop(
             f"window from {start:g} to {end:g} s leaves {len(rows)} frames; valid: at least {LEAST_FRAMES} "
             f"between {time[0]:g} and {time[-1]:g} s"
         )
-    begin, last, told = float(time[rows[0]]), float(time[rows[-1]]), found.targets
-    seen = np.flatnonzero(np.any(np.isfinite(told.positions[rows, :, 0]), axis=0))
+    begin, last, known = float(time[rows[0]]), float(time[rows[-1]]), found.targets
+    seen = np.flatnonzero(np.any(np.isfinite(known.positions[rows, :, 0]), axis=0))
     targets = PointTargets(
-        tuple(told.names[k] for k in seen), tuple(told.segments[k] for k in seen), told.points[seen],
-        told.positions[np.ix_(rows, seen)], told.weights[seen],
+        tuple(known.names[k] for k in seen), tuple(known.segments[k] for k in seen), known.points[seen],
+        known.positions[np.ix_(rows, seen)], known.weights[seen],
     )  # fmt: skip
     part = replace(
         found, time=found.time[rows] - found.time[rows[0]], q=found.q[rows], targets=targets,
@@ -114,8 +113,8 @@ Method = Literal["keyframes", "timing-free"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
 SHORTEST, LONGEST = 0.5, 2.0
-"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: nobody swings a leg in
-no time, and phases of a walk are no places to stay."""
+"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: a leg needs time to
+swing, and a walk does not pause."""
 
 HEIGHT_ROOM = 0.1
 """Beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
@@ -173,7 +172,7 @@ def farthest_support(recording: RecordedCom) -> float:
 
 
 def _recorded_heights(recording: RecordedCom) -> tuple[GeometricConstraint, ...]:
-    """No lower and no higher than it was recorded, but for some room: feet admit a way through the floor."""
+    """Recorded heights with some room; contacts alone would admit a way through the floor."""
     heights = recording.com[:, 2]
     lower, upper = (
         BentSurface(float(height), 0.0, 0.0, 0.0)
@@ -190,8 +189,8 @@ def _free_durations(recording: RecordedCom) -> StanceSequence:
 
 
 SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
-"""Of the execution. A recorded posture is worth more than one that was only preferred: six times the usual
-weight keeps arms off the trunk while they make up for what the contacts do not give."""
+"""Settings of the execution: six times the usual weight of the posture keeps arms off the trunk while they
+make up for what the contacts do not supply."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +199,6 @@ class Replan:
 
     Attributes:
         method: Of the centre of mass.
-        body: Who moves.
         scene: A floor, and blocks under what stands or sits higher.
         recording: The recorded centre of mass on the stances.
         recorded: The recorded motion, smoothed, its time 0 at the first instant.
@@ -253,8 +251,7 @@ class Replan:
         failure, distance = self.com.failure, self.distance
         near = self.com if isinstance(self.com, NearKeyFramesResult) else None
         return {
-            "method": self.method,
-            "succeeded": self.com.succeeded,
+            "method": self.method, "succeeded": self.com.succeeded,
             "failure": None if failure is None else failure.reason,
             "recorded_duration_s": float(self.recording.time[-1]),
             "duration_s": None if distance is None else float(self.schedule.instants[-1]),
@@ -267,9 +264,8 @@ class Replan:
             "margin_unit": self.com.problem.margin_unit,
             "key_frames": None if near is None else len(near.frames),
             "added_key_frames": None if near is None else len(near.added),
-            "wholebody": self._adapted_block(),
-            "execution": self._execution_block(),
-        }
+            "wholebody": self._adapted_block(), "execution": self._execution_block(),
+        }  # fmt: skip
 
     def _adapted_block(self) -> dict[str, Any] | None:
         if self.adapted is None:
@@ -310,7 +306,6 @@ def adapt_recording(
 
     Args:
         found: The postures, not yet smoothed.
-        supports: Found from them.
         method: How the centre of mass is planned.
         execute: Whether the recorded postures are adapted to the plan and executed.
         rolling: Whether a foot may stand on its toes alone; without, it stands on its whole sole.
@@ -340,12 +335,9 @@ def adapt_recording(
 
 
 def _with_turning(
-    body: BodyModel,
-    scene: Scene,
-    recording: RecordedCom,
-    recorded: tuple[FloatArray, FloatArray],
+    body: BodyModel, scene: Scene, recording: RecordedCom, recorded: tuple[FloatArray, FloatArray],
     margin: float,
-) -> RecordedCom:
+) -> RecordedCom:  # fmt: skip
     """The same with a rate of the angular momentum that the body can follow.
 
     First that of the recorded postures on their contacts; and then that of the postures which are fitted to
