@@ -66,7 +66,6 @@ def crop(
     """Cut a reconstruction and its supports, so that the first instant left is 0 on both clocks.
 
     Args:
-        supports: Found from all of them.
         start: On the clock of the supports [s].
         end: The last instant left [s].
 
@@ -114,10 +113,10 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 SHORTEST, LONGEST = 0.5, 2.0
 """Bounds of a phase that is planned timing-free, as shares of its recorded duration: a leg needs time to
-swing, and a walk does not pause."""
+swing, and phases of a walk are no places to stay."""
 
 HEIGHT_ROOM = 0.1
-"""Beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
+"""Room beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
 
 
 def plan_recorded_com(
@@ -129,7 +128,6 @@ def plan_recorded_com(
         mass: [kg].
         recording: Samples, key frames and stances.
         velocity: (2, 3) of the recorded centre of mass at both ends, kept by the timing-free method [m/s].
-        method: See :data:`Method`.
         required_margin: To keep all along [N.m].
     """
     if method == "keyframes":
@@ -189,8 +187,8 @@ def _free_durations(recording: RecordedCom) -> StanceSequence:
 
 
 SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
-"""Settings of the execution: six times the usual weight of the posture keeps arms off the trunk while they
-make up for what the contacts do not supply."""
+"""Settings of the execution. A recorded posture is worth six times as much as one that was only preferred:
+that keeps arms off the trunk while they make up for what the contacts do not give."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,9 +200,7 @@ class Replan:
         scene: A floor, and blocks under what stands or sits higher.
         recording: The recorded centre of mass on the stances.
         recorded: The recorded motion, smoothed, its time 0 at the first instant.
-        com: The planned centre of mass.
         adapted: The recorded postures on the planned centre of mass.
-        execution: In the physics engine.
     """
 
     method: Method
@@ -234,7 +230,7 @@ class Replan:
 
     @property
     def content(self) -> MotionFile:
-        """What a motion file holds of it."""
+        """Content of its motion file."""
         return MotionFile(self.planned, self.executed, self.body, self.scene, self.schedule)
 
     @cached_property
@@ -306,7 +302,6 @@ def adapt_recording(
 
     Args:
         found: The postures, not yet smoothed.
-        method: How the centre of mass is planned.
         execute: Whether the recorded postures are adapted to the plan and executed.
         rolling: Whether a foot may stand on its toes alone; without, it stands on its whole sole.
         required_margin: Of the planned point mass, to keep all along [N.m].
@@ -335,13 +330,16 @@ def adapt_recording(
 
 
 def _with_turning(
-    body: BodyModel, scene: Scene, recording: RecordedCom, recorded: tuple[FloatArray, FloatArray],
+    body: BodyModel,
+    scene: Scene,
+    recording: RecordedCom,
+    recorded: tuple[FloatArray, FloatArray],
     margin: float,
-) -> RecordedCom:  # fmt: skip
-    """The same with a rate of the angular momentum that the body can follow.
+) -> RecordedCom:
+    """Recording with a rate of the angular momentum that the body can follow.
 
     First that of the recorded postures on their contacts; and then that of the postures which are fitted to
-    the plan it leads to, for the fit gives way between both.
+    the plan it leads to, for the fit compromises between both.
     """
     recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
     com = plan_near_recorded_com(body.mass, recording, margin)
@@ -359,6 +357,4 @@ def _executed(result: Replan, even: Reconstruction) -> Replan:
     clock = schedule.instants, result.recording.key_times
     adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, (even.time, even.q), clock)
     execution = execute(body, scene, adapted.motion, schedule, settings=SETTINGS, hold=0.0)
-    return Replan(
-        result.method, body, scene, result.recording, result.recorded, result.com, adapted, execution
-    )  # fmt: skip
+    return replace(result, adapted=adapted, execution=execution)

@@ -1,4 +1,4 @@
-"""Where each effector goes: on its contact while it holds one, and as recorded in between.
+"""Paths of the effectors: each on its contact while it holds one, and as recorded in between.
 
 A foot that only stands on its toes tilts about their hinge, as far as it was recorded to, within what
 toes can bend. In flight each effector goes smoothly from its contact to the recorded path and from there
