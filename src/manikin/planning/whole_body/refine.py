@@ -98,10 +98,7 @@ class RefineSettings:
 
     Attributes:
         knot_spacing: Largest distance of the spline's knots [s].
-        samples_per_span: Samples between two knots.
         sampling: Spacing of the finished motion's samples, at which it is certified [s].
-        scales: Weights and limits of the fit.
-        requirements: What the finished motion must keep.
         retime: Whether the motion may be slowed down.
         friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
         contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
@@ -136,15 +133,12 @@ class RefineResult(Displayed):
         schedule: The contacts in the motion's own time, without those that were let go.
         before: The input at the motion's own timing, joined by interpolation.
         smoothed: The spline through the input from which the optimisation begins.
-        after: The refined motion.
-        certificate: Measured on the samples of the motion.
         requirements: What the certificate and the contacts' limits were held against.
         contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
             apart, by linear programs, see :func:`.contact_slack` [N, N.m].
         variables: Of each phase, the contact variable of each contact of the input's sequence, in [0, 1].
-        released: Phases and effectors of the contacts that were let go.
+        released: Phase and effector of every contact that was let go.
         stretch: Duration of the motion relative to the input's.
-        iterations: Gauss-Newton steps.
     """
 
     motion: Motion
@@ -174,7 +168,6 @@ class _Goal:
     """Keys and contacts at one timing.
 
     Attributes:
-        job: The refinement that it belongs to.
         forces: Motion whose contact forces are held where its torques are beyond the strength.
     """
 
@@ -210,7 +203,7 @@ class _Goal:
         )  # fmt: skip
 
     def at_rest(self) -> VariableSamples:
-        """What the keys say about the contacts, before there is a motion."""
+        """Samples of the keys at rest, for the choice of the contacts."""
         time = sample_uniformly(self.schedule, SPARSE)
         return VariableSamples.at_rest(
             self.job.body, self.schedule.sequence.effectors, (self.path.time, self.path.q),
@@ -218,7 +211,7 @@ class _Goal:
         )  # fmt: skip
 
     def moving(self, spline: ConfigurationSpline) -> VariableSamples:
-        """What a motion says about the contacts."""
+        """Samples of a motion, for the choice of the contacts."""
         time = sample_uniformly(self.schedule, SPARSE)
         names = self.schedule.sequence.effectors
         return VariableSamples.of_motion(self.job.body, names, time, spline.evaluate(time))

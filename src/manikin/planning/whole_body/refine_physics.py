@@ -178,9 +178,6 @@ SHARE = 0.4
 class MarginCost:
     """The margin of one stance.
 
-    Args:
-        stance: The contacts with their caps.
-
     Attributes:
         polytope: Its wrenches about the mean contact point.
         is_flat: Whether the stance's wrenches fill no volume, as without contacts or on two points.
