@@ -75,13 +75,10 @@ class AdaptedMotion:
 
 
 def adapt_postures(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    polytopes: tuple[WrenchPolytope, ...],
-    recorded: tuple[FloatArray, FloatArray],
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory,
+    polytopes: tuple[WrenchPolytope, ...], recorded: tuple[FloatArray, FloatArray],
     clock: tuple[FloatArray, FloatArray],
-) -> AdaptedMotion:
+) -> AdaptedMotion:  # fmt: skip
     """Fit one smooth motion to contacts and centre of mass that stays near recorded postures.
 
     Args:
@@ -126,12 +123,9 @@ def rate_on_contacts(
 
 
 def rate_on_plan(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    recorded: tuple[FloatArray, FloatArray],
-    recording: RecordedCom,
-) -> FloatArray:
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory,
+    recorded: tuple[FloatArray, FloatArray], recording: RecordedCom,
+) -> FloatArray:  # fmt: skip
     """(n, 3) rate of the angular momentum of recorded postures adapted to a plan [N.m].
 
     At a recording's samples.

@@ -76,7 +76,7 @@ TURN_BEND = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class NearProgramme:
-    """Everything about the programme that does not depend on the last solution.
+    """Quadratic programme of a CoM near key frames: what does not depend on the last solution.
 
     Attributes:
         mass: Mass of the body [kg].

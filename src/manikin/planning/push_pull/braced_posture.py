@@ -51,7 +51,7 @@ _HANDS, _FEET, _POSTURE, _STRENGTH = _STEPS = range(4)
 
 @dataclass(frozen=True)
 class BraceSettings:
-    """Where the trunk is tried; lengths are those of a body of 1.75 m, the values are our choice.
+    """Settings of the search for a posture that acts, for a body of 1.75 m; the values are our choice.
 
     Attributes:
         distances: Distances of the root from the face that is acted on [m].

@@ -8,6 +8,8 @@ posture, but a whole body need only follow it loosely.
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
 from manikin.contact import StanceSequence
@@ -59,7 +61,7 @@ def continue_seated(
     problem = CentroidalProblem(
         trajectory.mass, phases, trajectory.position(end), Configuration(body, posture.q).com,
         start_velocity=trajectory.velocity(end), start_acceleration=trajectory.acceleration(end),
-        goal_acceleration=(0.0, 0.0, 0.0), degree=trajectory.spline.degree, weights=WEIGHTS,
+        goal_acceleration=np.zeros(3), degree=trajectory.spline.degree, weights=WEIGHTS,
         # Longest duration of the seated part, in sums of its shortest phases.
         max_duration=2.0 * sum(phase.min_duration for phase in phases),
     )  # fmt: skip
