@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from manikin.body import Configuration, human, insect, limbs_of, random_configuration
+from manikin.body import Configuration, human, insect, random_configuration
 from manikin.kinematics import reach_volume
 from manikin.scene import Scene
 from manikin.simulation import compile_model
@@ -69,4 +69,4 @@ def test_hundred_physics_steps_standing(benchmark):
 def test_reach_of_a_limb(benchmark, make, count):
     """Sampling and hull."""
     body = make()
-    benchmark(lambda: reach_volume(body, limbs_of(body)[0], np.random.default_rng(0), count))
+    benchmark(lambda: reach_volume(body, body.limbs[0], np.random.default_rng(0), count))

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from manikin.body import human, insect, integrate, limbs_of
+from manikin.body import human, insect, integrate
 from manikin.contact import ContactKind
 from manikin.planning.contacts import ContactGenerator, Task, sample_limb, sample_limbs
 from manikin.scene import Box, Obstacle, Scene
@@ -66,7 +66,7 @@ def crawling():
 @pytest.mark.parametrize("count", [10_000, 100_000])
 def test_samples_of_a_limb(benchmark, count):
     body = human()
-    benchmark(lambda: sample_limb(body, limbs_of(body)[0], np.random.default_rng(0), count))
+    benchmark(lambda: sample_limb(body, body.limbs[0], np.random.default_rng(0), count))
 
 
 @pytest.mark.parametrize("count", [1_000, 10_000, 100_000])
@@ -84,7 +84,7 @@ def test_requests(benchmark, make, count):
 
     def requests():
         for place in places:
-            for limb in limbs_of(body):
+            for limb in body.limbs:
                 start = time.process_time()
                 answer = generator.request(place, limb.name, task, kind=kind)
                 took.append(time.process_time() - start)

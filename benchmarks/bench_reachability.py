@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from manikin.body import human, limbs_of
+from manikin.body import human
 from manikin.kinematics import reach_volume
 from manikin.planning.guide import (
     Condition,
@@ -40,7 +40,7 @@ HOLDS = (
 @pytest.fixture(scope="module")
 def creature():
     body, rng = human(1.75, 79.0, "male"), np.random.default_rng(0)
-    return abstraction_of(body, [reach_volume(body, limb, rng) for limb in limbs_of(body)])
+    return abstraction_of(body, [reach_volume(body, limb, rng) for limb in body.limbs])
 
 
 def crouch(creature):

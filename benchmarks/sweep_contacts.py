@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manikin.body import human, limbs_of
+from manikin.body import human
 from manikin.kinematics import reach_volume
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.contact_stage import find_supports
@@ -61,7 +61,7 @@ def main() -> None:
     for name in ACTS:
         sweep(name, seeds, contacts(name, "limits"))
     body, rng = human(1.75, 79.0, "male"), np.random.default_rng(0)
-    creature = abstraction_of(body, [reach_volume(body, limb, rng) for limb in limbs_of(body)])
+    creature = abstraction_of(body, [reach_volume(body, limb, rng) for limb in body.limbs])
     spec = importlib.util.spec_from_file_location("worlds", Path(__file__).parent / "bench_reachability.py")
     assert spec is not None
     assert spec.loader is not None

@@ -15,7 +15,6 @@ from manikin.body import (
     insect,
     limb_named,
     limb_placement,
-    limbs_of,
     random_configuration,
     with_further_contacts,
     with_knees_and_elbows,
@@ -29,14 +28,14 @@ from manikin.kinematics import LimbKinematics, reach_volume
 from manikin.kinematics.limb_kinematics import hull_of
 
 BODIES = {"human": with_knees_and_elbows(human()), "insect": insect()}
-LIMBS = [pytest.param(body, limb, id=limb.name) for body in BODIES.values() for limb in limbs_of(body)]
+LIMBS = [pytest.param(body, limb, id=limb.name) for body in BODIES.values() for limb in body.limbs]
 SITTER = with_further_contacts(human())
 PELVIS = limb_named(SITTER, "pelvis")
 
 
 def test_a_human_has_arms_and_legs_and_with_knees_and_elbows_eight_limbs():
-    assert [limb.name for limb in limbs_of(human())] == ["left_arm", "right_arm", "left_leg", "right_leg"]
-    further = limbs_of(BODIES["human"])[4:]
+    assert [limb.name for limb in human().limbs] == ["left_arm", "right_arm", "left_leg", "right_leg"]
+    further = BODIES["human"].limbs[4:]
     assert {limb.name for limb in further} == {"left_knee", "right_knee", "left_elbow", "right_elbow"}
     assert all(limb.kind is ContactKind.POINT for limb in further)
 
@@ -44,7 +43,7 @@ def test_a_human_has_arms_and_legs_and_with_knees_and_elbows_eight_limbs():
 def test_an_insect_has_six_legs_of_five_hinges_and_a_free_root():
     """36 degrees of freedom, as in the results of the thesis."""
     body = insect()
-    assert [len(limb_slots(body, limb)) for limb in limbs_of(body)] == [5] * 6
+    assert [len(limb_slots(body, limb)) for limb in body.limbs] == [5] * 6
     assert body.nv == 36
     assert body.mass == pytest.approx(2.0)
 
@@ -52,10 +51,10 @@ def test_an_insect_has_six_legs_of_five_hinges_and_a_free_root():
 def test_an_insect_stands_on_six_tips_under_a_lifted_trunk():
     body = insect()
     state = Configuration(body, body.standing_posture())
-    tips = np.array([state.effector_placement(limb.effector)[1] for limb in limbs_of(body)])
+    tips = np.array([state.effector_placement(limb.effector)[1] for limb in body.limbs])
     assert np.abs(tips[:, 2]).max() < 1e-9
     assert 0.05 < state.q[2] < 0.3
-    down = [state.effector_placement(limb.effector)[0][2, 2] for limb in limbs_of(body)]
+    down = [state.effector_placement(limb.effector)[0][2, 2] for limb in body.limbs]
     assert min(down) > 0.8
     # Left tips in front of each other, and the centre of mass inside of all of them.
     assert tips[0, 0] > tips[2, 0] > tips[4, 0]
@@ -205,7 +204,7 @@ def test_the_inscribed_sphere_touches_the_hull_from_inside():
 
 def test_a_unit_cube_has_a_sphere_of_half_its_side():
     cube = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-    volume = hull_of(limbs_of(human())[0], "thorax", cube)
+    volume = hull_of(human().limbs[0], "thorax", cube)
     centre, radius = volume.inscribed_sphere
     assert radius == pytest.approx(0.5)
     assert np.allclose(centre, 0.5)
@@ -234,7 +233,7 @@ def test_a_wrong_limb_is_refused_in_one_line(changes, message):
 
 def test_other_misuse_is_refused():
     body = human()
-    arm = limbs_of(body)[0]
+    arm = body.limbs[0]
     with pytest.raises(BodyError, match="twice"):
         replace(body, limbs=(replace(arm, mirror=None), replace(arm, mirror=None)))
     with pytest.raises(BodyError, match="no limb 'tail'; valid: left_arm"):

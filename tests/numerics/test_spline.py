@@ -152,20 +152,17 @@ def test_unusable_knots_are_refused_in_one_line(degree, knots, count, text):
     assert "\n" not in str(error.value)
 
 
-def test_values_outside_the_domain_are_refused():
-    curve = BSpline(1, [0, 0, 1, 1], [[0.0], [1.0]])
-    with pytest.raises(SplineError, match=r"outside \[0, 1\]"):
-        curve(1.1)
-
-
-def test_breakpoints_must_increase():
-    with pytest.raises(SplineError, match="increasing"):
-        clamped_knots(2, [0.0, 0.5, 0.5, 1.0])
-
-
-def test_an_end_acceleration_needs_a_velocity():
-    with pytest.raises(SplineError, match="without a velocity"):
-        start_control_points(3, clamped_knots(3, [0.0, 1.0]), [0.0], None, [1.0])
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: BSpline(1, [0, 0, 1, 1], [[0.0], [1.0]])(1.1), r"outside \[0, 1\]"),
+        (lambda: clamped_knots(2, [0.0, 0.5, 0.5, 1.0]), "increasing"),
+        (lambda: start_control_points(3, clamped_knots(3, [0.0, 1.0]), [0.0], None, [1.0]), "without a vel"),
+    ],
+)
+def test_misuse_is_refused(make, text):
+    with pytest.raises(SplineError, match=text):
+        make()
 
 
 def test_arrays_cannot_be_written_to():

@@ -10,14 +10,16 @@ from manikin.scenarios import load_scenario
 from manikin.scenarios.planned import PLANNING, with_supports
 
 
-def search(name, variant=None, overrides=()):
-    scenario = load_scenario(name, variant, overrides)
+@pytest.fixture(scope="module")
+def rope():
+    """Contacts found for pulling a rope, and the scene."""
+    scenario = load_scenario("pull-rope")
     body, scene = scenario.build_body(), scenario.build_scene()
     return find_supports(scenario, body, scene, np.random.default_rng(0)), scene
 
 
-def test_a_way_ends_with_both_hands_on_the_object():
-    found, scene = search("pull-rope")
+def test_a_way_ends_with_both_hands_on_the_object(rope):
+    found, scene = rope
     assert found.failure is None
     found.scenario.check_contacts(scene)
     last = found.plan.stages[-1]
@@ -33,9 +35,9 @@ def test_an_object_out_of_reach_ends_in_an_explained_failure():
     assert "within reach" in result.summary["failure"]["reason"]
 
 
-def test_another_seed_keeps_the_planner_s_options():
+def test_another_seed_keeps_the_planner_s_options(rope):
     """A scenario that was changed has every default written out; its planning is still nobody's choice."""
-    found, _ = search("pull-rope")
+    found, _ = rope
     scenario = load_scenario("pull-rope").with_seed(3)
     planning = with_supports(scenario, found.plan).planning
     assert planning.degree == PLANNING["degree"]

@@ -70,8 +70,14 @@ def test_a_failure_in_another_stage_is_not_the_expected_one():
         assert report["runs"][0]["expected_because"] == "because"
 
 
-def test_every_scenario_that_is_not_proved_expects_its_failure_with_the_reason():
-    jobs = {job.name: job for job in built_in_jobs()}
+@pytest.fixture(scope="module")
+def built_in():
+    """Every scenario with its variants."""
+    return built_in_jobs()
+
+
+def test_every_scenario_that_is_not_proved_expects_its_failure_with_the_reason(built_in):
+    jobs = {job.name: job for job in built_in}
     for name in ("climb-wall", "insect-books", "truck-egress"):
         assert jobs[name].expected == "failure"
         assert jobs[name].because
@@ -124,18 +130,16 @@ def test_no_process_is_left_behind_when_the_work_is_interrupted(monkeypatch):
 PUSHES = {"push-back-500", "push-front-300", "push-right-200", "push-sine-100"}
 
 
-def test_jobs_for_another_stature_leave_out_what_has_none():
+def test_jobs_for_another_stature_leave_out_what_has_none(built_in):
     """A point mass has no stature and the body of Kudoh its own; everything else is asked."""
-    jobs = built_in_jobs()
-    left_out = set(jobs) - set(built_in_jobs(statures=True))
+    left_out = set(built_in) - set(built_in_jobs(statures=True))
     assert {job.scenario for job in left_out} == {"insect-books", "walls", *PUSHES}
 
 
-def test_built_in_jobs_are_every_scenario_with_its_variants():
-    jobs = built_in_jobs()
-    assert Job("platform") in jobs
-    assert Job("platform", "slippery", "failure") in jobs
-    assert len({job.name for job in jobs}) == len(jobs)
+def test_built_in_jobs_are_every_scenario_with_its_variants(built_in):
+    assert Job("platform") in built_in
+    assert Job("platform", "slippery", "failure") in built_in
+    assert len({job.name for job in built_in}) == len(built_in)
 
 
 def test_the_command_of_a_job(tmp_path):

@@ -93,18 +93,6 @@ def test_a_goal_beyond_the_legs_is_named_without_planning_again(tmp_path):
     assert block["key_postures"]["failed"][-1]["key"] == 5
 
 
-def test_constraints_that_forbid_the_postures_are_named(tmp_path):
-    """A stride of 1 m with the CoM above 0.94 m: legs of 0.9 m would need it far before the standing foot."""
-    band = '[{height_band: {lower: "0.94", upper: "1.0"}}]'
-    result = run(stride(tmp_path, length=1.0, constraints=band))
-    failure = result.summary["failure"]
-    assert failure["stage"] == "centroidal"
-    assert "no posture at T_" in failure["reason"]
-    assert "no plan of the centre of mass passes there" in failure["reason"]
-    assert "1 further plan of the centre of mass tried" in failure["reason"]
-    assert result.summary["centroidal"]["replans"] == 1
-
-
 @pytest.fixture
 def ramp():
     """Context, report and planned centre of mass of a motion that ends on a seat."""

@@ -29,7 +29,6 @@ SHORT = {
     "climb-wall": ("task.goal.height_m=0.55",),
     "insect-books": ("task.start.at=[-0.25, 0.0]", "task.goal.at=[-0.05, 0.0]", "task.goal.height_m=0.05"),
     "climb@left": (),
-    "climb@down": ("task.goal.height_m=0.9",),
 }
 """Two rows of holds; onto the first books; and along a wall from where the climber already hangs on it."""
 

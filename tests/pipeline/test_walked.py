@@ -31,7 +31,7 @@ def check(result):
 
 @pytest.mark.slow
 def test_a_walk_around_is_executed():
-    goal = (2.0, 2.0, np.pi / 2)
+    goal = (1.0, 1.0, np.pi / 2)
     path = walking_path((0, 0, 0), goal, max_speed=0.6)
     scenario = walking_supports(place_footprints(path), load_scenario("walk"))
     result = run(scenario)

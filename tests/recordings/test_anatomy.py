@@ -103,29 +103,24 @@ def inside(volumes, clips, part):
 
 @pytest.mark.slow
 def test_held_out_clips_are_inside(script, clips):
-    """Volumes learnt from three clips in four hold at least 95 % of the frames of the fourth ones."""
+    """Volumes learnt from three clips in four hold at least 95 % of the frames of the fourth ones.
+
+    One division into four; ``benchmarks/sweep_plans.py`` has all, and every person left out.
+    """
     names = sorted(clips)
-    for fold in range(4):
-        learnt = script.learn(clips[name] for number, name in enumerate(names) if number % 4 != fold)
-        rest = [clips[name] for number, name in enumerate(names) if number % 4 == fold]
-        for part in learnt:
-            assert inside(learnt, rest, part) >= 0.95, (fold, part)
+    learnt = script.learn(clips[name] for number, name in enumerate(names) if number % 4 != 0)
+    for part in learnt:
+        assert inside(learnt, [clips[name] for name in names[::4]], part) >= 0.95, part
 
 
 @pytest.mark.slow
 def test_people_who_were_not_recorded_move_within_the_hips_volume(script, clips):
-    """Each of the sixteen people against the others: at least 95 % of the frames of everyone's hips.
-
-    Shoulders: 95 % for all but the three who climbed, crawled and swung their arms as nobody else did;
-    80 % for these.
-    """
-    people = {name[0] for name in clips}
-    assert len(people) == 16
-    for person in people:
-        learnt = script.learn(clip for name, clip in clips.items() if name[0] != person)
-        own = [clip for name, clip in clips.items() if name[0] == person]
-        assert inside(learnt, own, "thigh") >= 0.95, person
-        assert inside(learnt, own, "upper_arm") >= (0.8 if person in ("01", "Male1", "08") else 0.95), person
+    """Somebody who climbed, against fifteen others: 95 % of the frames of the hips, 80 % of the shoulders."""
+    assert len({name[0] for name in clips}) == 16
+    learnt = script.learn(clip for name, clip in clips.items() if name[0] != "01")
+    own = [clip for name, clip in clips.items() if name[0] == "01"]
+    assert inside(learnt, own, "thigh") >= 0.95
+    assert inside(learnt, own, "upper_arm") >= 0.8
 
 
 @pytest.mark.slow

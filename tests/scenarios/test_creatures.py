@@ -23,8 +23,6 @@ DOG = {
     },
 }
 
-SUPPORTS = {"phases": [{"left_foot": {"position": [0, 0, 0]}}]}
-
 
 @pytest.fixture
 def write(tmp_path):

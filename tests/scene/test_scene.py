@@ -9,7 +9,6 @@ from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene import Box, Capsule, Obstacle, Scene, Sphere
 
 PLATFORM = Obstacle("platform", Box((1.0, 1.0, 0.2)), translation=(0.6, 0.0, 0.1))
-TILT = st.floats(-0.6, 0.6)
 FOOT = {"length": 0.28, "width": 0.12, "friction": 0.7}
 
 

@@ -164,7 +164,7 @@ def test_a_run_does_not_end_at_rest_before_the_push_is_over():
 
 
 def test_the_result_does_not_depend_on_the_number_of_jobs():
-    searches = [DirectionSearch(TRIALS, direction, 60.0) for direction in (0.0, 120.0)]
+    searches = [DirectionSearch(TRIALS, direction, 500.0) for direction in (0.0, 120.0)]
     here, beside = (dict(search_directions(searches, jobs=jobs)) for jobs in (1, 2))
     assert here == beside
     assert all(found.held > 0.0 for found in here.values())
@@ -172,7 +172,7 @@ def test_the_result_does_not_depend_on_the_number_of_jobs():
 
 def test_processes_end_when_nobody_waits_for_them():
     before = set(multiprocessing.active_children())
-    searches = [DirectionSearch(TRIALS, direction, 60.0) for direction in (0.0, 90.0, 180.0, 270.0)]
+    searches = [DirectionSearch(TRIALS, direction, 500.0) for direction in (0.0, 120.0, 240.0)]
     with closing(search_directions(searches, jobs=2)) as found:
         next(found)
     # Not joined: the pool's own thread joins them, and one of two that join at a time misses the end.

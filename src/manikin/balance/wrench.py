@@ -242,13 +242,10 @@ class WrenchPolytope(Displayed, Polytope):
 
 
 def pseudo_wrench(
-    mass: float,
-    com: ArrayLike,
-    acceleration: ArrayLike,
-    angular_momentum_rate: ArrayLike | None = None,
+    mass: float, com: ArrayLike, acceleration: ArrayLike, angular_momentum_rate: ArrayLike | None = None,
     reference: ArrayLike | None = None,
-) -> FloatArray:
-    """Wrench that the scene must apply: ``[m (a - g); (x - o) ^ m (a - g) + Ldot]``.
+) -> FloatArray:  # fmt: skip
+    """(..., 6) wrench that the scene must apply [N, N.m]: ``[m (a - g); (x - o) ^ m (a - g) + Ldot]``.
 
     [Qiu2012]_ 4.6 for the point mass, 4.51 with the rate of change of angular momentum.
 
@@ -258,9 +255,6 @@ def pseudo_wrench(
         acceleration: (..., 3) of the CoM [m/s^2].
         angular_momentum_rate: (..., 3) about the CoM [N.m]; zero when omitted.
         reference: (..., 3) point ``o`` of the moments [m]; the world origin when omitted.
-
-    Returns:
-        (..., 6) [N, N.m].
 
     Raises:
         InputError: If the mass is not positive.

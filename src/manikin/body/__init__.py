@@ -10,7 +10,6 @@ from manikin.body.limbs import (
     are_mirrored,
     limb_named,
     limb_placement,
-    limbs_of,
     with_further_contacts,
     with_knees_and_elbows,
     with_root,
@@ -24,6 +23,6 @@ __all__ = [
     "Anthropometry", "BodyModel", "Configuration", "Effector", "Hinge", "JointVolume", "Limb", "LimbSpec",
     "NaturalRange", "Segment", "Sex", "Shape", "ShapeKind", "are_mirrored", "body_from_signature", "carrying",
     "creature_from_urdf", "difference", "human", "human_volumes", "insect", "integrate", "interpolate",
-    "kudoh", "limb_named", "limb_placement", "limbs_of", "point_mass", "random_configuration", "volume_of",
+    "kudoh", "limb_named", "limb_placement", "point_mass", "random_configuration", "volume_of",
     "with_further_contacts", "with_knees_and_elbows", "with_root",
 ]  # fmt: skip

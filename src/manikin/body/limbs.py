@@ -131,7 +131,7 @@ def with_further_contacts(body: BodyModel, kinds: Collection[str] = FURTHER) -> 
     unknown = sorted(set(kinds) - set(FURTHER))
     if unknown:
         raise BodyError(f"further contact is {unknown[0]!r}; valid: {', '.join(FURTHER)}")
-    effectors, limbs = dict(body.effectors), list(limbs_of(body))
+    effectors, limbs = dict(body.effectors), list(body.limbs)
     for joint, parts, ahead in _JOINTS:
         if f"{joint}s" not in kinds:
             continue
@@ -188,11 +188,6 @@ def with_root(body: BodyModel) -> tuple[BodyModel, str]:
 
 REFLECTION = np.array([1.0, -1.0, 1.0])
 """Factors of the coordinates of a point under reflection in the sagittal plane."""
-
-
-def limbs_of(body: BodyModel) -> tuple[Limb, ...]:
-    """Return the limbs of a body, in its own order; none for a point mass."""
-    return body.limbs
 
 
 def limb_named(body: BodyModel, name: str) -> Limb:

@@ -82,21 +82,24 @@ class SupportInterval:
     """One planned support of one effector.
 
     Attributes:
-        contact: The contact held.
         start: Planned touch-down [s]; -inf when held from the beginning.
         end: Planned lift-off [s]; inf when held to the end.
         early: First time at which a touch counts as this touch-down [s].
+        late: Last time at which a touch counts as not having left it yet [s].
         parts: Contact from each time on, in order; the same place throughout, but other parts of
             a sole that rolls.
-        late: Last time at which a touch counts as not having left it yet [s].
     """
 
-    contact: Contact
     start: float
     end: float
     early: float
-    late: float = math.inf
-    parts: tuple[tuple[float, Contact], ...] = ()
+    late: float
+    parts: tuple[tuple[float, Contact], ...]
+
+    @property
+    def contact(self) -> Contact:
+        """The contact at touch-down."""
+        return self.parts[0][1]
 
     def contact_at(self, time: float) -> Contact:
         """Part of the contact that is planned at a time [s]; before the first, the first."""
@@ -130,7 +133,7 @@ def support_intervals(
         early_window: Largest advance of a touch-down [s]; more before the end of a long flight,
             which comes down slowly, but at most its last third.
     """
-    found: list[SupportInterval] = []
+    intervals: list[SupportInterval] = []
     phases = list(schedule.sequence)
     previous_end = -math.inf
     for held, run in groupby(range(len(phases)), key=lambda number: effector in phases[number].stance):
@@ -144,14 +147,12 @@ def support_intervals(
         long = LONG_FLIGHT < flight < math.inf
         window = max(early_window, EARLY_SHARE * flight) if long else early_window
         early = max(start - window, start - flight / 3) if first else start
+        if intervals:  # a long flight rises as slowly as it comes down
+            intervals[-1] = replace(intervals[-1], late=previous_end + window)
         parts = tuple((float(schedule.instants[k]), phases[k].stance[effector]) for k in numbers)
-        found.append(SupportInterval(parts[0][1], start, end, early, end + early_window, parts))
-        if len(found) > 1:
-            # A long flight rises as slowly as it comes down.
-            before = found[-2]
-            found[-2] = replace(before, late=before.end + window)
+        intervals.append(SupportInterval(start, end, early, end + early_window, parts))
         previous_end = end
-    return tuple(found)
+    return tuple(intervals)
 
 
 @dataclass
@@ -182,7 +183,8 @@ class SupportSwitch:
             time: Not decreasing from call to call.
             touching: Whether each effector is felt to touch; the schedule is trusted where it says nothing.
         """
-        return {name: self._update(name, time, (touching or {}).get(name)) for name in self.effectors}
+        felt = touching or {}
+        return {name: self._update(name, time, felt.get(name)) for name in self.effectors}
 
     def _update(self, name: str, time: float, touching: bool | None) -> SupportState:
         number, interval = self._interval(name, time)
@@ -232,15 +234,15 @@ class SupportSwitch:
 
     def _fades(self, interval: SupportInterval, time: float) -> tuple[tuple[SolePart, float], ...]:
         """Load moves gradually to points that begin to touch, and off those that cease to."""
-        found = []
+        fades = []
         before, after = interval.part_before(time), interval.part_after(time)
         if before is not None:
             share = (time - before[1]) / self._settings.rolling_load_time
-            found.append((before[0], float(np.clip(share, 0.0, 1.0)) ** 2))
+            fades.append((before[0], float(np.clip(share, 0.0, 1.0)) ** 2))
         if after is not None:
             share = (after[1] - time) / self._settings.unload_time
-            found.append((after[0], float(np.clip(share, 0.0, 1.0))))
-        return tuple(item for item in found if item[1] < 1.0)
+            fades.append((after[0], float(np.clip(share, 0.0, 1.0))))
+        return tuple(item for item in fades if item[1] < 1.0)
 
     def _follow(self, name: str, time: float) -> float:
         """Feedback gains rise smoothly after a lift-off, where plan and reality differ in speed."""

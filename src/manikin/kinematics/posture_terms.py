@@ -39,9 +39,11 @@ class Term(Protocol):
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """Residual and Jacobian at a configuration."""
+        ...
 
     def describe(self, residual: FloatArray) -> str:
-        """Say in words what a residual of this term means."""
+        """Meaning of a residual of this term in words."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

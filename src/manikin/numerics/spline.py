@@ -3,6 +3,7 @@
 Knots are ``t_0 <= ... <= t_m``, control points ``a_0 ... a_n`` and ``m = n + k + 1`` for the
 degree ``k`` (the thesis says "order"). Knot spans are half-open, ``[t_j, t_j+1)``, and the
 last one is closed, so that the basis functions add up to one everywhere on the domain.
+Arguments ``degree`` are k, ``knots`` (m + 1,) clamped, ``t`` (s,) parameters inside the domain.
 """
 
 from dataclasses import dataclass
@@ -101,8 +102,8 @@ class BSpline:
 
         Args:
             degree: Degree k.
-            knots: (m + 1,) clamped knots.
-            t: (s,) parameter values inside the domain.
+            knots: Clamped knots.
+            t: (s,) parameter values.
             values: (s, d) wanted positions.
             first: (i, d) control points a_0 ... a_i-1 to keep, see :func:`start_control_points`.
             last: (j, d) control points a_n-j+1 ... a_n to keep, see :func:`end_control_points`.
@@ -176,11 +177,7 @@ def clamped_knots(degree: int, breakpoints: ArrayLike) -> FloatArray:
 def basis_matrix(degree: int, knots: ArrayLike, t: ArrayLike, derivative: int = 0) -> FloatArray:
     """(s, n + 1) matrix A with ``p^(d)(t_j) = A[j] @ control_points`` ([Qiu2012]_ 2.52, 2.55).
 
-    Args:
-        degree: Degree k.
-        knots: (m + 1,) clamped knots.
-        t: (s,) parameter values inside the domain.
-        derivative: Order d; the control points are those of the spline itself.
+    The control points are those of the spline itself for a derivative d, too.
 
     Raises:
         SplineError: If the knots are not clamped or a value lies outside the domain.
@@ -196,11 +193,6 @@ def basis_matrix(degree: int, knots: ArrayLike, t: ArrayLike, derivative: int = 
 
 def derivative_matrix(degree: int, knots: ArrayLike, order: int) -> FloatArray:
     """(n + 1 - d, n + 1) ``T_d0`` from control points to those of a derivative ([Qiu2012]_ 2.32, 2.44).
-
-    Args:
-        degree: Degree k.
-        knots: (m + 1,) clamped knots.
-        order: d, 0 <= d <= k.
 
     Raises:
         SplineError: If the knots are not clamped or the order is out of range.
@@ -227,12 +219,8 @@ def start_control_points(
 ) -> FloatArray:
     """(1 to 3, d) first control points that give the wanted start ([Qiu2012]_ 2.45-2.47).
 
-    Args:
-        degree: Degree k >= 2 when an acceleration is wanted.
-        knots: (m + 1,) clamped knots.
-        position: (d,) p(t_0).
-        velocity: (d,) first derivative there; None leaves it free.
-        acceleration: (d,) second derivative there; needs a velocity too.
+    Position p(t_0), first and second derivative are (d,); None leaves a derivative free. An acceleration
+    needs a velocity and a degree of 2 or more.
 
     Raises:
         SplineError: If an acceleration is given without a velocity.

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.collision import CollisionPart, collision_parts
+from manikin.scene.collision import CollisionPart, Measured, Meter, collision_parts, pair_meter, part_meter
 from manikin.scene.distance_bounds import KnownDistances, PairBounds, PlacedShapes, PlacementReader
 from manikin.scene.mesh import IntArray
-from manikin.scene.pair import Measured, Meter, pair_meter, part_meter
 from manikin.scene.scene import Scene
 
 Pair = tuple[str, str]
@@ -98,8 +97,8 @@ class Proximity:
     """Distances of every body shape to every obstacle and to other body shapes.
 
     Distances are exact for primitives and convex mesh pieces, negative by the penetration depth. Closed mesh
-    pieces that are not convex give exact clearances and a depth sampled on the body shape; open
-    ones have no inside, and where a shape crosses them the depth is that of the worst triangle.
+    pieces that are not convex give exact clearances and a depth sampled on the body shape; open ones have no
+    inside, and where a shape crosses them the depth is that of the worst triangle.
 
     One instance works on buffers of its own: use one per thread. Results do not depend on earlier queries.
 
@@ -110,11 +109,8 @@ class Proximity:
     def __init__(self, body: BodyGeometry, scene: Scene, *, self_collision: bool = True) -> None:
         """Prepare the pairs.
 
-        Args:
-            body: With ``pinocchio``, ``geometry`` and, for self-collision, ``collision_pairs``
-                (of shape names or geometry indices; the geometry's own pairs when absent).
-            scene: Obstacles; the floor is one of them.
-            self_collision: Whether to check the body against itself.
+        For self-collision the body has ``collision_pairs`` (of shape names or geometry indices; those of the
+        geometry when absent).
 
         Raises:
             SceneError: If a collision pair names no shape of the body.
@@ -146,7 +142,7 @@ class Proximity:
         return int(self._model.nv)
 
     def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
-        """Measure every pair closer than ``activation``.
+        """Measure every pair closer than ``activation``, in the order of :attr:`pairs`.
 
         The gradient of a distance is ``n^T (J_2 - J_1)``, with ``n`` from the body shape to
         the other and the Jacobians taken at the nearest points.
@@ -156,9 +152,6 @@ class Proximity:
             activation: [m]; farther pairs are left out.
             ignore: (segment, obstacle) or (segment, segment) pairs to leave out, in any
                 order; a full shape name may stand for its segment.
-
-        Returns:
-            Rows in the order of :attr:`pairs`.
 
         Raises:
             SceneError: If ``q`` is not a finite vector of the body's size.

@@ -11,7 +11,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from manikin.errors import SceneError
-from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, axes_of_normal, check_rotation, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.mesh import Mesh, as_trimesh
 
@@ -229,11 +229,7 @@ def _triangles(shape: Shape) -> trimesh.Trimesh:
 
 
 def _square(shape: Plane | HalfSpace) -> trimesh.Trimesh:
-    across = np.eye(3)[int(np.argmin(np.abs(shape.normal)))]
-    first = np.cross(shape.normal, across)
-    first /= np.linalg.norm(first)
-    second = np.cross(shape.normal, first)
-    corners = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
-    corner_offsets = [DRAWN_HALF_SIZE * (a * first + b * second) for a, b in corners]
-    vertices: FloatArray = np.array(corner_offsets, dtype=np.float64) + shape.normal * shape.offset
-    return as_trimesh(vertices, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int64))
+    axes = DRAWN_HALF_SIZE * axes_of_normal(shape.normal)[:, :2].T
+    corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int64)
+    return as_trimesh(corners @ axes + shape.normal * shape.offset, faces)

@@ -49,13 +49,18 @@ def margins(found, times):
     return np.array([wrench_polytope(s).margin(w) for s, w in zip(stances, wrench, strict=True)])
 
 
-def test_the_plan_is_balanced_and_near():
+@pytest.fixture(scope="module")
+def usual():
+    """Plan near the key frames of the motion without noise."""
+    return plan_com_near_key_frames(asked(stepping()[0]))
+
+
+def test_the_plan_is_balanced_and_near(usual):
     """Margin measured apart from the planner, at instants that it did not look at."""
-    found = plan_com_near_key_frames(asked(stepping()[0]))
-    assert found.succeeded
-    assert margins(found, np.random.default_rng(1).uniform(0.0, 3.0, 60)).min() >= 0.0
-    assert found.rms < 0.01
-    assert found.d_min >= 0.0
+    assert usual.succeeded
+    assert margins(usual, np.random.default_rng(1).uniform(0.0, 3.0, 60)).min() >= 0.0
+    assert usual.rms < 0.01
+    assert usual.d_min >= 0.0
 
 
 def test_noise_that_no_foot_could_follow_is_not_followed():
@@ -70,24 +75,21 @@ def test_noise_that_no_foot_could_follow_is_not_followed():
     assert np.sqrt(np.mean(away**2)) < 0.01
 
 
-def test_a_wanted_margin_is_kept_and_costs_nearness():
-    recording, _ = stepping()
-    usual, wide = (plan_com_near_key_frames(asked(recording, required_margin=m)) for m in (0.0, 6.0))
+def test_a_wanted_margin_is_kept_and_costs_nearness(usual):
+    wide = plan_com_near_key_frames(asked(stepping()[0], required_margin=6.0))
     assert wide.succeeded
     assert wide.d_min >= 6.0
     assert wide.rms >= usual.rms - 1e-4
 
 
-def test_more_margin_than_has_to_be_kept_is_wished_for(monkeypatch):
+def test_more_margin_than_has_to_be_kept_is_wished_for(monkeypatch, usual):
     """Where none is required the lower half of the margins is larger than without the wish."""
-    recording, _ = stepping()
     times = np.linspace(0.0, 3.0, 301)
-    wishing = plan_com_near_key_frames(asked(recording))
     monkeypatch.setattr(near_key_frames, "ROOM_PULL", 0.0)
-    content = plan_com_near_key_frames(asked(recording))
-    low, lower = (np.sort(margins(found, times))[:150].mean() for found in (wishing, content))
+    content = plan_com_near_key_frames(asked(stepping()[0]))
+    low, lower = (np.sort(margins(found, times))[:150].mean() for found in (usual, content))
     assert low > lower + 1.0
-    assert wishing.rms < 0.01
+    assert usual.rms < 0.01
 
 
 def test_stances_that_share_nothing_are_explained():

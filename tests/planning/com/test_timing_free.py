@@ -89,9 +89,7 @@ def test_duration_weight_shortens_the_motion(platform, planned):
     assert result.key_instants[-1] < planned.key_instants[-1] - 0.3
 
 
-@pytest.mark.parametrize(
-    ("stature", "mass", "required"), [(1.60, 58.0, 13.0), (1.75, 79.0, 20.0), (1.90, 95.0, 20.0)]
-)
+@pytest.mark.parametrize(("stature", "mass", "required"), [(1.60, 58.0, 13.0), (1.90, 95.0, 20.0)])
 def test_other_bodies_find_their_way(platform, stature, mass, required):
     """Heights above the supports and reach scale with the stature.
 

@@ -114,15 +114,6 @@ def test_a_body_that_may_end_falling_needs_no_lift():
     assert failure is None or failure.requirement != "weight"
 
 
-@pytest.mark.slow
-def test_the_last_trial_keeps_more_than_250_newtons_within_6_seconds():
-    """Table 5.1: 280.60 N in 5.28 s."""
-    result = plan_com(load_scenario("walls", "trial-5").build_centroidal_problem())
-    assert result.succeeded
-    assert result.d_min >= 250.0
-    assert result.trajectory.duration <= 6.0 + 1e-6
-
-
 def test_the_trials_have_the_weights_of_table_5_1():
     weights = {
         name: load_scenario("walls", name).planning.weights

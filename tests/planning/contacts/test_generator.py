@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manikin.body import Configuration, human, insect, integrate, limb_named, limbs_of
+from manikin.body import Configuration, human, insect, integrate, limb_named
 from manikin.body.limbs import limb_slots
 from manikin.body.natural_range import NaturalRange
 from manikin.contact import ContactKind
@@ -36,7 +36,7 @@ from manikin.scenarios import load_scenario
 from manikin.scenarios.sequence import contact_rules
 from manikin.scenarios.world import start_posture
 from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
-from manikin.scene.pair import pair_meter
+from manikin.scene.collision import pair_meter
 
 UP = Task((0.0, 0.0, 1.0))
 PUSH = Task((1.0, 0.0, 0.0), {"left_arm", "right_arm"})
@@ -88,7 +88,7 @@ def test_contacts_at_a_wall_are_true(person, at_wall, name):
 
 @given(st.floats(-0.15, 0.1), st.floats(-0.2, 0.2), st.floats(-0.4, 0.4), st.integers(0, 5))
 def test_whatever_is_found_is_true(person, at_wall, x, y, yaw, number):
-    limb = limbs_of(person)[number]
+    limb = person.limbs[number]
     move = np.zeros(person.nv)
     move[:2], move[5] = (x, y), yaw
     q = integrate(person, person.standing_posture(), move)
@@ -148,7 +148,7 @@ def test_an_insect_stands_on_books(creature, creature_samples):
     generator = ContactGenerator(creature, scene, creature_samples)
     q = creature.standing_posture()
     q[2] += 0.06
-    for limb in limbs_of(creature):
+    for limb in creature.limbs:
         answer = generator.request(q, limb.name, Task((1.0, 0.0, 0.5)))
         assert answer.found, answer.message
         check(creature, scene, answer, q, limb)
@@ -232,7 +232,7 @@ def test_misuse_is_refused(person, person_samples, creature, creature_samples):
 def test_alignment_reaches_what_can_be_reached(make):
     """Targets taken from other samples nearby: position and normal to the tolerance, ranges kept."""
     body = make()
-    chain = LimbKinematics(body, limbs_of(body)[0])
+    chain = LimbKinematics(body, body.limbs[0])
     rng = np.random.default_rng(5)
     angles = chain.lower + (0.3 + 0.4 * rng.random((60, len(chain)))) * (chain.upper - chain.lower)
     goal = chain.place(np.clip(angles + rng.uniform(-0.15, 0.15, angles.shape), chain.lower, chain.upper))
@@ -251,7 +251,7 @@ def test_alignment_reaches_what_can_be_reached(make):
 def test_alignment_turns_an_effector_that_looks_the_wrong_way():
     """Half a turn, where the axis of the turn is not unique, gives finite steps."""
     body = human()
-    chain = LimbKinematics(body, limbs_of(body)[0])
+    chain = LimbKinematics(body, body.limbs[0])
     angles = 0.5 * (chain.lower + chain.upper)
     placed = chain.place(angles[None])
     found = Aligner(chain).align(angles, placed.positions[0], -placed.rotations[0, :, 2])
@@ -261,7 +261,7 @@ def test_alignment_turns_an_effector_that_looks_the_wrong_way():
 
 def test_a_step_is_that_of_damped_least_squares():
     """The compiled step against the Jacobian of the chain, some joints at the end of their ranges."""
-    chain = LimbKinematics(human(), limbs_of(human())[0])
+    chain = LimbKinematics(human(), human().limbs[0])
     rng = np.random.default_rng(2)
     step = AlignmentStep(chain, level=True)
     for number, q in enumerate(chain.random_angles(rng, 20)):

@@ -38,13 +38,6 @@ def test_steps_under_a_slab_stay_within_the_learnt_ranges_where_that_is_asked_fo
     assert kept.min() >= -SLACK
 
 
-def test_a_climb_with_hands_stays_within_the_learnt_ranges_where_that_is_asked_for():
-    _, freely = found_with("limits", "climb")
-    assert freely.min() < -np.deg2rad(10.0)
-    _, kept = found_with("learnt", "climb")
-    assert kept.min() >= -SLACK
-
-
 def test_a_learnt_reach_lies_within_that_of_the_hinges():
     """The hull of 4.3.4 with the volumes of 4.3.3 is smaller, and inside but for sampling."""
     body = human()

@@ -88,7 +88,7 @@ def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArr
     equal = program.equalities
     upper, lower = np.isfinite(program.rows_upper), np.isfinite(program.rows_lower)
     upper[:equal] = lower[:equal] = False
-    found = linprog(
+    result = linprog(
         push_back,
         A_ub=np.concatenate((program.rows[upper], -program.rows[lower])),
         b_ub=np.concatenate((program.rows_upper[upper], -program.rows_lower[lower])),
@@ -96,12 +96,14 @@ def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArr
         b_eq=np.concatenate((program.rows_lower[:equal], -loop.com.offset[2:])),
         bounds=list(zip(program.lower, program.upper, strict=True)),
     )
-    if not found.success:
+    if not result.success:
         return 0.0
     height = controller.standing.height
     ahead = float(np.max((controller.area.corners - state.com[:2]) @ towards))
     by_zmp = GRAVITY / height * ahead
-    return max(0.0, state.mass * height * (-float(found.fun) - float(towards @ loop.com.offset[:2]) - by_zmp))
+    return max(
+        0.0, state.mass * height * (-float(result.fun) - float(towards @ loop.com.offset[:2]) - by_zmp)
+    )
 
 
 def _turned(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> tuple[float, float]:
@@ -117,14 +119,14 @@ def _turned(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> 
         joints = loop.joints.matrix
         least = np.maximum(-speed, np.minimum(0.0, (body.lower - q[7:]) / TURN_STEP))
         most = np.minimum(speed, np.maximum(0.0, (body.upper - q[7:]) / TURN_STEP))
-        found = linprog(
+        result = linprog(
             -turns, A_ub=np.concatenate((joints, -joints)), b_ub=np.concatenate((most, -least)),
             A_eq=loop.com.matrix[:2], b_eq=np.zeros(2), bounds=(None, None),
         )  # fmt: skip
-        if not found.success or -found.fun < 1e-3:
+        if not result.success or -result.fun < 1e-3:
             break
-        momentum, travel = max(momentum, -found.fun), travel - found.fun * TURN_STEP
-        q = integrate(body, q, loop.acceleration.matrix @ found.x * TURN_STEP)
+        momentum, travel = max(momentum, -result.fun), travel - result.fun * TURN_STEP
+        q = integrate(body, q, loop.acceleration.matrix @ result.x * TURN_STEP)
     return momentum, travel
 
 

@@ -122,9 +122,9 @@ def step_goals(
     ]
     captured = False
     for first, second in zip(tried[::2], tried[1::2], strict=True):
-        found = [goal for places in (first, second) for goal in places.captured(settings.inside)]
-        captured = captured or bool(found)
-        yield from (goal for _, goal in sorted(found, key=lambda item: item[0]))
+        goals = [goal for places in (first, second) for goal in places.captured(settings.inside)]
+        captured = captured or bool(goals)
+        yield from (goal for _, goal in sorted(goals, key=lambda item: item[0]))
     if captured or steps < 2:
         return
     leading = sorted((goal for places in tried for goal in places.nearest()), key=lambda item: item[0])

@@ -338,9 +338,9 @@ class SteppingRecovery:
         state = Configuration(self.body, q)
         stays = self.balance.soles[0]
         _, position = state.effector_placement(swing.foot)
-        place = np.array([*position[:2], stays.position[2]])
-        landed = sole_at(self.body, swing.foot, swing.rotation, place, self.balance.friction)
-        step = StepTaken(swing.foot, swing.start, time, self._from.position, swing.goal.copy(), place)
+        middle = np.array([*position[:2], stays.position[2]])
+        landed = sole_at(self.body, swing.foot, swing.rotation, middle, self.balance.friction)
+        step = StepTaken(swing.foot, swing.start, time, self._from.position, swing.goal.copy(), middle)
         self.steps.append(step)
         order = self.balance.groups.feet.index
         soles = tuple(sorted((stays, landed), key=lambda contact: order(contact.effector)))

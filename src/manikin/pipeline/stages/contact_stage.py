@@ -10,7 +10,7 @@ from itertools import islice
 
 import numpy as np
 
-from manikin.body import BodyModel, Limb, limb_named, limbs_of
+from manikin.body import BodyModel, Limb, limb_named
 from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
 from manikin.kinematics import reach_volume
@@ -156,7 +156,7 @@ class _FootSearch(_Search):
     def _abstraction(self) -> Abstraction:
         volumes = [
             reach_volume(self._body, limb, np.random.default_rng(0), natural=self._natural)
-            for limb in limbs_of(self._body)
+            for limb in self._body.limbs
             if limb.name in LEGS
         ]
         return abstraction_of(self._body, volumes)

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.static import static_room, static_torque_share
+from manikin.balance.criteria import static_room, static_torque_share
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import (
     Contact,
@@ -257,7 +257,7 @@ class PlanCertificate(RequirementTable):
     """Worst values of the postures of a plan beside their limits; ``where`` names the posture.
 
     ``min_room_m`` is the least room of the centre of mass on the contacts that stay, see
-    :func:`~manikin.balance.static.static_room`, ``max_torque_share`` the largest share of a torque limit with
+    :func:`~manikin.balance.static_room`, ``max_torque_share`` the largest share of a torque limit with
     which the postures can be held at rest, ``min_clearance_m`` the least distance of what does not touch.
 
     Attributes:

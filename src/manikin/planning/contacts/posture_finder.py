@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.static import StaticRegion
+from manikin.balance.criteria import StaticRegion
 from manikin.body import BodyModel, Configuration, with_root
 from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.kinematics import (

@@ -279,7 +279,7 @@ class MotionObjective:
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
 
     def _with_strength(
-        self, momentum: MomentumRate, motion: MotionSamples, forces: HeldForces, scales: FitScales
+        self, momentum: MomentumRate, motion: MotionSamples, forces: HeldForces, scales: MotionScales
     ) -> MomentumRate:
         """The momentum's rate with a row for each joint torque beyond the strength."""
         excess = excess_torque(self._body, motion.states, forces, scales.strength_share)

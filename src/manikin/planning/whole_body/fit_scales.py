@@ -20,6 +20,8 @@ class MotionScales:
         joint_buffer: Distance kept from the joint ranges [rad].
         joint_velocity: Violation of the velocity limits [rad/s].
         velocity_share: Share of the velocity limits that may be used.
+        torque_share: Share of a joint's strength beyond ``strength_share``, where contact forces are held.
+        strength_share: Share of the strength that may be used.
         acceleration: Joint acceleration [rad/s^2].
         pelvis_acceleration: Linear [m/s^2] and angular [rad/s^2] pelvis acceleration.
         rest: Velocity at both ends [m/s, rad/s].
@@ -42,6 +44,8 @@ class MotionScales:
     joint_buffer: float = 0.03
     joint_velocity: float = 0.1
     velocity_share: float = 0.9
+    torque_share: float = 0.02
+    strength_share: float = 0.93
     acceleration: float = 8.0
     pelvis_acceleration: float = 4.0
     rest: float = 1.0e-3
@@ -81,15 +85,11 @@ class FitScales(MotionScales):
         force: Rate of linear momentum, against the planned one [N].
         moment_share: Rate of angular momentum about the centre of mass that costs one unit, as
             a share of the planned margin: where balance is scarce, the body turns less.
-        torque_share: Share of a joint's strength beyond ``strength_share``.
-        strength_share: Share of the strength that may be used.
     """
 
     com: float = 3.0e-3
     force: float = 20.0
     moment_share: float = 0.15
-    torque_share: float = 0.02
-    strength_share: float = 0.93
 
     def loosened(self, factor: float) -> Self:
         """Return the same scales with contacts and centre of mass ``factor`` times looser."""

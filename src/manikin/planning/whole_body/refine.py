@@ -35,6 +35,7 @@ from manikin.planning.whole_body.fit import DEGREE, spline_through
 from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import MotionScales, RefineScales
+from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.refine_input import (
     ROUNDS,
     KeyPath,
@@ -69,7 +70,7 @@ LEAST_SLACK = -1e-6
 SPARSE = 0.03
 """Spacing of the samples for which the contact variables are chosen [s]."""
 
-_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin", "max_torque_share"})
+_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})
 """Broken requirements that a slower motion may keep."""
 
 _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
@@ -85,7 +86,7 @@ PENALTIES = MappingProxyType(
         "max_velocity_share": ("joint_velocity",),
         "max_physics_violation": ("missing_wrench", "margin_violation"),
         "min_margin": ("margin_violation", "missing_wrench"),
-        "max_torque_share": ("force",),
+        "max_torque_share": (),
     }
 )
 """Scales that decide each residual of the certificate."""
@@ -174,11 +175,13 @@ class _Goal:
 
     Attributes:
         job: The refinement that it belongs to.
+        forces: Motion whose contact forces are held where its torques are beyond the strength.
     """
 
     job: "Refinement"
     path: KeyPath
     schedule: ContactSchedule
+    forces: Motion | None = None
 
     def objective(self, time: FloatArray, basis: SampledBasis, scales: MotionScales) -> MotionObjective:
         """Residuals at times (n,) [s]."""
@@ -187,6 +190,9 @@ class _Goal:
         targets = refine_targets(
             job.body, job.scene, self.path, self.schedule, time, scales, job.task, job.padded, job.variables
         )
+        if self.forces is not None:
+            held = HeldForces.of(job.body, self.schedule, self.forces, time)
+            targets = replace(targets, fit=replace(targets.fit, forces=held))
         wanted = job.rooms(self.schedule, job.settings.friction_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
@@ -285,17 +291,20 @@ class Refinement:
 
     def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal]:
         """The next fit after one that breaks requirements: other contacts, weights, timing or knots."""
-        goal, job, broken = last.goal, self._job, last.broken
+        goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
         if self.settings.contact_variables:
             chosen = self._chosen(goal, goal.moving(last.result.spline), goal.at_rest())
             if chosen is not goal:
                 return job.attempt(chosen, last.scales, last.fine)
         if last.is_caught:
-            return job.restart(last, last.fine)
+            return job.restart(replace(last, goal=goal), last.fine)
         scales = job.updated(last.scales, broken)
-        slower = number > 0 and self.settings.retime and bool(broken & _SLOWED)
+        weak = "max_torque_share" in broken
+        slower = number > 0 and self.settings.retime and not weak and bool(broken & _SLOWED)
         # How often the spline's knots near the key instants are doubled at most.
         fine = last.fine + (last.fine < 2 and bool(broken & _EXACT))
+        if weak:
+            return job.attempt(replace(goal, forces=last.motion), scales, fine, last.result.spline)
         if not slower and fine == last.fine:
             return job.improve(last, scales)
         near = last.result.spline

@@ -210,6 +210,9 @@ class RefineObjective(MotionObjective):
         residual = np.linalg.solve(root, cost.gradient[:, :, None])[:, :, 0]
         first, second, third = (root.transpose(0, 2, 1) @ part for part in wrench.jacobians)
         out.momentum = MomentumRate(residual, (first, second, third))
+        if self.targets.forces is not None:
+            out.momentum = self._with_strength(out.momentum, motion, self.targets.forces, scales)
+            out.sample_cost += 0.5 * np.sum(out.momentum.value[:, 6:] ** 2, axis=1)
 
     def wrench_cost(self, wrench: FloatArray, com: FloatArray, scales: RefineScales) -> WrenchCost:
         """Physics violation and missing balance of wrenches (n, 6) about the world origin, CoM (n, 3)."""
