@@ -37,7 +37,7 @@ _RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
 @dataclass(frozen=True)
 class ContactRules:
-    """What contacts can carry.
+    """Friction of contacts and the strength of grasps.
 
     Attributes:
         friction: Coulomb coefficient of soles and points.
@@ -107,7 +107,7 @@ def make_contact(
 
 
 def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
-    """(3, 3) the rotation turned by the shortest way so that its z axis is the unit normal exactly."""
+    """(3, 3) rotation turned by the shortest way so that its z axis is the unit normal exactly."""
     across = skew(normal) @ rotation[:, 0]
     length = math.sqrt(across @ across)
     if length < 1e-9:
@@ -174,7 +174,7 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class ContactPlan:
-    """Stages from the start to the goal.
+    """Plan of contacts: stages from the start to the goal.
 
     Attributes:
         stages: At least one; one contact is made or broken from each to the next.

@@ -26,7 +26,7 @@ LEARNT_MARGIN = 0.01
 
 @dataclass(frozen=True)
 class PostureFinderSettings:
-    """What the postures of a contact plan keep to; the values are our choice.
+    """Requirements on the postures of a contact plan; the values are our choice.
 
     Attributes:
         clearance: Distance to obstacles and between body parts [m].
