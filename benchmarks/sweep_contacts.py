@@ -22,7 +22,7 @@ from manikin.planning.guide import abstraction_of, plan_guide
 from manikin.scenarios import load_scenario
 
 SCENARIOS = ("crouch", "stairs", "stand-up-chair", "stand-up-sofa", "climb-wall", "truck-egress")
-ACTS = ("push-cupboard", "pull-rope")
+LIMITS_ALONE = ("insect-books", "push-cupboard", "pull-rope")
 
 
 def sweep(name: str, seeds: int, search: Callable[[int], FloatArray | None]) -> None:
@@ -58,7 +58,7 @@ def main() -> None:
     for name in SCENARIOS:
         for ranges in ("limits", "learnt"):
             sweep(f"{name} {ranges}", seeds, contacts(name, ranges))
-    for name in ACTS:
+    for name in LIMITS_ALONE:
         sweep(name, seeds, contacts(name, "limits"))
     body, rng = human(1.75, 79.0, "male"), np.random.default_rng(0)
     creature = abstraction_of(body, [reach_volume(body, limb, rng) for limb in body.limbs])

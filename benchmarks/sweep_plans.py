@@ -130,7 +130,7 @@ def test_refinement_makes_a_contact_plan_a_motion():
     assert before.physics_violation > 10.0 * after.physics_violation
     assert before.squared_accelerations > 5.0 * after.squared_accelerations
     assert after.min_clearance_m > max(0.0, before.min_clearance_m)
-    assert refined.certificate.min_margin > 0.0
+    assert refined.certificate.value("min_margin") > 0.0
 
 
 def test_a_climb_with_hands_stays_within_the_learnt_ranges_where_that_is_asked_for():

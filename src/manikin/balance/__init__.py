@@ -1,11 +1,14 @@
 """Balance: admissible wrenches, margins and the classical criteria ([Qiu2012]_ chapter 4)."""
 
 from manikin.balance.criteria import (
+    StaticRegion,
     admissible_com_polygon,
     admissible_zmp_polygon,
     center_of_pressure,
     centroidal_moment_pivot,
     foot_rotation_indicator,
+    static_room,
+    static_torque_share,
     support_height,
     support_polygon,
     zero_moment_point,
@@ -21,7 +24,6 @@ from manikin.balance.margin import (
     stability_margins,
 )
 from manikin.balance.motion_margin import MotionMargin, motion_margin
-from manikin.balance.static import StaticRegion, static_room, static_torque_share
 from manikin.balance.wrench import (
     LimitingConstraint,
     LimitShare,

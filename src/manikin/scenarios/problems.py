@@ -226,7 +226,8 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
         ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
     """
     options, seat = values.planning, values.seated_from
-    rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
+    rest = np.zeros(3) if options.zero_end_accelerations else None
+    velocity = (0.0, 0.0, 0.0) if seat is None else values.file.task.goal.velocity_m_s
     given = {"degree": options.degree, "samples": options.samples}
     with values.refusing(("planning",)):
         return CentroidalProblem(
@@ -234,7 +235,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
             _standing(values, planning=True),
             values.start_com,
             values.goal_com,
-            goal_velocity=values.file.task.goal.velocity_m_s if seat is not None else (0.0, 0.0, 0.0),
+            goal_velocity=None if velocity is None else np.array(velocity),
             start_acceleration=rest,
             goal_acceleration=rest if seat is None else None,
             margin_space=options.margin_space,

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.collision import CollisionPart, collision_parts
+from manikin.scene.collision import CollisionPart, Measured, Meter, collision_parts, pair_meter, part_meter
 from manikin.scene.distance_bounds import KnownDistances, PairBounds, PlacedShapes, PlacementReader
 from manikin.scene.mesh import IntArray
-from manikin.scene.pair import Measured, Meter, pair_meter, part_meter
 from manikin.scene.scene import Scene
 
 Pair = tuple[str, str]

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.collision import CollisionPart
+from manikin.scene.collision import CollisionPart, local_box, shape_of
 from manikin.scene.covering import cover
-from manikin.scene.obstacle import Box, Capsule, Cylinder, Shape, Sphere
 
 _PARALLEL = 1e-12
 """Squared sine of the angle below which two axes count as parallel."""
@@ -233,29 +232,9 @@ def _least_over_spheres(gap: FloatArray, axis: int, shapes: int) -> FloatArray:
     return np.moveaxis(least, 0, axis)
 
 
-def shape_of(geometry: coal.CollisionGeometry) -> tuple[Shape, FloatArray]:
-    """Shape (or the box around it) of a Coal geometry and its (3,) centre in the geometry's frame."""
-    centre = np.zeros(3)
-    if isinstance(geometry, coal.Sphere):
-        return Sphere(geometry.radius), centre
-    if isinstance(geometry, coal.Capsule):
-        return Capsule(geometry.radius, 2 * geometry.halfLength), centre
-    if isinstance(geometry, coal.Cylinder):
-        return Cylinder(geometry.radius, 2 * geometry.halfLength), centre
-    if isinstance(geometry, coal.Box):
-        return Box(2 * geometry.halfSide), centre
-    low, high = _local_box(geometry)
-    return Box(np.maximum(high - low, 1e-6)), (low + high) / 2
-
-
-def _local_box(geometry: coal.CollisionGeometry) -> tuple[FloatArray, FloatArray]:
-    geometry.computeLocalAABB()
-    return geometry.aabb_local.min_, geometry.aabb_local.max_
-
-
 def box_corners(geometry: coal.CollisionGeometry) -> FloatArray:
     """(8, 3) corners of the box around a Coal geometry in its own frame."""
-    low, high = _local_box(geometry)
+    low, high = local_box(geometry)
     signs = np.array(list(product((0.0, 1.0), repeat=3)))
     return low + signs * (high - low)
 

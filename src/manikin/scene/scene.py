@@ -12,9 +12,8 @@ from manikin.contact import Contact, ContactKind
 from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
-from manikin.scene.collision import collision_parts
+from manikin.scene.collision import Meter, collision_parts, part_meter
 from manikin.scene.obstacle import HalfSpace, Obstacle
-from manikin.scene.pair import Meter, part_meter
 from manikin.scene.surface import Surface, surfaces_of
 
 FLOOR = "floor"

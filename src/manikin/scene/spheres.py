@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.numerics.spatial import FloatArray
+from manikin.scene.collision import shape_of
 from manikin.scene.covering import SphereCover, cover
 from manikin.scene.distance import (
     NOTHING,
@@ -20,7 +21,6 @@ from manikin.scene.distance import (
     moves_by_shape,
     self_pairs,
 )
-from manikin.scene.distance_bounds import shape_of
 from manikin.scene.mesh import IntArray
 from manikin.scene.obstacle import HalfSpace, Obstacle, Plane
 from manikin.scene.scene import Scene

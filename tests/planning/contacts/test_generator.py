@@ -36,7 +36,7 @@ from manikin.scenarios import load_scenario
 from manikin.scenarios.sequence import contact_rules
 from manikin.scenarios.world import start_posture
 from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
-from manikin.scene.pair import pair_meter
+from manikin.scene.collision import pair_meter
 
 UP = Task((0.0, 0.0, 1.0))
 PUSH = Task((1.0, 0.0, 0.0), {"left_arm", "right_arm"})

@@ -32,7 +32,11 @@ def setup(person):
         time=time,
         effectors={
             name: EffectorTarget(
-                rng.normal(size=(n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n), np.ones(n)
+                rng.normal(size=(n, 3)),
+                np.tile(np.eye(3), (n, 1, 1)),
+                np.ones(n),
+                np.ones(n),
+                np.tile(np.eye(3), (n, 1, 1)),
             )
             for name in ("left_foot", "right_hand")
         },

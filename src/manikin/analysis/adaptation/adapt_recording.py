@@ -66,8 +66,6 @@ def crop(
     """Cut a reconstruction and its supports, so that the first instant left is 0 on both clocks.
 
     Args:
-        found: The postures.
-        supports: Found from all of them.
         start: On the clock of the supports [s].
         end: The last instant left [s].
 
@@ -81,11 +79,11 @@ def crop(
             f"window from {start:g} to {end:g} s leaves {len(rows)} frames; valid: at least {LEAST_FRAMES} "
             f"between {time[0]:g} and {time[-1]:g} s"
         )
-    begin, last, told = float(time[rows[0]]), float(time[rows[-1]]), found.targets
-    seen = np.flatnonzero(np.any(np.isfinite(told.positions[rows, :, 0]), axis=0))
+    begin, last, known = float(time[rows[0]]), float(time[rows[-1]]), found.targets
+    seen = np.flatnonzero(np.any(np.isfinite(known.positions[rows, :, 0]), axis=0))
     targets = PointTargets(
-        tuple(told.names[k] for k in seen), tuple(told.segments[k] for k in seen), told.points[seen],
-        told.positions[np.ix_(rows, seen)], told.weights[seen],
+        tuple(known.names[k] for k in seen), tuple(known.segments[k] for k in seen), known.points[seen],
+        known.positions[np.ix_(rows, seen)], known.weights[seen],
     )  # fmt: skip
     part = replace(
         found, time=found.time[rows] - found.time[rows[0]], q=found.q[rows], targets=targets,
@@ -114,11 +112,11 @@ Method = Literal["keyframes", "timing-free"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
 SHORTEST, LONGEST = 0.5, 2.0
-"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: nobody swings a leg in
-no time, and phases of a walk are no places to stay."""
+"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: a leg needs time to
+swing, and phases of a walk are no places to stay."""
 
 HEIGHT_ROOM = 0.1
-"""Beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
+"""Room beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
 
 
 def plan_recorded_com(
@@ -130,7 +128,6 @@ def plan_recorded_com(
         mass: [kg].
         recording: Samples, key frames and stances.
         velocity: (2, 3) of the recorded centre of mass at both ends, kept by the timing-free method [m/s].
-        method: See :data:`Method`.
         required_margin: To keep all along [N.m].
     """
     if method == "keyframes":
@@ -173,7 +170,7 @@ def farthest_support(recording: RecordedCom) -> float:
 
 
 def _recorded_heights(recording: RecordedCom) -> tuple[GeometricConstraint, ...]:
-    """No lower and no higher than it was recorded, but for some room: feet admit a way through the floor."""
+    """Recorded heights with some room; contacts alone would admit a way through the floor."""
     heights = recording.com[:, 2]
     lower, upper = (
         BentSurface(float(height), 0.0, 0.0, 0.0)
@@ -190,8 +187,8 @@ def _free_durations(recording: RecordedCom) -> StanceSequence:
 
 
 SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
-"""Of the execution. A recorded posture is worth more than one that was only preferred: six times the usual
-weight keeps arms off the trunk while they make up for what the contacts do not give."""
+"""Settings of the execution. A recorded posture is worth six times as much as one that was only preferred:
+that keeps arms off the trunk while they make up for what the contacts do not give."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,13 +197,10 @@ class Replan:
 
     Attributes:
         method: Of the centre of mass.
-        body: Who moves.
         scene: A floor, and blocks under what stands or sits higher.
         recording: The recorded centre of mass on the stances.
         recorded: The recorded motion, smoothed, its time 0 at the first instant.
-        com: The planned centre of mass.
         adapted: The recorded postures on the planned centre of mass.
-        execution: In the physics engine.
     """
 
     method: Method
@@ -236,7 +230,7 @@ class Replan:
 
     @property
     def content(self) -> MotionFile:
-        """What a motion file holds of it."""
+        """Content of its motion file."""
         return MotionFile(self.planned, self.executed, self.body, self.scene, self.schedule)
 
     @cached_property
@@ -253,8 +247,7 @@ class Replan:
         failure, distance = self.com.failure, self.distance
         near = self.com if isinstance(self.com, NearKeyFramesResult) else None
         return {
-            "method": self.method,
-            "succeeded": self.com.succeeded,
+            "method": self.method, "succeeded": self.com.succeeded,
             "failure": None if failure is None else failure.reason,
             "recorded_duration_s": float(self.recording.time[-1]),
             "duration_s": None if distance is None else float(self.schedule.instants[-1]),
@@ -267,9 +260,8 @@ class Replan:
             "margin_unit": self.com.problem.margin_unit,
             "key_frames": None if near is None else len(near.frames),
             "added_key_frames": None if near is None else len(near.added),
-            "wholebody": self._adapted_block(),
-            "execution": self._execution_block(),
-        }
+            "wholebody": self._adapted_block(), "execution": self._execution_block(),
+        }  # fmt: skip
 
     def _adapted_block(self) -> dict[str, Any] | None:
         if self.adapted is None:
@@ -310,8 +302,6 @@ def adapt_recording(
 
     Args:
         found: The postures, not yet smoothed.
-        supports: Found from them.
-        method: How the centre of mass is planned.
         execute: Whether the recorded postures are adapted to the plan and executed.
         rolling: Whether a foot may stand on its toes alone; without, it stands on its whole sole.
         required_margin: Of the planned point mass, to keep all along [N.m].
@@ -346,10 +336,10 @@ def _with_turning(
     recorded: tuple[FloatArray, FloatArray],
     margin: float,
 ) -> RecordedCom:
-    """The same with a rate of the angular momentum that the body can follow.
+    """Recording with a rate of the angular momentum that the body can follow.
 
     First that of the recorded postures on their contacts; and then that of the postures which are fitted to
-    the plan it leads to, for the fit gives way between both.
+    the plan it leads to, for the fit compromises between both.
     """
     recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
     com = plan_near_recorded_com(body.mass, recording, margin)
@@ -367,6 +357,4 @@ def _executed(result: Replan, even: Reconstruction) -> Replan:
     clock = schedule.instants, result.recording.key_times
     adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, (even.time, even.q), clock)
     execution = execute(body, scene, adapted.motion, schedule, settings=SETTINGS, hold=0.0)
-    return Replan(
-        result.method, body, scene, result.recording, result.recorded, result.com, adapted, execution
-    )  # fmt: skip
+    return replace(result, adapted=adapted, execution=execution)

@@ -63,14 +63,14 @@ TOE_LOAD = 1.4
 """Load of a foot on its toes: above the second peak of a brisk walk's vertical force [body weights]."""
 
 ROOM = 0.03
-"""How far a block reaches beyond its contact [m]."""
+"""Reach of a block beyond its contact [m]."""
 
 THICKNESS = 0.05
-"""Of a block: legs pass below a seat [m]."""
+"""Thickness of a block: legs pass below a seat [m]."""
 
 
 def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
-    """The same with the whole sole where only the heel touches.
+    """Stances with the whole sole where only the heel touches.
 
     A recorded heel rolls down within some sixty milliseconds, on a round edge and a soft shoe; a stiff
     sole lands flat. Phases that do not differ any more are one.
@@ -80,10 +80,10 @@ def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
 
 
 def without_remnants(schedule: ContactSchedule) -> ContactSchedule:
-    """The same with no part of a foot at either end that a clip cuts to an instant.
+    """Stances with no part of a foot at either end that a clip cuts to an instant.
 
-    Who lifts the heel 40 ms after a clip begins has it almost up by then, and 40 ms before it ends hardly:
-    the foot stands there as it does beside. Phases that do not differ any more are one.
+    A heel that lifts 40 ms after a clip begins is almost up by then: the foot stands as it does next to it.
+    Phases that do not differ any more are one.
     """
     phases = list(schedule.sequence)
     durations = np.array(schedule.durations)
@@ -96,7 +96,7 @@ def without_remnants(schedule: ContactSchedule) -> ContactSchedule:
 def leaving_with_the_hinge(
     schedule: ContactSchedule, body: BodyModel, time: FloatArray, q: FloatArray
 ) -> ContactSchedule:
-    """The same with every foot that leaves from its toes off as soon as their hinge has moved away.
+    """Stances with every foot that leaves from its toes off as soon as their hinge has moved away.
 
     A recorded foot rolls over the tips of its toes in the last hundredths of a second, hardly loaded; a stiff
     toe segment lies flat up to the end, and would hold the leg back.
@@ -134,7 +134,7 @@ def leaving_with_the_hinge(
 def rising_at_once(
     schedule: ContactSchedule, body: BodyModel, time: FloatArray, q: FloatArray
 ) -> ContactSchedule:
-    """The same with a seat that is left as soon as the buttocks have risen from it.
+    """Stances with a seat that is left as soon as the buttocks have risen from it.
 
     Flesh and cushion follow a person up by some centimetres; a stiff seat does not, and would hold the
     pelvis back while the rest of the body rises.
@@ -162,7 +162,7 @@ def rising_at_once(
 
 
 def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
-    """The same with toes that carry no farther from their hinge than their strength allows.
+    """Stances with toes that carry no farther from their hinge than their strength allows.
 
     Whoever stands on the toes of one foot has the centre of pressure at most the toes' torque limit over the
     load ahead of the hinge; the rest of their length is no support.
@@ -171,7 +171,7 @@ def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSc
 
 
 def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
-    """The same with all contacts of a seat that lie near each other at one place: chairs do not move."""
+    """Stances with all contacts of a seat that lie near each other at one place: chairs do not move."""
     seats = [
         (index, contact)
         for index, phase in enumerate(schedule.sequence)

@@ -36,7 +36,7 @@ POSTURE = 0.06
 """Deviation of a hinge or of the pelvis' turn from the recording that costs one unit [rad]."""
 
 TRUNK_POSTURE = 0.04
-"""The same of the pelvis' turn, trunk and head: nobody throws them about [rad]."""
+"""Deviation of the pelvis' turn, trunk and head that costs one unit [rad]."""
 
 TRUNK = ("lumbar", "thorax", "neck")
 """First words of the hinges of trunk and head."""
@@ -52,11 +52,11 @@ UNSURE = 0.1
 """Time at both ends in which accelerations of a recording are not known well [s]."""
 
 SCALES = FitScales(rest=1e6, force=8.0, moment_share=0.25, acceleration=16.0, pelvis_acceleration=8.0)
-"""Of the fit: a recording need not begin or end at rest, and a rate of angular momentum of 5 N.m costs one
-unit, for the centre of mass is planned as that of a point mass."""
+"""Scales of the fit. A recording need not begin or end at rest, and a rate of angular momentum of 5 N.m
+costs one unit, for the centre of mass is planned as that of a point mass."""
 
 LOOSE = replace(SCALES, moment_share=1e3, force=1e3, com=0.01)
-"""Of a fit without dynamics."""
+"""Scales of a fit without dynamics."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +65,8 @@ class AdaptedMotion:
 
     Attributes:
         motion: Every millisecond, with forces, torques and whole-body margin.
-        certificate: Measured on its samples.
         posture_rms: Root mean square deviation of all joints from the recorded postures [rad]; without
-            toes, which lie flat and which no marker told.
+            toes, which lie flat and which no marker shows.
     """
 
     motion: Motion
@@ -76,17 +75,13 @@ class AdaptedMotion:
 
 
 def adapt_postures(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    polytopes: tuple[WrenchPolytope, ...],
-    recorded: tuple[FloatArray, FloatArray],
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory,
+    polytopes: tuple[WrenchPolytope, ...], recorded: tuple[FloatArray, FloatArray],
     clock: tuple[FloatArray, FloatArray],
-) -> AdaptedMotion:
+) -> AdaptedMotion:  # fmt: skip
     """Fit one smooth motion to contacts and centre of mass that stays near recorded postures.
 
     Args:
-        trajectory: Centre of mass with the contacts.
         recorded: (n,) instants [s] and (n, nq) postures.
         clock: (k,) key instants of the trajectory and the recorded instants that they stand for [s].
     """
@@ -128,12 +123,9 @@ def rate_on_contacts(
 
 
 def rate_on_plan(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    recorded: tuple[FloatArray, FloatArray],
-    recording: RecordedCom,
-) -> FloatArray:
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory,
+    recorded: tuple[FloatArray, FloatArray], recording: RecordedCom,
+) -> FloatArray:  # fmt: skip
     """(n, 3) rate of the angular momentum of recorded postures adapted to a plan [N.m].
 
     At a recording's samples.
@@ -157,11 +149,9 @@ class _Task:
     """Recorded postures and the contacts to put them on, at the samples of a spline.
 
     Attributes:
-        job: Knots and samples of the spline.
         time: (n,) samples [s].
         reference: (n, nq) recorded postures, with the toes that the contacts need.
         scale: (n, nv) deviation from them that costs one unit [rad].
-        paths: What effectors and toes do.
         ignored: Pairs that may touch, per sample.
     """
 
@@ -204,11 +194,11 @@ class _Task:
         self, com: FloatArray, acceleration: FloatArray, turning: FloatArray, scales: FitScales
     ) -> ConfigurationSpline:
         """Fit to a centre of mass [m], its acceleration and a rate of angular momentum [N.m], (n, 3) each."""
-        return self.job.solve(_Goal(self, com, acceleration, turning), scales)[1].spline
+        return self.job.solve(_AdaptationGoal(self, com, acceleration, turning), scales)[1].spline
 
 
 @dataclass(frozen=True, eq=False)
-class _Goal:
+class _AdaptationGoal:
     """A centre of mass (n, 3) with its acceleration and a rate of angular momentum for recorded postures."""
 
     task: _Task

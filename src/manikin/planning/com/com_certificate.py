@@ -26,7 +26,7 @@ UNIT_SCALE = {"m": 0.01, "m/s": 0.01, "m/s^2": 0.1, "s": 0.01, "N.m": 10.0, "N":
 
 @dataclass(frozen=True)
 class Residual:
-    """How far one requirement is violated at worst.
+    """Largest violation of one requirement.
 
     Attributes:
         requirement: ``"balance margin"``, ``"support distance"``, ``"phase duration"``,

@@ -20,7 +20,7 @@ from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 
 @dataclass(frozen=True, eq=False)
 class KeyPlane:
-    """The CoM behind a plane at one key instant: ``normal . p(T_key) <= offset``.
+    """Constraint that keeps the CoM behind a plane at one key instant: ``normal . p(T_key) <= offset``.
 
     At a key instant the CoM is the last Bezier point of a phase, an unknown of the programme:
     the constraint is linear and met exactly, and nothing is asked of the rest of the motion.
@@ -135,7 +135,7 @@ class _Below:
 def height_band(
     lower: CoordinateFunction, upper: CoordinateFunction
 ) -> tuple[GeometricConstraint, GeometricConstraint]:
-    """The CoM between two heights [m] at (x, y, z), such as :class:`BentSurface` ([Qiu2012]_ 5.29)."""
+    """Constraints that keep the CoM between two heights [m] at (x, y, z) ([Qiu2012]_ 5.29)."""
     return (
         GeometricConstraint("height above the lower surface", _Above(lower)),
         GeometricConstraint("height below the upper surface", _Below(upper)),
@@ -185,7 +185,7 @@ class Zone:
         return cls(normals, (points @ normals.T).max(axis=0) + reach, onset)
 
     def share(self, x: Any, y: Any) -> Any:
-        """1 inside, 0 beyond the onset of any edge, twice continuously differentiable between.
+        """Share of the zone at (x, y): 1 inside, 0 beyond the onset of any edge, smooth between (C2).
 
         The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges, of floats, arrays or
         CasADi symbols [m].
@@ -247,12 +247,12 @@ class _Outside:
 
 
 def height_below(name: str, surface: CeilingHeight) -> GeometricConstraint:
-    """The CoM below the greatest height that one overhead obstacle, of a name, allows."""
+    """Constraint that keeps the CoM below the greatest height that a named overhead obstacle allows."""
     return GeometricConstraint(f"height below '{name}'", _Below(surface))
 
 
 def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
-    """The CoM outside a zone through which nothing passes, at any height; half its onset counts as inside.
+    """Constraint that keeps the CoM out of a zone at any height; half its onset counts as inside.
 
     Args:
         name: Name of the obstacle.

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -19,7 +19,7 @@ from manikin.runtime.display import Displayed
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CentroidalTrajectory(Displayed):
-    """``p(t) = p_s(sigma t)`` with ``sigma = 1 / T`` ([Qiu2012]_ 5.2-5.6).
+    """CoM in time, ``p(t) = p_s(sigma t)`` with ``sigma = 1 / T`` ([Qiu2012]_ 5.2-5.6).
 
     Before the start and after the end the body rests: the position is held and all
     derivatives are zero.
@@ -263,66 +263,43 @@ class CentroidalProblem:
     sequence: StanceSequence
     start_com: FloatArray
     goal_com: FloatArray
-    start_velocity: FloatArray | None
-    goal_velocity: FloatArray | None
-    start_acceleration: FloatArray | None
-    goal_acceleration: FloatArray | None
-    degree: int
-    margin_space: MarginSpace
-    required_margin: float
-    support_distance: float | None
-    geometric: tuple[GeometricConstraint, ...]
-    key_planes: tuple[KeyPlane, ...]
-    max_duration: float | None
-    weights: Weights
-    samples: int
+    _: KW_ONLY
+    start_velocity: FloatArray | None = field(default_factory=lambda: np.zeros(3))
+    goal_velocity: FloatArray | None = field(default_factory=lambda: np.zeros(3))
+    start_acceleration: FloatArray | None = None
+    goal_acceleration: FloatArray | None = None
+    degree: int = 5
+    margin_space: MarginSpace = "wrench"
+    required_margin: float = 0.0
+    support_distance: float | None = None
+    geometric: tuple[GeometricConstraint, ...] = ()
+    key_planes: tuple[KeyPlane, ...] = ()
+    max_duration: float | None = None
+    weights: Weights = Weights()
+    samples: int = 10
 
-    def __init__(
-        self,
-        mass: float,
-        sequence: StanceSequence,
-        start_com: ArrayLike,
-        goal_com: ArrayLike,
-        *,
-        start_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
-        goal_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
-        start_acceleration: ArrayLike | None = None,
-        goal_acceleration: ArrayLike | None = None,
-        degree: int = 5,
-        margin_space: MarginSpace = "wrench",
-        required_margin: float = 0.0,
-        support_distance: float | None = None,
-        geometric: Sequence[GeometricConstraint] = (),
-        key_planes: Sequence[KeyPlane] = (),
-        max_duration: float | None = None,
-        weights: Weights | None = None,
-        samples: int = 10,
-    ) -> None:
-        if margin_space not in _UNITS:
-            raise InputError(f"centroidal margin_space is {margin_space!r}; valid: {', '.join(_UNITS)}")
-        values = {
-            "mass": finite_number(mass, "centroidal mass [kg]", above=0.0),
-            "sequence": sequence,
-            "start_com": frozen_array(start_com, "centroidal start_com [m]", (3,)),
-            "goal_com": frozen_array(goal_com, "centroidal goal_com [m]", (3,)),
-            "degree": _integer(degree, "degree", 3),
-            "margin_space": margin_space,
-            "required_margin": finite_number(required_margin, "centroidal required_margin", at_least=0.0),
-            "support_distance": _optional_limit(support_distance, "support_distance [m]"),
-            "geometric": tuple(geometric),
-            "key_planes": _inner_planes(key_planes, len(sequence)),
-            "max_duration": _optional_limit(max_duration, "max_duration [s]"),
-            "weights": Weights() if weights is None else weights,
-            "samples": _integer(samples, "samples", 2),
+    def __post_init__(self) -> None:
+        if self.margin_space not in _UNITS:
+            raise InputError(f"centroidal margin_space is {self.margin_space!r}; valid: {', '.join(_UNITS)}")
+        values: dict[str, object] = {
+            "mass": finite_number(self.mass, "centroidal mass [kg]", above=0.0),
+            "degree": _integer(self.degree, "degree", 3),
+            "required_margin": finite_number(
+                self.required_margin, "centroidal required_margin", at_least=0.0
+            ),
+            "geometric": tuple(self.geometric),
+            "key_planes": _inner_planes(self.key_planes, len(self.sequence)),
+            "samples": _integer(self.samples, "samples", 2),
         }
-        derivatives = {
-            "start_velocity": (start_velocity, "[m/s]"), "goal_velocity": (goal_velocity, "[m/s]"),
-            "start_acceleration": (start_acceleration, "[m/s^2]"),
-            "goal_acceleration": (goal_acceleration, "[m/s^2]"),
-        }  # fmt: skip
-        for name, (vector, unit) in derivatives.items():
-            known = None if vector is None else frozen_array(vector, f"centroidal {name} {unit}", (3,))
-            object.__setattr__(self, name, known)
+        for name, unit in (("support_distance", "m"), ("max_duration", "s")):
+            if getattr(self, name) is not None:
+                values[name] = finite_number(getattr(self, name), f"centroidal {name} [{unit}]", above=0.0)
+        for end in ("start", "goal"):
+            for name, unit in (("com", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
+                vector = getattr(self, f"{end}_{name}")
+                if vector is not None or name == "com":
+                    text = f"centroidal {end}_{name} [{unit}]"
+                    values[f"{end}_{name}"] = frozen_array(vector, text, (3,))
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -337,7 +314,7 @@ class CentroidalProblem:
 
     @property
     def margin_unit(self) -> str:
-        """``"N.m"`` or ``"N"``."""
+        """Unit of the margin, ``"N.m"`` or ``"N"``."""
         return _UNITS[self.margin_space]
 
     @property
@@ -357,10 +334,6 @@ def _inner_planes(planes: Sequence[KeyPlane], phases: int) -> tuple[KeyPlane, ..
             valid = f"1 to {phases - 1}" if phases > 1 else "none with a single phase"
             raise InputError(f"centroidal key_planes name key instant {plane.key}; valid: {valid}")
     return tuple(planes)
-
-
-def _optional_limit(value: float | None, name: str) -> float | None:
-    return None if value is None else finite_number(value, f"centroidal {name}", above=0.0)
 
 
 def _integer(value: object, name: str, least: int) -> int:

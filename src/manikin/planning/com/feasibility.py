@@ -32,7 +32,7 @@ _LEVELS = 15
 
 
 def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str | None:
-    """Say that the friction is too low to stand still on the slopes of a stance, or None."""
+    """Message that the friction is too low to stand still on the slopes of a stance, or None."""
     if any(contact.kind is ContactKind.GRASP for contact in stance) or not len(stance):
         return None
     slopes = [float(np.arccos(np.clip(contact.normal[2], -1.0, 1.0))) for contact in stance]
@@ -56,7 +56,7 @@ def low_friction(
     problem: CentroidalProblem,
     measure: Callable[[Sequence[WrenchPolytope]], float],
 ) -> str:
-    """Say that a quantity of some stances would suffice with firm friction; empty when it is not the cause.
+    """Message that a quantity of some stances would suffice with firm friction; empty where it would not.
 
     ``measure`` gives the quantity from the stances' polytopes; it suffices above the required margin.
     """
@@ -76,7 +76,7 @@ def least_friction(stances: Sequence[Stance]) -> float:
 
 
 def with_firm_friction(problem: CentroidalProblem) -> CentroidalProblem:
-    """The same problem with friction of :data:`FIRM_FRICTION` at least."""
+    """Problem with the friction of every contact raised to :data:`FIRM_FRICTION` at least."""
     phases = [replace(phase, stance=_firm(phase.stance)) for phase in problem.sequence]
     return replace(problem, sequence=StanceSequence(phases))
 
@@ -89,7 +89,7 @@ def _firm(stance: Stance) -> Stance:
 
 
 def out_of_reach(problem: CentroidalProblem, phase: int) -> str | None:
-    """Say that no CoM is near enough to all contacts of a phase and keeps the constraints, or None."""
+    """Message that no CoM is near enough to all contacts of a phase and keeps the constraints, or None."""
     stance, limit = problem.sequence[phase].stance, problem.support_distance
     if limit is None or len(stance) < 2:
         return None

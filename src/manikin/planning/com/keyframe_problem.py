@@ -98,7 +98,7 @@ class RecordedCom:
             object.__setattr__(self, name, value)
 
     def with_angular_momentum_rate(self, rate: ArrayLike) -> "RecordedCom":
-        """The same with a rate of the angular momentum (n, 3) about the CoM at its samples [N.m]."""
+        """Recording with a rate of the angular momentum (n, 3) about the CoM at its samples [N.m]."""
         return RecordedCom(self.time, self.com, self.sequence, self.key_times, rate)
 
     @property
@@ -186,7 +186,7 @@ class KeyframeProblem:
     def of(
         cls, problem: CentroidalProblem, recording: RecordedCom, control_points: int | None = None
     ) -> "KeyframeProblem":
-        """Ask for the same as ``problem``, but with ends and timing of a recording.
+        """Problem with the requirements of another one, and the ends and timing of a recording.
 
         Args:
             problem: Whose body, margin, constraints, weights and conditions at the ends are taken over.

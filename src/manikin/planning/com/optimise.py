@@ -83,7 +83,7 @@ LONGEST_PHASE = 20.0
 
 @dataclass(frozen=True)
 class MarginTargets:
-    """What the programme is asked at its samples, a little more than the problem asks everywhere.
+    """Bounds that the programme keeps at its samples, a little stricter than those of the problem.
 
     Attributes:
         margin: Smallest margin [N.m] or [N].

@@ -42,7 +42,7 @@ from manikin.runtime.display import Displayed
 
 @dataclass(frozen=True)
 class GuessStyle:
-    """One way of guessing; several are tried in order.
+    """Way of guessing a first trajectory; several are tried in order.
 
     Attributes:
         pull: 0 follows the straight line from start to goal, 1 goes over the supports. None is the motion of

@@ -16,7 +16,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """Where a limb is and what it is asked for.
+    """Place of a limb and what it is asked for.
 
     Attributes:
         rotation: (3, 3) from the limb's frame to the world's.

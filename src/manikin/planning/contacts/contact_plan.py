@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.static import static_room, static_torque_share
+from manikin.balance.criteria import static_room, static_torque_share
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import (
     Contact,
@@ -37,7 +37,7 @@ _RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
 @dataclass(frozen=True)
 class ContactRules:
-    """What contacts can carry.
+    """Friction of contacts and the strength of grasps.
 
     Attributes:
         friction: Coulomb coefficient of soles and points.
@@ -107,7 +107,7 @@ def make_contact(
 
 
 def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
-    """(3, 3) the rotation turned by the shortest way so that its z axis is the unit normal exactly."""
+    """(3, 3) rotation turned by the shortest way so that its z axis is the unit normal exactly."""
     across = skew(normal) @ rotation[:, 0]
     length = math.sqrt(across @ across)
     if length < 1e-9:
@@ -174,7 +174,7 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class ContactPlan:
-    """Stages from the start to the goal.
+    """Plan of contacts: stages from the start to the goal.
 
     Attributes:
         stages: At least one; one contact is made or broken from each to the next.
@@ -257,7 +257,7 @@ class PlanCertificate(RequirementTable):
     """Worst values of the postures of a plan beside their limits; ``where`` names the posture.
 
     ``min_room_m`` is the least room of the centre of mass on the contacts that stay, see
-    :func:`~manikin.balance.static.static_room`, ``max_torque_share`` the largest share of a torque limit with
+    :func:`~manikin.balance.static_room`, ``max_torque_share`` the largest share of a torque limit with
     which the postures can be held at rest, ``min_clearance_m`` the least distance of what does not touch.
 
     Attributes:

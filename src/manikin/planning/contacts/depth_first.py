@@ -130,7 +130,7 @@ class Moves(Protocol[Change]):
 
 
 class SearchLog:
-    """What a search has cost, and why changes were refused."""
+    """Cost of a search, and why changes were refused."""
 
     def __init__(self, poser: PostureFinder, most: int) -> None:
         """Begin to count the postures that ``poser`` looks for, ``most`` at most."""

@@ -19,7 +19,7 @@ MOST_RATIO = 1e6
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """``{x : x^T A^-1 x <= 1}`` by its half axes.
+    """Ellipsoid ``{x : x^T A^-1 x <= 1}`` by its half axes.
 
     Attributes:
         axes: (3, 3) unit directions in columns, the longest first.
@@ -98,7 +98,7 @@ def pulling_efort(products: FloatArray, direction: ArrayLike, normals: FloatArra
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is to be done, and with which limbs.
+    """Direction of what is to be done, and the limbs that act on an object.
 
     The thesis has one direction for all limbs, which makes every contact of hands that push a cupboard
     score negative: its side faces the hands and thus against the push. EFORT asks where the scene

@@ -41,7 +41,7 @@ CROUCH = 0.6
 
 
 class Habit(StrEnum):
-    """How a body is at rest."""
+    """Way in which a body is at rest."""
 
     STANDING = "standing"
     SEATED = "seated"

@@ -34,7 +34,7 @@ NATURAL_SLACK = 0.1
 
 
 class Hindrance(StrEnum):
-    """What kept a limb from making a contact."""
+    """Cause that kept a limb from making a contact."""
 
     REACH = "reach"
     """No surface is within reach of the limb."""
@@ -48,7 +48,7 @@ class Hindrance(StrEnum):
 
 @dataclass(frozen=True)
 class GeneratorSettings:
-    """How a request searches.
+    """Settings of a request for a contact.
 
     Attributes:
         tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics; of a

@@ -103,7 +103,7 @@ class StrongEfort:
 
 @dataclass(frozen=True)
 class ClosestDistance:
-    """Little movement: minus the distance of the contact to where the effector is [m] (8.1.3)."""
+    """Preference for little movement: minus the distance of the contact to the effector [m] (8.1.3)."""
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`Heuristic`."""
@@ -113,7 +113,7 @@ class ClosestDistance:
 
 @dataclass(frozen=True)
 class Manipulability:
-    """Freedom to move on: ``sqrt(det(J J^T))`` (5.6), whatever the task."""
+    """Preference for freedom to move on: ``sqrt(det(J J^T))`` (5.6), whatever the task."""
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
         """See :class:`Heuristic`."""
@@ -122,7 +122,7 @@ class Manipulability:
 
 @dataclass(frozen=True, eq=False)
 class Comfort:
-    """Far from the ends of the range of motion ([Tonneau2015]_ 4.3.3), see :class:`NaturalRange`.
+    """Preference for angles far from the ends of the :class:`NaturalRange` ([Tonneau2015]_ 4.3.3).
 
     Attributes:
         samples: The samples that are asked, by limb.
@@ -169,7 +169,7 @@ def heuristic_named(name: str, seed: int = 0, *, pulling: bool = False) -> Heuri
 
 @dataclass(frozen=True, eq=False)
 class Duration:
-    """How long a contact can be kept on the way ahead ([Tonneau2015]_ 7.1-7.4).
+    """Share of the way ahead on which a contact can be kept ([Tonneau2015]_ 7.1-7.4).
 
     The range of motion is the largest sphere inside the reach (7.1.1).
 

@@ -33,7 +33,7 @@ _REQUEST = coal.CollisionRequest()
 
 @dataclass(frozen=True)
 class FootholdSettings:
-    """Where footholds are looked for; the values are our choice.
+    """Settings of the search for footholds; the values are our choice.
 
     Attributes:
         reach: Farthest from the wanted place, along the heading and across it [m].

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.static import StaticRegion
+from manikin.balance.criteria import StaticRegion
 from manikin.body import BodyModel, Configuration, with_root
 from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.kinematics import (
@@ -26,7 +26,7 @@ LEARNT_MARGIN = 0.01
 
 @dataclass(frozen=True)
 class PostureFinderSettings:
-    """What the postures of a contact plan keep to; the values are our choice.
+    """Requirements on the postures of a contact plan; the values are our choice.
 
     Attributes:
         clearance: Distance to obstacles and between body parts [m].

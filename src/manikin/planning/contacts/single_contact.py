@@ -27,7 +27,7 @@ SOME_EFORT = 1e-9
 
 
 class Role(StrEnum):
-    """What a limb does with its contact; decides the sign of EFORT's direction."""
+    """Use that a limb makes of its contact; it decides the sign of EFORT's direction."""
 
     AUTO = "auto"
     """The body where some contact scores above zero that way, else the object; feet: the body."""
@@ -39,7 +39,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class ContactQuestion:
-    """What is asked of one limb.
+    """Request for a contact of one limb.
 
     Attributes:
         task: Direction of the task in the world; its length does not count.

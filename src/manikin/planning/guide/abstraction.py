@@ -51,7 +51,7 @@ class TrunkShape(Shape):
 
 @dataclass(frozen=True, eq=False)
 class LimbReach:
-    """Where one limb's effector can be, as a convex volume in the frame of the root.
+    """Convex volume of the places of one limb's effector, in the frame of the root.
 
     Attributes:
         vertices: (n, 3) corners of the hull [m].

@@ -35,7 +35,7 @@ DIRECTIONS = 128
 
 @dataclass(frozen=True)
 class Margins:
-    """What planning keeps in hand so that nothing is missed between checked poses.
+    """Reserves of planning, so that nothing is missed between checked poses.
 
     Attributes:
         trunk: Skin around the trunk's shapes [m].
@@ -179,7 +179,7 @@ class ReachabilityChecker:
         return None
 
     def steps(self, way: float, angle: float) -> int:
-        """Into how many steps a motion is cut so that nothing is missed between checked poses.
+        """Number of steps into which a motion is cut so that nothing is missed between checked poses.
 
         Between two poses every point moves by at most ``way + radius angle``, so that it is never
         farther from where it was checked than half of that. The margins must not be zero.

@@ -20,7 +20,7 @@ _SEEN_FROM_ABOVE = [0, 1, 3, 5]  # x, y, yaw, roll
 
 @dataclass(frozen=True)
 class ComfortSettings:
-    """How a guide is made comfortable; the values are our choice.
+    """Settings of the search for a comfortable guide; the values are our choice.
 
     Attributes:
         spacing: Between the poses that are looked at [m].

@@ -15,7 +15,7 @@ from manikin.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class UsableSurface:
-    """Which surfaces count as within reach of a limb ([Tonneau2015]_ 6.4.2).
+    """Surfaces that count as within reach of a limb ([Tonneau2015]_ 6.4.2).
 
     Attributes:
         direction: (3,) unit direction in the world that a surface's normal should have, or None
@@ -140,7 +140,7 @@ def _triangles(item: Obstacle) -> list[tuple[FloatArray, bool]]:
 
 @dataclass(frozen=True)
 class LimbRule:
-    """How many and which limbs must reach the scene, for trunks of some tilt.
+    """Number and names of limbs that must reach the scene, for trunks of some tilt.
 
     Attributes:
         required: Names of limbs that must all reach.
@@ -168,7 +168,7 @@ class LimbRule:
 
 @dataclass(frozen=True)
 class Condition:
-    """What a pose must satisfy beside a free trunk.
+    """Condition on the pose of the root beside a free trunk.
 
     The default is the condition of the thesis: at least one limb reaches some surface.
 

@@ -40,7 +40,7 @@ PATIENCE = 5
 
 @dataclass(frozen=True)
 class GuideSettings:
-    """Everything that chapter 6 leaves to its user.
+    """Numbers that [Tonneau2015]_ chapter 6 leaves to its user.
 
     Attributes:
         sampler: Numbers of Algorithm 3.
@@ -76,7 +76,7 @@ class GuideWorld:
 
 @dataclass(frozen=True, eq=False)
 class GuideTask:
-    """From where to where.
+    """Start and goal of a guide, and its speed limits.
 
     Attributes:
         start: (7,) pose of the root.
@@ -95,7 +95,7 @@ class GuideTask:
 
 @dataclass(frozen=True)
 class GuideStatistics:
-    """What a search did.
+    """Effort of a search for a guide.
 
     Attributes:
         samples: Poses drawn in this search.

@@ -31,7 +31,7 @@ _FULL_TURN = (-float(np.pi), float(np.pi))
 
 @dataclass(frozen=True, eq=False)
 class SamplingRegion:
-    """Where roots are drawn, and how they may be turned.
+    """Box in which roots are drawn, and how they may be turned.
 
     The turn is ``Rz(yaw) Ry(pitch) Rx(roll)``; without bounds on it, it is uniform over all turns.
 
@@ -125,7 +125,7 @@ class SamplerSettings:
 
 
 class PoseSampler:
-    """GENERATECONFIGURATION for one checker and region.
+    """Draws poses for one checker and region (GENERATECONFIGURATION).
 
     Attributes:
         corners: (n, 3, 3) triangles drawn from [m].

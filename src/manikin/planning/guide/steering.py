@@ -28,7 +28,7 @@ FINER = 8
 
 @dataclass(frozen=True)
 class Way:
-    """How two poses are joined.
+    """Way that joins two poses.
 
     Attributes:
         turn_at: Share of the way at which the root turns on the spot, or None when straight.

@@ -32,7 +32,7 @@ HANDS = ("left_hand", "right_hand")
 
 
 class ActKind(StrEnum):
-    """What the hands do."""
+    """Kind of an act of the hands."""
 
     PUSH = "push"
     """They press with their palms."""

@@ -22,7 +22,7 @@ SETTLED = 0.3
 
 @dataclass(frozen=True)
 class Timing:
-    """When the force acts.
+    """Times at which the force of an act rises and is held.
 
     Attributes:
         start: When it begins to rise [s].
@@ -106,7 +106,7 @@ def _held(motion: Motion, stance: Stance, forces: BracedForces, timing: Timing) 
 
 @dataclass(frozen=True)
 class MeasuredAct:
-    """What an executed act was like while its force was held.
+    """Forces and margin of an executed act while its force was held.
 
     Attributes:
         mean_force: On the object along the act's direction [N].

@@ -48,7 +48,7 @@ class FlightLimits:
 
 @dataclass(frozen=True, eq=False)
 class SamplingZone:
-    """Where random poses are drawn.
+    """Box of positions and range of turns in which random poses are drawn.
 
     Attributes:
         lower: (3,) lower corner of the box of positions [m].
@@ -91,7 +91,7 @@ class SamplingZone:
 
 @dataclass(frozen=True)
 class BiRrtStatistics:
-    """What the search did.
+    """Counts of a search.
 
     Attributes:
         iterations: Random points drawn.
@@ -117,9 +117,7 @@ class BiRrtResult:
     """Path found, or why none was.
 
     Attributes:
-        path: Timed poses from start to goal, or None.
         hints: What the feasibility check returned at each node of the path.
-        failure: None, or the reason.
     """
 
     path: EffectorPath | None
@@ -418,7 +416,7 @@ class _Search:
         )  # fmt: skip
 
     def explain(self) -> str:
-        """Why the iterations were not enough."""
+        """Reason why the iterations were not enough."""
         first, second = (tree.count for tree in self.trees)
         return (
             f"no path in {self.iterations} iterations: trees of {first} and {second} nodes stay "

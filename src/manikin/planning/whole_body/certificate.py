@@ -63,7 +63,7 @@ class WholeBodyRequirements:
 
 @dataclass(frozen=True)
 class RefineRequirements(WholeBodyRequirements):
-    """The same of a refined motion, whose clearance includes flights away from their supports."""
+    """Limits of a refined motion, whose clearance includes flights away from their supports."""
 
     clearance: float = 0.0
 
@@ -93,7 +93,7 @@ the field of :class:`WholeBodyRequirements` that has it; none where nothing is r
 
 @dataclass(frozen=True)
 class WholeBodyFailure:
-    """Why no whole-body motion was found.
+    """Reason why no whole-body motion was found.
 
     Attributes:
         reason: What could not be met, in one line.
@@ -118,10 +118,8 @@ class Impact:
     """A contact that is made at speed.
 
     Attributes:
-        effector: What touches down.
         time_s: When [s].
         torque_share: Largest share of a joint's torque limit in the :data:`IMPACT` after it.
-        joint: Name of that joint.
         at_s: When that share is reached [s].
     """
 

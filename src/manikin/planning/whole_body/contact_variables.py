@@ -43,7 +43,7 @@ TOUCHING = 0.02
 """Distance to a surface up to which a contact counts as lying on it [m]."""
 
 Variables = tuple[Mapping[str, float], ...]
-"""Of each phase, the variable of each effector in contact."""
+"""Contact variable of each effector in contact, for each phase."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,10 +156,7 @@ class VariableChoice:
         return found
 
     def _of_phase(
-        self,
-        stance: Stance,
-        motions: Sequence[tuple[FloatArray, FloatArray]],
-        errors: Mapping[str, float],
+        self, stance: Stance, motions: Sequence[tuple[FloatArray, FloatArray]], errors: Mapping[str, float]
     ) -> tuple[dict[str, float], Stance]:
         wrench, _ = motions[0]
         kept, needed, chosen = stance, set[str](), dict[str, float]()

@@ -42,7 +42,6 @@ class MotionFit:
     """Damped Gauss-Newton fit of a whole-body spline.
 
     Args:
-        objective: The residuals at samples of the spline.
         knots: Clamped knots of the spline [s].
     """
 

@@ -38,7 +38,7 @@ LEAST_SAFE_DISTANCE = 0.014
 """Wanted clearance that this leaves [m]: more than the required one."""
 
 SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
-"""Further knots around a touch-down at speed, from it [s]."""
+"""Knots added around a touch-down at speed, relative to it [s]."""
 
 CLOSEST_KNOTS = 4.0e-3
 """Knots closer than this are one [s]."""
@@ -59,7 +59,7 @@ def no_progress(share: float) -> None:
 
 
 class FitGoal(Protocol):
-    """What a spline is fitted to."""
+    """Contacts and residuals that a spline is fitted to."""
 
     @property
     def schedule(self) -> ContactSchedule:
@@ -72,7 +72,7 @@ class FitGoal(Protocol):
 
 
 class MeasuredGoal(FitGoal, Protocol):
-    """What a spline is fitted to and measured against."""
+    """Goal of a fit whose result can be measured."""
 
     def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
         """Dense samples of a motion, and what was measured on them."""
@@ -90,7 +90,6 @@ class FitAttempt(Generic[G]):
         fine: How often the knots near the key instants were doubled.
         continued: Whether it went on from an earlier spline.
         fit: The solver, with its multipliers and damping.
-        motion: Dense samples.
         certificate: Measured on them, beside its limits.
     """
 
@@ -120,7 +119,6 @@ class FitJob:
 
     Attributes:
         knot_spacing: Largest distance of the spline's knots [s].
-        samples_per_span: Samples between two knots.
         sudden: Whether knots lie closer around touch-downs at speed.
         penalties: Names of the scales that decide each residual, by the residual's key.
         patience: Relative decrease of the objective below which a repair stops.

@@ -300,20 +300,18 @@ def _effector_rows(
     target: EffectorTarget, place: FloatArray, by_joints: FloatArray, scales: MotionScales
 ) -> tuple[FloatArray, FloatArray]:
     """Scaled residuals (n, 6) of an effector at its places (n, 4, 4) and their derivatives (n, 6, nv)."""
-    along = np.eye(3) if target.along is None else target.along
-    along = (target.weight / scales.position)[:, None, None] * along
+    along = (target.weight / scales.position)[:, None, None] * target.along
     error = place[:, :3, 3] - target.position
     jacobian, residual = np.zeros_like(by_joints), np.zeros((len(error), 6))
     jacobian[:, :3] = along @ by_joints[:, :3]
     residual[:, :3] = (along @ error[:, :, None])[:, :, 0]
-    if target.rotation is not None:
-        relative = place[:, :3, :3] @ target.rotation.transpose(0, 2, 1)
-        turn = rotation_vector(relative)
-        weight = np.where(target.weight > 0.0, target.rotation_weight / scales.rotation, 0.0)
-        # Turning the world axes is a left perturbation: log(exp(w) E) = log(E exp(E^T w)).
-        by_turn = rotation_vector_jacobian(turn) @ relative.transpose(0, 2, 1)
-        jacobian[:, 3:] = weight[:, None, None] * by_turn @ by_joints[:, 3:]
-        residual[:, 3:] = weight[:, None] * turn
+    relative = place[:, :3, :3] @ target.rotation.transpose(0, 2, 1)
+    turn = rotation_vector(relative)
+    weight = np.where(target.weight > 0.0, target.rotation_weight / scales.rotation, 0.0)
+    # Turning the world axes is a left perturbation: log(exp(w) E) = log(E exp(E^T w)).
+    by_turn = rotation_vector_jacobian(turn) @ relative.transpose(0, 2, 1)
+    jacobian[:, 3:] = weight[:, None, None] * by_turn @ by_joints[:, 3:]
+    residual[:, 3:] = weight[:, None] * turn
     return jacobian, residual
 
 

@@ -89,7 +89,6 @@ def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wante
 
     Args:
         states: n states.
-        held: The contact forces.
         wanted: Share of the strength that costs nothing.
     """
     model, data = body.pinocchio, body.pinocchio.createData()

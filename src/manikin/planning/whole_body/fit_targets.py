@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
@@ -17,27 +18,37 @@ from manikin.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class EffectorTarget:
-    """Where an effector has to be at each sample.
+    """Placement of an effector at each sample, with its importance.
 
     Attributes:
         position: (n, 3) in the world [m].
-        rotation: (n, 3, 3) effector-to-world, or None when only the position counts.
+        rotation: (n, 3, 3) effector-to-world.
         weight: (n,) importance of the position: 1 in contact, less in flight, 0 where free.
         rotation_weight: (n,) importance of the orientation, likewise.
         along: (n, 3, 3) applied to the position error before it is weighted: the identity, or
-            less than it along the surface of a contact that is still settling; None for the identity.
+            less than it along the surface of a contact that is still settling.
     """
 
     position: FloatArray
-    rotation: FloatArray | None
+    rotation: FloatArray
     weight: FloatArray
     rotation_weight: FloatArray
-    along: FloatArray | None = None
+    along: FloatArray
+
+    @classmethod
+    def free(cls, n: int) -> "EffectorTarget":
+        """Target without importance at n samples, in arrays to be filled."""
+        identity = np.tile(np.eye(3), (n, 1, 1))
+        return cls(np.zeros((n, 3)), identity, np.zeros(n), np.ones(n), identity.copy())
+
+    def put(self, rows: NDArray[np.bool_], contact: Contact) -> None:
+        """Place the effector at a contact in some rows."""
+        self.position[rows], self.rotation[rows] = contact.position, contact.rotation_contact_to_world
 
 
 @dataclass(frozen=True, eq=False)
 class FitTargets:
-    """What the motion has to do.
+    """Targets of the whole-body fit at its samples.
 
     Attributes:
         time: (n,) [s].
@@ -83,25 +94,24 @@ def effector_targets(
     phases = schedule.phase_at(time)
     targets = {}
     for name in schedule.sequence.effectors:
-        position, rotation = np.zeros((len(time), 3)), np.tile(np.eye(3), (len(time), 1, 1))
-        weight, rotation_weight = np.zeros(len(time)), np.ones(len(time))
+        target = targets[name] = EffectorTarget.free(len(time))
+        weight, rotation_weight = target.weight, target.rotation_weight
         settling = schedule.settling(time, name)
-        along = np.tile(np.eye(3), (len(time), 1, 1)) if np.any(settling) else None
         for index, phase in enumerate(schedule.sequence):
             if name in phase.stance:
                 contact, rows = phase.stance[name], phases == index
-                position[rows], rotation[rows] = contact.position, contact.rotation_contact_to_world
+                target.put(rows, contact)
                 weight[rows] = np.where(settling[rows], ALMOST, 1.0)
                 if contact.kind is ContactKind.GRASP:
                     rotation_weight[rows] = GRASP_ROTATION_WEIGHT if contact.oriented else 0.0
-                if along is not None:
+                if np.any(settling):
                     share = settled_share(schedule, index, contact, time[rows])
-                    along[rows] = settling_map(contact, share)
+                    target.along[rows] = settling_map(contact, share)
                     rotation_weight[rows] = share
         for item in swings:
             if item.swing.effector == name:
                 start, end = item.interval
-                _place(item, time, position, rotation, (start, end))
+                _place(item, time, target)
                 rows = (time >= start) & (time < end)
                 share = (time[rows] - start) / (end - start)
                 place, turn, leave = (
@@ -119,24 +129,18 @@ def effector_targets(
                 hold = item.swing.end or item.swing.start
                 if hold is not None and hold.kind is ContactKind.GRASP and not hold.oriented:
                     rotation_weight[rows] = 0.0
-        targets[name] = EffectorTarget(position, rotation, weight, rotation_weight, along)
     return targets
 
 
-def _place(
-    item: PlannedSwing,
-    time: FloatArray,
-    position: FloatArray,
-    rotation: FloatArray,
-    interval: tuple[float, float],
-) -> None:
+def _place(item: PlannedSwing, time: FloatArray, target: EffectorTarget) -> None:
     """Write the effector's placement during a flight, and while it rolls before and after it."""
-    start, end = interval if item.roll is None else (item.roll.instants[0], item.roll.instants[3])
+    start, end = item.interval if item.roll is None else item.roll.instants[[0, 3]].tolist()
     rows = (time >= start) & (time < end)
     state = item.curve.evaluate(time[rows])
-    position[rows], rotation[rows] = state.position, state.rotation
+    position, rotation = state.position, state.rotation
     if item.roll is not None:
-        position[rows], rotation[rows] = item.roll.pose(state.position, state.rotation, time[rows])
+        position, rotation = item.roll.pose(position, rotation, time[rows])
+    target.position[rows], target.rotation[rows] = position, rotation
 
 
 def toe_angles(body: BodyModel, swings: Sequence[PlannedSwing], time: FloatArray) -> dict[int, FloatArray]:
@@ -167,7 +171,7 @@ def lay_toes_flat(
 
 
 def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> dict[int, FloatArray]:
-    """How much (n,) each joint of toes has to be straight, by joint index: wholly while their sole is held.
+    """Importance (n,) of straight toes, by joint index: 1 while their sole is held.
 
     What a foot stands on does not count as an obstacle: nothing else keeps its toes out of it.
     """
@@ -239,10 +243,10 @@ POSITION_RAMP = 0.2
 """Longest time near the ends of a flight in which the position matters more [s]."""
 
 ROTATION_RAMP = 0.12
-"""The same for the orientation before the landing [s]."""
+"""Longest time before a landing in which the orientation matters more [s]."""
 
 LEAVING_RAMP = 0.04
-"""The same for the orientation after the lift-off to a long flight: the foot may roll off at once [s]."""
+"""Longest such time after the lift-off to a long flight: the foot may roll off at once [s]."""
 
 
 def _reach_weight(share: FloatArray, ramp: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""How a foot pitches from the rise of its heel to its next flat landing.
+"""Pitch of a foot from the rise of its heel to its next flat landing.
 
 The foot tilts about the hinge of its toes, which stay flat, until it leaves the ground; flies; lands
 on the edge of its heel and tilts down onto its sole. One pitch, twice continuously differentiable,
@@ -51,7 +51,7 @@ class FootRoll:
 
     @property
     def pivots(self) -> tuple[Pose, Pose]:
-        """Where the hinge lies before the flight and the heel's edge after it."""
+        """Poses of the toes' hinge before the flight and of the heel's edge after it."""
         return (
             Pose(self.start.position + self.start.rotation @ self.hinge, self.start.rotation),
             Pose(self.end.position + self.end.rotation @ self.heel, self.end.rotation),

@@ -29,7 +29,6 @@ def measure_passage(
     scene without its floor and what may be leaned on.
 
     Args:
-        schedule: The planned contacts.
         motion: Planned or executed; what lies beyond the schedule counts as its last phase.
         padded: Obstacles that any part of the body may lean on.
     """

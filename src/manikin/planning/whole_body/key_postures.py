@@ -33,7 +33,7 @@ from manikin.planning.whole_body.swing_planner import leaning_pairs
 from manikin.scene import Proximity, Scene
 
 SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)
-"""A posture counts when it is as exact as the finished motion has to be, unless told otherwise."""
+"""A posture counts when it is as exact as the finished motion has to be, by default."""
 
 NEARNESS = (200.0, 1000.0)
 """Weights of the planned centre of mass where it is only wished, one search after the other [1/m^2]: far
@@ -85,17 +85,13 @@ class KeyPosture:
 
 @dataclass(frozen=True, eq=False)
 class KeyPostures:
-    """Postures at the key instants of a plan.
-
-    Attributes:
-        postures: In order of time.
-    """
+    """Postures at the key instants of a plan, in order of time."""
 
     postures: tuple[KeyPosture, ...]
 
     @property
     def failed(self) -> tuple[KeyPosture, ...]:
-        """Those that were not found."""
+        """Key postures that were not found."""
         return tuple(posture for posture in self.postures if not posture.found)
 
     def guide(self) -> Guide:
@@ -136,7 +132,6 @@ def find_key_postures(
     """Look for a posture at every key instant until which the trajectory binds.
 
     Args:
-        trajectory: Planned centre of mass with its contacts in time.
         manner: How the body carries itself where the task leaves freedom.
         requirements: What the finished motion must keep; the clearance is asked of the postures.
         range_margin: Angle that the postures keep from the ends of the hinge ranges [rad].
@@ -147,7 +142,7 @@ def find_key_postures(
     """
     instants = trajectory.schedule.instants
     time = instants[trajectory.binds(instants)]
-    search = _Search(
+    search = _KeyPostureSearch(
         body, scene, trajectory, time, manner, (requirements or WholeBodyRequirements()).clearance,
         range_margin, replace(SETTINGS, tolerance=tolerance), leaning_pairs(body, padded),
         None if known is None else align_quaternions(np.array(known[: len(time)])),
@@ -155,7 +150,7 @@ def find_key_postures(
     return KeyPostures(search.run())
 
 
-class _Search:
+class _KeyPostureSearch:
     """The search for one plan, each posture starting from the one before."""
 
     def __init__(
@@ -211,7 +206,7 @@ class _Search:
         return posture if result.succeeded else self._explained(posture, problem, result)
 
     def _explained(self, posture: KeyPosture, problem: PostureProblem, result: PostureResult) -> KeyPosture:
-        """Why there is no posture, and the nearest centre of mass with which there is one.
+        """The posture with the reason why it fails, and the nearest centre of mass with which one exists.
 
         The nearest posture is also where a search that only ended in a poor minimum finds its way.
         """
@@ -250,7 +245,7 @@ Rolls = tuple[tuple[str, FootRoll], ...]
 
 
 def rolls_of(body: BodyModel, schedule: ContactSchedule) -> Rolls:
-    """How the feet roll about their flights."""
+    """Rolls of the feet about their flights."""
     found = ((swing.effector, foot_roll(body, schedule, swing)) for swing in schedule.sequence.swings())
     return tuple((name, roll) for name, roll in found if roll is not None)
 
@@ -258,7 +253,7 @@ def rolls_of(body: BodyModel, schedule: ContactSchedule) -> Rolls:
 def requirements_at(
     schedule: ContactSchedule, key: int, rolls: Rolls = ()
 ) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
-    """What the effectors must keep at a key instant: the contacts of both phases that meet there.
+    """Contacts and placements at a key instant: the contacts of both phases that meet there.
 
     A sole that lies flat in one of them lies flat; one that only touches with an edge has the
     pitch of its roll.  A contact that has yet to settle is only wished at its place.
@@ -297,7 +292,7 @@ def _held_at(schedule: ContactSchedule, key: int) -> dict[str, Contact]:
 
 
 def _tilted(contact: Contact, time: float, rolls: Sequence[FootRoll]) -> Placement:
-    """Where a sole is that stands on an edge."""
+    """Placement of a sole that stands on an edge."""
     for roll in rolls:
         up, off, land, flat = roll.instants
         for pivot, start, end in zip(roll.pivots, (up, land), (off, flat), strict=True):
@@ -338,11 +333,10 @@ Look = Callable[[CentroidalTrajectory], KeyPostures]
 
 @dataclass(frozen=True)
 class IneligiblePlan:
-    """Why no plan has all its key postures.
+    """Reason why no plan has all its key postures.
 
     Attributes:
         stage: ``"wholebody"``, or ``"centroidal"`` when no plan keeps the tightened constraints.
-        reason: In one line.
         posture: The first key posture that fails.
     """
 
@@ -377,8 +371,6 @@ def find_eligible_plan(
 
     Args:
         first: A plan that succeeded.
-        realise: Completes a plan.
-        look: Finds key postures.
         replan: Whether its problem may be solved again; a recorded centre of mass is what it is.
     """
     plan, replans = first, 0
@@ -408,9 +400,6 @@ def tighten(problem: CentroidalProblem, failed: tuple[KeyPosture, ...]) -> Centr
 
     It cannot where there is no posture with any centre of mass, nor at the start and the goal,
     where the centre of mass is given.
-
-    Args:
-        failed: Key postures that were not found.
     """
     planes = []
     for posture in failed:

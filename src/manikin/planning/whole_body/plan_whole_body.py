@@ -65,7 +65,7 @@ FIRST_DECREASE = 0.02
 """Relative decrease of the objective below which the first repair stops."""
 
 LATER_DECREASE = 0.005
-"""The same where that did not help, or a fit begins again: the harder, the more patience."""
+"""Relative decrease below which a later repair, or a fit that begins again, stops."""
 
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
@@ -92,12 +92,8 @@ class WholeBodySettings:
 
     Attributes:
         knot_spacing: Largest distance of the spline's knots [s].
-        samples_per_span: Samples between two knots.
         guide_spacing: Largest distance of the guide postures [s].
         sampling: Spacing of the finished motion's samples [s].
-        swing: What a swing must keep.
-        fit: Scales and limits of the fit.
-        requirements: What the finished motion must keep.
         manner: How the body carries itself where the task leaves freedom.
     """
 
@@ -118,7 +114,7 @@ class WholeBodyResult(Displayed):
     Attributes:
         motion: Sampled at 1 kHz; of the best attempt when it failed.
         certificate: Measured on the samples of the motion, beside its limits.
-        iterations: Of the fit.
+        iterations: Gauss-Newton steps of the fit.
     """
 
     motion: Motion
@@ -189,9 +185,6 @@ class _Goal:
     """Swings to follow, led by guide postures.
 
     Attributes:
-        planner: The job that it belongs to.
-        guide: Postures that show the way.
-        manner: How the body carries itself.
         straight_toes: Whether toes are straight while their sole is held.
         forces: Motion at whose contact forces torques beyond the strength cost; None where no torque costs.
     """
@@ -230,7 +223,7 @@ class _Goal:
         return motion, certificate
 
     def failure(self, certificate: MotionCertificate) -> WholeBodyFailure | None:
-        """Why a motion to this goal is no success, or None."""
+        """Reason why a motion to this goal is no success, or None."""
         broken = certificate.first_broken
         if broken is None:
             return None

@@ -26,9 +26,6 @@ def point_mass_motion(
 ) -> Motion:
     """Sample a CoM trajectory with its margin and contact forces.
 
-    Args:
-        polytopes: W_i of the phases.
-
     Returns:
         The motion of :func:`manikin.body.further_bodies.point_mass`, every :data:`STEP` and at the key
         instants; ``tau`` is zero.

@@ -18,13 +18,7 @@ from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
 from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.errors import InputError
-from manikin.kinematics import (
-    Placement,
-    PostureProblem,
-    Preferences,
-    SolverSettings,
-    generate_posture,
-)
+from manikin.kinematics import Placement, PostureProblem, Preferences, SolverSettings, generate_posture
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -149,11 +143,7 @@ def _requirements(
     for name, target in effectors.items():
         # Targets of less importance than this are left to the fit.
         if name not in held and name not in settling and target.weight[k] >= 0.05:
-            turn = (
-                target.rotation[k]
-                if target.rotation is not None and target.rotation_weight[k] > 0.5
-                else None
-            )
+            turn = target.rotation[k] if target.rotation_weight[k] > 0.5 else None
             placements[name] = Placement(target.position[k], turn)
     return tuple(held.values()), placements
 
@@ -191,7 +181,6 @@ class PostureStyle:
     """Preferred posture and how firmly each joint keeps to it; all numbers are our choice.
 
     Attributes:
-        name: Short name, as in a scenario.
         angles: Joint angles that differ from the standing posture, by a part of the joint's name [rad].
         scales: Deviation of a joint from its preferred angle that costs one unit, by a part of
             the joint's name [rad].
@@ -228,13 +217,14 @@ class PostureStyle:
         return scale
 
 
+def _degrees(**angles: float) -> Mapping[str, float]:
+    """Angles [deg] as read-only radians."""
+    return MappingProxyType({name: np.deg2rad(angle) for name, angle in angles.items()})
+
+
 READY = PostureStyle(
     "ready",
-    MappingProxyType({
-        "shoulder_flexion": np.deg2rad(20.0),
-        "shoulder_abduction": np.deg2rad(25.0),
-        "elbow_flexion": np.deg2rad(60.0),
-    }),
+    _degrees(shoulder_flexion=20.0, shoulder_abduction=25.0, elbow_flexion=60.0),
     MappingProxyType({
         "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.35, "thorax": 0.35, "neck": 0.25,
         "shoulder": 0.35, "elbow": 0.35, "wrist": 0.1,
@@ -244,7 +234,7 @@ READY = PostureStyle(
 
 WALKING = PostureStyle(
     "walking",
-    MappingProxyType({"shoulder_flexion": np.deg2rad(3.0), "elbow_flexion": np.deg2rad(22.0)}),
+    _degrees(shoulder_flexion=3.0, elbow_flexion=22.0),
     MappingProxyType({
         "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.12, "thorax": 0.12, "neck": 0.1,
         "shoulder": 0.12, "elbow": 0.15, "wrist": 0.1,
@@ -261,13 +251,7 @@ WALKING = PostureStyle(
 
 CLOSE = PostureStyle(
     "close",
-    MappingProxyType(
-        {
-            "shoulder_flexion": np.deg2rad(25.0),
-            "shoulder_abduction": np.deg2rad(15.0),
-            "elbow_flexion": np.deg2rad(80.0),
-        }
-    ),
+    _degrees(shoulder_flexion=25.0, shoulder_abduction=15.0, elbow_flexion=80.0),
     MappingProxyType({**READY.scales, "shoulder": 0.15, "elbow": 0.2}),
     preferences=Preferences(
         hinges=MappingProxyType({"shoulder": 0.5, "elbow": 0.3, **Preferences().hinges}), arms=0.3
@@ -277,16 +261,9 @@ CLOSE = PostureStyle(
 
 CLIMBING = PostureStyle(
     "climbing",
-    MappingProxyType(
-        {
-            "shoulder_flexion": np.deg2rad(115.0),
-            "shoulder_abduction": np.deg2rad(20.0),
-            "elbow_flexion": np.deg2rad(70.0),
-            "hip_flexion": np.deg2rad(45.0),
-            "hip_abduction": np.deg2rad(25.0),
-            "hip_rotation": np.deg2rad(-20.0),
-            "knee_flexion": np.deg2rad(65.0),
-        }
+    _degrees(
+        shoulder_flexion=115.0, shoulder_abduction=20.0, elbow_flexion=70.0, hip_flexion=45.0,
+        hip_abduction=25.0, hip_rotation=-20.0, knee_flexion=65.0,
     ),
     MappingProxyType({**READY.scales, "shoulder": 1.0, "elbow": 1.0, "wrist": 0.5}),
     preferences=Preferences(arms=0.0, grasp=0.0),
@@ -295,13 +272,7 @@ CLIMBING = PostureStyle(
 
 HANGING = PostureStyle(
     "hanging",
-    MappingProxyType(
-        {
-            "shoulder_flexion": np.deg2rad(5.0),
-            "shoulder_abduction": np.deg2rad(12.0),
-            "elbow_flexion": np.deg2rad(25.0),
-        }
-    ),
+    _degrees(shoulder_flexion=5.0, shoulder_abduction=12.0, elbow_flexion=25.0),
     CLOSE.scales,
     preferences=CLOSE.preferences,
 )

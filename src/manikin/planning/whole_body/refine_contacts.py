@@ -36,7 +36,7 @@ STILL = 1.0e-3
 
 @dataclass(frozen=True, eq=False)
 class LimbDirections:
-    """What EFORT is about, for one limb.
+    """Joints and directions of one limb's EFORT.
 
     Attributes:
         joints: (m,) velocity indices of the limb's hinges, from its root to its effector.
@@ -86,7 +86,6 @@ def efort_with_derivative(
     ``dJ_i/dq_k = z_k x J_i`` for a joint ``k`` before ``i`` in the chain, ``z_i x J_k`` after it.
 
     Args:
-        limb: Its joints and directions.
         jacobian: (n, 6, nv) of the effector, linear above angular, world axes.
         chain: (m,) velocity indices of the joints that move it, in order.
     """
@@ -128,7 +127,7 @@ def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, 
 def contact_targets(
     schedule: ContactSchedule, time: FloatArray, variables: dict[str, FloatArray], approach: float
 ) -> dict[str, EffectorTarget]:
-    """Where the contact variables want every effector.
+    """Targets of every effector by the contact variables.
 
     Args:
         time: (n,) [s].
@@ -138,7 +137,7 @@ def contact_targets(
     """
     targets = {}
     for name in schedule.sequence.effectors:
-        place = _Place.nowhere(len(time))
+        target = targets[name] = EffectorTarget.free(len(time))
         for swing in schedule.sequence.swings():
             if swing.effector == name:
                 start, end = schedule.swing_interval(swing)
@@ -147,50 +146,29 @@ def contact_targets(
                     (swing.end, (time >= 0.5 * (start + end)) & (time < end)),
                 ):
                     if contact is not None:
-                        place.approach(near, contact, variables[name], approach)
+                        _approach(target, near, contact, approach * np.sqrt(variables[name][near]))
         for number, phase in enumerate(schedule.sequence):
             if name in phase.stance:
                 start, end = schedule.instants[number : number + 2]
-                place.hold((time >= start) & (time <= end), phase.stance[name])
-        targets[name] = EffectorTarget(
-            place.position, place.rotation, place.weight, place.rotation_weight, place.along
-        )
+                _hold(target, (time >= start) & (time <= end), phase.stance[name])
     return targets
 
 
-@dataclass(frozen=True, eq=False)
-class _Place:
-    """The arrays of one effector's target, being filled."""
+def _hold(target: EffectorTarget, rows: NDArray[np.bool_], contact: Contact) -> None:
+    target.put(rows, contact)
+    target.weight[rows], target.rotation_weight[rows] = 1.0, _turn_weight(contact)
+    target.along[rows] = np.eye(3)
 
-    position: FloatArray
-    rotation: FloatArray
-    weight: FloatArray
-    rotation_weight: FloatArray
-    along: FloatArray
 
-    @classmethod
-    def nowhere(cls, n: int) -> "_Place":
-        identity = np.tile(np.eye(3), (n, 1, 1))
-        return cls(np.zeros((n, 3)), identity, np.zeros(n), np.zeros(n), identity.copy())
+def _approach(target: EffectorTarget, rows: NDArray[np.bool_], contact: Contact, weight: FloatArray) -> None:
+    """Keep to the contact's normal; the height above the surface is left to the distances.
 
-    def hold(self, rows: NDArray[np.bool_], contact: Contact) -> None:
-        self._put(rows, contact)
-        self.weight[rows], self.rotation_weight[rows] = 1.0, _turn_weight(contact)
-        self.along[rows] = np.eye(3)
-
-    def approach(
-        self, rows: NDArray[np.bool_], contact: Contact, variable: FloatArray, weight: float
-    ) -> None:
-        """Keep to the contact's normal; the height above the surface is left to the distances."""
-        self._put(rows, contact)
-        # Weights are of residuals, the contact variable of their squares.
-        share = np.sqrt(variable[rows])
-        self.weight[rows] = np.minimum(weight * share, ALMOST)
-        self.along[rows] = np.eye(3) - np.outer(contact.normal, contact.normal)
-        self.rotation_weight[rows] = weight * share * _turn_weight(contact)
-
-    def _put(self, rows: NDArray[np.bool_], contact: Contact) -> None:
-        self.position[rows], self.rotation[rows] = contact.position, contact.rotation_contact_to_world
+    Weights are of residuals, the contact variable of their squares.
+    """
+    target.put(rows, contact)
+    target.weight[rows] = np.minimum(weight, ALMOST)
+    target.along[rows] = np.eye(3) - np.outer(contact.normal, contact.normal)
+    target.rotation_weight[rows] = weight * _turn_weight(contact)
 
 
 def _turn_weight(contact: Contact) -> float:
@@ -224,7 +202,6 @@ def effector_speed(
     ``d(J v)/dq_i = (sum_{k <= i} z_k v_k) x J_i + z_i x (sum_{k > i} J_k v_k)``.
 
     Args:
-        motion: The samples.
         jacobian: (n, 6, nv) of the effector, linear above angular, world axes.
         chain: (m,) velocity indices of the joints that move it, the pelvis' six first, in order.
         turn: Derivatives of the pelvis' turn by the raw quaternion.

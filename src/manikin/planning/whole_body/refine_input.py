@@ -76,7 +76,7 @@ class KeyPath:
         return align_quaternions(out)
 
     def retimed(self, before: FloatArray, after: FloatArray) -> "KeyPath":
-        """The same keys at other times: ``before`` (k,) becomes ``after`` (k,), linear in between."""
+        """Path with its keys at other times: ``before`` (k,) becomes ``after`` (k,), linear in between."""
         return KeyPath(np.interp(self.time, before, after), self.q)
 
 
@@ -171,7 +171,6 @@ def shortening(
     """(phases,) factor on the duration of each phase, in [:data:`SHORTER`, 1].
 
     Args:
-        motion: Its motion at the present timing.
         share: Of the velocity limits that the fastest joint of each phase should come up to.
         settled: Phases that stay as long as they are.
     """

@@ -54,7 +54,7 @@ class _Side:
 
 
 class RefineObstacles:
-    """What may be near what, at samples of a motion.
+    """Pairs that may be near each other, at samples of a motion.
 
     Args:
         time: (n,) [s].
@@ -154,7 +154,7 @@ STEP = 0.01
 
 @dataclass(frozen=True)
 class RefineMeasures:
-    """What every term of the refinement measures on a motion.
+    """Terms of the refinement as measured on a motion.
 
     Attributes:
         duration_s: [s].

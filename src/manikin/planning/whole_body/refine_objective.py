@@ -42,18 +42,17 @@ from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint
 
 KNEE = "knee_flexion"
-"""How the names of knees end."""
+"""End of the names of knee joints."""
 
 
 @dataclass(frozen=True, eq=False)
 class RefineTargets:
-    """What the refinement does at its samples.
+    """Targets of the refinement at its samples.
 
     Attributes:
         fit: Contacts, reference and obstacles as the whole-body fit knows them.
         variables: (n,) contact variable of each effector of the sequence.
         load: (n, effectors) readiness of each to carry load, in the order of ``fit.effectors``.
-        limbs: Directions of EFORT of the limbs, by effector.
         obstacles: What may touch, and how far flights keep off.
     """
 

@@ -8,6 +8,8 @@ posture, but a whole body need only follow it loosely.
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
 from manikin.contact import StanceSequence
@@ -19,14 +21,10 @@ from manikin.planning.whole_body.swing_planner import touch_pairs
 from manikin.scene import Proximity, Scene
 
 WEIGHTS = Weights(
-    margin=0.0,
-    smoothness=1.0,
-    duration=1.0,
-    velocity=(20.0, 20.0, 20.0),
-    acceleration=(0.1, 0.1, 0.1),
+    margin=0.0, smoothness=1.0, duration=1.0, velocity=(20.0, 20.0, 20.0), acceleration=(0.1, 0.1, 0.1),
     jerk=(1e-2, 1e-2, 1e-2),
-)
-"""Of the seated part: smooth, and not longer than it has to be."""
+)  # fmt: skip
+"""Weights of the seated part: smooth, and not longer than it has to be."""
 
 CLEARANCES = (0.02, 0.0105)
 """Distances that the final posture keeps to the scene [m], tried in order; within the body the
@@ -39,9 +37,7 @@ class SeatedContinuation:
 
     Attributes:
         trajectory: The whole motion: the given part, then the seated one, which does not bind.
-        posture: The final posture.
         centroidal: The plan of the seated part; None where the final posture failed.
-        failure: Why there is no seated part, or None.
     """
 
     trajectory: CentroidalTrajectory | None
@@ -57,25 +53,18 @@ def continue_seated(
 
     Args:
         trajectory: Centre of mass up to the touch of the seat.
-        phases: The phases after it.
     """
     posture = final_posture(body, scene, phases, trajectory)
     if not posture.succeeded:
         return SeatedContinuation(None, posture, None, f"no final sitting posture: {posture.failure}")
     end = trajectory.duration
     problem = CentroidalProblem(
-        trajectory.mass,
-        phases,
-        trajectory.position(end),
-        Configuration(body, posture.q).com,
-        start_velocity=trajectory.velocity(end),
-        start_acceleration=trajectory.acceleration(end),
-        goal_acceleration=(0.0, 0.0, 0.0),
-        degree=trajectory.spline.degree,
-        weights=WEIGHTS,
+        trajectory.mass, phases, trajectory.position(end), Configuration(body, posture.q).com,
+        start_velocity=trajectory.velocity(end), start_acceleration=trajectory.acceleration(end),
+        goal_acceleration=np.zeros(3), degree=trajectory.spline.degree, weights=WEIGHTS,
         # Longest duration of the seated part, in sums of its shortest phases.
         max_duration=2.0 * sum(phase.min_duration for phase in phases),
-    )
+    )  # fmt: skip
     result = plan_com(problem)
     if result.trajectory is None:
         reason = "not found" if result.failure is None else result.failure.reason
@@ -89,18 +78,12 @@ def final_posture(
 ) -> PostureResult:
     """The sitting posture on the contacts of the last phase, its centre of mass left free."""
     contacts = tuple(phases[len(phases) - 1].stance)
-    pairs: set[tuple[str, str]] = set()
-    for contact in contacts:
-        pairs |= touch_pairs(body, scene, contact)
     problem = PostureProblem(
-        body,
-        contacts,
-        proximity=Proximity(body, scene),
-        clearance=CLEARANCES[0],
+        body, contacts, proximity=Proximity(body, scene), clearance=CLEARANCES[0],
         self_clearance=CLEARANCES[-1],
-        ignore=frozenset(pairs),
+        ignore=frozenset().union(*(touch_pairs(body, scene, contact) for contact in contacts)),
         reference=_sitting(body, trajectory.position(trajectory.duration)),
-    )
+    )  # fmt: skip
     result = generate_posture(problem)
     for clearance in CLEARANCES[1:]:
         if not result.succeeded:

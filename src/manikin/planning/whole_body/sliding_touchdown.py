@@ -30,7 +30,7 @@ _REACH = 0.1
 
 @dataclass(frozen=True, eq=False)
 class SlidingTouchdown:
-    """Which shapes meet which obstacles at speed.
+    """Shapes that meet obstacles at speed.
 
     Attributes:
         pairs: Pairs of segment and obstacle that may touch but not go into each other.
@@ -82,7 +82,7 @@ class SlidingTouchdown:
 def sliding_touchdown_at(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> SlidingTouchdown | None:
-    """What is met at speed, from shortly before the touch until it has settled.
+    """Contacts made at speed, from shortly before the touch until they have settled.
 
     Args:
         time: (n,) [s].
@@ -106,12 +106,7 @@ def sliding_touchdown_at(
 def sliding_touchdown_errors(
     proximity: Proximity, meeting: SlidingTouchdown | None, motion: Motion
 ) -> FloatArray:
-    """(n,) depth of what meets at speed in its surface, or its distance where it should touch [m].
-
-    Args:
-        meeting: What is met, at the samples of the motion.
-        motion: The planned motion, with n samples.
-    """
+    """(n,) depth of what meets at speed in its surface, or its distance where it should touch [m]."""
     errors = np.zeros(len(motion.time))
     if meeting is None:
         return errors

@@ -41,7 +41,7 @@ APEXES = (0.5, 0.4, 0.6)
 
 @dataclass(frozen=True)
 class SwingLimits:
-    """What a swing must keep.
+    """Limits that a swing must keep.
 
     Attributes:
         clearance: Distance to everything once the effector is away from its two contacts [m].
@@ -69,11 +69,10 @@ class SwingLimits:
 
 @dataclass(frozen=True)
 class SwingCheck:
-    """How a curve stands against its limits.
+    """Measures of a curve beside its limits.
 
     Attributes:
         slack: Smallest distance minus the distance required there [m]; negative is too close.
-        slack_time: When [s].
         clearance: Smallest distance while away from the two contacts [m].
         speed: Peak speed [m/s].
         angular_speed: Peak angular speed [rad/s].
@@ -81,7 +80,6 @@ class SwingCheck:
     """
 
     slack: float
-    slack_time: float
     clearance: float
     speed: float
     angular_speed: float
@@ -99,7 +97,6 @@ class SwingPlan:
 
     Attributes:
         curve: The curve found, or the best attempt when none keeps the limits.
-        check: How it stands against the limits.
         candidates: Curves of the family that were tried.
     """
 
@@ -114,7 +111,7 @@ class SwingPlan:
 
     @property
     def failure(self) -> str | None:
-        """What the best attempt does not keep, or None."""
+        """Limit that the best attempt breaks, or None."""
         return self.check.failure
 
 
@@ -143,7 +140,6 @@ def plan_swing(
         end_normal: (3,) normal of the surface that is reached.
         pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
         refine: Largest number of iterations of the optimisation; 0 tries the family only.
-        controls: Number of control poses of the curves.
         heights: Apex heights above the higher end that are tried [m].
 
     Returns:
@@ -186,19 +182,14 @@ def check_swing(
     worst = int(np.argmin(slack)) + 1
     in_flight = required >= limits.clearance
     smallest = float(distance[in_flight].min() if np.any(in_flight) else distance[1:-1].min())
-    failure = None
+    failure = curve.haste(limits.speed, limits.angular_speed)
     if slack[worst - 1] < -TOLERANCE:
-        place = ", ".join(f"{x:.3f}" for x in state.position[worst])
+        position = ", ".join(f"{x:.3f}" for x in state.position[worst])
         failure = (
             f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
-            f"[{place}]; required {required[worst]:.4f} m"
+            f"[{position}]; required {required[worst]:.4f} m"
         )
-    else:
-        failure = curve.haste(limits.speed, limits.angular_speed)
-    return SwingCheck(
-        float(slack[worst - 1]), float(state.time[worst]), smallest,
-        curve.peak_speed, curve.peak_angular_speed, failure,
-    )  # fmt: skip
+    return SwingCheck(float(slack[worst - 1]), smallest, curve.peak_speed, curve.peak_angular_speed, failure)
 
 
 def _first_clear(
@@ -346,7 +337,7 @@ SETTLED = 0.004
 """Change of the control coordinates below which the optimisation stops [m]."""
 
 STATIONARY = 1e-5
-"""The same where no curve keeps the limits: another iteration would lead to the same curve [m]."""
+"""Change below which it stops where no curve keeps the limits: the next would be the same curve [m]."""
 
 TOLERANCE = 1e-5
 """Accuracy expected of measured distances [m]."""

@@ -110,7 +110,6 @@ class SwingCurve:
             end_normal: (3,) surface normal along which it arrives, reversed.
             pitch: Extra turn about the effector's own y axis in early flight, toes down when
                 positive [rad], as of a foot whose heel comes up first.
-            controls: Number of control poses.
 
         Raises:
             InputError: If a via-point or a time is not usable or there are too many via-points.
@@ -154,7 +153,6 @@ class SwingCurve:
             start_normal: (3,) surface normal at lift-off.
             end_normal: (3,) surface normal at touch-down.
             pitch: As for :meth:`through` [rad].
-            controls: Number of control poses.
         """
         up, left = _flight_axes(start.position, goal.position, start_normal, end_normal)
         share = 0.5 + 0.6 * (apex - 0.5)  # where along the way: close to the middle even for early apexes
@@ -245,7 +243,7 @@ class SwingCurve:
         return float(np.linalg.norm(self._dense.angular_velocity, axis=1).max())
 
     def haste(self, speed: float, angular_speed: float) -> str | None:
-        """Which peak speed is above its limit [m/s, rad/s], or None."""
+        """Reason why a peak speed is above its limit [m/s, rad/s], or None."""
         if self.peak_speed > speed:
             return f"speed reaches {self.peak_speed:.2f} m/s; limit {speed:.2f} m/s"
         if self.peak_angular_speed > angular_speed:
@@ -312,7 +310,7 @@ def _knots(controls: int) -> FloatArray:
 
 
 def _greville(controls: int) -> FloatArray:
-    """Where each control point acts: averages of DEGREE neighbouring knots."""
+    """Share at which each control point acts: averages of DEGREE neighbouring knots."""
     knots = _knots(controls)
     return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(controls)])
 
@@ -394,7 +392,7 @@ def _least_norm_gain(n: int, energy_bytes: bytes, matrix_bytes: bytes) -> FloatA
 
 
 PITCH_DECLINE = 2.0
-"""How much longer the extra pitch takes to fade than to grow: it peaks at a third of the turn."""
+"""Time in which the extra pitch fades relative to that in which it grows: it peaks at a third."""
 
 
 def _turning(start: FloatArray, goal: FloatArray, pitch: float, controls: int) -> FloatArray:

@@ -176,7 +176,6 @@ class EffectorClearance:
 
     Args:
         scene: The obstacles, the floor included.
-        effector: Name of the flying effector.
         standing: Contacts of the other effectors during the flight.
         com: Planned centre of mass, which the standing limbs point to.
         bend: Angle of the hanging segment (toes) at a time [rad]; straight when omitted.
@@ -232,7 +231,7 @@ class EffectorClearance:
         ]
         smallest = min((self._distance(mine, limb) for limb in self._placed_limbs(time) for mine in own),
                        default=np.inf)  # fmt: skip
-        # Far obstacles are told by the box around them and the ball around the own shape.
+        # Far obstacles are ruled out by the box around them and the ball around the own shape.
         centres = pose.position + self._centres @ pose.rotation.T
         slack = 0.0 if local is self._own else self._reach
         beyond = np.maximum(np.maximum(self._low - centres[:, None], centres[:, None] - self._high), 0.0)
@@ -274,14 +273,13 @@ class EffectorClearance:
         return coal.distance(*mine, *other, self._request, self._result)
 
 
-@dataclass(frozen=True, eq=False)
-class _Hinge:
-    """Hinge of the segment that hangs on an effector's own.
+class _Hinge(NamedTuple):
+    """Hinge of the segment that hangs on an effector's own, in the effector frame.
 
     Attributes:
         first: Number of shapes before those of the hanging segment.
-        place: (3,) in the effector frame [m].
-        axis: (3,) unit axis in the effector frame.
+        place: (3,) [m].
+        axis: (3,) unit axis.
     """
 
     first: int

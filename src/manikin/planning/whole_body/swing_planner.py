@@ -88,12 +88,7 @@ def with_mid_flights(
 
 
 def _curve(
-    body: BodyModel,
-    scene: Scene,
-    schedule: ContactSchedule,
-    path: KeyPath,
-    swing: Swing,
-    limits: SwingLimits,
+    body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, swing: Swing, limits: SwingLimits
 ) -> SwingCurve | None:
     """A curve of the effector that keeps off everything; None where there is none, or none is needed."""
     assert swing.start is not None
@@ -173,8 +168,6 @@ class FlightPlanner:
     """Plans the flights of one motion.
 
     Args:
-        limits: What a smooth swing must keep.
-        rng: Source of all randomness of the search.
         reference: (time) -> (nq,) preferred posture, for the posture checks.
     """
 

@@ -57,15 +57,10 @@ class SmoothCurve:
     """Result of :func:`smooth_curve`.
 
     Attributes:
-        curve: A curve that was checked, or None.
-        controls: Control poses of the last curve tried.
-        checks: Calls of the feasibility check.
         failure: None, or what the last curve tried does not keep, and when.
     """
 
     curve: SwingCurve | None
-    controls: int
-    checks: int
     failure: str | None = None
 
     @property
@@ -91,8 +86,6 @@ def smooth_path(
 
     Args:
         path: Path to shorten; its nodes are taken to be feasible.
-        feasible: CHECK-PG, as for the search.
-        limits: Speed limits, metric and density of the checks, as for the search.
         hints: Hints at the nodes of the path, for warm starts.
         iterations: How many replacements are tried.
     """
@@ -125,8 +118,6 @@ def smooth_curve(
     (smoothest) one that keeps the speed limits and has a posture everywhere is returned.
 
     Args:
-        path: A feasible path.
-        feasible: CHECK-PG, as for the search.
         limits: Speed limits; a rest-to-rest curve is faster in the middle than the path's average.
         hint: Hint at the start of the path.
         time_step: Spacing of the checked instants [s].
@@ -134,22 +125,17 @@ def smooth_curve(
     finite_number(time_step, "smooth_curve time_step [s]", above=0.0)
     limits = limits or FlightLimits()
     checker = EdgeChecker(feasible, limits)
-    failure, controls = None, 0
+    failure = None
     for controls, sharpening in itertools.product(CONTROLS, SHARPENINGS):
         curve = SwingCurve.along(path, controls, sharpening)
         failure = _curve_failure(curve, checker, limits, hint, time_step)
         if failure is None:
-            return SmoothCurve(curve, controls, checker.checks)
-    return SmoothCurve(None, controls, checker.checks, failure)
+            return SmoothCurve(curve)
+    return SmoothCurve(None, failure)
 
 
 def _shortcut(
-    path: EffectorPath,
-    hints: list[Any],
-    first: int,
-    second: int,
-    shares: FloatArray,
-    checker: EdgeChecker,
+    path: EffectorPath, hints: list[Any], first: int, second: int, shares: FloatArray, checker: EdgeChecker
 ) -> tuple[EffectorPath, list[Any]] | None:
     """The path with a straight edge from a point of segment ``first`` to one of segment ``second``."""
     steps = np.diff(path.time)
@@ -191,7 +177,7 @@ def _spliced(path: EffectorPath, edge: EffectorPath, first: int, second: int) ->
 def _curve_failure(
     curve: SwingCurve, checker: EdgeChecker, limits: FlightLimits, hint: Any, time_step: float
 ) -> str | None:
-    """What a curve does not keep, or None."""
+    """Limit or check that a curve does not keep, or None."""
     haste = curve.haste(limits.speed, limits.angular_speed)
     if haste is not None:
         return haste
@@ -215,7 +201,6 @@ class PostureCheck:
     """CHECK-PG: whether a posture exists with the effector at a pose, its posture as the hint.
 
     Args:
-        effector: Name of the flying effector.
         problem_at: What else must hold at a time [s]: contacts, centre of mass, scene.
         screen: Cheap test of pose and time that is asked first, such as :class:`ClearFlight`.
         rotation_weight: None to require the rotation too; otherwise it is only wished, with
@@ -294,7 +279,6 @@ class SwingSearch:
     Attributes:
         curve: A smooth curve with a posture at every checked instant, or None.
         path: The shortened path it follows, or None when no path was found.
-        failure: None, or why there is no curve.
     """
 
     curve: SwingCurve | None
@@ -332,7 +316,6 @@ def search_swing(
         roomy: Stricter CHECK-PG for the path, so that rounding its corners stays feasible;
             ``feasible`` itself when omitted.
         limits: Speed limits of the curve, metric and density of the checks.
-        zone: Where poses are drawn.
         iterations: Largest number of random points.
         shortcuts: How many replacements are tried on the path.
         attempts: How many paths are searched when no smooth curve follows one.
