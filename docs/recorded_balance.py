@@ -6,8 +6,10 @@ recordings with a class each) and, in ``mocap``, recordings with and without for
 
 import csv
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -21,12 +23,10 @@ from manikin.body.configuration import Configuration
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.numerics.polygon import polygon_of_halfplanes
-from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about
 from manikin.recordings import (
-    Cause,
     ForcePlate,
     LeastShift,
-    Loss,
     MarkerRecording,
     PlateComparison,
     PlateForces,
@@ -34,7 +34,7 @@ from manikin.recordings import (
     RecordedDynamics,
     RecordedMargins,
     RecordedSupports,
-    balance_losses,
+    Support,
     compare_with_plates,
     dynamics_of,
     least_shift,
@@ -45,14 +45,12 @@ from manikin.recordings import (
     reconstruct,
     recorded_margins,
     recorded_schedule,
-    seat_changes,
-    share_by_cause,
     supports_of,
     timing_errors,
     touch_downs_of,
     with_mass,
 )
-from manikin.recordings.dynamics.plate_forces import JOINTS, UNSURE, compare_torques, plate_torques
+from manikin.recordings.dynamics.plate_forces import JOINTS, UNSURE, compare_torques
 from manikin.recordings.dynamics.recorded_dynamics import CUTOFF, TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
 from manikin.recordings.dynamics.recorded_margins import margins_of_wrenches
@@ -103,7 +101,7 @@ is fitted to the plates but the mass of the person; the cutoff at touch-downs wa
 `manikin analyze` measures the motion as recorded. *Shifted* is the whole body moved by the smooth path
 that is least and leaves the centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if
 none longer than {1e2 * LARGEST_SHIFT:.0f} cm along an axis is needed, and rather near the axis of a foot that
-carries alone (`manikin.recordings.least_shift`). Markers tell the place of a body to a centimetre; a
+carries alone (`manikin.recordings.least_shift`). Markers give the position of a body to a centimetre; a
 millimetre at 4 Hz moves the centre of pressure by 6 cm. The plates have no part in a shift, but the weight
 of a foot's axis ({1e2 * ASIDE:.0f} cm count as much as {1e3 * PLACE_ERROR:.0f} mm of shift)
 was chosen with them.
@@ -139,7 +137,7 @@ Torques of the legs by inverse dynamics from the motion alone, beside those with
 feet, both sides, while a foot is on a plate of its own: root mean square of the difference (*least, smooth,
 shifted*), and the largest magnitudes of the shifted motion and by plates [N.m]. Two feet that carry together
 can share the wrench in many ways. *Least*: forces of least squares; *smooth*: each foot is loaded and
-unloaded bit by bit (`manikin.recordings.dynamics.recorded_forces`), as `manikin analyze` measures;
+unloaded gradually (`manikin.recordings.dynamics.recorded_forces`), as `manikin analyze` measures;
 *shifted*: the same of the shifted motion.
 
 """
@@ -167,6 +165,138 @@ Seat-off and seat-on by the height of the buttocks, and by the plates under the 
 they carry a tenth of the body's weight less than the motion needs.
 
 """
+
+
+class Cause(StrEnum):
+    """What a margin that is not positive is put down to."""
+
+    CHANGE = "change of support"
+    """The stance before or after a change within a quarter of the cutoff's period admits the wrench."""
+    END = "end of the recording"
+    """Half of the cutoff's period from the first or the last frame, or less."""
+    FLIGHT = "flight"
+    """Nothing supports."""
+    UNTOLD = "untold trunk or arms"
+    """No marker tells where a third of the body, or its arms, are."""
+    MODEL = "model"
+    """None of these: the body's masses, the soles, the recording."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A frame whose margin is not positive.
+
+    Attributes:
+        frame: Its index.
+        time: On the clock of the stances [s].
+        margin: [N.m].
+        cause: What it is put down to.
+    """
+
+    frame: int
+    time: float
+    margin: float
+    cause: Cause
+
+
+def balance_losses(
+    margins: RecordedMargins, dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0,
+    neutral: Sequence[str] = (), cutoff: float = CUTOFF,
+) -> tuple[Loss, ...]:  # fmt: skip
+    """Every frame without a positive margin of the whole body, with its cause.
+
+    A low-pass spreads what happens at touch-down over a quarter of its period to either side, and supports
+    are known no better. A wrench that the stance before or after such a change admits is told from one that
+    no stance does; so are the ends of the recording, where derivatives look to one side only, and recordings
+    that say nothing about trunk or arms.
+
+    Args:
+        margins: Of the motion.
+        dynamics: The motion.
+        schedule: Its stances.
+        start: The schedule's clock at the motion's first instant [s].
+        neutral: Segments about which the recording says nothing.
+        cutoff: Of the low-pass of the postures [Hz].
+    """
+    times, near = dynamics.time + start, 0.25 / cutoff
+    untold = bool({"thorax", "left_upper_arm", "right_upper_arm"} & set(neutral))
+    before, after = schedule.phase_at(times - near), schedule.phase_at(times + near)
+    found = []
+    for frame in np.flatnonzero(margins.whole_body <= 0.0).tolist():
+        others = [margins.polytopes[k] for k in range(before[frame], after[frame] + 1)]
+        wrench = dynamics.wrench[frame]
+        if any(one is not None and one.margin(wrench_about(wrench, one.reference)) > 0.0 for one in others):
+            cause = Cause.CHANGE
+        elif margins.polytopes[int(margins.phase[frame])] is None:
+            cause = Cause.FLIGHT
+        elif min(times[frame] - times[0], times[-1] - times[frame]) <= 2.0 * near:
+            cause = Cause.END
+        else:
+            cause = Cause.UNTOLD if untold else Cause.MODEL
+        found.append(Loss(frame, float(times[frame]), float(margins.whole_body[frame]), cause))
+    return tuple(found)
+
+
+def share_by_cause(losses: Sequence[Loss], frames: int) -> dict[Cause, float]:
+    """Share of all frames that each cause takes."""
+    counts = Counter(loss.cause for loss in losses)
+    return {cause: counts[cause] / frames for cause in Cause}
+
+
+LOADED = 0.1
+"""Share of the body's weight from which a seat is loaded."""
+
+LOOK = 0.5
+"""Time about a change of the supports within which the load's own is looked for [s]."""
+
+
+@dataclass(frozen=True)
+class SeatChange:
+    """A seat-off or a seat-on, extracted from the motion and seen by the plates.
+
+    Attributes:
+        event: ``"seat-off"`` or ``"seat-on"``.
+        time: That of the plates [s].
+        error: Extracted minus plates [s].
+    """
+
+    event: str
+    time: float
+    error: float
+
+
+def seat_load(dynamics: RecordedDynamics, feet: PlateForces) -> FloatArray:
+    """(n,) what of the vertical force the feet's plates do not carry, per body weight."""
+    return (dynamics.vertical_force - feet.wrench[:, 2]) / (GRAVITY * dynamics.body.mass)
+
+
+def seat_changes(
+    seats: Sequence[Support], times: FloatArray, dynamics: RecordedDynamics, feet: PlateForces
+) -> tuple[SeatChange, ...]:
+    """Changes of extracted seats beside those of the load that the feet do not carry.
+
+    Those that are not seen during the recording, or near which the load does not pass :data:`LOADED`, are
+    left out; of several passages the nearest counts.
+
+    Args:
+        seats: Supports of the seat.
+        times: (n,) instants of the motion on the clock of the supports [s].
+        dynamics: The motion, with the person's mass.
+        feet: Forces under both feet.
+    """
+    load = seat_load(dynamics, feet) > LOADED
+    passages = {"seat-on": np.flatnonzero(~load[:-1] & load[1:]) + 1}
+    passages["seat-off"] = np.flatnonzero(load[:-1] & ~load[1:]) + 1
+    found = []
+    for seat in seats:
+        for event, instant, seen in (
+            ("seat-on", seat.start, seat.start_seen), ("seat-off", seat.end, seat.end_seen)
+        ):  # fmt: skip
+            there = times[passages[event]]
+            if seen and len(there) and np.abs(there - instant).min() < LOOK:
+                nearest = float(there[np.argmin(np.abs(there - instant))])
+                found.append(SeatChange(event, nearest, instant - nearest))
+    return tuple(sorted(found, key=lambda change: change.time))
 
 
 @dataclass(frozen=True, eq=False)
@@ -402,7 +532,8 @@ def torque_text(trials: list[Trial]) -> str:
 def torque_figure(one: Trial) -> None:
     """Torques of the legs beside those by plates."""
     assert one.measured is not None
-    theirs, least = plate_torques(one.dynamics, one.measured), with_least_forces(one)
+    theirs = torques_of(one.dynamics, one.measured.effectors, one.measured.of_effector)
+    least = with_least_forces(one)
     names = one.motion.joint_names
     figure = Figure(figsize=(9.0, 6.6), layout="constrained")
     rows = figure.subplots(3, 2, sharex=True, sharey="row")

@@ -48,16 +48,17 @@ the side. Whether feet stand on toes, and up to when [s]."""
 SHOWN = WALKS[1]
 """The walk of the figures and of the table of phases."""
 
-TEXT = """# Recorded motions planned anew
+TEXT = """# Recorded motions re-planned
 
 What people did, on the very stances they did it on, planned by both methods of Qiu (2012, chapter 5) and
 executed by our controller in the physics engine. By `docs/replanning.py`; in Python:
 
 ```text
-from manikin.analysis.adaptation import against_recording, replan
-result = replan(found, supports, method="keyframes", execute=True)   # of manikin.recordings
+from manikin.analysis.adaptation import adapt_recording
+from manikin.reports.analysis_directory import compare_with_recording
+result = adapt_recording(found, supports, method="keyframes", execute=True)  # of manikin.recordings
 result.as_dict(), result.planned, result.executed, result.schedule
-against_recording(result).as_dict()                                  # timing, centre of mass, margins
+compare_with_recording(result).as_dict()                             # timing, centre of mass, margins
 ```
 
 ## The key frame method (5.3)
@@ -65,7 +66,7 @@ against_recording(result).as_dict()                                  # timing, c
 The thesis passes the recorded CoM exactly at every change of support and adds recorded positions as key
 frames where balance is lost in between. *Exact* says what that comes to on each walk, whole soles, margin ≥
 0 all along. A walk's double supports last a tenth of a second: a centimetre of error in a CoM that is fixed
-there asks for accelerations that no foot can give, and a further fixed position makes it worse. So
+there needs accelerations that no foot can give, and a further fixed position makes it worse. So
 `plan_com_near_key_frames` lets the key frames pull, imposes balance every 10 ms (the wrench, bilinear,
 linearised about the last solution), measures it every millisecond, and adds the sample that is farthest off
 as one more key frame where the plan strays by more than 1 cm. Feet stand on their whole soles, or on their
@@ -92,7 +93,7 @@ The recorded postures are adapted to that CoM, its angular momentum and the exac
 (postures and accelerations near the recorded ones, feet, CoM, distances), and the controller executes the
 result at the recorded speed from the first frame to the last, or one step before it where it would be
 stopped dead. *Posture*: root mean square deviation of all hinges from the recording, without the toes,
-which no marker tells. *Torque*: largest share of a joint's strength in the plan. *Balanced*: share of the
+which no marker shows. *Torque*: largest share of a joint's strength in the plan. *Balanced*: share of the
 control steps with a positive margin of the measured contact forces. CoM and feet: errors from the plan.
 
 """

@@ -46,7 +46,7 @@ LOADED = 0.3
 
 TEXT = f"""# Recorded runs
 
-When a runner's feet carry is told twice: by the feet, and by the force that the motion of the whole body
+When a runner's feet carry is measured twice: by the feet, and by the force that the motion of the whole body
 needs, for in flight the centre of mass falls with gravity. By `docs/runs.py`.
 
 `supports_of` takes both. The feet, low-passed at 5 Hz, say which foot, and when in a walk. The vertical
@@ -99,9 +99,9 @@ At 120 frames per second higher cutoffs take force out of flights, most of it at
 at both fewer frames are in balance as recorded, and none more once shifted. So the rule of walks stays:
 5 Hz, and 8 Hz at touch-downs.
 
-## What is not told
+## What is not known
 
-* *Forefeet*: a runner whose heel never lands has only the ball of the foot to push with. Skeletons tell the
+* *Forefeet*: a runner whose heel never lands has only the ball of the foot to push with. Skeletons give the
   tilt of a sole no better than to 0.2 of its length, with opposite signs for the two feet in some runs, and
   a run has no flat stance to learn it from. So every stance has the whole sole, and margins of runners on
   their toes come out too large.

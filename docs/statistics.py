@@ -126,7 +126,7 @@ the lowest point, 1 the first behind it.
 
 """
 PLACES_SEEN = """
-Who ducks at a run has supports spread several times as far along the way as across, and far more than the
+A runner who ducks has supports spread several times as far along the way as across, and far more than the
 thesis' "small dispersion": its person began at given places and always passed the same beam.
 
 ![Places of the supports](images/statistics_placements.png)
@@ -174,8 +174,8 @@ WEAK = """
 """
 WEAK_END = """
   The jumps fall as they should.
-* Who moves on while low for another reason, such as landing from a jump, is taken to pass a bar: its place is
-  not known. A box has one.
+* A person who moves on while low for another reason, such as landing from a jump, is taken to pass a bar: its
+  place is not known. A box has one.
 * Two touch-downs within {shortest:g} s make a phase that no one saw; it counts in durations and not in
   sequences.
 * The lengths of the trunk come from the most upright frames of all clips of a skeleton; the top of the head

@@ -91,7 +91,7 @@ ERRORS = {
 
 TEXT = """# Supports of recorded people
 
-Which of feet, hands, knees, elbows and trunk carry a recorded person, when and where, told from positions
+Which of feet, hands, knees, elbows and trunk carry a recorded person, when and where, found from positions
 alone (`supports_of`). By `docs/supports.py`.
 
 * Positions of effectors of the reconstructed body, low-passed at 5 Hz (Butterworth, second order, forward
@@ -102,11 +102,11 @@ alone (`supports_of`). By `docs/supports.py`.
   other without a gap of 3 cm. A foot of which even the
   slowest point gets faster than 0.6 m/s steps. A support lasts at least 0.08 s, or 0.04 s where the recording
   cuts it.
-* **Seat**: who is still and low with the centre of mass beside the feet sits.
+* **Seat**: a person who is still and low with the centre of mass beside the feet sits.
 * **Hands**: a palm that rests on the ground; on the seat while it is taken or left; or elsewhere, where
   the shoulder moves by more than 12 cm while the palm stays (less than 0.45 of that, for more than 0.25
   s) and is more than 30 cm away from the own hips and knees. Hands that hang, lie on a knee or carry a
-  box are none. Where such a hand takes part of the weight or only touches is not told by positions.
+  box are none. Where such a hand takes part of the weight or only touches does not show in positions.
 * **Sliding**: hands, knees and elbows slide without leaving by up to 15 cm between two times below 0.2 m/s,
   at less than 0.6 m/s; half of the time a hand off the ground is slower than 0.4 m/s.
 * **Knees and elbows**: near the surface under the feet, with the body's thickness; **pelvis**, for the
@@ -140,13 +140,13 @@ AFTER = """
 What is wrong has three causes:
 
 * **Fast and short.** Filters spread events: whether there is a flight of less than 0.06 s in a crouched run
-  is told neither by the feet nor by the acceleration of the centre of mass; at 30 Hz of ACCAD a frame is 33
+  shows neither in the feet nor in the acceleration of the centre of mass; at 30 Hz of ACCAD a frame is 33
   ms. What begins in the last 0.05 s of a recording is missed.
 * **Small steps.** A foot that turns on the spot has a point that hardly moves, loaded or not; the tips of
   toes that slide at 0.4 m/s may carry.
 * **Crawling low.** Limbs of the model are thinner than flesh, toes are not recorded and the recorded floor
   drifts by up to 0.1 m. Hands and knees come out right; feet, which drag, do not. Of the trunk only the
-  pelvis is reported: chest and head are not told apart.
+  pelvis is reported: chest and head are not distinguished.
 
 The thresholds were chosen on these clips. What guards against choosing too well: the plates above, the walks
 and runs below, and the rule that what a cut of the recording shortens counts from 0.04 s on, which was

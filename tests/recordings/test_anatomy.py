@@ -9,10 +9,19 @@ import pytest
 from manikin.body import human
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.recordings import anatomy_of, ball_joint_angles, read_bvh, read_recording
+from manikin.recordings import read_bvh, read_recording
 from manikin.reports.export import to_bvh
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def script():
+    """The script ``docs/ranges_of_motion.py``."""
+    spec = importlib.util.spec_from_file_location("ranges_of_motion", ROOT / "docs/ranges_of_motion.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def ours(body, postures, file):
@@ -28,7 +37,7 @@ def ours(body, postures, file):
     return read_bvh(file)
 
 
-def test_our_own_angles_come_back(tmp_path):
+def test_our_own_angles_come_back(script, tmp_path):
     """Hips and shoulders of random postures of our body, through a file, to its digits.
 
     Near the singular ends of the second angle the others are not told; those are left out.
@@ -41,8 +50,8 @@ def test_our_own_angles_come_back(tmp_path):
     q[:, 3:7] = rng.standard_normal((40, 4))
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1)[:, None]
     recording = ours(body, q, tmp_path / "ours.bvh")
-    anatomy = anatomy_of([recording])
-    for name, angles in ball_joint_angles(recording, anatomy).items():
+    anatomy = script.anatomy_of([recording])
+    for name, angles in script.ball_joint_angles(recording, anatomy).items():
         slots = [7 + body.joint_index(hinge.name) for hinge in body.segment(name).hinges]
         clear = np.abs(q[:, slots[1]]) < np.deg2rad(80.0)
         np.testing.assert_allclose(angles[clear], q[clear][:, slots], atol=1e-5)
@@ -50,7 +59,7 @@ def test_our_own_angles_come_back(tmp_path):
     np.testing.assert_allclose(bend, q[:, 7 + body.joint_index("left_knee_flexion")], atol=1e-6)
 
 
-def test_an_upright_recording_replaces_the_rest_pose(tmp_path):
+def test_an_upright_recording_replaces_the_rest_pose(script, tmp_path):
     """A pelvis and thorax that are upright in the recording and tilted in the rest pose."""
     body = human()
     bent = body.posture(
@@ -58,38 +67,29 @@ def test_an_upright_recording_replaces_the_rest_pose(tmp_path):
     )
     recording = ours(body, [bent] * 12, tmp_path / "ours.bvh")
     np.testing.assert_allclose(
-        anatomy_of([recording], recording.cut(0, 1)).axes["pelvis"], np.eye(3), atol=1e-7
+        script.anatomy_of([recording], recording.cut(0, 1)).axes["pelvis"], np.eye(3), atol=1e-7
     )
     tilted = bent.copy()
     tilted[3:7] = [0.0, np.sin(0.1), 0.0, np.cos(0.1)]
     leaning = ours(body, [tilted], tmp_path / "leaning.bvh")
-    turn = anatomy_of([recording], leaning).axes["pelvis"]
+    turn = script.anatomy_of([recording], leaning).axes["pelvis"]
     assert np.degrees(np.arccos(turn[2, 2])) == pytest.approx(np.degrees(0.2), abs=1e-4)
 
 
-def test_what_anatomy_needs_is_said(tmp_path, bvh_file):
+def test_what_anatomy_needs_is_said(script, tmp_path, bvh_file):
     body = human()
     straight = ours(body, [body.zero_posture()] * 12, tmp_path / "straight.bvh")
     with pytest.raises(InputError, match="bent in 0 frames"):
-        anatomy_of([straight])
+        script.anatomy_of([straight])
     with pytest.raises(InputError, match="no joint for 'pelvis'"):
-        anatomy_of([read_bvh(bvh_file, 0.01)])
+        script.anatomy_of([read_bvh(bvh_file, 0.01)])
     with pytest.raises(InputError, match="other joints"):
-        anatomy_of([straight, read_bvh(bvh_file, 0.01)])
+        script.anatomy_of([straight, read_bvh(bvh_file, 0.01)])
     with pytest.raises(InputError, match="no recording"):
-        anatomy_of([])
+        script.anatomy_of([])
 
 
 # --- real recordings -----------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="session")
-def script():
-    """The script ``docs/ranges_of_motion.py``."""
-    spec = importlib.util.spec_from_file_location("ranges_of_motion", ROOT / "docs/ranges_of_motion.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="session")
@@ -133,12 +133,12 @@ def test_shipped_volumes_are_what_the_script_makes(script, clips):
         np.testing.assert_allclose(human_volumes()[part].origin, volume.origin, atol=1e-9)
 
 
-def test_a_standing_person_has_hips_and_shoulders_near_zero(recordings_folder):
+def test_a_standing_person_has_hips_and_shoulders_near_zero(script, recordings_folder):
     """Of the recorded axes: within 25 degrees while standing at ease, arms hanging."""
     folder = recordings_folder / "accad_male1_bvh"
     stand = read_recording(folder / "Male1_A1_Stand.bvh")
-    anatomy = anatomy_of(
+    anatomy = script.anatomy_of(
         [read_recording(folder / "Male1_B3_Walk.bvh"), read_recording(folder / "Male1_A7_Crouch.bvh")], stand
     )
-    for name, angles in ball_joint_angles(stand, anatomy).items():
+    for name, angles in script.ball_joint_angles(stand, anatomy).items():
         assert np.abs(np.rad2deg(angles.mean(axis=0))).max() < 25.0, name

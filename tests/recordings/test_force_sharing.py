@@ -13,7 +13,7 @@ from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import wrench_about
-from manikin.recordings.dynamics.plate_forces import compare_torques, plate_forces, plate_torques
+from manikin.recordings.dynamics.plate_forces import compare_torques, plate_forces
 from manikin.recordings.dynamics.recorded_dynamics import dynamics_of
 from manikin.recordings.dynamics.recorded_forces import (
     LEVER,
@@ -22,6 +22,7 @@ from manikin.recordings.dynamics.recorded_forces import (
     motion_on_contacts,
     shared_wrenches,
     smooth_shares,
+    torques_of,
 )
 from manikin.recordings.readers.markers import ForcePlate
 from manikin.recordings.reconstruction.proportions import Reconstruction
@@ -197,8 +198,9 @@ def test_plates_that_feel_our_shares_give_our_torques():
     measured = plate_forces(plates, dynamics.time, schedule, cutoff=60.0)
     assert measured.apart.all()
     np.testing.assert_allclose(measured.of_effector.sum(axis=1), measured.wrench)
+    by_plates = torques_of(dynamics, measured.effectors, measured.of_effector)
     # A plate tells nothing below 20 N, and takes the mean of that for its offset: newtons at a leg's length.
-    np.testing.assert_allclose(plate_torques(dynamics, measured)[:, 6:], motion.tau[:, 6:], atol=2.0)
+    np.testing.assert_allclose(by_plates[:, 6:], motion.tau[:, 6:], atol=2.0)
     shown = {one.joint: one for one in compare_torques(dynamics, motion, measured)}
     assert set(shown) == {"hip_flexion", "hip_abduction", "knee_flexion", "ankle_dorsiflexion"}
     assert shown["hip_abduction"].frames == 301 + 201  # left all the time, right in two of three seconds

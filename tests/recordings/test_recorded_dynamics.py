@@ -1,6 +1,9 @@
 """Wrenches, forces, torques and margins of motions that are known, and of real ones beside force plates."""
 
+import importlib.util
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,10 +21,8 @@ from manikin.errors import BodyError
 from manikin.kinematics import PointTargets
 from manikin.numerics.spatial import GRAVITY, wrench_about
 from manikin.recordings import (
-    Cause,
     ForcePlate,
     Reconstruction,
-    balance_losses,
     compare_with_plates,
     dynamics_of,
     least_shift,
@@ -32,8 +33,6 @@ from manikin.recordings import (
     reconstruct,
     recorded_margins,
     recorded_schedule,
-    seat_changes,
-    share_by_cause,
     supports_of,
     touch_downs_of,
     with_mass,
@@ -179,7 +178,17 @@ def test_margins_are_those_of_the_polytope(swinging, dynamics):
     assert limiting.margin == pytest.approx(margins.whole_body.min())
 
 
-def test_in_flight_nothing_holds(swinging, dynamics):
+@pytest.fixture(scope="module")
+def script():
+    """The script ``docs/recorded_balance.py``."""
+    path = Path(__file__).resolve().parents[2] / "docs" / "recorded_balance.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = sys.modules[path.stem] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_in_flight_nothing_holds(script, swinging, dynamics):
     schedule = on_feet(swinging, until=2.0)
     margins = recorded_margins(dynamics, schedule)
     flying = margins.phase == 1
@@ -190,23 +199,24 @@ def test_in_flight_nothing_holds(swinging, dynamics):
     motion = motion_on_contacts(dynamics, schedule)
     assert not motion.contact_force[flying].any()
     assert not motion.tau[:, :6].any()
-    losses = balance_losses(margins, dynamics, schedule, cutoff=5.0)
+    losses = script.balance_losses(margins, dynamics, schedule, cutoff=5.0)
     # For a quarter of 0.2 s the stance before the change still admits the wrench; the rest is flight.
-    shares = share_by_cause(losses, FRAMES)
-    frames = [FRAMES * shares[cause] for cause in Cause]
+    shares = script.share_by_cause(losses, FRAMES)
+    frames = [FRAMES * shares[cause] for cause in script.Cause]
     assert frames == pytest.approx([6, 0, 95, 0, 0], abs=1.1)
-    assert losses[0].cause is Cause.CHANGE
+    assert losses[0].cause is script.Cause.CHANGE
     assert losses[0].time == pytest.approx(2.0)
 
 
-def test_a_wrench_out_of_reach_is_put_down_to_the_model_or_to_what_is_not_told(swinging):
+def test_a_wrench_out_of_reach_is_put_down_to_the_model_or_to_what_is_not_told(script, swinging):
     far = replace(swinging, q=swinging.q + np.eye(1, swinging.body.nq)[0])
     gone = dynamics_of(far)
     schedule = on_feet(swinging)
     margins = recorded_margins(gone, schedule)
     assert (margins.whole_body < 0.0).all()
-    assert balance_losses(margins, gone, schedule)[150].cause is Cause.MODEL
-    assert balance_losses(margins, gone, schedule, neutral=("thorax",))[150].cause is Cause.UNTOLD
+    assert script.balance_losses(margins, gone, schedule)[150].cause is script.Cause.MODEL
+    without_trunk = script.balance_losses(margins, gone, schedule, neutral=("thorax",))
+    assert without_trunk[150].cause is script.Cause.UNTOLD
 
 
 def plate_of(dynamics, share=1.0, corners=None):
@@ -241,13 +251,13 @@ def test_a_foot_beside_the_plate_is_not_covered(swinging, dynamics):
     assert compare_with_plates(dynamics, margins, measured) is None
 
 
-def test_a_seat_is_loaded_while_the_feet_lack_weight(dynamics, swinging):
+def test_a_seat_is_loaded_while_the_feet_lack_weight(script, dynamics, swinging):
     wrenches = np.array(dynamics.wrench)
     wrenches[100:200] *= 0.3
     plate = ForcePlate("floor", wrenches, np.zeros(3), RATE)
     feet = plate_forces([plate], TIME, on_feet(swinging), cutoff=45.0)
     seat = Support("buttocks", 1.05, 1.98, *(np.zeros(3),) * 3, True, True)
-    on, off = seat_changes([seat], TIME, dynamics, feet)
+    on, off = script.seat_changes([seat], TIME, dynamics, feet)
     assert (on.event, off.event) == ("seat-on", "seat-off")
     assert (on.time, off.time) == pytest.approx((1.0, 2.0), abs=0.02)
     assert (on.error, off.error) == pytest.approx((0.05, -0.02), abs=0.02)
@@ -314,7 +324,7 @@ def analysed(path, frames=None):
         ("opensim_core/walking5.c3d", 66.0, 0.030, 0.89, 0.005),
     ],
 )
-def test_walks_agree_with_force_plates(recordings_folder, file, mass, cop, positive, shift):
+def test_walks_agree_with_force_plates(script, recordings_folder, file, mass, cop, positive, shift):
     pytest.importorskip("ezc3d")
     found, supports, schedule, dynamics, measured = analysed(recordings_folder / "grf" / file)
     assert dynamics.body.mass == pytest.approx(mass, abs=0.5)
@@ -332,14 +342,14 @@ def test_walks_agree_with_force_plates(recordings_folder, file, mass, cop, posit
     assert closer.cop_rms < cop
     assert np.mean(nearest.margins.whole_body > 0.0) > 0.97
     assert nearest.rms < shift
-    losses = balance_losses(nearest.margins, nearest.dynamics, schedule, supports.start, found.neutral)
-    assert {loss.cause for loss in losses} <= {Cause.CHANGE, Cause.END}
+    losses = script.balance_losses(nearest.margins, nearest.dynamics, schedule, supports.start, found.neutral)
+    assert {loss.cause for loss in losses} <= {script.Cause.CHANGE, script.Cause.END}
 
 
-def test_rising_from_a_seat_is_seen_by_the_plates_at_the_same_time(recordings_folder):
+def test_rising_from_a_seat_is_seen_by_the_plates_at_the_same_time(script, recordings_folder):
     path = recordings_folder / "grf" / "nimble_opencap_s4" / "STS1.trc"
     _, supports, schedule, dynamics, measured = analysed(path, (0, 330))
-    changes = seat_changes(supports.of("buttocks"), dynamics.time, dynamics, measured)
+    changes = script.seat_changes(supports.of("buttocks"), dynamics.time, dynamics, measured)
     assert [change.event for change in changes] == ["seat-off", "seat-on"]
     assert max(abs(change.error) for change in changes) < 0.1
     margins = recorded_margins(dynamics, schedule, supports.start)

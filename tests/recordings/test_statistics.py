@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib import resources
 from itertools import pairwise
 
 import numpy as np
@@ -30,7 +31,6 @@ from manikin.recordings import (
     phase_durations,
     published_consistency,
     published_distances,
-    published_grasps,
     published_heights,
     published_phases,
     published_statistics,
@@ -145,7 +145,9 @@ def test_key_frames_of_the_example_are_those_listed():
     example = next(one for one in published_phases() if one.name == "01_TR_H1C1S2_1")
     frames = [round(100 * phase.start) for phase in example.phases] + [round(100 * example.phases[-1].end)]
     assert frames == [1, 158, 209, 222, 285, 296, 346, 372]
-    grasps = published_grasps()
+    file = resources.files("manikin.recordings") / "data" / "qiu_2012_chapter_3.json"
+    data = json.loads(file.read_text(encoding="utf-8"))
+    grasps = {name: grasp[0] * data["frame_s"] for name, _, *grasp in data["table_3_4"] if grasp}
     assert grasps["01_TR_H1C1S2_1"] == pytest.approx(2.40)
     assert len(grasps) == 10
     for one in published_phases():
@@ -254,7 +256,6 @@ def test_mirror_images_are_counted_as_one():
     assert (found.motions, found.modal_share, found.mirrored_share) == (4, 0.5, 0.75)
     assert found.first_steps == {"left_foot": 3, "right_foot": 1}  # of two at once the left one is named
     assert mirror_image(found.modal) == tuple(frozenset(one) for one in (BOTH, LEFT, BOTH))
-    assert found.first_step_share == 0.75
     assert sequence_consistency([]).modal_share == 0.0
 
 

@@ -1,8 +1,4 @@
-"""What was measured of one recording.
-
-Also here. What a reader of an analysis must know before believing it. A recorded motion beside the force
-plates under it. A recorded motion as it is, and beside it the nearest one that its contacts can carry.
-"""
+"""Results of the analysis of one recording: motions, margins, force plates, remarks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -45,7 +41,7 @@ SLOW_RATE = 50.0
 """Below this rate instants of supports are as coarse as the frames [Hz]."""
 
 LONG_FLIGHT = 0.5
-"""Nobody is without support for longer [s]."""
+"""A flight longer than this means a contact that was not recorded [s]."""
 
 OTHER_MASS = 0.03
 """Share by which the mass of a person is not that on the plates."""
@@ -55,7 +51,6 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
     """Reasons to doubt the numbers, a line each.
 
     Args:
-        analysis: Whose numbers.
         recording: What they were measured on.
     """
     found, supports, lines = analysis.found, analysis.supports, []
@@ -106,11 +101,9 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMotion:
-    """A motion as recorded, which is what is measured, and shifted onto its contacts, beside it.
+    """A motion as recorded and smoothed, and the nearest one that its contacts can carry.
 
     Attributes:
-        recorded: Smoothed, as recorded.
-        recorded_margins: Of it.
         shifted: The motion nearest to it that its contacts can carry, whether that one is to be believed or
             not; None if none was looked for.
     """
@@ -150,31 +143,27 @@ class MeasuredMotion:
             return None
         margin, held, at_floor = shifted.margins.whole_body, shifted.margins.held, shifted.at_floor
         lowest, is_floor = self.lowest_shifted()
-        there = margin[at_floor]
+        imposed = margin[at_floor]
         return {
-            "believed": shifted.believable,
-            "share_positive": float(np.mean(margin > 0.0)),
-            "share_positive_in_contact": shifted.margins.balanced,
-            "rms_m": shifted.rms,
-            "max_m": float(shifted.size.max()),
-            "floor_m": shifted.floor_length,
+            "believed": shifted.believable, "share_positive": float(np.mean(margin > 0.0)),
+            "share_positive_in_contact": shifted.margins.balanced, "rms_m": shifted.rms,
+            "max_m": float(shifted.size.max()), "floor_m": shifted.floor_length,
             "floor_Nm": shifted.floor,
-            "margin_at_floor_Nm": float(np.median(there)) if there.size else None,
+            "margin_at_floor_Nm": float(np.median(imposed)) if imposed.size else None,
             "share_at_floor_in_contact": float(np.mean(at_floor[held])) if held.any() else None,
-            "min_at_floor": is_floor,
-            "min": lowest,
-        }
+            "min_at_floor": is_floor, "min": lowest,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class PlateReport:
-    """What plates say of a motion, and how far the motion is from it.
+    """Forces by plates, and the errors of a motion against them.
 
     Attributes:
         vertical_force: (n,) of all plates together [N].
         cop: (n, 2) their centre of pressure [m]; NaN while they are not loaded.
-        compared: (n,) whether every support is on a plate, so that the plates tell all there is.
-        mass: Of the person, by them [kg]; None where they cannot tell.
+        compared: (n,) whether every support is on a plate, so that the plates measure the whole force.
+        mass: Of the person, by them [kg]; None where it is not known.
         timing: Touch-downs and lift-offs beside those of the plates.
         forces: Errors of forces and centres of pressure of the motion as recorded; None where no foot alone
             was on a plate.
@@ -198,8 +187,7 @@ class PlateReport:
         forces = self.forces
         errors = [abs(one.error) for one in self.timing]
         return {
-            "mass_kg": self.mass,
-            "events": len(errors),
+            "mass_kg": self.mass, "events": len(errors),
             "timing_median_s": float(np.median(errors)) if errors else None,
             "timing_max_s": float(np.max(errors)) if errors else None,
             "vertical_rms_body_weight": None if forces is None else forces.vertical_rms,
@@ -209,9 +197,8 @@ class PlateReport:
             "frames": int(self.compared.sum()),
             "single_support_frames": None if forces is None else forces.single_frames,
             "margin_share_positive": None if forces is None else forces.margin_share,
-            "torques": _torques(self.torques),
-            "torques_shifted": _torques(self.shifted_torques),
-        }
+            "torques": _torques(self.torques), "torques_shifted": _torques(self.shifted_torques),
+        }  # fmt: skip
 
 
 def _torques(compared: Sequence[TorqueComparison]) -> dict[str, dict[str, float]]:
@@ -231,7 +218,7 @@ def _torques(compared: Sequence[TorqueComparison]) -> dict[str, dict[str, float]
 def measured_mass(
     plates: Sequence[ForcePlate], dynamics: RecordedDynamics, schedule: ContactSchedule, start: float
 ) -> float | None:
-    """Mass by the plates [kg]; None where there are none, or they cannot tell.
+    """Mass by the plates [kg]; None without plates or too short on them.
 
     Args:
         plates: On the clock of the schedule.
@@ -247,11 +234,10 @@ def plate_report(
     plates: Sequence[ForcePlate], supports: RecordedSupports, schedule: ContactSchedule,
     measured: MeasuredMotion, motions: tuple[Motion, Motion | None], mass: float | None,
 ) -> PlateReport:  # fmt: skip
-    """Hold a motion against the plates under it.
+    """Compare a motion with the plates under it.
 
     Args:
         plates: At least one, on the clock of the supports.
-        supports: Of the motion.
         measured: The motion, with the person's mass.
         motions: As recorded, and shifted where that is to be believed, with forces and torques.
         mass: Of the person, by the plates [kg].
@@ -279,11 +265,10 @@ WHOLE_BODY = "whole-body"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Analysis(Displayed):
-    """A recorded motion under the yardsticks of planned ones; instants are on the recording's clock [s].
+    """Measures of a recorded motion, as of planned ones; instants are on the recording's clock [s].
 
     Attributes:
         name: What to call it.
-        source: The file.
         rate: Frames per second [Hz].
         sex: Table of segment masses that was used.
         found: Reconstruction, not smoothed.
@@ -295,7 +280,7 @@ class Analysis(Displayed):
         measured: The motion as recorded, and shifted, with the margins of both.
         limiting: What limits the lowest margin; None if no margin is known.
         cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
-        segments: Holonomic and nonholonomic stretches; None where nobody walks upright.
+        segments: Holonomic and nonholonomic stretches; None without an upright walk.
         ergonomics: Scores, torques against strength, effort; its time is that of the motion.
         plates: Comparison with force plates; None without plates.
         remarks: What a reader must know, a line each.
@@ -357,7 +342,7 @@ class Analysis(Displayed):
         return (self.time >= phase.start - 1e-9) & (self.time < phase.end - 1e-9)
 
     def lowest_margin(self, phase: SupportPhase) -> float | None:
-        """Of the motion as recorded in a phase [N.m]; None where none is known."""
+        """Lowest margin of the motion as recorded in a phase [N.m]; None where none is known."""
         known = self.motion.margin[self.frames_of(phase) & np.isfinite(self.motion.margin)]
         return float(known.min()) if known.size else None
 
@@ -403,15 +388,10 @@ class Analysis(Displayed):
         lowest = int(np.argmin(self.com_height))
         supports = self.supports
         return {
-            "name": self.name,
-            "file": self.source,
-            "duration_s": float(self.time[-1] - self.time[0]),
-            "frames": len(self.time),
-            "rate_hz": self.rate,
-            "stature_m": self.body.stature,
-            "mass_kg": self.body.own_mass,
-            "load_kg": sum(self.body.loads.values()),
-            "sex": self.sex,
+            "name": self.name, "file": self.source,
+            "duration_s": float(self.time[-1] - self.time[0]), "frames": len(self.time), "rate_hz": self.rate,
+            "stature_m": self.body.stature, "mass_kg": self.body.own_mass,
+            "load_kg": sum(self.body.loads.values()), "sex": self.sex,
             "supports": [
                 {
                     "effector": one.effector, "start_s": one.start, "end_s": one.end,
@@ -419,8 +399,7 @@ class Analysis(Displayed):
                 }
                 for one in supports.supports
             ],
-            "surfaces_m": list(supports.surfaces),
-            "sequence": list(supports.sequence),
+            "surfaces_m": list(supports.surfaces), "sequence": list(supports.sequence),
             "key_frames_s": list(supports.key_frames),
             "phases": [self._phase(one) for one in supports.phases],
             "phase_durations_s": [one.duration for one in supports.phases],
@@ -449,34 +428,30 @@ class Analysis(Displayed):
 
     def _margin(self) -> dict[str, Any]:
         margin = self.motion.margin
-        known, lowest = np.isfinite(margin), None
-        if known.any():
-            lowest = int(np.nanargmin(margin))
-        body, held = self.measured.recorded_margins.body, self.measured.recorded_margins.held
+        known = np.isfinite(margin)
+        lowest = int(np.nanargmin(margin)) if known.any() else None
+        recorded = self.measured.recorded_margins
+        body, held = recorded.body, recorded.held
         points = self.point_mass_margin[np.isfinite(self.point_mass_margin)]
         return {
-            "form": WHOLE_BODY,
-            "motion": "recorded",
-            "unit": self.motion.margin_unit,
+            "form": WHOLE_BODY, "motion": "recorded", "unit": self.motion.margin_unit,
             "min": None if lowest is None else float(margin[lowest]),
             "at_s": None if lowest is None else float(self.time[lowest]),
             "share_positive": float(np.mean(margin[known] > 0.0)) if known.any() else None,
             "limiting": None if self.limiting is None else self.limiting.description,
             "limiting_contact": None if self.limiting is None else self.limiting.effector,
-            "share_known": float(np.mean(known)),
-            "share_in_contact": float(np.mean(held)),
-            "share_positive_in_contact": self.measured.recorded_margins.balanced,
+            "share_known": float(np.mean(known)), "share_in_contact": float(np.mean(held)),
+            "share_positive_in_contact": recorded.balanced,
             "recorded": {
-                "share_positive": float(np.mean(self.measured.recorded_margins.whole_body > 0.0)),
-                "share_positive_in_contact": self.measured.recorded_margins.balanced,
-                "min": float(self.measured.recorded_margins.whole_body.min()),
+                "share_positive": float(np.mean(recorded.whole_body > 0.0)),
+                "share_positive_in_contact": recorded.balanced, "min": float(recorded.whole_body.min()),
             },
             "shifted": self.measured.shifted_dict(),
             "force_min_N": float(body.force[held].min()) if held.any() else None,
             "zmp_distance_min_m": body.min_zmp_distance,
             "point_mass_min": float(points.min()) if points.size else None,
             "point_mass_share_positive": float(np.mean(points > 0.0)) if points.size else None,
-        }
+        }  # fmt: skip
 
 
 def _later(numbers: Any, start: float) -> Any:

@@ -1,8 +1,4 @@
-"""A recording measured from beginning to end.
-
-Also here. Holonomic and nonholonomic stretches of a reconstructed person's walk. One file among several that
-are measured, and what came of it. Files of recordings among files and folders.
-"""
+"""Analysis of recordings: from a file, or several, to all that is measured of the person."""
 
 import time as clock
 from collections.abc import Iterable
@@ -51,13 +47,13 @@ SHOULDERS = ("left_upper_arm", "right_upper_arm")
 """Segments that begin at the shoulders."""
 
 UPRIGHT = 0.5
-"""Height of the shoulders above the pelvis, per that in standing, below which nobody walks."""
+"""Height of the shoulders above the pelvis, per that in standing, below which no walk is segmented."""
 
 
 def walked_segments(found: Reconstruction) -> PathSegments | None:
-    """Function 1 on the shoulders of the reconstructed body (:mod:`manikin.walking.segments.segmentation`).
+    """Holonomic and nonholonomic stretches of a walk, by the shoulders ([Truong2010]_ function 1).
 
-    None where the trunk ever lies or is bent so far that the shoulders no longer say where the body looks.
+    None where the trunk ever lies or is bent so far that the shoulders do not give the heading.
 
     Args:
         found: At least three instants at an even rate.
@@ -93,7 +89,6 @@ class AnalysisJob:
     """One file to measure.
 
     Attributes:
-        path: The recording.
         directory: For its files; None to write none.
         draw: Whether the report has its figure.
     """
@@ -105,10 +100,9 @@ class AnalysisJob:
 
 @dataclass(frozen=True)
 class AnalysisEntry:
-    """What came of one file.
+    """Result of one file.
 
     Attributes:
-        job: The file.
         summary: As :meth:`manikin.analysis.Analysis.as_dict`; None where it was refused.
         refusal: Why, in one line.
     """
@@ -148,12 +142,12 @@ def recordings_in(sources: Iterable[str | Path]) -> tuple[Path, ...]:
 SEXES = ("male", "female")
 
 FEWEST_FRAMES = 10
-"""Fewer frames are no motion: smoothing and differences need as many."""
+"""Frames that smoothing and differences need."""
 
 
 @dataclass(frozen=True)
 class AnalysisOptions:
-    """What a recording does not say, or not well.
+    """What a recording does not contain, or not precisely.
 
     Attributes:
         frames: First frame and the one after the last; None for all.
@@ -246,8 +240,8 @@ def analyze(
     touch_downs = touch_downs_of(supports)
     dynamics = dynamics_of(found, touch_downs=touch_downs)
     mass = measured_mass(plates, dynamics, schedule, supports.start)
-    told = given.mass is not None or (isinstance(recording, MarkerRecording) and recording.subject.mass)
-    if mass is not None and not told and (weighed := _weighed(found, mass - given.load)) is not None:
+    stated = given.mass is not None or (isinstance(recording, MarkerRecording) and recording.subject.mass)
+    if mass is not None and not stated and (weighed := _weighed(found, mass - given.load)) is not None:
         found = weighed
         schedule = recorded_schedule(found, supports, friction=given.friction)
         dynamics = dynamics_of(found, touch_downs=touch_downs)
@@ -280,7 +274,7 @@ def analyze(
 
 
 def _weighed(found: Reconstruction, mass: float) -> Reconstruction | None:
-    """With the mass by the plates; None where that is nobody's, as where a foot stands beside them."""
+    """With the mass by the plates; None if it is not an adult's, as where a foot stands beside them."""
     try:
         return with_mass(found, mass)
     except BodyError:

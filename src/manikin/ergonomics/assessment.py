@@ -1,7 +1,4 @@
-"""Scores of RULA or REBA over a motion.
-
-Also here. Postures held for long.
-"""
+"""Scores of RULA and REBA over a motion, with postures that are held for long."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -54,7 +51,7 @@ def held(
         band: Width of the band that every angle stays in [rad].
 
     Returns:
-        (n,), or None of a motion that is too short to tell.
+        (n,), or None of a motion that is too short.
     """
     if time[-1] - time[0] < duration:
         return None
@@ -84,7 +81,7 @@ class Assessment:
         steps: Step scores (n,) of each side.
         levels: Meaning of the action levels, the lowest first.
         level_of: Action level of scores.
-        static_known: Whether the motion was long enough to tell what is held for a minute.
+        static_known: Whether the motion lasted long enough for a posture held for a minute.
     """
 
     method: str
@@ -131,10 +128,9 @@ class Assessment:
 
 @dataclass(frozen=True, eq=False)
 class PosturalAssessment:
-    """What the posture alone tells.
+    """Assessment of postures alone.
 
     Attributes:
-        angles: Of each frame.
         bearing: What carries the weight.
         rula: Scores 1 to 7.
         reba: Scores 1 to 15.
@@ -153,9 +149,7 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
     legs, each by itself. Of a shorter motion :attr:`Circumstances.static` says it.
 
     Args:
-        body: A human.
-        motion: Of this body.
-        given: What the motion does not tell.
+        given: Circumstances that the motion does not contain.
 
     Raises:
         BodyError: If the body is no human.

@@ -1,7 +1,4 @@
-"""Which segments of a body are its trunk, head, arms and legs, and how they are turned, frame by frame.
-
-Also here. What carries the weight in each frame: legs, seat, hands.
-"""
+"""Trunk, neck, arms and legs of a body: their rotations and what carries the weight, frame by frame."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,10 +18,10 @@ EVEN = 0.3
 """A leg that carries at least this share of what both carry bears its part; ours."""
 
 NEAR_FLOOR = 0.05
-"""Of a motion without contacts: a sole this little above the lower one is on the ground [m]; ours."""
+"""In a motion without contacts a sole this little above the lower one is on the ground [m]; ours."""
 
 WALKING_SPEED = 0.4
-"""Horizontal speed of the centre of mass of somebody who walks [m/s]; ours."""
+"""Horizontal speed of the centre of mass from which a person walks [m/s]; ours."""
 
 ARM_WEIGHT = 0.025
 """Share of the body's weight, half that of an arm, from which on a hand's support carries the arm; ours."""
@@ -40,7 +37,7 @@ class Bearing:
         seated: Whether the buttocks are in contact.
         walking: Whether the centre of mass goes faster than :data:`WALKING_SPEED`.
         arms: Whether a support of the hand carries the arm, by side.
-        source: ``"contacts"``, or ``"heights of the soles"`` of a motion that knows no contact.
+        source: ``"contacts"``, or ``"heights of the soles"`` of a motion without contacts.
     """
 
     balanced: Flags
@@ -69,7 +66,11 @@ def bearing_of(body: BodyModel, motion: Motion) -> Bearing:
         on = height <= height.min(axis=1, keepdims=True) + NEAR_FLOOR
     load = np.column_stack([_vertical(motion, name) for name in feet])
     total = load.sum(axis=1)
-    between = _place_between(motion.com, places[feet[0]], places[feet[1]])
+    left_foot, right_foot = (places[name] for name in feet)
+    way = (left_foot - right_foot)[:, :2]
+    # Share of the way from the right foot to the left one that the centre of mass has gone.
+    gone = np.einsum("ni,ni->n", (motion.com - right_foot)[:, :2], way)
+    between = gone / np.maximum(np.sum(way**2, axis=1), 1e-9)
     with np.errstate(invalid="ignore", divide="ignore"):
         left = np.where(total > 0.0, load[:, 0] / total, between)
     both = on.all(axis=1)
@@ -97,12 +98,6 @@ def _vertical(motion: Motion, effector: str) -> FloatArray:
         return np.zeros(len(motion.time))
     force = motion.contact_force[:, motion.contact_names.index(effector), 2]
     return np.maximum(np.nan_to_num(force), 0.0)
-
-
-def _place_between(com: FloatArray, left: FloatArray, right: FloatArray) -> FloatArray:
-    """(n,) share of the way from the right foot to the left one that the centre of mass has gone."""
-    way = (left - right)[:, :2]
-    return np.einsum("ni,ni->n", (com - right)[:, :2], way) / np.maximum(np.sum(way**2, axis=1), 1e-9)
 
 
 SIDES = ("left", "right")
@@ -162,9 +157,7 @@ def joint_rotation(body: BodyModel, q: FloatArray, segment: str) -> FloatArray:
     Each hinge turns about a constant axis, so that Rodrigues' formula needs only its sines and cosines.
 
     Args:
-        body: The body.
         q: (n, nq) configurations.
-        segment: Not the root.
     """
     found = np.broadcast_to(np.eye(3), (len(q), 3, 3))
     for hinge in body.segment(segment).hinges:
@@ -191,7 +184,6 @@ def placements(
     """Rotations (n, 3, 3) and origins (n, 3) [m] of a chain of segments.
 
     Args:
-        body: The body.
         q: (n, nq) configurations.
         segments: Each the parent of the next.
         rotation: (n, 3, 3) of the first one's parent, in the frame that is asked for.

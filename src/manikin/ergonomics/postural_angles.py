@@ -86,7 +86,6 @@ class PosturalAngles:
         neck_flexion: Forward positive, of the head against the chest [rad].
         neck_side_bend: To the left positive [rad].
         neck_twist: To the left positive [rad].
-        arms: By side.
         knees: Flexion by side [rad].
     """
 
@@ -160,21 +159,20 @@ def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -
         neck_side_bend=_arcsin(head[:, 1, 2]),
         neck_twist=twist_about_z(head),
         arms={side: _arm(body, q, parts, side, chest) for side in SIDES},
-        knees={side: _knee(body, q, parts.legs[side][1]) for side in SIDES},
+        knees={side: _arccos(joint_rotation(body, q, parts.legs[side][1])[:, 2, 2]) for side in SIDES},
     )
 
 
 def upright_neck(body: BodyModel, q: FloatArray) -> float | None:
-    """Flexion of the neck of somebody who stands or walks upright, the zero of a recording's neck [rad].
+    """Flexion of the neck in upright standing or walking, the zero of a recording's neck [rad].
 
     The line from the base of a real neck to the top of the head leans forward (by 10 to 23 degrees in the
     skeletons we looked at), while the neck of our human is upright at 0. So where recorded points are
     followed an upright neck has that angle. It is taken from the recording itself: the median over the frames
-    whose trunk is within 10 degrees of the vertical, or None of a recording without such a frame. Of somebody
-    who looks down all the time that is not noticed.
+    whose trunk is within 10 degrees of the vertical, or None without such a frame. A person who looks down
+    all the time is not noticed.
 
     Args:
-        body: A human.
         q: (n, nq) configurations.
 
     Raises:
@@ -221,11 +219,6 @@ def _arm(body: BodyModel, q: FloatArray, parts: Parts, side: str, chest: FloatAr
         wrist_deviation=np.arctan2(in_hand[:, 0], in_hand[:, 2]),
         wrist_twist=-outward * turn,
     )
-
-
-def _knee(body: BodyModel, q: FloatArray, shank: str) -> FloatArray:
-    """Angle between thigh and shank [rad]."""
-    return _arccos(joint_rotation(body, q, shank)[:, 2, 2])
 
 
 def _arcsin(value: FloatArray) -> FloatArray:

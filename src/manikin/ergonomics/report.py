@@ -1,7 +1,4 @@
-"""Everything that ergonomics says about one motion, in one report.
-
-Also here. Where a motion comes nearest to losing its balance, and which contact ends it there.
-"""
+"""Ergonomics of one motion: scores, strength, effort, and the lowest margin with its limiting contact."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,9 +29,10 @@ from manikin.motion import Motion
 from manikin.motion.dynamics import CarriedForces, centroidal_motion
 from manikin.numerics.spatial import FloatArray, finite_number, wrench_about
 from manikin.runtime.display import Displayed
+from manikin.runtime.files import csv_text
 
 FRICTION = 0.8
-"""Coefficient of friction of contacts that only the motion tells of."""
+"""Coefficient of friction of contacts that are known by the motion alone."""
 
 AGREES = 0.5
 """Difference up to which a margin counts as reproduced [N.m]."""
@@ -50,7 +48,7 @@ class LowestMargin:
         time: When [s].
         supports: Effectors in contact then.
         limiting: Nearest face of the wrench polytope then, in words; None with its reason in ``unknown``.
-        again: Margin that the stance found gives, to hold against ``value`` [N.m]; None without a stance.
+        again: Margin that the stance gives, to compare with ``value`` [N.m]; None without a stance.
         stance: ``"planned contacts"`` or ``"effectors in contact"``: from what the stance was rebuilt.
         unknown: Why there is no limiting contact.
     """
@@ -80,10 +78,8 @@ def lowest_margin(
     effectors in contact: soles as large as the body's, points at the hands, the patch of the buttocks.
 
     Args:
-        body: Who moves.
         motion: Its motion; instants whose margin is NaN are passed over.
-        schedule: The planned contacts.
-        friction: Coefficient of contacts that the schedule does not tell of.
+        friction: Coefficient of contacts without a schedule.
 
     Returns:
         None if the margin is not known at any instant.
@@ -106,23 +102,11 @@ def lowest_margin(
         return replace(found, unknown="nothing is in contact at that instant")
     (W,) = wrench_polytopes([stance])
     com, wrench = _dynamic_wrench(body, motion, row)
-    return replace(
-        found,
-        limiting=W.limiting(wrench_about(wrench, W.reference), com),
-        again=_margin_margin(W, wrench, com),
-        stance="effectors in contact",
-    )
+    return _explained(found, W, wrench, com, "effectors in contact")
 
 
 def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = FRICTION) -> Stance:
-    """Contacts of one frame at the poses of the effectors; effectors that can make none are left out.
-
-    Args:
-        body: Who moves.
-        motion: Its motion.
-        row: The frame.
-        friction: Of every contact.
-    """
+    """Contacts of one frame at the poses of the effectors; effectors that can make none are left out."""
     configuration, sizes = Configuration(body, motion.q[row]), {}
     if body.stature is not None:
         sizes["buttocks"] = SEAT_LENGTH * body.stature, SEAT_WIDTH * body.stature
@@ -142,7 +126,8 @@ def _of_schedule(
 ) -> LowestMargin:
     com, wrench = _dynamic_wrench(body, motion, row, schedule)
     wrenches = [wrench]
-    measured = contact_wrench(_one_frame(motion, row), schedule)[0]
+    frame = replace(motion, **{name: array[row : row + 1] for name, array in motion.arrays().items()})
+    measured = contact_wrench(frame, schedule)[0]
     if np.isfinite(measured).all() and measured.any():
         wrenches.insert(0, measured)
     phase = int(schedule.phase_at(found.time))
@@ -155,20 +140,18 @@ def _of_schedule(
     if not polytopes:
         return replace(found, unknown="nothing is planned to be in contact at that instant")
     pairs: list[tuple[WrenchPolytope, FloatArray]] = [(W, wrench) for W in polytopes for wrench in wrenches]
-    W, wrench = min(pairs, key=lambda pair: abs(_margin_margin(*pair, com) - found.value))
-    return replace(
-        found,
-        limiting=W.limiting(wrench_about(wrench, W.reference), com),
-        again=_margin_margin(W, wrench, com),
-        stance="planned contacts",
-    )
+    W, wrench = min(pairs, key=lambda pair: abs(_margin_of(*pair, com) - found.value))
+    return _explained(found, W, wrench, com, "planned contacts")
 
 
-def _one_frame(motion: Motion, row: int) -> Motion:
-    return replace(motion, **{name: array[row : row + 1] for name, array in motion.arrays().items()})
+def _explained(
+    found: LowestMargin, W: WrenchPolytope, wrench: FloatArray, com: FloatArray, stance: str
+) -> LowestMargin:
+    limiting = W.limiting(wrench_about(wrench, W.reference), com)
+    return replace(found, limiting=limiting, again=_margin_of(W, wrench, com), stance=stance)
 
 
-def _margin_margin(W: WrenchPolytope, wrench: FloatArray, com: FloatArray) -> float:
+def _margin_of(W: WrenchPolytope, wrench: FloatArray, com: FloatArray) -> float:
     """Margin about the CoM of a wrench (6,) about the world's origin [N.m]."""
     return float(stability_margins(W, wrench_about(wrench, W.reference), com).wrench_about_com)
 
@@ -190,18 +173,16 @@ NO_TORQUES = "the motion has no joint torques"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ergonomics(Displayed):
-    """Ergonomics of one motion; a part that could not be told is None, and ``missing`` says why.
+    """Ergonomics of one motion; an unknown part is None, and ``missing`` says why.
 
     Attributes:
         time: (n,) [s].
-        circumstances: What the motion does not tell and was given.
+        circumstances: Given by the observer.
         posture: Angles, RULA and REBA.
-        strength: Torques against strength.
-        effort: Cumulative effort.
         margin: Smallest margin and its limiting contact.
         margin_series: (n,) margin of the motion, NaN where it is not known.
         missing: Reason by part: ``"posture"``, ``"strength"``, ``"effort"``, ``"margin"``.
-        untold: Segments about which a recording says nothing; they were scored as in standing.
+        untold: Segments that the recording does not observe; they were scored as in standing.
     """
 
     time: FloatArray
@@ -218,8 +199,7 @@ class Ergonomics(Displayed):
         """JSON-ready values (SI); see the docs page on JSON for the keys."""
         posture = self.posture
         return {
-            "duration_s": float(self.time[-1] - self.time[0]),
-            "frames": len(self.time),
+            "duration_s": float(self.time[-1] - self.time[0]), "frames": len(self.time),
             "circumstances": vars(self.circumstances).copy(),
             "legs_from": None if posture is None else posture.bearing.source,
             "rula": None if posture is None else posture.rula.as_dict(),
@@ -227,9 +207,8 @@ class Ergonomics(Displayed):
             "strength": None if self.strength is None else _strength(self.strength),
             "effort": None if self.effort is None else _effort(self.effort),
             "margin": None if self.margin is None else _margin(self.margin),
-            "missing": dict(self.missing),
-            "untold": list(self.untold),
-        }
+            "missing": dict(self.missing), "untold": list(self.untold),
+        }  # fmt: skip
 
     def series(self) -> dict[str, NDArray[Any]]:
         """(n,) time series by column name, the time first: scores, angles, shares, margin."""
@@ -252,34 +231,24 @@ class Ergonomics(Displayed):
     def csv(self) -> str:
         """The series as comma-separated text with a header; unknown values are empty."""
         columns = self.series()
-        rows = [",".join(columns)]
-        rows += [",".join(_cell(value) for value in row) for row in zip(*columns.values(), strict=True)]
-        return "\n".join(rows) + "\n"
+        rows = zip(*columns.values(), strict=True)
+        return csv_text(tuple(columns), ([_cell(value) for value in row] for row in rows))
 
 
 def ergonomics_of(
-    body: BodyModel,
-    motion: Motion,
-    *,
-    schedule: ContactSchedule | None = None,
-    given: Circumstances | None = None,
-    fraction: float = LOADED,
-    friction: float = FRICTION,
-    untold: Sequence[str] = (),
-    lowest: LowestMargin | None = None,
-) -> Ergonomics:
+    body: BodyModel, motion: Motion, *, schedule: ContactSchedule | None = None,
+    given: Circumstances | None = None, fraction: float = LOADED, friction: float = FRICTION,
+    untold: Sequence[str] = (), lowest: LowestMargin | None = None,
+) -> Ergonomics:  # fmt: skip
     """Judge a motion, recorded, planned or executed.
 
     Args:
-        body: Who moves; of another creature than a human there is no RULA and REBA.
-        motion: Of this body.
+        body: Who moves; RULA and REBA exist for humans only.
         schedule: Its planned contacts, for the limiting contact.
-        given: What the motion does not tell.
+        given: Circumstances that the motion does not contain.
         fraction: Share of the strength above which a joint counts as loaded.
-        friction: Of contacts that the schedule does not tell of.
-        untold: Segments about which a recording says nothing, as
-            :attr:`manikin.recordings.reconstruction.proportions.Reconstruction.neutral`; without the trunk
-            no scores.
+        friction: Of contacts without a schedule.
+        untold: Segments that a recording does not observe; without the trunk there are no scores.
         lowest: The lowest margin, where it is known already.
 
     Raises:
@@ -358,17 +327,12 @@ def _effort(found: CumulativeEffort) -> dict[str, Any]:
 def _margin(found: LowestMargin) -> dict[str, Any]:
     limiting = found.limiting
     return {
-        "min": found.value,
-        "unit": found.unit,
-        "at_s": found.time,
-        "supports": list(found.supports),
+        "min": found.value, "unit": found.unit, "at_s": found.time, "supports": list(found.supports),
         "limiting_contact": None if limiting is None else limiting.description,
         "effector": None if limiting is None else limiting.effector,
-        "kind": None if limiting is None else limiting.kind.value,
-        "stance_from": found.stance,
-        "again": found.again,
-        "reproduced": found.reproduced,
-    }
+        "kind": None if limiting is None else limiting.kind.value, "stance_from": found.stance,
+        "again": found.again, "reproduced": found.reproduced,
+    }  # fmt: skip
 
 
 def _cell(value: float) -> str:

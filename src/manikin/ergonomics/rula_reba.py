@@ -1,7 +1,4 @@
-"""RULA, the rapid upper limb assessment ([McAtamney1993]_): step scores, tables and grand score.
-
-Also here. REBA, the rapid entire body assessment ([Hignett2000]_): step scores, tables and score.
-"""
+"""RULA ([McAtamney1993]_) and REBA ([Hignett2000]_), assessments of upper limbs and of the entire body."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,34 +36,30 @@ REBA_TABLE_A = np.array([
 ])  # fmt: skip
 """Posture score of the body by trunk (5), neck (3) and legs (4)."""
 
-REBA_TABLE_B = np.array(
-    [
-        [[1, 2, 2], [1, 2, 3]],
-        [[1, 2, 3], [2, 3, 4]],
-        [[3, 4, 5], [4, 5, 5]],
-        [[4, 5, 5], [5, 6, 7]],
-        [[6, 7, 8], [7, 8, 8]],
-        [[7, 8, 8], [8, 9, 9]],
-    ]
-)
+REBA_TABLE_B = np.array([
+    [[1, 2, 2], [1, 2, 3]],
+    [[1, 2, 3], [2, 3, 4]],
+    [[3, 4, 5], [4, 5, 5]],
+    [[4, 5, 5], [5, 6, 7]],
+    [[6, 7, 8], [7, 8, 8]],
+    [[7, 8, 8], [8, 9, 9]],
+])  # fmt: skip
 """Posture score of the arm by upper arm (6), lower arm (2) and wrist (3)."""
 
-REBA_TABLE_C = np.array(
-    [
-        [1, 1, 1, 2, 3, 3, 4, 5, 6, 7, 7, 7],
-        [1, 2, 2, 3, 4, 4, 5, 6, 6, 7, 7, 8],
-        [2, 3, 3, 3, 4, 5, 6, 7, 7, 8, 8, 8],
-        [3, 4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9],
-        [4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9, 9],
-        [6, 6, 6, 7, 8, 8, 9, 9, 10, 10, 10, 10],
-        [7, 7, 7, 8, 9, 9, 9, 10, 10, 11, 11, 11],
-        [8, 8, 8, 9, 10, 10, 10, 10, 10, 11, 11, 11],
-        [9, 9, 9, 10, 10, 10, 11, 11, 11, 12, 12, 12],
-        [10, 10, 10, 11, 11, 11, 11, 12, 12, 12, 12, 12],
-        [11, 11, 11, 11, 12, 12, 12, 12, 12, 12, 12, 12],
-        [12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12],
-    ]
-)
+REBA_TABLE_C = np.array([
+    [1, 1, 1, 2, 3, 3, 4, 5, 6, 7, 7, 7],
+    [1, 2, 2, 3, 4, 4, 5, 6, 6, 7, 7, 8],
+    [2, 3, 3, 3, 4, 5, 6, 7, 7, 8, 8, 8],
+    [3, 4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9],
+    [4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9, 9],
+    [6, 6, 6, 7, 8, 8, 9, 9, 10, 10, 10, 10],
+    [7, 7, 7, 8, 9, 9, 9, 10, 10, 11, 11, 11],
+    [8, 8, 8, 9, 10, 10, 10, 10, 10, 11, 11, 11],
+    [9, 9, 9, 10, 10, 10, 11, 11, 11, 12, 12, 12],
+    [10, 10, 10, 11, 11, 11, 11, 12, 12, 12, 12, 12],
+    [11, 11, 11, 11, 12, 12, 12, 12, 12, 12, 12, 12],
+    [12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12],
+])  # fmt: skip
 """Score C by score A of the body and score B of the arm, 1 to 12 each."""
 
 RISKS = {0: "negligible", 1: "low", 2: "medium", 3: "high", 4: "very high"}
@@ -103,7 +96,6 @@ def reba_score(
     """REBA score of postures, 1 to 15.
 
     Args:
-        steps: Of the postures.
         load: 0 to 3, see :func:`reba_load`.
         coupling: 0 (good) to 3 (unacceptable).
         activity: 0 to 3: 1 each for what is held for more than a minute, small movements repeated more than
@@ -151,7 +143,6 @@ def reba_steps(
     Args:
         angles: (n,) each.
         bearing: What carries the weight.
-        given: What the motion does not tell.
     """
     circumstances = given or Circumstances()
     trunk, neck, legs = _reba_trunk(angles), _reba_neck(angles), _legs(angles, bearing)
@@ -178,7 +169,7 @@ def _reba_neck(angles: PosturalAngles) -> Scores:
 def _legs(angles: PosturalAngles, bearing: Bearing) -> Scores:
     """Both legs, walking or sitting 1, else 2; more for bent knees of those who do not sit.
 
-    Of somebody who walks the straighter knee counts, for a leg that swings is bent without carrying (ours).
+    While walking the straighter knee counts, as the swinging leg is bent without carrying (ours).
     """
     score = np.where(bearing.balanced | bearing.walking | bearing.seated, 1, 2)
     knees = np.array([degrees(angle) for angle in angles.knees.values()])
@@ -215,30 +206,26 @@ TABLE_A = np.array([
 ]).reshape(6, 3, 4, 2)  # fmt: skip
 """Posture score of the arm by upper arm (6), lower arm (3), wrist (4) and wrist twist (2)."""
 
-TABLE_B = np.array(
-    [
-        [1, 3, 2, 3, 3, 4, 5, 5, 6, 6, 7, 7],
-        [2, 3, 2, 3, 4, 5, 5, 5, 6, 7, 7, 7],
-        [3, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 7],
-        [5, 5, 5, 6, 6, 7, 7, 7, 7, 7, 8, 8],
-        [7, 7, 7, 7, 7, 8, 8, 8, 8, 8, 8, 8],
-        [8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9],
-    ]
-).reshape(6, 6, 2)
+TABLE_B = np.array([
+    [1, 3, 2, 3, 3, 4, 5, 5, 6, 6, 7, 7],
+    [2, 3, 2, 3, 4, 5, 5, 5, 6, 7, 7, 7],
+    [3, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 7],
+    [5, 5, 5, 6, 6, 7, 7, 7, 7, 7, 8, 8],
+    [7, 7, 7, 7, 7, 8, 8, 8, 8, 8, 8, 8],
+    [8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9],
+]).reshape(6, 6, 2)  # fmt: skip
 """Posture score of the body by neck (6), trunk (6) and legs (2)."""
 
-TABLE_C = np.array(
-    [
-        [1, 2, 3, 3, 4, 5, 5],
-        [2, 2, 3, 4, 4, 5, 5],
-        [3, 3, 3, 4, 4, 5, 6],
-        [3, 3, 3, 4, 5, 6, 6],
-        [4, 4, 4, 5, 6, 7, 7],
-        [4, 4, 5, 6, 6, 7, 7],
-        [5, 5, 6, 6, 7, 7, 7],
-        [5, 5, 6, 7, 7, 7, 7],
-    ]
-)
+TABLE_C = np.array([
+    [1, 2, 3, 3, 4, 5, 5],
+    [2, 2, 3, 4, 4, 5, 5],
+    [3, 3, 3, 4, 4, 5, 6],
+    [3, 3, 3, 4, 5, 6, 6],
+    [4, 4, 4, 5, 6, 7, 7],
+    [4, 4, 5, 6, 6, 7, 7],
+    [5, 5, 6, 6, 7, 7, 7],
+    [5, 5, 6, 7, 7, 7, 7],
+])  # fmt: skip
 """Grand score by score C of the arm (1 to 8 and more) and score D of the body (1 to 7 and more)."""
 
 ACTIONS = {
@@ -279,7 +266,6 @@ def rula_score(
     """Grand score of postures, 1 to 7.
 
     Args:
-        steps: Of the postures.
         muscle_arm: 1 where the arm is held for more than a minute or moves more than four times a minute.
         muscle_body: The same of neck, trunk and legs.
         force: 0 to 3, see :func:`rula_force`; it counts for both.
@@ -324,7 +310,6 @@ def rula_steps(
     Args:
         angles: (n,) each.
         bearing: What carries the weight.
-        given: What the motion does not tell.
     """
     circumstances = given or Circumstances()
     neck, trunk = _neck(angles), _trunk(angles, bearing, circumstances)
@@ -349,14 +334,9 @@ def _trunk(angles: PosturalAngles, bearing: Bearing, given: Circumstances) -> Sc
 
 
 def _arm(
-    angles: PosturalAngles,
-    bearing: Bearing,
-    given: Circumstances,
-    side: str,
-    neck: Scores,
-    trunk: Scores,
-    legs: Scores,
-) -> RulaSteps:
+    angles: PosturalAngles, bearing: Bearing, given: Circumstances, side: str, neck: Scores,
+    trunk: Scores, legs: Scores,
+) -> RulaSteps:  # fmt: skip
     arm = angles.arms[side]
     raised, elbow = degrees(arm.raised), degrees(arm.elbow)
     upper = np.where(raised < -20.0, 2, band(raised, 20.0, 45.0, 90.0)) + (degrees(arm.abduction) > ABDUCTED)

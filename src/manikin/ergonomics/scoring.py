@@ -1,11 +1,8 @@
-"""What a motion does not tell and an observer would write down: load, grip, repetition.
+"""Circumstances of a task that a motion does not contain, and the thresholds of RULA and REBA.
 
-Also here. Scores as places in published tables. Angles at which a posture changes its score where neither
-RULA nor REBA gives a number.
-
-Both say "upright", "twisted", "abducted", "across the midline" and leave the rest to the observer; to a
-measurement every posture is a little twisted. All values here are our choice, near what an observer would
-notice; they are in degrees, as the published ones.
+Both methods say "upright", "twisted", "abducted", "across the midline" without a number, but every measured
+posture is a little twisted. The values here are our choice, near what an observer would notice, in degrees
+as the published ones.
 """
 
 from dataclasses import dataclass
@@ -73,7 +70,7 @@ OUTWARD = 30.0
 """A bent forearm that points further out than this works out to the side of the body [deg]."""
 
 BENT_ELBOW = 30.0
-"""Less bent arms hang; where they point is told by the upper arm [deg]."""
+"""Less bent arms hang; they point where the upper arm does [deg]."""
 
 
 def degrees(angle: FloatArray) -> FloatArray:

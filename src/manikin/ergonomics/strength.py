@@ -1,7 +1,4 @@
-"""Joint torques against what the joints can give.
-
-Also here. What a motion costs its joints over time.
-"""
+"""Joint torques compared with strength, and the cumulative effort of the joints."""
 
 from dataclasses import dataclass
 
@@ -17,7 +14,6 @@ class CumulativeEffort:
     """Effort of each joint, (j,) each, from frame to frame with the trapezoidal rule.
 
     Attributes:
-        joint_names: j hinges.
         squared_share: Integral of the square of torque per strength [s].
         positive_work: Integral of the power that the joint gives [J].
         negative_work: Integral of the power that it takes up, negative [J].
@@ -48,7 +44,6 @@ def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | Non
 
     Args:
         body: Whose torque limits are taken.
-        motion: Of this body.
 
     Returns:
         None if there are not two frames with torques, or the body has no joint.
@@ -88,7 +83,6 @@ class JointStrength:
     """Torques of a motion against the torque limits of its body.
 
     Attributes:
-        joint_names: j hinges.
         limit: (j,) size of the torque limit in the direction in which the largest share is reached [N.m].
         share: (n, j) torque over the limit in its direction; NaN where the torque is not known.
         peak: (j,) largest share.
@@ -125,7 +119,6 @@ def joint_strength(body: BodyModel, motion: Motion, fraction: float = LOADED) ->
 
     Args:
         body: Whose torque limits are taken.
-        motion: Of this body.
         fraction: Share of the strength above which a joint counts as loaded.
 
     Returns:

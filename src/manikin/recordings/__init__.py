@@ -1,4 +1,4 @@
-"""Recorded human motion: readers, and the angles of hips and shoulders.
+"""Recorded human motion: readers, reconstruction, supports, dynamics and statistics.
 
 Skeletons are read from BVH and from ASF with AMC, markers from C3D and TRC, force plates from C3D and MOT.
 :func:`reconstruct` makes a motion of our human of any of them, :func:`statistics_of` measures many.
@@ -21,14 +21,7 @@ from manikin.recordings.dynamics.recorded_dynamics import (
     with_mass,
 )
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
-from manikin.recordings.dynamics.recorded_margins import (
-    Cause,
-    Loss,
-    RecordedMargins,
-    balance_losses,
-    recorded_margins,
-    share_by_cause,
-)
+from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import LeastShift, least_shift
 from manikin.recordings.readers.acclaim import Skeleton, read_amc, read_asf
 from manikin.recordings.readers.bvh import read_bvh
@@ -37,7 +30,6 @@ from manikin.recordings.readers.markers import Event, ForcePlate, Gap, MarkerRec
 from manikin.recordings.readers.opensim import read_mot, read_trc
 from manikin.recordings.readers.read import read_recording
 from manikin.recordings.readers.skeleton_recording import Recording, Subject
-from manikin.recordings.reconstruction.anatomy import Anatomy, anatomy_of, ball_joint_angles
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import person_of, reconstruct
 from manikin.recordings.statistics.clip_statistics import (
@@ -68,25 +60,21 @@ from manikin.recordings.statistics.phases import (
     phase_durations,
     published_consistency,
     published_distances,
-    published_grasps,
     published_heights,
     published_phases,
     sequence_consistency,
 )
-from manikin.recordings.supports.plate_supports import SeatChange, TimingError, seat_changes, timing_errors
+from manikin.recordings.supports.plate_supports import TimingError, timing_errors
 from manikin.recordings.supports.recorded_stances import recorded_schedule
 from manikin.recordings.supports.recorded_supports import RecordedSupports, Support, SupportPhase
 from manikin.recordings.supports.supports import supports_of
 
 __all__ = [
-    "Anatomy",
-    "Cause",
     "Event",
     "ForcePlate",
     "Gap",
     "GroupStatistics",
     "LeastShift",
-    "Loss",
     "MarkerRecording",
     "Origin",
     "Overhead",
@@ -100,7 +88,6 @@ __all__ = [
     "RecordedMargins",
     "RecordedSupports",
     "Recording",
-    "SeatChange",
     "SequenceConsistency",
     "Skeleton",
     "StatisticsSettings",
@@ -110,9 +97,6 @@ __all__ = [
     "SupportPhase",
     "SupportPlacement",
     "TimingError",
-    "anatomy_of",
-    "balance_losses",
-    "ball_joint_angles",
     "clip_of",
     "com_extreme",
     "compare_with_plates",
@@ -130,7 +114,6 @@ __all__ = [
     "plate_forces",
     "published_consistency",
     "published_distances",
-    "published_grasps",
     "published_heights",
     "published_phases",
     "published_statistics",
@@ -144,9 +127,7 @@ __all__ = [
     "reconstruct",
     "recorded_margins",
     "recorded_schedule",
-    "seat_changes",
     "sequence_consistency",
-    "share_by_cause",
     "shares_within",
     "smoothed",
     "statistics_of",

@@ -1,4 +1,4 @@
-"""Recorded motions planned anew: their stances, their centre of mass, and what becomes of them."""
+"""Recorded motions re-planned: their stances, their centre of mass, and what becomes of them."""
 
 import json
 from dataclasses import replace

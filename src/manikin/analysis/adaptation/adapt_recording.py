@@ -170,7 +170,7 @@ def farthest_support(recording: RecordedCom) -> float:
 
 
 def _recorded_heights(recording: RecordedCom) -> tuple[GeometricConstraint, ...]:
-    """No lower and no higher than it was recorded, but for some room: feet admit a way through the floor."""
+    """Recorded heights with some room; contacts alone would admit a way through the floor."""
     heights = recording.com[:, 2]
     lower, upper = (
         BentSurface(float(height), 0.0, 0.0, 0.0)
@@ -247,8 +247,7 @@ class Replan:
         failure, distance = self.com.failure, self.distance
         near = self.com if isinstance(self.com, NearKeyFramesResult) else None
         return {
-            "method": self.method,
-            "succeeded": self.com.succeeded,
+            "method": self.method, "succeeded": self.com.succeeded,
             "failure": None if failure is None else failure.reason,
             "recorded_duration_s": float(self.recording.time[-1]),
             "duration_s": None if distance is None else float(self.schedule.instants[-1]),
@@ -261,9 +260,8 @@ class Replan:
             "margin_unit": self.com.problem.margin_unit,
             "key_frames": None if near is None else len(near.frames),
             "added_key_frames": None if near is None else len(near.added),
-            "wholebody": self._adapted_block(),
-            "execution": self._execution_block(),
-        }
+            "wholebody": self._adapted_block(), "execution": self._execution_block(),
+        }  # fmt: skip
 
     def _adapted_block(self) -> dict[str, Any] | None:
         if self.adapted is None:

@@ -82,8 +82,8 @@ def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
 def without_remnants(schedule: ContactSchedule) -> ContactSchedule:
     """Stances with no part of a foot at either end that a clip cuts to an instant.
 
-    Who lifts the heel 40 ms after a clip begins has it almost up by then, and 40 ms before it ends hardly:
-    the foot stands there as it does beside. Phases that do not differ any more are one.
+    A heel that lifts 40 ms after a clip begins is almost up by then: the foot stands as it does next to it.
+    Phases that do not differ any more are one.
     """
     phases = list(schedule.sequence)
     durations = np.array(schedule.durations)

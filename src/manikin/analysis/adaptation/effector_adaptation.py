@@ -41,8 +41,7 @@ SHORTEST_JOINING = 0.2
 """Time in which a foot in flight at a clip's end does so at least, as long as there is so much [s]."""
 
 LONGEST_JOINING = 0.25
-"""Time in which any effector does so at most: buttocks that lag behind a person who rises make the arms swing
-up [s]."""
+"""Time in which any effector does so at most: buttocks that lag behind make the arms swing up [s]."""
 
 SWING_HEIGHT = 0.03
 """Least height of a foot's lowest point in the middle of its flight [m]."""
@@ -69,7 +68,6 @@ class EffectorPaths:
     """Targets of every effector of a schedule.
 
     Attributes:
-        targets: By effector.
         toes: (n,) angle of each joint of toes, by its index among the hinges [rad].
     """
 

@@ -75,13 +75,10 @@ class AdaptedMotion:
 
 
 def adapt_postures(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    polytopes: tuple[WrenchPolytope, ...],
-    recorded: tuple[FloatArray, FloatArray],
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory,
+    polytopes: tuple[WrenchPolytope, ...], recorded: tuple[FloatArray, FloatArray],
     clock: tuple[FloatArray, FloatArray],
-) -> AdaptedMotion:
+) -> AdaptedMotion:  # fmt: skip
     """Fit one smooth motion to contacts and centre of mass that stays near recorded postures.
 
     Args:
@@ -126,12 +123,9 @@ def rate_on_contacts(
 
 
 def rate_on_plan(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    recorded: tuple[FloatArray, FloatArray],
-    recording: RecordedCom,
-) -> FloatArray:
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory,
+    recorded: tuple[FloatArray, FloatArray], recording: RecordedCom,
+) -> FloatArray:  # fmt: skip
     """(n, 3) rate of the angular momentum of recorded postures adapted to a plan [N.m].
 
     At a recording's samples.
@@ -200,11 +194,11 @@ class _Task:
         self, com: FloatArray, acceleration: FloatArray, turning: FloatArray, scales: FitScales
     ) -> ConfigurationSpline:
         """Fit to a centre of mass [m], its acceleration and a rate of angular momentum [N.m], (n, 3) each."""
-        return self.job.solve(_Goal(self, com, acceleration, turning), scales)[1].spline
+        return self.job.solve(_AdaptationGoal(self, com, acceleration, turning), scales)[1].spline
 
 
 @dataclass(frozen=True, eq=False)
-class _Goal:
+class _AdaptationGoal:
     """A centre of mass (n, 3) with its acceleration and a rate of angular momentum for recorded postures."""
 
     task: _Task

@@ -1,13 +1,9 @@
-"""Forces that plates measured, beside those that a recorded motion needs.
+"""Forces and joint torques by force plates, compared with those of the recorded motion alone.
 
-Plates tell all that pushes a person only while every support is wholly on one of them. A plate that is not
-loaded tells its own offset, which is taken off.
-
-Also here. Joint torques by force plates, beside those of a recorded motion alone.
-
-With the plates' forces on the feet the torques of a leg follow from its own motion. Without plates the motion
-of the whole body tells the sum of the forces, and how feet that both carry share it has to be assumed
-(:mod:`manikin.recordings.dynamics.recorded_forces`).
+Plates measure the whole external force only while every support is wholly on one of them. The offset of a
+plate is its reading without load. With the plates' forces on the feet the torques of a leg follow from its
+own motion; without plates the motion gives the sum of the forces, and the shares of two feet have to be
+assumed (:mod:`manikin.recordings.dynamics.recorded_forces`).
 """
 
 from collections.abc import Sequence
@@ -30,7 +26,7 @@ CUTOFF = 20.0
 """Low-pass of the plates, of second order, forward and backward [Hz]."""
 
 LEAST_UNLOADED = 0.1
-"""Time without load that tells the offset of a plate [s]."""
+"""Time without load from which the offset of a plate is taken [s]."""
 
 OVERHANG = 0.02
 """How far a sole may be beyond the edge of the plate that is to carry it [m]."""
@@ -42,12 +38,12 @@ UNSURE = 0.03
 """Time about a support off the plates whose frames are left out: supports are known that well [s]."""
 
 SHORTEST = 0.3
-"""Shortest time on the plates from which a mass is told [s]."""
+"""Shortest time on the plates from which a mass is taken [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlateForces:
-    """What plates say at the instants of a motion.
+    """Forces by plates at the instants of a motion.
 
     Attributes:
         wrench: (n, 6) of all plates about the world's origin, without their offsets [N, N.m].
@@ -55,7 +51,7 @@ class PlateForces:
         single: (n,) whether one foot alone supports.
         effectors: The c effectors of the schedule.
         of_effector: (n, c, 6) the part of the wrench on each of them; 0 where no plate carries it.
-        apart: (n,) whether it is told what is on each: all is covered, and no plate carries two of them.
+        apart: (n,) whether the load of each is known: all is covered, and no plate carries two of them.
     """
 
     wrench: FloatArray
@@ -71,7 +67,6 @@ class PlateComparison:
     """Forces of a motion beside those of plates, in frames in which all supports are on plates.
 
     Attributes:
-        frames: Compared.
         single_frames: Of them in single support.
         vertical_rms: Of the vertical force, per body weight.
         vertical_rms_single: The same in single support.
@@ -137,7 +132,7 @@ def mass_on_plates(dynamics: RecordedDynamics, measured: PlateForces) -> float |
     """Mass of a person by the forces under them; None where too little of the motion is on plates.
 
     The impulse of the plates over all covered frames, divided by that of a body of one kilogram with the
-    recorded motion of the centre of mass: weight, and change of velocity.
+    recorded motion of the centre of mass.
     """
     step = float(dynamics.time[1] - dynamics.time[0])
     if measured.covered.sum() * step < SHORTEST:
@@ -153,8 +148,6 @@ def compare_with_plates(
 
     Args:
         dynamics: The motion, with the person's mass.
-        margins: Its margins.
-        measured: The plates.
         height: Of the plates' surfaces, where centres of pressure are compared [m].
     """
     both = measured.covered & measured.single
@@ -174,7 +167,7 @@ def compare_with_plates(
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
+class _HeldPlate:
     """A contact and the time for which it is made [s]."""
 
     contact: Contact
@@ -182,9 +175,9 @@ class _Held:
     end: float
 
 
-def _held(schedule: ContactSchedule) -> list[_Held]:
+def _held(schedule: ContactSchedule) -> list[_HeldPlate]:
     """Contacts in the order of their beginnings; one that lasts for several phases is one."""
-    found: list[_Held] = []
+    found: list[_HeldPlate] = []
     for phase, begin, end in zip(
         schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
     ):
@@ -199,12 +192,12 @@ def _held(schedule: ContactSchedule) -> list[_Held]:
             if same:
                 found[same[0]] = replace(found[same[0]], end=float(end))
             else:
-                found.append(_Held(contact, float(begin), float(end)))
+                found.append(_HeldPlate(contact, float(begin), float(end)))
     return found
 
 
 def _sampled(plate: ForcePlate, times: FloatArray, cutoff: float) -> FloatArray:
-    """(n, 6) low-passed wrench of one plate without its offset; 0 while nobody is on it."""
+    """(n, 6) low-passed wrench of one plate without its offset; 0 while it is not loaded."""
     wrenches, free = plate.wrenches, ~plate.pressed
     if free.sum() >= LEAST_UNLOADED * plate.rate:
         wrenches = wrenches - wrenches[free].mean(axis=0)
@@ -217,7 +210,7 @@ def _sampled(plate: ForcePlate, times: FloatArray, cutoff: float) -> FloatArray:
 
 def _carries(plate: ForcePlate, contact: Contact, schedule: ContactSchedule) -> bool:
     """Whether a plate carries a contact over the time for which it is held."""
-    if contact.kind is not ContactKind.SOLE or not _within(plate, contact.points_in_world):
+    if contact.kind is not ContactKind.SOLE or not plate.below(contact.points_in_world, OVERHANG):
         return False
     held = [phase.stance for phase in schedule.sequence]
     mine = [contact.effector in stance and stance[contact.effector].same_place(contact) for stance in held]
@@ -230,18 +223,6 @@ def _carries(plate: ForcePlate, contact: Contact, schedule: ContactSchedule) -> 
     local = (plate.cop[frames & plate.pressed] - contact.position) @ contact.rotation_contact_to_world
     near = np.abs(local[:, :2]) < 0.5 * np.array([contact.length, contact.width]) + BESIDE
     return bool(np.mean(near.all(axis=1)) > 0.5)
-
-
-def _within(plate: ForcePlate, points: FloatArray) -> bool:
-    if plate.corners is None:
-        return True
-    corners = plate.corners[:, :2]
-    sides = np.roll(corners, -1, axis=0) - corners
-    turning = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
-    inward = np.sign(turning) * np.stack([-sides[:, 1], sides[:, 0]], axis=1)
-    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    depth = np.einsum("pkj,kj->pk", points[:, None, :2] - corners, inward)
-    return bool(depth.min() > -OVERHANG)
 
 
 def _rms(values: FloatArray) -> float:
@@ -275,30 +256,18 @@ class TorqueComparison:
     peak_by_plates: float
 
 
-def plate_torques(dynamics: RecordedDynamics, measured: PlateForces) -> FloatArray:
-    """(n, nv) generalised forces of a motion if the plates are all that pushes; told where ``apart``.
-
-    The first six are what the plates' forces lack of the motion's, in the pelvis' frame [N, N.m].
-
-    Args:
-        dynamics: The motion.
-        measured: The plates at its instants.
-    """
-    return torques_of(dynamics, measured.effectors, measured.of_effector)
-
-
 def compare_torques(
     dynamics: RecordedDynamics, motion: Motion, measured: PlateForces
 ) -> tuple[TorqueComparison, ...]:
     """Compare the torques of legs with those by plates; none where no foot is on a plate of its own.
 
     Args:
-        dynamics: The motion.
         motion: The same with forces and torques, of
             :func:`manikin.recordings.dynamics.recorded_forces.motion_on_contacts`.
         measured: The plates at its instants.
     """
-    theirs, names = plate_torques(dynamics, measured), motion.joint_names
+    theirs = torques_of(dynamics, measured.effectors, measured.of_effector)
+    names = motion.joint_names
     feet = [f"{side}_foot" for side in SIDES]
     held = {
         foot: measured.apart & motion.support[:, motion.contact_names.index(foot)]

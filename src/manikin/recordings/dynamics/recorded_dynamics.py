@@ -1,15 +1,12 @@
-"""What has to push a recorded person so that they move as they did: the external wrench, frame by frame.
+"""Smoothed postures of a recorded person, their derivatives, and the external wrench that they need.
 
-Everything follows from the smoothed postures, their velocities and accelerations: one pass of the recursive
-Newton-Euler equations gives the torques that a body without contacts would need, and its first six
-components, those of the free pelvis, are the wrench that the ground has to supply.
+One pass of the recursive Newton-Euler equations over postures, velocities and accelerations gives the torques
+that a body without contacts would need; their first six components, those of the free pelvis, are the wrench
+that the ground has to supply.
 
-Also here. A reconstruction without the noise of its recording, and with velocities and accelerations.
-Smoothing without delay whose cutoff rises for a moment at each touch-down.
-
-A foot that lands stops within a few hundredths of a second, the rest of a step is slow. One cutoff for all of
-it smears the impact over the end of the single support before, or lets the noise of the markers through
-where nothing happens. Here the cutoff is a function of time: the smooth values ``x`` minimise
+A foot that lands stops within a few hundredths of a second, while the rest of a step is slow. One cutoff for
+both either smears the impact over the single support before it, or lets the noise of the markers through.
+Here the cutoff may be a function of time, higher at each touch-down: the smooth values ``x`` minimise
 
     ``sum |x - y|^2 + sum lambda_k |x_(k-1) - 2 x_k + x_(k+1)|^2``,
 
@@ -47,14 +44,14 @@ MOTION_CUTOFF = 6.0
 FEWEST_FRAMES = 4
 
 HIGHEST_SHARE = 0.45
-"""Highest cutoff at a touch-down, per rate of the recording: what is faster cannot be told from slower."""
+"""Highest cutoff at a touch-down, per rate of the recording: faster motion aliases."""
 
 
 def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruction:
-    """The same without fast changes: Butterworth of second order, forward and backward, so without delay.
+    """A reconstruction low-passed by a Butterworth filter of second order, forward and backward.
 
-    Filtered are place, hinges, and the turn of the pelvis as a quaternion of continuous sign, set to length 1
-    again; hinges are kept to their limits. Residuals are those of the filtered postures.
+    Filtered are position, hinges, and the rotation of the pelvis as a quaternion of continuous sign, then
+    normalised; hinges are kept to their limits. Residuals are those of the filtered postures.
 
     Args:
         found: At least four instants at an even rate.
@@ -69,23 +66,18 @@ def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruc
 
 
 def smoothed_postures(
-    found: Reconstruction,
-    cutoff: float = MOTION_CUTOFF,
-    limits: bool = True,
+    found: Reconstruction, cutoff: float = MOTION_CUTOFF, limits: bool = True,
     touch_downs: Sequence[float] = (),
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(n, nq) postures of :func:`smoothed`, without their residuals.
 
     Args:
-        found: As there.
-        cutoff: As there [Hz].
-        limits: Whether hinges are kept to their limits afterwards. Where a smooth angle meets its limit it
-            gets a kink, so what is differentiated twice had better overshoot a little.
-        touch_downs: Instants at which the cutoff rises for a moment, on the clock of ``found`` [s], see
-            :mod:`manikin.recordings.dynamics.recorded_dynamics`; none for the Butterworth filter.
-
-    Raises:
-        InputError: As there.
+        found: As of :func:`smoothed`, and so is ``cutoff``.
+        cutoff: Low-pass [Hz].
+        limits: Whether hinges are kept to their limits; the kink where an angle meets its limit spoils second
+            derivatives.
+        touch_downs: Instants at which the cutoff rises for a moment, on the clock of ``found`` [s]; none for
+            the Butterworth filter.
     """
     rate = _rate(found)
     finite_number(cutoff, "cutoff [Hz]", above=0.0)
@@ -108,8 +100,8 @@ def smoothed_postures(
 def motion_of(found: Reconstruction, cutoff: float | None = MOTION_CUTOFF) -> Motion:
     """A motion of the recorded postures, smoothed, with velocities and accelerations by central differences.
 
-    Differences are taken on the configuration space: the pelvis' parts are in its own frame. Contacts and
-    forces are not known of a recording: there are none, and ``tau`` and ``margin`` are NaN.
+    Differences are taken on the configuration space: the pelvis' parts are in its own frame. There are no
+    contacts and forces, and ``tau`` and ``margin`` are NaN.
 
     Args:
         found: At least four instants at an even rate.
@@ -121,16 +113,23 @@ def motion_of(found: Reconstruction, cutoff: float | None = MOTION_CUTOFF) -> Mo
     _rate(found)
     q = found.q if cutoff is None else smoothed_postures(found, cutoff)
     v, a = rates_of(found, q)
-    model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
-    com, spin = np.empty((n, 3)), np.empty((n, 3))
-    for frame in range(n):
-        momentum = pin.computeCentroidalMomentum(model, data, q[frame], v[frame])
-        com[frame], spin[frame] = data.com[0], momentum.angular
+    com, spin = _com_and_spin(found.body, q, v)
+    n = len(q)
     return Motion(
         time=found.time, q=q, v=v, a=a, tau=np.full_like(v, np.nan), com=com, angular_momentum=spin,
         margin=np.full(n, np.nan), support=np.zeros((n, 0), dtype=bool), contact_force=np.zeros((n, 0, 6)),
         contact_names=(), joint_names=tuple(found.body.joint_names),
     )  # fmt: skip
+
+
+def _com_and_spin(body: BodyModel, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) centre of mass [m] and (n, 3) angular momentum about it [kg.m^2/s]."""
+    data = body.pinocchio.createData()
+    com, spin = np.empty((len(q), 3)), np.empty((len(q), 3))
+    for frame in range(len(q)):
+        spin[frame] = pin.computeCentroidalMomentum(body.pinocchio, data, q[frame], v[frame]).angular
+        com[frame] = data.com[0]
+    return com, spin
 
 
 def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -150,13 +149,9 @@ def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def level_heading(q: FloatArray) -> float:
-    """Direction on the level into which a person looks on the whole, from the world's x [rad].
+    """Mean heading of (n, nq) postures, from the world's x [rad].
 
-    That of the pelvis' x axis, or, of who lies on the back or the front, of its z axis: from the hips to the
-    head.
-
-    Args:
-        q: (n, nq) postures.
+    It is that of the pelvis' x axis, or of its z axis, from the hips to the head, for a person who lies.
     """
     turn = Rotation.from_quat(q[:, 3:7])
     ahead, above = (turn.apply(axis).mean(axis=0)[:2] for axis in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
@@ -178,19 +173,16 @@ TOUCH_DOWN_WIDTH = 0.08
 
 
 def local_cutoff(
-    time: FloatArray,
-    touch_downs: Sequence[float],
-    cutoff: float,
-    peak: float = TOUCH_DOWN_CUTOFF,
+    time: FloatArray, touch_downs: Sequence[float], cutoff: float, peak: float = TOUCH_DOWN_CUTOFF,
     width: float = TOUCH_DOWN_WIDTH,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(n,) cutoff at each instant [Hz]: a bell over each touch-down, the highest where they overlap.
 
     Args:
         time: (n,) instants [s].
-        touch_downs: Instants [s].
+        touch_downs: Instants of the peaks [s].
         cutoff: Away from them [Hz].
-        peak: At one [Hz]; none below ``cutoff``.
+        peak: At a touch-down [Hz]; without effect below ``cutoff``.
         width: Of the bell [s].
     """
     found = np.full(len(time), cutoff)
@@ -200,9 +192,9 @@ def local_cutoff(
 
 
 def smooth(values: FloatArray, rate: float, cutoff: FloatArray) -> FloatArray:
-    """(n, k) columns without what is faster than the cutoff of each instant.
+    """(n, k) columns low-passed with a cutoff for each instant.
 
-    Both ends are continued as point reflections while smoothing, so that a straight line stays as it is.
+    Both ends are continued as point reflections, so that a straight line stays as it is.
 
     Args:
         values: (n, k), at least two instants at an even rate.
@@ -317,11 +309,7 @@ def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynami
         InputError: If there are too few instants.
     """
     v, a = rates_of(found, q)
-    model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
-    com, spin = np.empty((n, 3)), np.empty((n, 3))
-    for frame in range(n):
-        spin[frame] = pin.computeCentroidalMomentum(model, data, q[frame], v[frame]).angular
-        com[frame] = data.com[0]
+    com, spin = _com_and_spin(found.body, q, v)
     free = FreeDynamics.of(found.body, q, v, a)
     return RecordedDynamics(
         found.body, found.time, q, v, a, com, spin, free.needed, free.wrench, free.jacobians

@@ -1,22 +1,16 @@
 """Contact forces and joint torques of a recorded motion.
 
-The wrench that a motion needs is known, and shared among its contacts by
-:mod:`manikin.recordings.dynamics.recorded_forces`.
-
-Also here. Which contact supplies how much of the wrench that a recorded motion needs.
-
-One contact has to supply all of it. Several can share it in many ways. People load a foot bit by bit, from
-nothing at its touch-down on, and unload it until its lift-off; of all shares that add up to the wrench in
-every frame, those are wanted whose wrenches ``f_i`` at the contacts change least:
+A single contact supplies the whole wrench that the motion needs. Several contacts can share it in many ways.
+People load a foot gradually from its touch-down and unload it until its lift-off; of all shares that add up
+to the wrench in every frame, those are chosen whose wrenches ``f_i`` at the contacts minimise
 
     ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 dt``,
 
-with ``f_i = 0`` before the contact is made and after it is left. What one foot has to supply alone before
-and after, if for longer than supports are known to, continues into a double support that way, so that the
-foot behind keeps pushing ahead while the one in front brakes, as under people who walk; the least forces,
-which the second term asks for where little changes, would not have the feet push against each other at all.
-It is the thought of Ren, Jones and Howard ("Whole body inverse dynamics over a complete gait cycle based only
-on measured kinematics", J. Biomech. 41, 2008) for contacts of any number and kind.
+with ``f_i = 0`` before the contact is made and after it is left. What one foot supplies alone before and
+after a double support continues into it, so that the rear foot pushes ahead while the front one brakes, as
+measured under people who walk; least forces would not have the feet push against each other at all. The idea
+is that of Ren, Jones and Howard ("Whole body inverse dynamics over a complete gait cycle based only on
+measured kinematics", J. Biomech. 41, 2008), for contacts of any number and kind.
 
 Shares that the contacts can give stay as they are. Others become pushes within the friction pyramids: with
 ``G`` the wrenches of unit pushes at the corners, one a column, and ``l`` the pushes of each contact that come
@@ -24,8 +18,8 @@ next to its share, the nearest to ``l`` that supply the wrench are ``max(0, l + 
 multipliers ``y`` that solve ``G max(0, l + G^T y) + e y = w`` (:func:`manikin.balance.contact_forces.share`);
 caps and torsion limits of contacts are not regarded there. What they cannot supply, because
 the wrench is outside what the contacts admit, is added as the smallest wrenches at the contacts: the sum is
-always the whole wrench, so that the pelvis needs no hand from heaven, and a centre of pressure outside its
-sole is seen as such.
+always the whole wrench, so that the residual wrench at the pelvis is zero, and a centre of pressure
+outside its sole shows as such.
 """
 
 from collections.abc import Sequence
@@ -56,7 +50,7 @@ SLOW = 0.2
 walk would have it longer, under one who stands after a step shorter."""
 
 ALONE = 0.05
-"""Time for which a contact has to carry alone to tell what it carries in the support of several beside [s]:
+"""Time for which a contact has to carry alone to define its load in an adjoining support of several [s]:
 instants of supports are known to some hundredths of a second."""
 
 
@@ -110,8 +104,8 @@ def _admissible(stance: Stance, shares: FloatArray, weight: float) -> NDArray[np
     fine = np.ones(len(shares), dtype=bool)
     for contact, part in zip(stance, shares.swapaxes(0, 1), strict=True):
         limits, turn = contact_limits(contact, stance.friction_model), contact.rotation_contact_to_world
-        there = wrench_about(part, contact.position)
-        local = np.hstack([there[:, :3] @ turn, there[:, 3:] @ turn])
+        moved = wrench_about(part, contact.position)
+        local = np.hstack([moved[:, :3] @ turn, moved[:, 3:] @ turn])
         fine &= (local @ limits.A.T - limits.b).max(axis=1) <= SOFTNESS * weight
     return fine
 
@@ -124,13 +118,12 @@ def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray
     columns = np.vstack(generators).T
     known = np.zeros((len(wanted), columns.shape[1]))
     if near is not None:
-        told = _scaled(near, middle, weight).swapaxes(0, 1)
-        known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, told, strict=True)])
+        given = _scaled(near, middle, weight).swapaxes(0, 1)
+        known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, given, strict=True)])
     pushes = _pushes(columns, wanted, known)
     ends = np.cumsum([0, *map(len, generators)])
     shares = np.stack(
-        [pushes[:, a:b] @ part for a, b, part in zip(ends[:-1], ends[1:], generators, strict=True)],
-        axis=1,
+        [pushes[:, a:b] @ part for a, b, part in zip(ends[:-1], ends[1:], generators, strict=True)], axis=1
     )
     shares += _smallest([contact.position - middle for contact in stance], wanted - shares.sum(axis=1))
     shares = shares * weight
@@ -156,9 +149,9 @@ def _smooth_run(
     inside = np.ones((len(before), 1), dtype=bool)
     inside[0], inside[-1] = _telling(held[:first][::-1], step), _telling(held[end:], step)
     changing = inside & ((before >= 0) | (after >= 0))
-    frames, who = np.nonzero(changing)
+    frames, column = np.nonzero(changing)
     rows = np.arange(len(frames))
-    ours, theirs = after[frames, who], before[frames, who]
+    ours, theirs = after[frames, column], before[frames, column]
     change = sparse.csr_array(
         (np.r_[np.ones((ours >= 0).sum()), -np.ones((theirs >= 0).sum())],
          (np.r_[rows[ours >= 0], rows[theirs >= 0]], np.r_[ours[ours >= 0], theirs[theirs >= 0]])),
@@ -167,10 +160,10 @@ def _smooth_run(
     known = np.zeros((len(rows), 6))
     if first > 0:
         start = frames == 0
-        known[start] = _about(found[first - 1, who[start]], places[0, who[start]])
+        known[start] = _about(found[first - 1, column[start]], places[0, column[start]])
     if end < len(held):
         last = frames == len(before) - 1
-        known[last] = -_about(found[end, who[last]], places[-1, who[last]])
+        known[last] = -_about(found[end, column[last]], places[-1, column[last]])
     cost = change.T @ change + (step / SLOW) ** 2 * sparse.eye_array(count)
     frame, contact = np.nonzero(made)
     middle = places.sum(axis=1) / made.sum(axis=1)[:, None]
@@ -187,9 +180,9 @@ def _smooth_run(
 
 
 def _telling(beside: NDArray[np.bool_], step: float) -> bool:
-    """Whether the frames (n, c) beside a run, the nearest first, tell what is carried there.
+    """Whether the load in the frames (n, c) beside a run, the nearest first, is known.
 
-    In flight nothing is; one contact alone tells it if it is long enough, or lasts up to the recording's end.
+    It is in flight, and for a single contact that is long enough or lasts up to the recording's end.
     """
     if not len(beside):
         return False
@@ -255,8 +248,6 @@ def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches:
     """(n, nv) generalised forces beside those of contacts: torques of the joints, and what the pelvis lacks.
 
     Args:
-        dynamics: The motion.
-        effectors: c names.
         wrenches: (n, c, 6) on each, about the world's origin [N, N.m].
     """
     torques = np.array(dynamics.free_torque)
@@ -270,8 +261,6 @@ def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, star
     """(n, c, 6) wrench on each effector of a schedule, about the world's origin [N, N.m]; 0 off its contacts.
 
     Args:
-        dynamics: The motion.
-        schedule: Its stances.
         start: The schedule's clock at the motion's first instant [s].
     """
     names, times = schedule.sequence.effectors, dynamics.time + start
@@ -294,21 +283,16 @@ def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, star
 
 
 def motion_on_contacts(
-    dynamics: RecordedDynamics,
-    schedule: ContactSchedule,
-    start: float = 0.0,
+    dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0,
     margins: RecordedMargins | None = None,
-) -> Motion:
-    """The recorded motion with contacts, their forces, joint torques and the margin of balance.
+) -> Motion:  # fmt: skip
+    """The recorded motion with contacts, their forces, joint torques and the whole-body margin.
 
-    The margin is that of the whole body about its centre of mass, see
-    :func:`manikin.recordings.dynamics.recorded_margins.recorded_margins`. In flight no contact can push: the
-    torques are those that the motion would need with nothing to push against, and the margin is minus the
-    length of the wrench that is missing. The pelvis' six generalised forces are zero: with contacts exactly
-    (but for rounding), in flight what is missing is left out.
+    In flight the torques are those that the motion would need without contacts, the margin is minus the
+    length of the missing wrench, and the pelvis' six generalised forces are set to zero; with contacts they
+    are zero but for rounding.
 
     Args:
-        dynamics: The motion.
         schedule: Its stances, of :func:`manikin.recordings.supports.recorded_stances.recorded_schedule`.
         start: The schedule's clock at the motion's first instant [s].
         margins: Of the same motion on the same stances, where they are known already.

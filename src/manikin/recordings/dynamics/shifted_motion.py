@@ -1,31 +1,30 @@
 """The motion nearest to a recorded one that its contacts can carry.
 
-Markers tell where a body is to a centimetre, and so leave its acceleration open: a millimetre to and fro at
-4 Hz is 0.6 m/s^2, which moves the zero moment point by 6 cm. A margin that is not positive therefore need not
-say that a person was out of balance. It says so if no motion within the error of the recording is in balance.
+Markers give the position of a body to a centimetre, which leaves its acceleration open: a millimetre at 4 Hz
+is 0.6 m/s^2, which moves the zero moment point by 6 cm. A margin that is not positive therefore means that a
+person was out of balance only if no motion within the error of the recording is in balance.
 
-Here the whole body is shifted in every frame by a smooth ``s(t)``, all of its postures kept, such that the
-wrench stays within the admissible ones by a given margin, and
+The whole body is shifted in every frame by a smooth ``s(t)``, its postures kept, such that the wrench stays
+within the admissible ones by a given margin, and
 
     ``sum |s|^2 / e^2 + |s''|^2 / f^2 + y^2 / a^2``
 
-is least, with ``e`` and ``f`` the errors of place and of acceleration, and ``y`` how far the centre of
-pressure of a foot that carries alone is to the side of its axis, which is about ``a`` in people who walk. The
+is least, with ``e`` and ``f`` the errors of position and acceleration, and ``y`` the distance of the centre
+of pressure of a foot that carries alone from its long axis, which is about ``a`` in people who walk. The
 wrench of the shifted body is
 
     ``w(s) = w + [m s'', s x f + c x m s'']``,
 
 linear in ``s`` but for its product with itself, so that this is a quadratic program; ``s`` is a spline of
-fifth degree, differentiated by the differences with which the motion is, but for the turning of the pelvis.
-The margins that are told are measured on the shifted motion. Where a facet at the imposed margin, the floor,
-holds the shift, the margin of the shifted motion says nothing about the person (:attr:`LeastShift.at_floor`).
+fifth degree, differentiated like the motion. Reported margins are measured on the shifted motion. Where a
+facet at the imposed margin, the floor, holds the shift, the margin of the shifted motion says nothing about
+the person (:attr:`LeastShift.at_floor`).
 
 The imposed margin is a distance to the facets with moments about the middle of the contacts of the phase,
-per body weight: of a facet at which a sole tips it is the distance of the centre of pressure from the edge.
-It does not depend on the world's origin, and the bounds of a shift are along the person's own axes at the
-first instant, so the shift does not depend on the world's heading either. Only facets that a solution
-violates enter the program, a few at a time. What no shift up to a bound repairs stays as far as it must: the
-largest violation of each frame is paid for at a price.
+per body weight: where a sole tips it is the distance of the centre of pressure from the edge. It does not
+depend on the world's origin, nor, as the bounds of a shift are along the person's axes at the first instant,
+on the world's heading. Only facets that a solution violates enter the program. What no shift within the
+bounds repairs remains: the largest violation of each frame has a price.
 """
 
 from collections.abc import Sequence
@@ -85,7 +84,7 @@ LEAST_BALANCED = 0.9
 """Share of the frames with contacts that have to be in balance once shifted."""
 
 PRICE = 1e4
-"""Of a violation, per metre, for which a shift is not made longer."""
+"""Price of a violation, per metre."""
 
 TOLERANCE = 1e-4
 """Violations that are let pass, per body weight [m]."""
@@ -129,7 +128,7 @@ class LeastShift:
 
     @property
     def rms(self) -> float:
-        """[m]."""
+        """Root mean square of the shift [m]."""
         return float(np.sqrt(np.mean(self.size**2)))
 
     @property
@@ -143,12 +142,9 @@ class LeastShift:
 
 
 def least_shift(
-    found: Reconstruction,
-    dynamics: RecordedDynamics,
-    margins: RecordedMargins,
-    inside: float = INSIDE,
+    found: Reconstruction, dynamics: RecordedDynamics, margins: RecordedMargins, inside: float = INSIDE,
     aside: float | None = ASIDE,
-) -> LeastShift:
+) -> LeastShift:  # fmt: skip
     """Shift a recorded motion as little as its contacts ask for.
 
     Args:
@@ -255,13 +251,9 @@ class _Rows:
 
     @classmethod
     def of(
-        cls,
-        dynamics: RecordedDynamics,
-        frame: NDArray[np.int64],
-        H: FloatArray,
-        h: FloatArray,
+        cls, dynamics: RecordedDynamics, frame: NDArray[np.int64], H: FloatArray, h: FloatArray,
         about: FloatArray,
-    ) -> "_Rows":
+    ) -> "_Rows":  # fmt: skip
         """``h - H w`` of (v, 6) rows in (v,) frames, moments about a point."""
         weight, (force, moment) = GRAVITY * dynamics.body.mass, (H[:, :3], H[:, 3:])
         base = (h - np.sum(H * wrench_about(dynamics.wrench[frame], about), axis=1)) / weight
@@ -272,12 +264,12 @@ class _Rows:
 
     @classmethod
     def none(cls) -> "_Rows":
-        """Of nothing."""
+        """No rows."""
         return cls(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
 
     @classmethod
     def joined(cls, parts: Sequence["_Rows"]) -> "_Rows":
-        """All of several."""
+        """The rows of several."""
         each = [(one.frame, one.base, one.on_shift, one.on_bend) for one in (cls.none(), *parts)]
         return cls(*(np.concatenate(column) for column in zip(*each, strict=True)))
 
@@ -347,7 +339,7 @@ class _Spline:
         inner = np.linspace(time[0], time[-1], spans + 1)
         knots = np.r_[[inner[0]] * _DEGREE, inner, [inner[-1]] * _DEGREE]
         values = sparse.csr_array(BSpline.design_matrix(time, knots, _DEGREE))
-        # As velocities and accelerations of recorded postures, see recorded_motion.rates_of.
+        # As velocities and accelerations of recorded postures, see recorded_dynamics.rates_of.
         velocity = sparse.lil_array((n, n))
         velocity.setdiag(-0.5, -1)
         velocity.setdiag(0.5, 1)
@@ -374,8 +366,9 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
     ])  # fmt: skip
     linear = np.concatenate([-(aside.T @ axes.base), np.full(len(frames), PRICE)])
     bound = np.concatenate([np.full(3 * count, LARGEST_SHIFT), np.full(len(frames), np.inf)])
+    rows = sparse.csc_matrix(sparse.hstack([*facets.taken(spline), excess]))
     solution = solve_sparse_qp(
-        quadratic, linear, sparse.hstack([*facets.taken(spline), excess]), None, facets.base,
+        quadratic, linear, rows, None, facets.base,
         (np.where(np.isinf(bound), 0.0, -bound), bound), tolerance=1e-8,
     )  # fmt: skip
     return solution.x[: 3 * count].reshape(3, count).T if solution.solved else None

@@ -1,13 +1,8 @@
 """Recordings in Acclaim files: a skeleton (ASF) and the motion (AMC) of it.
 
-Y is up. With a bone's own axes ``C`` in the rest pose and the turns ``R = Rz Ry Rx`` of its degrees of
-freedom its rotation to its parent is ``C R C^T``, the identity in the rest pose. Our joint of a bone's name
-is where the bone begins.
-
-Also here. Skeletons in Acclaim files (ASF), whose motions are AMC files.
-
-Y is up. A bone has a direction and a length in the rest pose, which is the world's frame, and turns about
-axes of its own.
+Y is up. A bone has a direction and a length in the rest pose, in world axes. With its own axes ``C`` and the
+turns ``R = Rz Ry Rx`` of its degrees of freedom its rotation to its parent is ``C R C^T``, the identity in
+the rest pose. Our joint of a bone's name is where the bone begins.
 """
 
 from collections.abc import Iterator
@@ -206,7 +201,6 @@ def read_amc(
     """Read an AMC file and its skeleton.
 
     Args:
-        path: The motion.
         skeleton: The skeleton or its file; None for the one beside the motion whose name is the
             beginning of the motion's up to the first underscore (``16_08.amc``: ``16.asf``).
         rate: Frames per second [Hz].
@@ -306,10 +300,21 @@ def _recording(name: str, skeleton: Skeleton, frames: FloatArray, radians: bool,
         angles = values if radians else np.deg2rad(values)
         axes, order = skeleton.axes[number], skeleton.root_order if number == 0 else "XYZ"
         rotations[:, number] = axes @ fixed_turns(angles, order) @ axes.T
+    # A bone begins where its parent ends.
+    parents, vectors = skeleton.parents, skeleton.vectors
+    offsets = np.array([np.zeros(3) if parent < 0 else vectors[parent] for parent in parents])
+    ends = {bone: vectors[k] for k, bone in enumerate(skeleton.bones) if k not in parents}
+    root = frames[:, slots[ROOT]][:, [skeleton.turns[0].index(axis) for axis in ("tx", "ty", "tz")]]
     return z_up(
-        name, skeleton.bones, np.array(skeleton.parents), _offsets(skeleton), _ends(skeleton), rotations,
-        skeleton.metres_per_unit * _root_places(frames[:, slots[ROOT]], skeleton.turns[0]), rate,
-    )  # fmt: skip
+        name,
+        skeleton.bones,
+        np.array(parents),
+        offsets,
+        ends,
+        rotations,
+        skeleton.metres_per_unit * root,
+        rate,
+    )
 
 
 def _by_turn(values: FloatArray, turns: tuple[str, ...]) -> FloatArray:
@@ -319,22 +324,3 @@ def _by_turn(values: FloatArray, turns: tuple[str, ...]) -> FloatArray:
         if turn in TURNS:
             angles[:, TURNS.index(turn)] = values[:, column]
     return angles
-
-
-def _root_places(values: FloatArray, order: tuple[str, ...]) -> FloatArray:
-    return values[:, [order.index(name) for name in ("tx", "ty", "tz")]]
-
-
-def _offsets(skeleton: Skeleton) -> FloatArray:
-    """(j, 3) begin of each bone in its parent's frame: the parent's end."""
-    return np.array([
-        np.zeros(3) if parent < 0 else skeleton.vectors[parent] for parent in skeleton.parents
-    ])  # fmt: skip
-
-
-def _ends(skeleton: Skeleton) -> dict[str, FloatArray]:
-    """Ends of the bones that have no children."""
-    parents = set(skeleton.parents)
-    return {
-        bone: skeleton.vectors[number] for number, bone in enumerate(skeleton.bones) if number not in parents
-    }

@@ -2,7 +2,7 @@
 
 Y is up, angles are degrees, the rotation of a joint is the product of its channels from left to right.
 The format has no unit of length: it is the one in which the skeleton's longest chain through the root,
-from the toes to the fingers, fits a person, unless the caller knows better.
+from the toes to the fingers, fits a person, unless it is given.
 """
 
 from dataclasses import dataclass, field
@@ -31,12 +31,11 @@ def read_bvh(path: str | Path, metres_per_unit: float | None = None) -> Recordin
     """Read a BVH file.
 
     Args:
-        path: The file.
-        metres_per_unit: Unit of length [m], > 0; None to tell it from the size of the skeleton.
+        metres_per_unit: Unit of length [m], > 0; None to find it from the size of the skeleton.
 
     Raises:
         InputError: If the file is missing, damaged, cut short or holds what is no number; if a joint
-            other than the root has channels of position; or if the unit cannot be told.
+            other than the root has channels of position; or if no unit fits.
     """
     if metres_per_unit is not None:
         finite_number(metres_per_unit, "metres_per_unit", above=0.0)
@@ -52,7 +51,7 @@ def read_bvh(path: str | Path, metres_per_unit: float | None = None) -> Recordin
         unit * np.array([joint.offset if joint.parent >= 0 else np.zeros(3) for joint in joints]),
         {joint.name: unit * joint.end for joint in joints if joint.end is not None},
         _rotations(joints, values),
-        unit * _root_positions(joints[0], values),
+        unit * values[:, [joints[0].channels.index(name) for name in _POSITIONS]],
         rate,
     )
 
@@ -200,10 +199,6 @@ def _span(joints: list[_Joint]) -> float:
         tip = lengths[-1] + (0.0 if joint.end is None else float(np.linalg.norm(joint.end)))
         branches[owner[-1]] = max(branches.get(owner[-1], 0.0), tip)
     return sum(sorted(branches.values())[-2:])
-
-
-def _root_positions(root: _Joint, values: FloatArray) -> FloatArray:
-    return values[:, [root.channels.index(name) for name in _POSITIONS]]
 
 
 def _rotations(joints: list[_Joint], values: FloatArray) -> FloatArray:

@@ -36,7 +36,6 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     """Read a C3D file.
 
     Args:
-        path: The file.
         up: The file's axis that points up; None for the one that it declares.
         plates: Whether force plates are read.
 
@@ -59,7 +58,8 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     unit = metres_per(next(iter(_texts(parameters, "POINT", "UNITS")), ""), f"{file}: POINT:UNITS")
     if with_plates:
         _check_moments(parameters, layout)
-    turn = rotation_to_z_up(up or _declared_up(parameters), f"{file}: POINT:Y_SCREEN")
+    declared_up = next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "")
+    turn = rotation_to_z_up(up or declared_up or "+z", f"{file}: POINT:Y_SCREEN")
     rate = layout.real("POINT", "RATE")
     start = (layout.first_frame - 1) / rate
     names, kept = _markers(parameters, layout)
@@ -99,10 +99,6 @@ def _finite(values: FloatArray, file: str, what: str) -> FloatArray:
 def _texts(parameters: Mapping[str, Any], group: str, name: str) -> list[str]:
     values = parameters.get(group, {}).get(name, {}).get("value", [])
     return [str(value).strip() for value in values] if isinstance(values, list) else []
-
-
-def _declared_up(parameters: Mapping[str, Any]) -> str:
-    return next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "") or "+z"
 
 
 # --- points ------------------------------------------------------------------------------------
@@ -203,7 +199,7 @@ def _check_channels(layout: C3dLayout, count: int, each: int) -> None:
 
 
 def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
-    """The library adds moments and forces times lengths: their units have to agree, where they are told."""
+    """The library adds moments and forces times lengths: declared units have to agree."""
     lengths = _texts(parameters, "POINT", "UNITS")[0].lower()
     units = _texts(parameters, "ANALOG", "UNITS")
     for channel in np.unique(layout.integers("FORCE_PLATFORM", "CHANNEL")).tolist():

@@ -1,15 +1,12 @@
-"""Header and parameters of a C3D file, checked against the size of the file.
+"""Header, parameters and force-plate channels of a C3D file, checked against its size (c3d.org, user guide).
 
 The C++ library that reads the data trusts the counts in a file, so that a damaged one could make it read
-outside its memory. What passes here is safe to hand over: every record of the parameters lies in its
-section, counts agree with each other, and the file is as long as they say (c3d.org, user guide).
-
-Also here. Force and moment on a force plate from the channels that a C3D file keeps of it (c3d.org, user
-guide).
+outside its memory. A file that passes here is safe: every record of the parameters lies in its section,
+counts agree with each other, and the file is as long as they say.
 
 In a plate's own axes x points from its second corner to the first one, y from the fourth to the first, and
-z at right angles to both, into the ground of most plates. Its origin is the middle of the surface seen from
-that of its sensors, which lie deeper; some programs write the opposite, told by its sign.
+z at right angles to both, into the ground of most plates. Its origin is the middle of the surface relative to
+the origin of its sensors, which lie deeper; some programs write the opposite sign.
 """
 
 from collections.abc import Mapping
@@ -27,7 +24,7 @@ from manikin.numerics.spatial import FloatArray
 def plate_load(
     kind: int, channels: FloatArray, corners: FloatArray, origin: FloatArray, calibration: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Force and moment about the middle of the corners, in the axes in which the corners are told.
+    """Force and moment about the middle of the corners, in the axes of the corners.
 
     Args:
         kind: Type of the plate: 1 force, centre of pressure and free moment; 2 force and moment; 3 eight
@@ -100,11 +97,8 @@ class C3dLayout:
 
     Attributes:
         file: Its path, for messages.
-        points: Points per frame.
-        channels: Analog channels.
         samples: Samples of each channel per frame.
         first_frame: Number of the first frame, counted from 1.
-        frames: Number of frames.
         processor: Kind of processor whose numbers these are: 84 Intel, 85 DEC, 86 MIPS.
         parameters: By group and name, both in upper case.
     """
@@ -161,7 +155,6 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
     """Check header, parameters and size of a C3D file.
 
     Args:
-        content: The whole file.
         file: Its path, for messages.
 
     Raises:

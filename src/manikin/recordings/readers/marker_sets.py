@@ -1,4 +1,4 @@
-"""Which marker sits where, told by its name.
+"""Roles and segments of markers by their names.
 
 Known are the names of Plug-in Gait and Helen Hayes sets, of OpenSim's gait models, and of sets that spell
 the place out (``R_Knee_Lat``, ``L.ASIS``, ``r_shoulder``). Case, separators and a subject's prefix

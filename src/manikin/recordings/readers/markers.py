@@ -1,8 +1,4 @@
-"""One recorded motion of markers: their places at an even rate, force plates and events beside them.
-
-Also here. Frames in which a marker was not seen: finding them, and filling the short ones. One force plate of
-a recording: wrenches of the ground on the person.
-"""
+"""Recorded markers at an even rate, their gaps, and the force plates and events recorded with them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +26,6 @@ class Gap:
     """One run of frames without a marker.
 
     Attributes:
-        marker: Its name.
         first: First frame without it.
         stop: First frame with it again, or the number of frames.
     """
@@ -85,12 +80,12 @@ def filled(positions: FloatArray, longest: int) -> FloatArray:
 
 
 LEAST_FORCE = 20.0
-"""Normal force below which no centre of pressure is told; noise would place it [N]."""
+"""Normal force below which noise would define the centre of pressure [N]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ForcePlate:
-    """Wrenches that a plate applies to who stands on it, at an even rate; the world is z up.
+    """Wrenches that a plate applies to the person on it, at an even rate; the world is z up.
 
     Attributes:
         name: How messages call it.
@@ -156,6 +151,21 @@ class ForcePlate:
         places.setflags(write=False)
         return places
 
+    def below(self, points: FloatArray, overhang: float) -> bool:
+        """Whether (..., 3) points are all above the plate, or at most ``overhang`` [m] beyond its edge.
+
+        True where the corners are not known.
+        """
+        if self.corners is None:
+            return True
+        corners = self.corners[:, :2]
+        sides = np.roll(corners, -1, axis=0) - corners
+        turning = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
+        inward = np.sign(turning) * np.stack([-sides[:, 1], sides[:, 0]], axis=1)
+        inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-9)
+        depth = np.sum((points[..., None, :2] - corners) * inward, axis=-1)
+        return bool(depth.min() > -overhang)
+
     def cut(self, begin: float, end: float) -> "ForcePlate":
         """Samples at instants from ``begin`` up to, not with, ``end`` [s].
 
@@ -172,10 +182,9 @@ class ForcePlate:
 
 @dataclass(frozen=True)
 class Event:
-    """Something marked in a recording by who made it, such as ``"Foot Strike"`` of ``"Left"``.
+    """An event marked in a recording, such as ``"Foot Strike"`` of ``"Left"``.
 
     Attributes:
-        label: What happens.
         context: Side or part that does it; empty where the file does not say.
         time: Instant on the recording's clock [s].
     """

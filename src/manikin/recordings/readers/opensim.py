@@ -1,15 +1,14 @@
-"""Markers in TRC files (Motion Analysis, OpenSim): text, one row per frame, tabs in between.
+"""Markers in TRC files and force plates in MOT and STO files (Motion Analysis, OpenSim).
 
-The header declares rate, counts and unit; it does not say which axis points up. OpenSim's files are y up,
-x forward, z right. A cell that is empty or ``nan``, or a place of exact zeros, is a marker that was not seen.
+TRC: one row per frame, tabs in between. The header declares rate, counts and unit, but not which axis points
+up; OpenSim's files are y up, x forward, z right. A cell that is empty or ``nan``, or a position of exact
+zeros, is a marker that was not seen.
 
-Also here. Force plates in OpenSim's MOT and STO files: text, one row per instant, a name for each column.
-
-A plate has three columns of force, ``..._vx`` to ``..._vz``, the point where it acts, ``..._px`` to
-``..._pz``, and a moment, ``..._mx`` (or ``ground_torque..._x``) to z; metres and newtons. OpenSim's files
-are y up. The moment should be about that point. Some programs leave it about a fixed point, such as the
-middle of the plate. Which one it is can be told: feet press and do not pull, so that about the centre of
-pressure the moment is upright.
+MOT and STO: one row per instant, a name for each column. A plate has three columns of force, ``..._vx`` to
+``..._vz``, the point where it acts, ``..._px`` to ``..._pz``, and a moment, ``..._mx`` (or
+``ground_torque..._x``) to z; metres and newtons. The moment should be about that point, but some programs
+leave it about a fixed point, such as the middle of the plate. As feet press and do not pull, the moment about
+the centre of pressure is vertical, which identifies the point.
 """
 
 from collections.abc import Sequence
@@ -46,10 +45,9 @@ def read_mot(
     """Read the force plates of a MOT or STO file, also those that were never stepped on.
 
     Args:
-        path: The file.
         up: The file's axis that points up.
-        moments_about: (3,) fixed point of all moments in the world, z up [m]; None to tell from the moments
-            of each plate whether they are about the points where the forces act, or else about which one.
+        moments_about: (3,) fixed point of all moments in the world, z up [m]; None to find
+            it from the moments of each plate.
 
     Raises:
         InputError: If the file is missing, damaged, cut short, uneven in time, holds what is no number
@@ -74,14 +72,9 @@ def read_mot(
 
 
 def _plate(
-    name: str,
-    force: FloatArray,
-    point: FloatArray,
-    moment: FloatArray,
-    rate: float,
-    start: float,
+    name: str, force: FloatArray, point: FloatArray, moment: FloatArray, rate: float, start: float,
     fixed: FloatArray | None,
-) -> ForcePlate:
+) -> ForcePlate:  # fmt: skip
     """A plate of what the file holds, turned to z up."""
     pressed = force[:, 2] >= LEAST_FORCE
     # Without a force there is no point where it acts; some files say so.
@@ -176,7 +169,6 @@ def read_trc(
     """Read a TRC file and the force plates recorded with it.
 
     Args:
-        path: The markers.
         forces: Force plates or their MOT file, with the same axis up; None for ``NAME_grf.mot`` beside
             ``NAME.trc`` where there is one. An empty sequence for none.
         up: The file's axis that points up.

@@ -1,4 +1,4 @@
-"""Recordings of any format that is known, told by the ending of the file's name."""
+"""Reading of a recording by the reader of the file's ending."""
 
 from pathlib import Path
 

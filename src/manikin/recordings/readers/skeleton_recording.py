@@ -1,7 +1,4 @@
-"""One recorded motion of a skeleton: names, lengths and rotations of its joints at an even rate.
-
-Also here. What a file says about the person recorded.
-"""
+"""Recorded skeletons: names, lengths and rotations of joints at an even rate, and measures of the person."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -174,15 +171,9 @@ class Recording(Displayed):
 
 
 def z_up(
-    name: str,
-    joint_names: tuple[str, ...],
-    parents: NDArray[np.int64],
-    offsets: FloatArray,
-    ends: Mapping[str, FloatArray],
-    rotations: FloatArray,
-    root_positions: FloatArray,
-    rate: float,
-) -> Recording:
+    name: str, joint_names: tuple[str, ...], parents: NDArray[np.int64], offsets: FloatArray,
+    ends: Mapping[str, FloatArray], rotations: FloatArray, root_positions: FloatArray, rate: float,
+) -> Recording:  # fmt: skip
     """Recording from values whose world is y up; the arguments are those of :class:`Recording`."""
     turn = Y_UP_TO_Z_UP
     return Recording(

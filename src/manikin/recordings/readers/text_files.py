@@ -1,7 +1,4 @@
-"""Reading the text files of motion capture: decoding, numbers, instants and rotations of three angles.
-
-Also here. Units and axes of marker files: lengths to metres, the axis that points up to z.
-"""
+"""Text files of motion capture: decoding, numbers, units, axes, and rotations of three angles."""
 
 from pathlib import Path
 
@@ -63,7 +60,6 @@ def read_text(path: str | Path, kind: str) -> str:
     """Text of a file.
 
     Args:
-        path: The file.
         kind: What it should be, for the message (``"BVH"``).
 
     Raises:
@@ -87,7 +83,6 @@ def numbers(words: list[str], where: str, gaps: bool = False) -> FloatArray:
     """(n,) finite numbers, none beyond :data:`LARGEST`.
 
     Args:
-        words: Their texts.
         where: File and line or key, for the message.
         gaps: Whether ``nan`` may stand where there is no number.
 

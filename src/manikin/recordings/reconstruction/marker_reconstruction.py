@@ -1,12 +1,8 @@
 """Recorded markers as a motion of our human.
 
-A person's lengths and the first postures follow from joint centres
-(:mod:`manikin.recordings.reconstruction.marker_reconstruction`). On some frames of these postures every
-marker of a known segment is placed on our human where it is seen on average; postures that follow the
-markers and places of the markers are then improved in turn, and at last all frames follow the markers
-themselves.
-
-Also here. Joint centres from markers on the skin.
+A person's lengths and the first postures follow from joint centres. On some frames every marker of a known
+segment is placed on our human at its median position; postures and marker positions are then improved in
+turn, and finally all frames follow the markers. Joint centres follow from markers on the skin:
 
 * Hips where the file has them; else by regression on the distance of the ASIS and the depth of the pelvis:
   Harrington, Zavatsky, Lawson, Yuan, Theologis, "Prediction of the hip joint centre in adults, children, and
@@ -18,7 +14,7 @@ Also here. Joint centres from markers on the skin.
   Petuskey, Bagley, "A method for determination of upper extremity kinematics", Gait & Posture 15 (2002)).
 * Wrists midway between two markers, or at the only one.
 
-Markers that are not seen make NaN.
+Markers that are not seen give NaN.
 """
 
 from collections.abc import Mapping
@@ -37,16 +33,16 @@ from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Subject
 from manikin.recordings.reconstruction.anatomy import SIDES
 from manikin.recordings.reconstruction.orientation_targets import placing_targets
-from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle
+from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle, unit
 
 KNEE_WIDTH, ANKLE_WIDTH, ELBOW_WIDTH = 0.10, 0.07, 0.08
-"""Of a joint where neither the file nor a second marker tells [m]."""
+"""Width of a joint where neither the file nor a second marker gives it [m]."""
 
 MARKER_RADIUS = 0.007
-"""Where the file does not say [m]."""
+"""Radius of a marker where the file does not give it [m]."""
 
 SHOULDER_SHARE = 0.17
-"""Of the distance of both acromia: depth of a shoulder's centre below its acromion (Rab et al. 2002)."""
+"""Depth of a shoulder's centre below its acromion, per distance of both acromia (Rab et al. 2002)."""
 
 PELVIS_WIDTHS = (0.12, 0.45)
 """Distances of the ASIS that are believed [m]."""
@@ -54,10 +50,7 @@ PELVIS_WIDTHS = (0.12, 0.45)
 BENT = 0.12
 """Share of a limb's length by which its middle joint is off the line of its ends when the bend is trusted."""
 
-_LIMBS = {
-    "leg": ("knee", "thigh", "foot", -1.0),
-    "forearm": ("elbow", "upper_arm", "hand", 1.0),
-}
+_LIMBS = {"leg": ("knee", "thigh", "foot", -1.0), "forearm": ("elbow", "upper_arm", "hand", 1.0)}
 """Segment below a hinge: name of its markers, segments at both ends of the limb, sense of the bend."""
 
 
@@ -128,7 +121,7 @@ def hip_centres(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -
 def marker_centres(
     marks: Mapping[str, FloatArray], axes: FloatArray, subject: Subject, where: str
 ) -> dict[str, FloatArray]:
-    """Joint centres in the world, (n, 3) [m], by the segment that begins there, of those that can be told.
+    """Joint centres in the world, (n, 3) [m], by the segment that begins there, of those that are known.
 
     Args:
         marks: (n, 3) markers by role.
@@ -141,7 +134,9 @@ def marker_centres(
     widths = {"leg": subject.knee_width or KNEE_WIDTH, "forearm": subject.elbow_width or ELBOW_WIDTH}
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         found |= _ankle(marks, side, sign, axes, 0.5 * (subject.ankle_width or ANKLE_WIDTH) + radius)
-        found |= _wrist(marks, side)
+        wrist = [marks[name] for name in (f"{side}_wrist_radius", f"{side}_wrist_ulna") if name in marks]
+        if wrist:
+            found[f"{side}_hand"] = sum(wrist[1:], wrist[0]) / len(wrist)
         for part, (joint, first, last, bend) in _LIMBS.items():
             outer, inner = (marks.get(f"{side}_{joint}_{place}") for place in ("lateral", "medial"))
             if outer is None:
@@ -166,20 +161,20 @@ def _hinge(
     That plane holds both ends of the limb and the centre; a limb that is nearly straight has the pelvis'
     left-right axis as that of its hinge.
     """
-    along = _unit(outer - begin)
-    plain = sign * _unit(aside - np.sum(aside * along, axis=1, keepdims=True) * along)
-    line = _unit(end - begin)
+    along = unit(outer - begin)
+    plain = sign * unit(aside - np.sum(aside * along, axis=1, keepdims=True) * along)
+    line = unit(end - begin)
     off = outer - begin - np.sum((outer - begin) * line, axis=1, keepdims=True) * line
     distance = np.linalg.norm(off, axis=1, keepdims=True)
     share = np.minimum(reach / np.maximum(distance, 1e-9), 1.0)
-    unit = off / np.maximum(distance, 1e-9)
-    normal = share * unit + sign * bend * np.sqrt(1.0 - share**2) * np.cross(line, unit)
+    away = off / np.maximum(distance, 1e-9)
+    normal = share * away + sign * bend * np.sqrt(1.0 - share**2) * np.cross(line, away)
     length = np.linalg.norm(end - begin, axis=1, keepdims=True)
     trust = np.clip(np.sqrt(np.maximum(distance**2 - reach**2, 0.0)) / (BENT * length), 0.0, 1.0) ** 2
     agrees = np.sum(normal * plain, axis=1, keepdims=True) > 0.3
     trust = np.where(np.isnan(trust) | ~agrees, 0.0, trust)
     normal = np.where(trust > 0.0, normal, plain)
-    return outer - reach * _unit(trust * normal + (1.0 - trust) * plain)
+    return outer - reach * unit(trust * normal + (1.0 - trust) * plain)
 
 
 def _ankle(
@@ -194,13 +189,8 @@ def _ankle(
     aside = axes[:, :, 1]
     if heel is not None and toe is not None and knee is not None:
         across = np.cross(knee - outer, toe - heel)
-        aside = np.where(np.isnan(across), aside, _unit(across))
+        aside = np.where(np.isnan(across), aside, unit(across))
     return {f"{side}_foot": outer - sign * reach * aside}
-
-
-def _wrist(marks: Mapping[str, FloatArray], side: str) -> dict[str, FloatArray]:
-    both = [marks[f"{side}_{name}"] for name in ("wrist_radius", "wrist_ulna") if f"{side}_{name}" in marks]
-    return {f"{side}_hand": sum(both[1:], both[0]) / len(both)} if both else {}
 
 
 def _shoulders(marks: Mapping[str, FloatArray], subject: Subject, radius: float) -> dict[str, FloatArray]:
@@ -259,10 +249,6 @@ def _median(values: FloatArray) -> float:
     return float(np.median(seen)) if seen.size else 0.0
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
-
-
 PLACING_FRAMES = 40
 """Frames on which markers are placed."""
 
@@ -290,9 +276,8 @@ def reconstruct_markers(
 ) -> Reconstruction:
     """Motion of our human that follows markers; see ``reconstruct``.
 
-    Short gaps are filled (:mod:`manikin.recordings.readers.markers`); in longer ones a marker does not
-    count. Frames at the ends that see less than half of the markers are left out. Segments without markers
-    stay as in standing.
+    Short gaps are filled; in longer ones a marker does not count. Frames at the ends that see less than half
+    of the markers are left out. Segments without markers stay as in standing.
     """
     marked = _Marked(recording)
     subject = recording.subject
@@ -316,12 +301,12 @@ def reconstruct_markers(
         body, time, q, PointTargets(placed.names, placed.segments, placed.points, recorded, placed.weights),
         np.where(np.isnan(recorded[..., 0]), np.nan, residual), first,
         tuple(name for name in recording.marker_names if name not in followed),
-        tuple(s.name for s in body.segments if s.hinges and not _told(body, s.name, {*placed.segments})),
+        tuple(s.name for s in body.segments if s.hinges and not _is_marked(body, s.name, {*placed.segments})),
     )  # fmt: skip
 
 
 class _Marked:
-    """What the markers of a recording tell by their names."""
+    """Markers of a recording by role, the axes of the pelvis and the joint centres."""
 
     def __init__(self, recording: MarkerRecording) -> None:
         where = f"recording {recording.name!r}"
@@ -342,7 +327,8 @@ def _placed(marked: _Marked, body: BodyModel) -> PointTargets:
     names = tuple(marked.set.segments)
     positions = recording.chosen(names).positions
     frames = _frames(np.isnan(wanted.positions[..., 0]), np.isnan(positions[..., 0]))
-    names, positions = _seen_in(frames, names, positions)
+    kept = np.flatnonzero(~np.isnan(positions[frames][..., 0]).all(axis=0))
+    names, positions = tuple(names[k] for k in kept), positions[:, kept]
     segments = tuple(marked.set.segments[name] for name in names)
     first = _present(wanted, frames)
     q, _ = follow(body, first, _starts(body, marked, pelvis)[frames])
@@ -360,13 +346,6 @@ def _frames(unknown: NDArray[np.bool_], unseen: NDArray[np.bool_]) -> NDArray[np
     known = (~unknown).sum(axis=1) + (~unseen).sum(axis=1)
     good = np.flatnonzero((known >= COMPLETE * known.max()) & ~unknown.all(axis=1))
     return good[np.unique(np.linspace(0, len(good) - 1, min(PLACING_FRAMES, len(good))).astype(int))]
-
-
-def _seen_in(
-    frames: NDArray[np.int64], names: tuple[str, ...], positions: FloatArray
-) -> tuple[tuple[str, ...], FloatArray]:
-    kept = np.flatnonzero(~np.isnan(positions[frames][..., 0]).all(axis=0))
-    return tuple(names[k] for k in kept), positions[:, kept]
 
 
 def _present(targets: PointTargets, frames: NDArray[np.int64]) -> PointTargets:
@@ -397,7 +376,7 @@ def _starts(body: BodyModel, marked: _Marked, pelvis: FloatArray | None = None) 
     return q
 
 
-def _told(body: BodyModel, segment: str, marked: set[str]) -> bool:
+def _is_marked(body: BodyModel, segment: str, marked: set[str]) -> bool:
     """Whether a segment, or one that it carries, has a marker."""
     children = [one.name for one in body.segments if one.parent == segment]
-    return segment in marked or any(_told(body, child, marked) for child in children)
+    return segment in marked or any(_is_marked(body, child, marked) for child in children)

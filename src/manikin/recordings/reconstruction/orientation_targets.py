@@ -1,17 +1,9 @@
-"""What a skeleton tells beyond its joint centres: turns of pelvis, thorax and head, feet and hands.
+"""Targets for the rotations of segments, beside joint centres, of recorded skeletons and markers.
 
-Each is expressed by points on our segments, as markers would be. They weigh less than joint centres,
-for they are placed by assumption: where the trunk is most extended, pelvis and thorax are taken to be
-aligned with it; on the mean of a recording the head looks where the chest points; a sole is flat where
-its ankle is lowest.
-
-Also here. Where points of our segments are while markers are being placed on them: joint centres, and turns.
-
-Anatomical markers tell the joint centres (:mod:`manikin.recordings.reconstruction.marker_reconstruction`)
-and, by assumption, the turns of pelvis, thorax, head, feet and forearms: pelvis and thorax are aligned with
-the trunk where it is most extended, with the vertical where the trunk has no markers; on the mean of a
-recording the head looks where the chest points; a sole is flat where its ankle is lowest; in the zero
-posture palms point inward.
+Each is expressed by points on our segments, as markers would be. They weigh less than joint centres because
+they rest on assumptions: where the trunk is most extended, pelvis and thorax are aligned with it, or with the
+vertical if the trunk has no markers; on the mean of a recording the head looks where the chest points; a sole
+is flat where its ankle is lowest; in the zero posture palms point inward.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,7 +29,7 @@ from manikin.recordings.reconstruction.proportions import (
 )
 
 FEWEST = 3
-"""Markers that tell a turn."""
+"""Fewest markers that define a rotation."""
 
 _Guide = tuple[str, FloatArray, FloatArray]
 
@@ -49,9 +41,7 @@ def placing_targets(
     """Joint centres and guides of every frame, and the pelvis' turns.
 
     Args:
-        recording: The markers.
         found: Which of them are known.
-        body: Our human.
         marks: (n, 3) markers by role [m].
         centres: (n, 3) joint centres [m].
         pelvis: (n, 3, 3) from the axes of the pelvis' markers to the world's.
@@ -166,7 +156,7 @@ def _thorax(
     if np.all(np.isnan(both)):
         return None
     if "left_upper_arm" not in centres:
-        # Who walks sways over the hips, the same to both sides: the mean of the straightest half.
+        # A walking person sways over the hips, the same to both sides: the mean of the straightest half.
         length = np.where(np.isnan(both), np.nan, np.linalg.norm(up, axis=1))
         tall = length >= np.nanmedian(length)
         local = [np.einsum("nji,nj->ni", turns, axis)[tall].mean(axis=0) for axis in (up, pelvis[:, :, 1])]
@@ -262,7 +252,7 @@ def _of_segment(recording: MarkerRecording, found: MarkerSet, segment: str) -> F
 
 
 WEIGHT = 0.05
-"""Of a guide, against 1 of a joint centre."""
+"""Weight of a guide, against 1 of a joint centre."""
 
 ARM = 0.2
 """Distance of a guide from the middle of its segment's joints [m]."""
@@ -282,9 +272,8 @@ NECKS = ("neck", "Neck", "lowerneck")
 def trunk_turns(recording: Recording, centres: Mapping[str, FloatArray], segment: str) -> FloatArray:
     """(n, 3, 3) from the axes of ``"pelvis"`` or ``"thorax"`` to the world's.
 
-    The recorded joint's turns, aligned with the line from hips to shoulders where that is longest and the
-    arms hang; the
-    left-right axis is exactly that of the two joint centres.
+    The recorded joint's rotations, aligned with the line from hips to shoulders where that is longest and the
+    arms hang; the left-right axis is exactly that of the two joint centres.
     """
     geometric = trunk_axes(centres, _PARTS[segment])
     length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
@@ -302,8 +291,6 @@ def orientation_targets(
     """Targets of the turns of pelvis, thorax and head and of the directions of feet and hands.
 
     Args:
-        recording: The skeleton's motion.
-        body: Our human.
         centres: (n, 3) joint centres [m].
         pelvis: (n, 3, 3) from the pelvis' axes to the world's.
         thorax: (n, 3, 3) from the thorax' axes to the world's.
@@ -311,11 +298,7 @@ def orientation_targets(
     girdle = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
     found: list[tuple[str, FloatArray, FloatArray]] = [
         ("pelvis", np.array([0.0, 0.0, ARM]), middle(centres, "thigh") + ARM * pelvis[:, :, 2]),
-        (
-            "thorax",
-            girdle + np.array([ARM, 0.0, 0.0]),
-            middle(centres, "upper_arm") + ARM * thorax[:, :, 0],
-        ),
+        ("thorax", girdle + np.array([ARM, 0.0, 0.0]), middle(centres, "upper_arm") + ARM * thorax[:, :, 0]),
     ]
     found += _head(recording, body, centres, thorax, girdle)
     for side in ("left", "right"):

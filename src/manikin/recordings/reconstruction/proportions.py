@@ -1,8 +1,4 @@
-"""The human of a recorded person: lengths between joint centres, and the stature they tell.
-
-Also here. The joint centres that a recorded skeleton shares with our human. Postures of our human straight
-from joint centres, without search. Postures of our human that follow a recording.
-"""
+"""Joint centres of a recorded person: the human with their lengths, and postures without search."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,31 +15,13 @@ from manikin.errors import InputError
 from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.recordings.readers.skeleton_recording import Recording
-from manikin.recordings.reconstruction.anatomy import JOINTS, SIDES
+from manikin.recordings.reconstruction.anatomy import SIDES, joint_of
 from manikin.runtime.display import Displayed
 
 CENTRES = tuple(
     f"{side}_{part}" for side in SIDES for part in ("thigh", "leg", "foot", "upper_arm", "forearm", "hand")
 )
 """Segments whose origins are hips, knees, ankles, shoulders, elbows and wrists."""
-
-WRISTS = {"left_hand": ("lhand",), "right_hand": ("rhand",)}
-"""Joints that are the wrist before those of JOINTS: CMU's ASF ends the forearm twice, second at the wrist."""
-
-
-def joint_of(recording: Recording, segment: str) -> str:
-    """Name of the recorded joint at which one of our segments begins.
-
-    Raises:
-        InputError: If the skeleton has none.
-    """
-    names = (*WRISTS.get(segment, ()), *JOINTS[segment])
-    for name in names:
-        if name in recording.joint_names:
-            return name
-    raise InputError(
-        f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {', '.join(names)}"
-    )
 
 
 def joint_centres(recording: Recording) -> Mapping[str, FloatArray]:
@@ -67,7 +45,7 @@ def far_point(recording: Recording, joint: str) -> FloatArray | None:
 
 
 STRAIGHT = 0.15
-"""Sine of the bend below which the carrier's left-right axis, too, tells a limb's turn about itself."""
+"""Sine of the bend below which the carrier's left-right axis counts for a limb's rotation about itself."""
 
 _LIMBS = {
     "thigh": ("pelvis", "leg", "foot", "knee_flexion", 1.0),
@@ -90,11 +68,10 @@ def analytic_ik(
 ) -> FloatArray:
     """Postures within the joints' limits, close to the recorded ones.
 
-    The spine's turn is shared by lumbar and thorax, limbs point as recorded, their turn about
-    themselves is told by the bend of knee and elbow; neck, wrists and ankles are at 0.
+    Lumbar and thorax share the rotation of the spine, limbs point as recorded, and the bend of knee and
+    elbow gives the rotation about the limb; neck, wrists and ankles are at 0.
 
     Args:
-        body: Our human.
         centres: (n, 3) joint centres [m].
         pelvis: (n, 3, 3) from the pelvis' axes to the world's.
         thorax: (n, 3, 3) from the thorax' axes to the world's.
@@ -114,7 +91,7 @@ def analytic_ik(
         for side in SIDES:
             upper = centres[f"{side}_{beyond}"] - centres[f"{side}_{part}"]
             lower = centres[f"{side}_{end}"] - centres[f"{side}_{beyond}"]
-            upper, lower = _unit(upper), _unit(lower)
+            upper, lower = unit(upper), unit(lower)
             cross = np.cross(upper, lower)
             bent = np.linalg.norm(cross, axis=1)
             y = sign * cross + np.maximum(STRAIGHT - bent, 0.0)[:, None] * carriers[carrier][:, :, 1]
@@ -129,11 +106,11 @@ def analytic_ik(
 def frames(z: FloatArray, y: FloatArray, *, keep_y: bool) -> FloatArray:
     """(n, 3, 3) with columns x, y, z of (n, 3) directions; the one kept is exact."""
     if keep_y:
-        y = _unit(y)
-        z = _unit(z - np.sum(z * y, axis=1, keepdims=True) * y)
+        y = unit(y)
+        z = unit(z - np.sum(z * y, axis=1, keepdims=True) * y)
     else:
-        z = _unit(z)
-        y = _unit(y - np.sum(y * z, axis=1, keepdims=True) * z)
+        z = unit(z)
+        y = unit(y - np.sum(y * z, axis=1, keepdims=True) * z)
     return np.stack([np.cross(y, z), y, z], axis=-1)
 
 
@@ -148,7 +125,8 @@ def _set_ball(body: BodyModel, q: FloatArray, segment: str, turns: FloatArray) -
     return ball_rotation(axes, angles)
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def unit(vectors: FloatArray) -> FloatArray:
+    """(..., 3) unit vectors."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
@@ -200,21 +178,13 @@ class Reconstruction(Displayed):
 
     @cached_property
     def median(self) -> float:
-        """Of all residuals [m]."""
+        """Median of all residuals [m]."""
         return float(np.nanmedian(self.residual))
 
     @cached_property
     def worst(self) -> float:
         """The largest residual [m]."""
         return float(np.nanmax(self.residual))
-
-    @cached_property
-    def by_frame(self) -> FloatArray:
-        """(n,) root mean square of the residuals of each frame [m]; NaN where nothing was seen."""
-        seen = ~np.isnan(self.residual)
-        squares = np.where(seen, self.residual, 0.0) ** 2
-        counts = np.where(seen.any(axis=1), seen.sum(axis=1), np.nan)
-        return np.sqrt(squares.sum(axis=1) / counts)
 
 
 REFERENCE_STATURE = 1.75
@@ -250,24 +220,16 @@ def segment_lengths(centres: Mapping[str, FloatArray]) -> dict[str, float]:
     pairs = {
         name: [(f"{side}_{near}", f"{side}_{far}") for side in SIDES] for name, (near, far) in _BONES.items()
     }
-    pairs |= {
-        "hips": [("left_thigh", "right_thigh")],
-        "shoulders": [("left_upper_arm", "right_upper_arm")],
-    }
+    pairs |= {"hips": [("left_thigh", "right_thigh")], "shoulders": [("left_upper_arm", "right_upper_arm")]}
     lengths = {name: [apart(*pair) for pair in both] for name, both in pairs.items()}
     found = {name: float(np.nanmean(both)) for name, both in lengths.items() if not np.all(np.isnan(both))}
     if "hips" in found and "shoulders" in found:
         length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
         if not np.all(np.isnan(length)):
-            found["trunk"] = _trunk(centres, length)
+            upright = np.percentile(length[hanging_arms(centres)], UPRIGHT_SHARE)
+            # Where arms hang in a crouch only, the trunk is never upright then.
+            found["trunk"] = float(max(upright, np.median(length[~np.isnan(length)])))
     return found
-
-
-def _trunk(centres: Mapping[str, FloatArray], length: FloatArray) -> float:
-    """Where it is extended and no arm is raised [m]."""
-    upright = np.percentile(length[hanging_arms(centres)], UPRIGHT_SHARE)
-    # Where arms hang in a crouch only, the trunk is never upright then.
-    return float(max(upright, np.median(length[~np.isnan(length)])))
 
 
 def hanging_arms(centres: Mapping[str, FloatArray]) -> NDArray[np.int64]:
@@ -294,11 +256,9 @@ def middle(centres: Mapping[str, FloatArray], part: str) -> FloatArray:
 
 
 def human_of(
-    centres: Mapping[str, FloatArray],
-    sex: str = "male",
-    mass: float | None = None,
+    centres: Mapping[str, FloatArray], sex: str = "male", mass: float | None = None,
     stature: float | None = None,
-) -> BodyModel:
+) -> BodyModel:  # fmt: skip
     """Our human with the lengths of a recorded person, its masses off the lines between joints.
 
     Args:

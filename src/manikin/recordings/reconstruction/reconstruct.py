@@ -1,17 +1,13 @@
 """A recorded motion as a motion of our human, scaled to the person.
 
-Also here. A recorded skeleton's motion as a motion of our human. What a recording says nothing about, held as
-people hold it: trunk and head upright, arms hanging.
+Segments that the recording does not observe are held as people hold them: trunk and head upright, arms
+hanging, turned to where the segment that carries them heads. An unmeasured trunk that was fixed to the pelvis
+would tip with it, and the centre of mass too.
 
-Left at rest on the segment that carries it, an untold trunk would tip with every tilt of the pelvis, and the
-centre of mass with it. People keep trunk and head upright in the world, and arms hang: so each untold ball
-joint turns its segment as in upright standing, towards where the carrying segment heads.
-
-Bolt upright, the trunk would share every push forward that the pelvis gets in a step. People do not let it:
-they tilt the trunk so that the head moves evenly (Menz, Lord and Fitzpatrick, "Acceleration patterns of the
-head and pelvis when walking on level and irregular surfaces", Gait & Posture 18, 2003). Where walks here have
-markers on the trunk, its upper end has a third of the pelvis' acceleration along the walk; sideways it
-follows. So an untold trunk tilts forward and back by what leaves a third.
+People tilt the trunk so that the head moves evenly (Menz, Lord and Fitzpatrick, "Acceleration patterns of the
+head and pelvis when walking on level and irregular surfaces", Gait & Posture 18, 2003). In walks with markers
+on the trunk its upper end has a third of the pelvis' acceleration along the walk, and follows it sideways. An
+unmeasured trunk therefore tilts forward and back such that a third remains.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,14 +39,11 @@ from manikin.recordings.reconstruction.proportions import (
 def reconstruct_skeleton(
     recording: Recording, body: BodyModel | None, sex: str, mass: float | None
 ) -> Reconstruction:
-    """Motion of our human that follows a skeleton; see ``reconstruct``.
+    """Motion of our human that follows a skeleton; see :func:`reconstruct`.
 
-    Hips, knees, ankles, shoulders, elbows and wrists are followed
-    (:mod:`manikin.recordings.reconstruction.proportions`); the turns of pelvis, thorax, head, feet and hands
-    count less (:mod:`manikin.recordings.reconstruction.orientation_targets`). The first frame starts from
-    the closed form (:mod:`manikin.recordings.reconstruction.proportions`), every other one from the frame
-    before. Our shoulders are fixed in the thorax: movements of a recorded shoulder girdle remain as
-    residuals.
+    Hips, knees, ankles, shoulders, elbows and wrists are followed; the rotations of pelvis, thorax, head,
+    feet and hands count less. Our shoulders are fixed in the thorax: movements of a recorded shoulder girdle
+    remain as residuals.
     """
     centres = joint_centres(recording)
     measured = human_of(centres, sex, mass)
@@ -63,26 +56,26 @@ def reconstruct_skeleton(
 
 
 UPRIGHT = ("lumbar", "thorax", "neck", "left_upper_arm", "right_upper_arm")
-"""Segments on ball joints, from the pelvis outward, that are upright or hang unless a recording tells."""
+"""Segments on ball joints, from the pelvis outward, that are upright or hang unless they are recorded."""
 
 _TILTED = ("lumbar", "thorax")
 
 
 CALMED_SHARE = 1.0 / 3.0
-"""Of what is fast in the pelvis' motion forward and back, what the upper end of the trunk has as well."""
+"""Share of the pelvis' fast motion forward and back that the upper end of an unmeasured trunk has too."""
 
 SLOW = 1.0
 """Slower motion of the pelvis takes the trunk along [Hz]: below the frequency of steps."""
 
 LARGEST_TILT = np.deg2rad(10.0)
-"""Of an untold trunk [rad]."""
+"""Largest tilt of an unmeasured trunk [rad]."""
 
 
 def unmeasured_upright(found: Reconstruction) -> Reconstruction:
-    """The same with untold trunk, neck and upper arms as in upright standing, whatever carries them does.
+    """A reconstruction with unmeasured trunk, neck and upper arms as in upright standing.
 
-    An untold trunk tilts to calm its upper end. Angles are kept to the limits of their hinges. Elbows and
-    wrists stay as in standing. Nothing that is followed moves.
+    Angles are kept to the limits of their hinges. Elbows and wrists stay as in standing. Nothing that is
+    followed moves.
     """
     body, standing = found.body, found.body.standing_posture()
     if not set(UPRIGHT) & set(found.neutral):
@@ -107,7 +100,7 @@ def unmeasured_upright(found: Reconstruction) -> Reconstruction:
 
 
 def _calming_tilts(found: Reconstruction, pelvis: FloatArray) -> FloatArray:
-    """(n, 3, 3) tilts of the trunk about the axis to the left; none where it is told, or for a few frames."""
+    """(n, 3, 3) tilts of the trunk about the left axis; none where it is measured or clips are short."""
     n, rate = len(found.q), (len(found.q) - 1) / max(float(found.time[-1] - found.time[0]), 1e-9)
     if not set(_TILTED) <= set(found.neutral) or n * SLOW < rate or rate <= 2.0 * SLOW:
         return np.tile(np.eye(3), (n, 1, 1))
@@ -129,24 +122,19 @@ FEWEST_FRAMES = 2
 
 
 def reconstruct(
-    recording: Recording | MarkerRecording,
-    body: BodyModel | None = None,
-    *,
-    sex: str = "male",
+    recording: Recording | MarkerRecording, body: BodyModel | None = None, *, sex: str = "male",
     mass: float | None = None,
-) -> Reconstruction:
+) -> Reconstruction:  # fmt: skip
     """Motion of our human that follows a recording, by inverse kinematics within joint limits.
 
-    Of a skeleton the joint centres are followed (:mod:`manikin.recordings.reconstruction.reconstruct`), of
-    markers the markers themselves (:mod:`manikin.recordings.reconstruction.marker_reconstruction`). What no
-    marker tells is held as in standing, trunk and head upright and arms hanging
-    (:mod:`manikin.recordings.reconstruction.reconstruct`).
+    Of a skeleton the joint centres are followed, of markers the markers themselves
+    (:mod:`manikin.recordings.reconstruction.marker_reconstruction`). Unmeasured segments are held as in
+    standing, trunk and head upright and arms hanging.
 
     Args:
         recording: Motion of a skeleton or of markers, at least two frames.
-        body: Our human; None for one with the lengths of the recorded person. Where other clips of the
-            person exist, take that of :func:`person_of` all of them: the trunk's length is told by extended
-            postures only.
+        body: Our human; None for one with the lengths of the recorded person. With several clips of the
+            person use :func:`person_of`: only extended postures show the trunk's length.
         sex: Table of segment masses where ``body`` is None.
         mass: Body mass where ``body`` is None [kg]; None for the one in the file, or else a usual one.
 

@@ -55,7 +55,7 @@ class StatisticsSettings:
     Attributes:
         overhead: What is passed under; None for nothing.
         limit: Distance from the centre of mass to a support within which shares are counted [m].
-        active: Effectors by which phases and sequences are told; None for all.
+        active: Effectors that define phases and sequences; None for all.
         phases: Number of phases that are compared in sequences; None for all.
         start: Kind of phase from which on they are compared, such as ``DS``; None for the first of all.
         shortest: Phases shorter than this are passed over in sequences [s].
@@ -97,7 +97,6 @@ class GroupStatistics:
     """Measures of the motions of one group; what is not known of them is empty.
 
     Attributes:
-        group: Its name.
         motions: Names of the motions.
         durations: Of phases seen from beginning to end, by ``number`` (DS-1 and so on), by ``kind`` (DS, SS)
             and by the ``effectors`` that support [s].
@@ -106,7 +105,6 @@ class GroupStatistics:
         within: Share of the instants within the limit, by effector.
         whole: Lowest and highest points of each motion, by its name.
         under: Passages under what is overhead, with the motion of each.
-        placements: Of the supports.
         unplaced: Why motions have no placements, by name.
     """
 

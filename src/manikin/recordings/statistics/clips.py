@@ -1,7 +1,4 @@
-"""What statistics need of one recorded motion, as a plain value.
-
-Also here. Many recordings from files, each made a clip; one that cannot be used takes no other with it.
-"""
+"""Clips: the supports, centre of mass and highest points of recorded motions, for statistics."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -37,7 +34,6 @@ class RecordedClip:
     """One recorded motion, on one clock.
 
     Attributes:
-        name: Of the recording.
         group: What it is compared with: a person, a condition.
         supports: When and where which effectors support.
         time: (n,) instants, rising [s].
@@ -77,19 +73,13 @@ class RecordedClip:
 
 
 def clip_of(
-    found: Reconstruction,
-    name: str,
-    group: str,
-    *,
-    start: float = 0.0,
-    cutoff: float = MOTION_CUTOFF,
+    found: Reconstruction, name: str, group: str, *, start: float = 0.0, cutoff: float = MOTION_CUTOFF,
     supports: RecordedSupports | None = None,
-) -> RecordedClip:
+) -> RecordedClip:  # fmt: skip
     """Supports, centre of mass and highest points of a reconstructed recording.
 
     Args:
         found: At least four instants at an even rate, not yet smoothed.
-        name: Of the recording.
         group: What it is compared with.
         start: What the first frame of the recording is on its clock [s].
         cutoff: Of the postures [Hz], see :func:`~manikin.recordings.dynamics.recorded_dynamics.smoothed`.
@@ -158,7 +148,6 @@ class GroupedFile:
     """A recording and what it is compared with.
 
     Attributes:
-        path: The file.
         group: Name of its group.
     """
 
@@ -168,7 +157,7 @@ class GroupedFile:
 
 @dataclass(frozen=True, eq=False)
 class ClipFiles:
-    """What became of some files.
+    """Clips read from files.
 
     Attributes:
         clips: Those that could be used, in the order of the files.
@@ -182,8 +171,8 @@ class ClipFiles:
 def grouped_files(words: Iterable[str]) -> tuple[GroupedFile, ...]:
     """Files of words such as ``walk.bvh``, ``duck=clips/127_3*.amc`` or ``clips``.
 
-    Each is a file, a folder (all recordings directly in it) or a pattern; before ``=`` may stand the group,
-    which else is the name of the file's folder.
+    Each is a file, a folder (all recordings directly in it) or a pattern, after its group and ``=``; without
+    them the group is the name of the file's folder.
 
     Raises:
         InputError: If a folder or pattern has no recording.
@@ -206,10 +195,7 @@ def grouped_files(words: Iterable[str]) -> tuple[GroupedFile, ...]:
 
 
 def read_clips(
-    files: Sequence[GroupedFile],
-    *,
-    sex: str = "male",
-    report: Callable[[float, str], None] | None = None,
+    files: Sequence[GroupedFile], *, sex: str = "male", report: Callable[[float, str], None] | None = None
 ) -> ClipFiles:
     """Read and reconstruct recordings.
 
@@ -220,7 +206,7 @@ def read_clips(
         sex: Table of segment masses.
         report: Told the share that is done and the file at work.
     """
-    tell = report or _silent
+    tell = report or (lambda _share, _remark: None)
     recordings: dict[int, Recording | MarkerRecording] = {}
     refused: dict[Path, str] = {}
     for number, file in enumerate(files):
@@ -239,8 +225,8 @@ def read_clips(
             start = recording.start if isinstance(recording, MarkerRecording) else 0.0
             clips.append(clip_of(found, names[number], file.group, start=start))
         except ManikinError as error:
-            told = str(error)
-            refused[file.path] = told if file.path.name in told else f"{file.path}: {told}"
+            text = str(error)
+            refused[file.path] = text if file.path.name in text else f"{file.path}: {text}"
     tell(1.0, f"{len(clips)} of {len(files)} files")
     return ClipFiles(tuple(clips), refused)
 
@@ -257,7 +243,7 @@ def _bodies(recordings: Mapping[int, Recording | MarkerRecording], sex: str) -> 
             try:
                 body = person_of([recordings[number] for number in numbers], sex=sex)
             except ManikinError:
-                continue  # told of each recording by itself
+                continue  # reported for each recording by itself
             bodies |= dict.fromkeys(numbers, body)
     return bodies
 
@@ -271,7 +257,3 @@ def _names(files: Sequence[GroupedFile]) -> list[str]:
     ]
     again = Counter(names)
     return [name if again[name] == 1 else f"{name} ({number})" for number, name in enumerate(names, start=1)]
-
-
-def _silent(_share: float, _remark: str) -> None:
-    """Take a report and do nothing."""

@@ -1,13 +1,9 @@
-"""How low people go under something, and how much room they leave below it.
+"""Passages of recorded people under something, placements of their supports, distances of the CoM from them.
 
-What hangs over the way is a bar or the underside of a box. Of a bar only the height is given: wherever it
-was, it was where all of the body was below it. Each part may have passed it where it was lowest itself, so
-the room below a bar is an upper bound. Of a box the place is given as well, and the room is the least one
-while any part is below it; it is negative for who would have hit it.
-Who crouches on the spot, or is low when the recording begins or ends, passes no bar.
-
-Also here. Where people put their feet and hands, seen from what they pass or from where they begin. How far
-the centre of mass is from what supports it.
+What is overhead is a bar or the underside of a box. Of a bar only the height is given; the body passes it
+while all of it is lower. As each part may pass where it is lowest itself, the room below a bar is an upper
+bound. The position of a box is given, and the room is the least one while any part is below it, negative for
+a collision. A person who crouches on the spot, or is low when the recording begins or ends, passes no bar.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,7 +23,7 @@ AROUND = 0.25
 """Time before and after an instant over which the direction of travel is taken [s]."""
 
 FEWEST_TRAVELLED = 0.02
-"""Way over which a direction is told [m]."""
+"""Shortest way that has a direction [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +56,7 @@ class SupportPlacement:
     """One support of several motions ([Qiu2012]_ Fig. 3.9).
 
     Attributes:
-        effector: Which one.
-        number: Its how-manieth support behind the origin; 0 the last before it.
+        number: Its count after the origin, from 1; 0 is the last one before it.
         clips: (k,) names of the motions.
         places: (k, 2) in the frame of the origin, x ahead [m].
     """
@@ -144,16 +139,12 @@ def com_extreme(clip: RecordedClip, *, highest: bool = False) -> Origin:
 def support_placements(
     clips: Sequence[RecordedClip], origins: Sequence[Origin] | None = None, *, mirror: bool = False
 ) -> tuple[SupportPlacement, ...]:
-    """Supports of the same number of several motions, seen from their origins.
+    """Supports of the same number of several motions, seen from their origins, by effector and number.
 
     Args:
         clips: The motions of one group.
         origins: One for each; :func:`first_stance` if None.
-        mirror: Whether motions whose first step behind the origin is made by the right foot are seen in a
-            mirror, so that all begin with the left one.
-
-    Returns:
-        By effector and number, in their order.
+        mirror: Whether motions whose first step after the origin is made by the right foot are mirrored.
 
     Raises:
         InputError: As :func:`first_stance`, or if there are not as many origins as motions.
@@ -164,7 +155,9 @@ def support_placements(
         raise InputError(f"{len(origins)} origins of {len(clips)} motions; valid: one for each")
     found: dict[tuple[str, int], list[tuple[str, FloatArray]]] = {}
     for clip, origin in zip(clips, origins, strict=True):
-        turned = mirror and _first_behind(clip, origin) == "right_foot"
+        later = [one.effector for one in clip.supports.supports if one.start > origin.instant]
+        first = next((name for name in later if name.endswith("foot")), None)
+        turned = mirror and first == "right_foot"
         for effector, places in _numbered(clip, origin).items():
             name = mirrored(effector) if turned else effector
             for number, place in places.items():
@@ -187,15 +180,10 @@ def _numbered(clip: RecordedClip, origin: Origin) -> Mapping[str, Mapping[int, F
     return numbered
 
 
-def _first_behind(clip: RecordedClip, origin: Origin) -> str | None:
-    later = (one for one in clip.supports.supports if one.start > origin.instant)
-    return next((one.effector for one in later if one.effector.endswith("foot")), None)
-
-
 def _heading(clip: RecordedClip, way: FloatArray) -> float:
     if np.hypot(*way) < FEWEST_TRAVELLED:
         raise InputError(
-            f"clip {clip.name!r} stays where it is, which tells no direction; valid: an origin with a heading"
+            f"clip {clip.name!r} stays where it is, without a direction; valid: an origin with a heading"
         )
     return float(np.arctan2(way[1], way[0]))
 
@@ -210,7 +198,6 @@ class SupportDistance:
 
     Attributes:
         clip: Name of the motion.
-        effector: Which one.
         time: (k,) instants, at least one [s].
         distance: (k,) [m].
     """
@@ -236,10 +223,10 @@ class SupportDistance:
 
 
 def support_distances(clip: RecordedClip) -> tuple[SupportDistance, ...]:
-    """Of each support, in their order; those too short for any instant are left out.
+    """Distances to each support, in order; supports too short for any instant are left out.
 
-    The place of a foot's support is the middle of its sole on the ground, as in the thesis the projection of
-    the foot's centre of mass ([Qiu2012]_ 3.2.3).
+    A foot's support is at the middle of its sole on the ground; the thesis projects the foot's centre of mass
+    ([Qiu2012]_ 3.2.3).
     """
     found = []
     for one in clip.supports.supports:
@@ -314,12 +301,11 @@ def whole_passage(clip: RecordedClip) -> Passage:
 
 
 def passages(clip: RecordedClip, overhead: Overhead) -> tuple[Passage, ...]:
-    """Times in which a person is below something, in order; none for who never is.
+    """Times in which a person is below something, in order.
 
     Args:
         clip: The motion, with tops.
-        overhead: What is passed. Below a bar is who has all tops below it, below a box who has any part
-            or the centre of mass there.
+        overhead: What is passed. All tops have to be below a bar, any part or the centre of mass below a box.
 
     Raises:
         InputError: If the motion has no tops.

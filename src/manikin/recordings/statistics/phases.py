@@ -1,12 +1,9 @@
-"""The phases of one motion, recorded or published, and their names.
+"""Phases of motions, recorded or published: their names, durations and sequences ([Qiu2012]_ chapter 3).
 
-Also here. How long the phases of several motions last. How many people do it in the same order. What Qiu
-measured of one person who passed under a beam, as numbers ([Qiu2012]_ chapter 3).
-
-The file holds the numbers of Tables 3.2, 3.4 and 3.5 and those quoted in the text, nothing else. Table 3.4
-gives the phases between changes of the feet up to the last landing; the last double support is not in it.
-A motion with three steps is the left foot's first, one with four the right foot's first: Table 3.2 says so
-of 01_TR_H1C1L_1, and for 01_TR_H2C3L_1, which is not in that table, it is inferred.
+The published numbers are those of Tables 3.2, 3.4 and 3.5 and of the text. Table 3.4 gives the phases between
+changes of the feet up to the last landing, without the last double support. A motion with three steps begins
+with the left foot, one with four with the right foot: Table 3.2 says so of 01_TR_H1C1L_1; for 01_TR_H2C3L_1,
+which is not in that table, it is inferred.
 """
 
 import json
@@ -35,9 +32,7 @@ class PhaseSequence:
     """Phases of one motion, each beginning where the one before it ends.
 
     Attributes:
-        name: Of the motion.
         group: What it is compared with: a person, a condition.
-        phases: In their order.
         start_seen: Whether the first phase begins with a change of the supports, not with the recording.
         end_seen: Whether the last phase ends with a change of the supports.
     """
@@ -54,10 +49,9 @@ class PhaseSequence:
         return cls(name, group, supports.phases)
 
     def of_effectors(self, active: Collection[str]) -> "PhaseSequence":
-        """The same with the supports of some effectors only: phases that then are alike become one.
+        """The phases of the supports of some effectors only; equal neighbours become one.
 
-        Hands that could be left out are passive supports, and phases are told by the feet
-        ([Qiu2012]_ 3.2.1).
+        Hands that could be left out are passive supports; the feet define the phases ([Qiu2012]_ 3.2.1).
         """
         kept = (
             SupportPhase(one.start, one.end, tuple(name for name in one.effectors if name in active))
@@ -77,7 +71,7 @@ class PhaseSequence:
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:
-        """Of each phase, see :func:`kind_of`."""
+        """Kind of each phase, see :func:`kind_of`."""
         return tuple(kind_of(phase.effectors) for phase in self.phases)
 
     @cached_property
@@ -188,7 +182,7 @@ Supporting = tuple[frozenset[str], ...]
 """The effectors that support in each phase, one after the other."""
 
 SHORTEST = 0.03
-"""A phase shorter than this is not told from an error of touch-downs and lift-offs [s]."""
+"""A phase shorter than this may be an error of touch-downs and lift-offs [s]."""
 
 
 @dataclass(frozen=True)
@@ -232,29 +226,19 @@ class SequenceConsistency:
         """Share of the motions with the most frequent sequence or its mirror image."""
         return max(self.mirrored_counts.values(), default=0) / max(self.motions, 1)
 
-    @property
-    def first_step_share(self) -> float:
-        """Share of the motions with a step whose first one is made by the most frequent effector."""
-        total = sum(self.first_steps.values())
-        return max(self.first_steps.values()) / total if total else 0.0
-
 
 def sequence_consistency(
-    motions: Sequence[PhaseSequence],
-    *,
-    phases: int | None = None,
-    shortest: float = SHORTEST,
+    motions: Sequence[PhaseSequence], *, phases: int | None = None, shortest: float = SHORTEST,
     start: str | None = None,
-) -> SequenceConsistency:
+) -> SequenceConsistency:  # fmt: skip
     """Count the sequences of supports and the first steps.
 
     Args:
         motions: Those of one group, or all.
-        phases: How many phases are looked at; None for all. Recordings that end anywhere differ in their
-            length and not in their order.
+        phases: How many phases are compared; None for all.
         shortest: Phases shorter than this are passed over [s].
-        start: Kind of the phase from which on they are looked at, such as ``DS``, for recordings that begin
-            anywhere: the first one that is seen from its beginning. None for the first phase of all.
+        start: Kind of the first compared phase, such as ``DS``, for recordings that begin anywhere: the first
+            one that is seen from its beginning. None for the first phase of all.
     """
     lasting = [one.without_short(shortest) for one in motions]
     sequences = Counter(
@@ -271,7 +255,10 @@ def mirror_image(sequence: Supporting) -> Supporting:
 
 def initials(sequence: Supporting) -> str:
     """A sequence in short: ``LR R LR L``, hands in small letters, others by name, ``-`` in flight."""
-    return " ".join("".join(sorted(map(_initial, one), key=_feet_first)) or "-" for one in sequence)
+    each = [
+        sorted(map(_initial, one), key=lambda initial: (not initial.isupper(), initial)) for one in sequence
+    ]
+    return " ".join("".join(letters) or "-" for letters in each)
 
 
 def _from(one: PhaseSequence, kind: str | None) -> tuple[SupportPhase, ...]:
@@ -289,11 +276,6 @@ def _initial(effector: str) -> str:
     return side[0].upper() if part == "foot" else side[0]
 
 
-def _feet_first(initial: str) -> tuple[int, str]:
-    return (0 if initial.isupper() else 1, initial)
-
-
-SHIPPED = "qiu_2012_chapter_3.json"
 MOTIONS = 30
 """All that were made by the person, and all that Table 3.5 is about."""
 
@@ -308,7 +290,6 @@ class PublishedHeights:
     Attributes:
         standing: Of the centre of mass before the motion.
         lowest: Of the centre of mass under each beam.
-        beams: Of the beams.
     """
 
     standing: float
@@ -327,12 +308,6 @@ def published_phases(first_step: str | None = None) -> tuple[PhaseSequence, ...]
     """
     found = (_sequence(name, frames) for name, frames, *_ in _published()["table_3_4"])
     return tuple(one for one in found if first_step is None or one.first_step == first_step)
-
-
-def published_grasps() -> dict[str, float]:
-    """Instant at which the left hand grasped, by motion; in all others it did not [s]."""
-    data = _published()
-    return {name: rest[0] * data["frame_s"] for name, _, *rest in data["table_3_4"] if rest}
 
 
 def published_consistency() -> SequenceConsistency:
@@ -366,7 +341,7 @@ def published_heights() -> PublishedHeights:
 
 @cache
 def _published() -> dict[str, Any]:
-    file = resources.files("manikin.recordings") / "data" / SHIPPED
+    file = resources.files("manikin.recordings") / "data" / "qiu_2012_chapter_3.json"
     return json.loads(file.read_text(encoding="utf-8"))
 
 

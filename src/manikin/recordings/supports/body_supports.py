@@ -1,21 +1,18 @@
-"""When a recorded person sits.
+"""Supports of a recorded person other than the feet: seat, hands, knees, elbows and trunk.
 
-Who holds still with the centre of mass beside the feet, and low, is carried by something else. The
-height of the buttocks then is that of a seat, and they are on it for as long as they are no higher.
+**Seat**: a person who rests with a low centre of mass beside the feet is carried by something else. The
+buttocks are then at the height of a seat, and on it for as long as they are no higher.
 
-Also here. Knees, elbows and the trunk of a recorded person who kneels, crawls or lies on the ground. Which
-hands support a recorded person.
+**Knees, elbows and trunk** (kneeling, crawling, lying) support while they are slow and near the surface under
+the feet. Speeds are compared with those between two rests, as of feet.
 
-Each is a support while it is slow and near the surface under the feet. Speeds are compared with those
-between two rests, as of feet.
-
-A hand rests while it is slow beside its own swings. That it carries something is told by where it rests:
+**Hands** rest while they are slow compared with their own swings. A resting hand supports
 
 * on the ground, or on the seat while the person sits down, holds it or gets up;
-* anywhere else, on a rail, a bar or the furniture, where the body moves past it while it stays.
+* anywhere else, on a rail, a bar or the furniture, if the body moves past it.
 
-A hand that hangs at the side or lies on the own knee stays only as long as the body does, or is beside the
-body; a hand that carries moves with the body. Neither is a support.
+A hand that hangs at the side or lies on the person's own knee rests only while the body does, or is beside
+the body; a hand that carries a load moves with the body. Neither supports.
 """
 
 from collections.abc import Mapping, Sequence
@@ -58,7 +55,7 @@ LYING = 0.12
 """Height of the middle of the hips above the ground, per stature, within which the trunk lies on it."""
 
 SHORTEST = 0.12
-"""Shorter supports, and shorter interruptions, are not told from noise [s]."""
+"""Shorter supports, and shorter interruptions, are noise [s]."""
 
 
 def ground_supports(
@@ -67,18 +64,8 @@ def ground_supports(
     """Supports of knees, elbows and the pelvis on the ground; none for a body that is not a human.
 
     The pelvis stands for the trunk: it supports where it is low and nearer to lying than to upright.
-    The supports are named after the effectors ``left_knee`` ... of
-    :func:`manikin.body.limbs.with_knees_and_elbows`, and ``pelvis``.
-
-    Args:
-        found: At least four instants.
-        floor: (n,) height of the surface under the feet [m].
-        rate: Frames per second [Hz].
-        start: Instant of the first frame [s].
-        cutoff: Of the low-pass filter [Hz].
-
-    Raises:
-        InputError: If the cutoff is too high.
+    The names are those of :func:`manikin.body.limbs.with_knees_and_elbows`, and ``pelvis``. Arguments are
+    those of :func:`hand_supports`.
     """
     stature = found.body.stature
     if stature is None:
@@ -102,12 +89,12 @@ def ground_supports(
 
 
 def stays(one: Track) -> list[tuple[int, int]]:
-    """First frame and the one after the last of each time in which a point stays, wherever it is."""
+    """Runs of frames in which a point rests: first frame and the one after the last."""
     return lasting(switch(*slow_and_leaving(one)), SHORTEST * one.rate)
 
 
 def slow_and_leaving(one: Track) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(n,) whether a point is slow enough to stay, and fast enough to leave, other than a foot may roll."""
+    """(n,) whether a point that may roll is slow enough to rest, and (n,) fast enough to leave."""
     slow, fast = one.slow_and_fast(ROLLS, SLIDE_WAY)
     return slow | (one.speed < ROLLS), fast & (one.speed > LEAVES)
 
@@ -145,12 +132,12 @@ def hand_supports(
     found: Reconstruction, floor: FloatArray, seats: Sequence[Support], rate: float, *,
     start: float = 0.0, cutoff: float = CUTOFF,
 ) -> tuple[Support, ...]:  # fmt: skip
-    """Times in which hands support, by hand and in order; none for a body without hands.
+    """Supports of the hands, by hand and in order; none for a body without hands.
 
     Args:
         found: At least four instants.
         floor: (n,) height of the surface under the feet [m].
-        seats: Times in which the person sits.
+        seats: Supports of the seat.
         rate: Frames per second [Hz].
         start: Instant of the first frame [s].
         cutoff: Of the low-pass filter [Hz].
@@ -181,7 +168,7 @@ def hand_supports(
 
 
 def _on_seat(hand: Support, seats: Sequence[Support]) -> bool:
-    """Whether a resting hand is at the height of the seat that the person takes or leaves then."""
+    """Whether a resting hand is beside a seat that the person takes, holds or leaves then."""
     return any(
         seat.start - SEAT_SOON < hand.end
         and hand.start < seat.end + SEAT_SOON
@@ -206,26 +193,19 @@ TILTED = np.deg2rad(60.0)
 """Angle of the line from pelvis to neck with the vertical from which a person lies or crawls [rad]."""
 
 SHORTEST_SEAT = 0.2
-"""Shorter supports of a seat, and shorter interruptions, are not told from noise [s]."""
+"""Shorter supports of a seat, and shorter interruptions, are noise [s]."""
 
 
 def seat_supports(
     found: Reconstruction, soles: Mapping[str, tuple[FloatArray, FloatArray]], rate: float, *,
     start: float = 0.0, cutoff: float = CUTOFF,
 ) -> tuple[Support, ...]:  # fmt: skip
-    """Times in which a person sits, in order; none for a body without buttocks.
-
-    Who lies does not sit (:mod:`manikin.recordings.supports.body_supports`).
+    """Supports of the seat, in order; none for a body without buttocks, or while the person lies.
 
     Args:
         found: At least four instants.
         soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
-        rate: Frames per second [Hz].
-        start: Instant of the first frame [s].
-        cutoff: Of the low-pass filter [Hz].
-
-    Raises:
-        InputError: If the cutoff is too high.
+        rate: As of :func:`hand_supports`, and so are ``start`` and ``cutoff``.
     """
     body = found.body
     if SEAT not in body.effectors:

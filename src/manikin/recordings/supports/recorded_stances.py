@@ -1,12 +1,11 @@
 """Contacts of a recorded person, from the supports and the postures.
 
 A foot is a rectangular sole of the body's size, flat on its surface where the foot lies flattest, for as long
-as it supports: so it stays at one place, as every stance here. A recorded foot rolls, though. While its heel
-is lifted only what lies before the hinge of the toes can carry, while its toes are only the heel;
-:func:`recorded_schedule` splits phases there if asked to. It tells by the height of both ends of a stiff
-sole above their height in flat stance. Who sits presses on a seat with a rectangle under the hips, who lies
-with one under the trunk. A hand, knee or elbow on the ground is a point; a hand anywhere else holds a grasp,
-for a recording does not tell how its surface lies.
+as it supports. A recorded foot rolls, though: while its heel is lifted only the part before the hinge of the
+toes carries, while its toes are lifted only the heel. :func:`recorded_schedule` can split phases there, by
+the height of both ends of a stiff sole above their height in flat stance. A seat carries a rectangle under
+the hips, the ground one under a lying trunk. A hand, knee or elbow on the ground is a point; a hand anywhere
+else is a grasp, as the recording does not show the surface.
 """
 
 from collections.abc import Sequence
@@ -56,7 +55,7 @@ HEEL_SHARE = 0.25
 """Share of a sole's length that touches while the toes are lifted: a heel is round, and gives way."""
 
 SHORTEST_PART = 0.04
-"""Shorter changes between heel, full sole and toes are not told from noise [s]."""
+"""Shorter changes between heel, full sole and toes are noise [s]."""
 
 
 class _Part(IntEnum):
@@ -71,20 +70,15 @@ class _Part(IntEnum):
 def recorded_schedule(
     found: Reconstruction, supports: RecordedSupports, *, friction: float = FRICTION, rolling: bool = False
 ) -> ContactSchedule:
-    """Stances of a recording with the durations of its phases.
-
-    Times are on the clock of the supports, their start being the first instant of the reconstruction. Every
-    phase has its recorded duration as shortest and longest. A phase without support is a flight: it has a
-    stance without contacts.
+    """Stances of a recording with the durations of its phases; a flight has a stance without contacts.
 
     Args:
-        found: The postures, best smoothed.
-        supports: Found from them.
+        found: The postures, best smoothed; their first instant is the start of the supports.
         friction: Coefficient of feet and seat.
         rolling: Whether phases are split where only the heel or the toes of a foot touch.
 
     Raises:
-        InputError: If there is nobody's foot, or no two instants.
+        InputError: If the body has no feet with soles, or there are no two instants.
     """
     if len(found.time) < 2:
         raise InputError("stances of a reconstruction of one instant; valid: at least two")
@@ -149,7 +143,7 @@ class _SoleEnds:
 def _other_contact(
     found: Reconstruction, support: Support, frames: slice, friction: float, surfaces: Sequence[float]
 ) -> Contact:
-    """Of a seat, of the trunk or a limb on the ground, or else of a hand that holds something."""
+    """Contact of a seat, of the trunk or a limb on the ground, or else of a hand that holds something."""
     name, place, stature = support.effector, support.place, found.body.stature
     below = [height for height in surfaces if abs(place[2] - height) < ON_GROUND]
     if below:
@@ -160,7 +154,7 @@ def _other_contact(
         rotation = rotation_from_yaw(level_heading(found.q[frames]))
         return point(name, place, rotation=rotation, friction=friction)
     size = (SEAT_LENGTH, SEAT_WIDTH) if name == SEAT else (TRUNK_LENGTH, SEAT_WIDTH)
-    # Who sits looks along x of the pelvis, who lies has the shoulders along its z.
+    # A seated person looks along x of the pelvis; a lying one has the shoulders along its z.
     along = Rotation.from_quat(found.q[frames, 3:7]).apply(
         [1.0, 0.0, 0.0] if name == SEAT else [0.0, 0.0, 1.0]
     )

@@ -18,13 +18,9 @@ MEDIAN_STEPS = 60
 
 
 def median_place(positions: FloatArray) -> FloatArray:
-    """Median of (n, 3) places that does not depend on where x and y point, (3,) [m].
+    """(3,) median of (n, 3) positions that does not depend on where x and y point [m].
 
-    On the level it is the place with the least sum of distances to all (the spatial median, by the steps of
-    Weiszfeld); a median of each coordinate would turn with the axes. In height it is the ordinary median.
-
-    Args:
-        positions: (n, 3), at least one [m].
+    In the horizontal plane it is the spatial median (Weiszfeld's steps), in height the ordinary median.
     """
     level = positions[:, :2] - positions[0, :2]
     place = level.mean(axis=0)
@@ -79,7 +75,6 @@ def support_between(
     """Support of one point for a run of frames.
 
     Args:
-        effector: Its name.
         positions: (n, 3) of the point in all frames [m].
         frames: First frame of the run and the one after its last.
         rate: Frames per second [Hz].

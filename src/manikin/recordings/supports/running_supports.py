@@ -1,22 +1,18 @@
-"""Feet of a runner: when they carry is told by the force that the motion needs, which foot by the feet.
+"""Supports corrected by the vertical force that the motion needs, as for runners and jumpers.
 
-Fast feet stop and start within a tenth of a second, which a low-pass of positions spreads. The centre of mass
-is heavier and slower, and knows more: in flight it falls with gravity, and while it does not, something
-carries it. So a support of a foot that ends or begins within a fall ends where it begins or begins where it
-ends; one that lasts all through a fall is left to the feet. A time between two supports in
-which nothing was found but the body is carried belongs to the feet beside it, up to where the later one is
-the slower one; who is carried between two falls stands on the lowest foot, if it is low. Where the same foot
-is on both sides, and the lowest as well, the gap stays: it stepped on the spot. In a walk the body never
-falls, so nothing changes but gaps.
+A foot that is slow and near a surface need not be on it: in a jump it turns round where it is highest. By
+Newton's second law the supports give the centre of mass all the acceleration it has beside gravity, so
+nothing supports during a free fall.
 
-At both ends of a recording the low-pass knows one side only: there the force is taken for that half a period
-of the cutoff away.
+Fast feet stop and start within a tenth of a second, which a low-pass of positions spreads; the centre of mass
+is slower. A support of a foot that ends (begins) within a fall therefore ends where the fall begins (begins
+where it ends); one that lasts all through a fall is left as it is. Where the body is carried but no support
+was found, the feet before and after carry, the later one from where it is the slower one; between two falls
+the lowest foot carries, if it is low. Where the same foot is on both sides, and the lowest as well, the gap
+stays: the foot stepped on the spot. In a walk the body never falls, so that only gaps change.
 
-Also here. When nothing can support a recorded person: where the centre of mass falls freely.
-
-What is slow and near a surface need not be on it: a foot that goes up in a jump turns round where it is
-highest, be it at the height of the box that the jump began on. Newton's second law knows: the supports give
-the centre of mass all the acceleration it has beside gravity.
+Within half a period of the cutoff from an end of the recording the force is not known, and the value at that
+distance is taken.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -30,14 +26,8 @@ from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.supports.recorded_supports import Support, median_place
-from manikin.recordings.supports.support_levels import (
-    CUTOFF as SUPPORT_LEVELS_CUTOFF,
-)
-from manikin.recordings.supports.support_levels import (
-    Track,
-    slowest_speed,
-    track,
-)
+from manikin.recordings.supports.support_levels import CUTOFF as SUPPORT_LEVELS_CUTOFF
+from manikin.recordings.supports.support_levels import Track, slowest_speed, track
 
 FREE = 0.8
 """Downward acceleration over gravity from which, as a median, nothing carries: a tenth of a second of free
@@ -51,14 +41,10 @@ def while_carried(
     """Those supports during which the centre of mass does not fall freely, in order.
 
     Args:
-        supports: Of any effectors.
         found: At least four instants.
         rate: Frames per second [Hz].
         start: Instant of the first frame [s].
         cutoff: Of the low-pass filter [Hz].
-
-    Raises:
-        InputError: If the cutoff is too high.
     """
     falls = -vertical_acceleration(found, rate, cutoff) / GRAVITY
     kept = []
@@ -72,16 +58,7 @@ def while_carried(
 def vertical_acceleration(
     found: Reconstruction, rate: float, cutoff: float = SUPPORT_LEVELS_CUTOFF
 ) -> FloatArray:
-    """(n,) upward, of the low-passed centre of mass [m/s^2].
-
-    Args:
-        found: At least four instants.
-        rate: Frames per second [Hz].
-        cutoff: Of the low-pass filter [Hz].
-
-    Raises:
-        InputError: If the cutoff is too high.
-    """
+    """(n,) upward acceleration of the centre of mass, low-passed at a cutoff [Hz], at a rate [Hz] [m/s^2]."""
     model = found.body.pinocchio
     data = model.createData()
     com = np.array([pin.centerOfMass(model, data, q).copy() for q in found.q])
@@ -90,7 +67,7 @@ def vertical_acceleration(
 
 
 CUTOFF = 10.0
-"""Of the low-pass of the centre of mass and of the feet [Hz]."""
+"""Cutoff of the low-pass of the centre of mass and of the feet [Hz]."""
 
 FALLING = 0.2
 """Vertical force per body weight below which nothing carries. A half-sine of a force whose mean over the step
@@ -98,7 +75,7 @@ is the weight has, low-passed at :data:`CUTOFF`, 0.09 to 0.31 of the weight left
 0.3 to 0.17 s and flights of 0.05 to 0.13 s."""
 
 SHORTEST_FALL = 0.03
-"""Shorter falls are not told from noise [s]."""
+"""Shorter falls are noise [s]."""
 
 AT_END = 0.05
 """Time from either end of the recording in which the force is not known [s]: half a period of the cutoff."""
@@ -113,7 +90,7 @@ NEAR = 0.02
 """The same beside an end of the recording [m]: the fall that would bound the support is not seen."""
 
 SHORTEST = 0.08
-"""Shorter times between two falls are not told from noise [s]."""
+"""Shorter times between two falls are noise [s]."""
 
 SHORTEST_KEPT = 0.04
 """Less of a support beside a fall is none [s]."""
@@ -147,15 +124,11 @@ class _Foot:
 
 
 def by_the_force(
-    supports: Sequence[Support],
-    found: Reconstruction,
-    soles: Mapping[str, tuple[FloatArray, FloatArray]],
-    surfaces: Sequence[float],
-    rate: float,
-    *,
+    supports: Sequence[Support], found: Reconstruction,
+    soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float], rate: float, *,
     start: float = 0.0,
-) -> tuple[Support, ...]:
-    """Supports that begin and end where the body begins and ends to be carried; those missed are added.
+) -> tuple[Support, ...]:  # fmt: skip
+    """Supports of feet cut at falls and extended to where the body is carried; missing ones are added.
 
     Args:
         supports: Of any effectors; those of feet change.

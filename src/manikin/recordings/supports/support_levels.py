@@ -1,7 +1,4 @@
-"""Points of the feet that rest, and the heights of the surfaces on which they do.
-
-Also here. Where effectors and segments of a recorded body are.
-"""
+"""Positions and speeds of points of a recorded body, and the heights of the surfaces on which feet rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -48,7 +45,7 @@ def effector_places(body: BodyModel, q: FloatArray, names: Sequence[str]) -> Flo
 
 
 CUTOFF = 5.0
-"""Of the low-pass filter of positions, of second order, forward and backward ([Qiu2012]_ 3.2.1) [Hz]."""
+"""Cutoff of the low-pass of positions, of second order, forward and backward ([Qiu2012]_ 3.2.1) [Hz]."""
 
 REST = 0.12
 """Speed below which a point rests [m/s]."""
@@ -120,10 +117,9 @@ class Track:
     def peak_speed(self, rest: float = REST, shift: float = SHIFT_WAY) -> FloatArray:
         """(n,) the highest speed of the swing between two rests [m/s]; infinite where there is none.
 
-        A point that leaves its rest slowly and rests again close to it has not swung, it has shifted: as
-        the toes do when the heel lifts, and a hand that slides along what it holds. Of a swing that the
-        recording cuts, the highest speed may be missing: it is taken for at least the median of the whole
-        ones.
+        A point that leaves its rest slowly and rests again close to it has shifted, not swung: toes do while
+        the heel lifts, and hands that slide along what they hold. A swing that the recording cuts counts
+        with at least the median of the whole ones.
 
         Args:
             rest: Speed below which the point rests [m/s].
@@ -197,16 +193,13 @@ def surfaces_under(
 ) -> tuple[RestSurface, ...]:
     """Surfaces on which feet stand, lowest first.
 
-    A foot that rests while another one moves carries the body, so what it rests on is a surface; so is the
-    lowest height at which one rests, and any at which one rests as level as on those. A foot that hangs
-    still in the air, while another one stands, is on none.
-
-    Where no sole ever rests, as in running, slow ones are taken.
+    A foot that rests while another one moves carries the body, so it rests on a surface; so does the lowest
+    one, and any that rests as level as on those. A foot that hangs still in the air is on none. Where no sole
+    ever rests, as in running, slow ones are taken.
 
     Args:
         feet: Heel and toes of each.
-        lying: (n,) whether the person lies or crawls: such feet lean on anything, and tell the lowest
-            surface only. None for never.
+        lying: (n,) whether the person lies or crawls, when feet show the lowest surface only; None for never.
     """
     rests: list[_Rest] = []
     for limit in (REST, *NEVER_AT_REST):
@@ -238,10 +231,8 @@ def sole_height(heel: Track, toes: Track, lying: NDArray[np.bool_] | None = None
     """(n,) of the middle of a sole, of the ball of a steep one, or of the lower end of an upright one [m].
 
     Args:
-        heel: Of the foot.
-        toes: Of the foot.
-        lying: (n,) whether the person lies or crawls: who squats stands on the ball however upright the
-            sole is. None for never.
+        lying: (n,) whether the person lies or crawls; otherwise an upright sole stands on its ball. None for
+            never.
     """
     ends = heel.positions[:, 2], toes.positions[:, 2]
     rise = sole_rise(heel, toes)
@@ -283,7 +274,7 @@ def _rests(
 
 
 def _surface(heights: Sequence[float]) -> RestSurface:
-    """Of heights of rest, lowest first, with a level for every :data:`LEVELS_APART` of them or less."""
+    """Surface of heights of rest, lowest first, with a level for each :data:`LEVELS_APART` or less."""
     levels = [[heights[0]]]
     for height in heights[1:]:
         if height - levels[-1][0] > LEVELS_APART:

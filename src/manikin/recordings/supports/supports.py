@@ -1,14 +1,12 @@
-"""What supports a recorded person, when and at which height: here the feet, and all others with them.
+"""Supports of a recorded person: which effector, when, and at which height.
 
-A foot supports while its heel or its toes do, or, with the heel raised, the ball that it turns about. Each of
-these points is followed by a switch with hysteresis: it closes where the point is slow and near a surface,
-and opens where it is fast or away from it. Speeds are compared with the highest one of the swing, for the
-low-pass filter turns the stop of a fast foot into a slope that is as high as the foot was fast. Surfaces are
-found from the recording itself (:mod:`manikin.recordings.supports.support_levels`), so stairs need no
-description. Others: :mod:`manikin.recordings.supports.body_supports`,
-:mod:`manikin.recordings.supports.body_supports`, :mod:`manikin.recordings.supports.body_supports`. Nobody is
-supported who falls freely (:mod:`manikin.recordings.supports.running_supports`), and who does not is by the
-feet that are low then (:mod:`manikin.recordings.supports.running_supports`).
+A foot supports while its heel or toes do, or, with the heel raised, the ball about which it turns. Each of
+these points has a switch with hysteresis: it closes where the point is slow and near a surface, and opens
+where it is fast or away from it. Speeds are compared with the highest one of the swing, because the low-pass
+filter turns the stop of a fast foot into a slope in proportion to its speed. Surfaces are found from the
+recording (:mod:`manikin.recordings.supports.support_levels`), so stairs need no description. Other effectors
+are in :mod:`manikin.recordings.supports.body_supports`; the force that the motion needs corrects all of them
+(:mod:`manikin.recordings.supports.running_supports`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -58,7 +56,7 @@ MOVES = 0.25
 """Speed of the slowest point of a sole above which the foot is on its way [m/s]."""
 
 SHORTEST = 0.08
-"""Shorter supports, and shorter interruptions of one, are not told from noise [s]."""
+"""Shorter supports, and shorter interruptions of one, are noise [s]."""
 
 SHORTEST_CUT = 0.04
 """The same of a support that the recording cuts, of which a part is missing [s]."""
@@ -73,9 +71,8 @@ def supports_of(
         found: At least four instants at an even rate, not yet smoothed.
         start: What the first frame of the recording is on its clock [s].
         cutoff: Of the low-pass filter [Hz].
-        with_force: Whether the force that the motion needs tells when feet of a runner carry, see
-            :mod:`manikin.recordings.supports.running_supports`; False for what the positions of the feet say
-            alone.
+        with_force: Whether the force that the motion needs corrects the supports of the feet, see
+            :mod:`manikin.recordings.supports.running_supports`.
 
     Raises:
         InputError: If the body has no feet with soles, there are too few instants, or the cutoff is too high.
@@ -124,15 +121,18 @@ def supports_of_points(
     near, away = np.where(down, NEAR_LYING, NEAR), np.where(down, AWAY_LYING, AWAY)
     supports: list[Support] = []
     for name, both in tracks.items():
-        offsets = _offsets(both, flat[name] & ~_others(flat, name), levels, down)
+        others_rest = np.any([rests for other, rests in flat.items() if other != name], axis=0)
+        offsets = _offsets(both, flat[name] & ~others_rest, levels, down)
         if offsets is None:
             offsets = _offsets(both, flat[name], levels, down) or (0.0, 0.0)
         heel, toes = (one.positions[:, 2] - offset for one, offset in zip(both, offsets, strict=True))
         points = (*both, ball_of(*both))
+        # Heel and toes of a foot that turns on the spot with its heel raised move about a resting ball.
+        ball = _height_above((1.0 - BALL) * heel + BALL * toes, levels)
         above = (
             _height_above(heel, levels),
             _toes_above(both, toes, levels, down),
-            _ball_above(both, (1.0 - BALL) * heel + BALL * toes, levels),
+            np.where(heel_rise(*both) > RAISED, ball, np.inf),
         )
         touching = [_touching(one, height, near, away) for one, height in zip(points, above, strict=True)]
         supports += _supports(name, points, np.array(touching) & ~_steps(both, touching), surfaces, start)
@@ -175,18 +175,12 @@ def floor_under(soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Se
     return levels[np.argmin(np.abs(lowest[:, None] - levels), axis=1)]
 
 
-def _others(flat: Mapping[str, NDArray[np.bool_]], name: str) -> NDArray[np.bool_]:
-    """(n,) whether another foot rests."""
-    return np.any([rests for other, rests in flat.items() if other != name], axis=0)
-
-
 def _offsets(
     points: tuple[Track, Track], stands: NDArray[np.bool_], levels: FloatArray, lying: NDArray[np.bool_]
 ) -> tuple[float, float] | None:
     """Heights of heel and toes above the surface where the foot stands: the errors of a model's sole [m].
 
-    They are learnt best while the other foot moves: with both on the ground a person may be on the toes.
-    None where the foot never stands so.
+    They are most reliable while the other foot moves; None where the foot never stands so.
     """
     height = sole_height(*points, lying)
     above = _height_above(height, levels)
@@ -209,19 +203,11 @@ def _height_above(heights: FloatArray, levels: FloatArray) -> FloatArray:
 def _toes_above(
     points: tuple[Track, Track], toes: FloatArray, levels: FloatArray, lying: NDArray[np.bool_]
 ) -> FloatArray:
-    """(n,) of the toes from the nearest level, or of what a steep sole stands on where that is nearer [m]."""
+    """(n,) height of the toes, or of the lowest part of a steep sole, whichever is nearer to a level [m]."""
     above = _height_above(toes, levels)
     stands = _height_above(sole_height(*points, lying), levels)
     ball = np.where(sole_rise(*points) > STEEP, stands, np.inf)
     return np.where(np.abs(ball) < np.abs(above), ball, above)
-
-
-def _ball_above(points: tuple[Track, Track], ball: FloatArray, levels: FloatArray) -> FloatArray:
-    """(n,) of the ball from the nearest level [m]; infinite while the heel is down and tells by itself.
-
-    A foot that turns on the spot moves both ends beside a ball that stays, though it is lifted.
-    """
-    return np.where(heel_rise(*points) > RAISED, _height_above(ball, levels), np.inf)
 
 
 def _touching(one: Track, height: FloatArray, near: FloatArray, away: FloatArray) -> NDArray[np.bool_]:
@@ -231,9 +217,9 @@ def _touching(one: Track, height: FloatArray, near: FloatArray, away: FloatArray
 
 
 def _steps(points: tuple[Track, Track], touching: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-    """(n,) whether a foot that seems to touch steps: even the slowest point of its sole is too fast to shift.
+    """(n,) whether a foot that seems to touch makes a step: the slowest point of its sole is too fast.
 
-    A small step after a fast swing is slow beside that, if the foot was down for too short to come to rest.
+    A small step after a fast swing looks slow if the foot was down for too short to come to rest.
     """
     down, speed = np.logical_or.reduce(touching), slowest_speed(*points)
     steps = np.zeros(len(speed), dtype=bool)
@@ -248,19 +234,12 @@ def _supports(
     name: str, points: tuple[Track, ...], touching: NDArray[np.bool_],
     surfaces: Sequence[RestSurface], start: float,
 ) -> list[Support]:  # fmt: skip
-    """Runs in which any of the points touches, without those that are too short to tell.
-
-    Args:
-        name: The foot.
-        points: Heel, toes and ball.
-        touching: (3, n) which of them touches.
-        surfaces: Those found.
-        start: Instant of the first frame [s].
-    """
+    """Runs in which heel, toes or ball touch, (3, n), without those that are too short."""
     rate, last, found = points[0].rate, touching.shape[1] - 1, []
     for first, stop in lasting(np.logical_or.reduce(touching), SHORTEST * rate, SHORTEST_CUT * rate):
         place = median_place(np.mean([point.positions[first:stop] for point in points[:2]], axis=0))
-        place[2] = _surface_at(float(place[2]), surfaces).height
+        away = [min(abs(level - float(place[2])) for level in surface.levels) for surface in surfaces]
+        place[2] = surfaces[int(np.argmin(away))].height
         begins, ends = (points[int(np.argmax(touching[:, frame]))] for frame in (first, stop - 1))
         found.append(
             Support(
@@ -269,8 +248,3 @@ def _supports(
             )
         )  # fmt: skip
     return found
-
-
-def _surface_at(height: float, surfaces: Sequence[RestSurface]) -> RestSurface:
-    """That one of them with the nearest level."""
-    return min(surfaces, key=lambda surface: min(abs(level - height) for level in surface.levels))
