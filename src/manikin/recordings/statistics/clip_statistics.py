@@ -190,11 +190,7 @@ def group_statistics(
 def statistics_of(
     clips: Sequence[RecordedClip], settings: StatisticsSettings | None = None
 ) -> dict[str, GroupStatistics]:
-    """Measures of each group of motions, in the order in which groups appear.
-
-    Raises:
-        InputError: As :func:`group_statistics`.
-    """
+    """:func:`group_statistics` of each group of motions, in the order in which groups appear."""
     groups: dict[str, list[RecordedClip]] = {}
     for clip in clips:
         groups.setdefault(clip.group, []).append(clip)

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from manikin.errors import InputError
 from manikin.numerics.signals import Spread
-from manikin.recordings.supports.recorded_supports import RecordedSupports, SupportPhase
+from manikin.recordings.supports.recorded_supports import SupportPhase
 from manikin.recordings.supports.supports import FEET
 
 FLIGHT = "flight"
@@ -42,11 +42,6 @@ class PhaseSequence:
     phases: tuple[SupportPhase, ...]
     start_seen: bool = False
     end_seen: bool = False
-
-    @classmethod
-    def of(cls, name: str, group: str, supports: RecordedSupports) -> "PhaseSequence":
-        """Phases of a recording, of which the first and the last are cut off by it."""
-        return cls(name, group, supports.phases)
 
     def of_effectors(self, active: Collection[str]) -> "PhaseSequence":
         """The phases of the supports of some effectors only; equal neighbours become one.
