@@ -198,7 +198,7 @@ def statistics_of(
 
 
 def published_statistics() -> dict[str, GroupStatistics]:
-    """The same of the published motions: each configuration, left foot first, and all of them.
+    """Statistics of the published motions: each configuration, left foot first, and all of them.
 
     ``all`` has the sequences of Table 3.2 and the distances of Table 3.5.
     """

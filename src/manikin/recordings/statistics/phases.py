@@ -55,7 +55,7 @@ class PhaseSequence:
         return replace(self, phases=_merged(kept))
 
     def without_short(self, shortest: float) -> "PhaseSequence":
-        """The same without phases shorter than ``shortest`` [s], whose time goes to the one before."""
+        """Sequence without phases shorter than ``shortest`` [s], whose time goes to the one before."""
         kept = list(self.phases[:1])
         for phase in self.phases[1:]:
             if phase.duration < shortest:
@@ -209,7 +209,7 @@ class SequenceConsistency:
 
     @property
     def mirrored_counts(self) -> Mapping[Supporting, int]:
-        """As ``counts``, with a sequence and its mirror image counted as one, the more frequent of both."""
+        """Motions of each sequence, with its mirror image counted as the more frequent of both."""
         merged: Counter[Supporting] = Counter()
         for sequence, count in self.counts.items():
             image = mirror_image(sequence)

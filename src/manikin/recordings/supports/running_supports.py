@@ -83,7 +83,7 @@ AWAY = 0.10
 """Height above where a foot stood, or above a surface, up to which it can be what carries [m]."""
 
 NEAR = 0.02
-"""The same beside an end of the recording [m]: the fall that would bound the support is not seen."""
+"""AWAY beside an end of the recording [m]: the fall that would bound the support is not seen."""
 
 SHORTEST = 0.08
 """Shorter times between two falls are noise [s]."""
