@@ -74,7 +74,7 @@ def creature_from_urdf(
         BodyError: If the file or a limb is not usable.
     """
     robot = _without_empty_root(read_urdf(path), str(path))
-    tree = _Tree(robot, str(path))
+    tree = _SegmentTree(robot, str(path))
     specs = {name: _spec(name, value, str(path)) for name, value in limbs.items()}
     _check_soles(specs, sole_length, sole_width)
     effectors = {spec.tip: tree.effector(name, spec) for name, spec in specs.items()}
@@ -146,7 +146,7 @@ class _Member:
     place: FloatArray
 
 
-class _Tree:
+class _SegmentTree:
     """Segments of a robot, and where its links went."""
 
     def __init__(self, robot: Urdf, where: str) -> None:

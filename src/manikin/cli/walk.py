@@ -1,4 +1,4 @@
-"""``manikin walk``: how a person walks to a place, with the whole body; or somebody steered with keys."""
+"""``manikin walk``: the walk of a whole body to a place, or of a walker steered with keys."""
 
 import math
 from typing import Annotated, Any

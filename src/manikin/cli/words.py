@@ -29,7 +29,7 @@ def words(
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Partition the goals of a walk by the word of the best path; goes on where it was interrupted."""
+    """Partition the goals of a walk by the word of the best path; an interrupted run is continued."""
     headings = _headings(slices)
     directory = directory_of(out, "words", json=json)
     refuse(figures is True and directory is None, "--figures", "there is no directory to draw into")

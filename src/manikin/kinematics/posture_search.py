@@ -156,7 +156,7 @@ def generate_posture(
     return solver.result(best, solver.iterations + (freely.iterations if freely else 0))
 
 
-class _Move(NamedTuple):
+class _Step(NamedTuple):
     """A step tried: where it leads, its largest component, and the merit before, gained and expected."""
 
     candidate: "_Iterate"
@@ -237,7 +237,7 @@ class PostureSolver:
                 break
         return self._exact(iterate) if iterate.violation < 5.0 * NEAR else iterate
 
-    def _best_move(self, iterate: _Iterate, trust: float) -> "_Move":
+    def _best_move(self, iterate: _Iterate, trust: float) -> "_Step":
         """The step of the quadratic programme, bent back onto the requirements where that is better."""
         before = self._merit(iterate)
         step, predicted = self._step(iterate, trust)
@@ -250,10 +250,10 @@ class PostureSolver:
             move = other if other.gained > move.gained else move
         return move
 
-    def _move(self, iterate: _Iterate, step: FloatArray, before: float, expected: float) -> "_Move":
+    def _move(self, iterate: _Iterate, step: FloatArray, before: float, expected: float) -> "_Step":
         candidate = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
         gained = before - self._merit(candidate)
-        return _Move(candidate, float(np.abs(step).max()), before, gained, expected)
+        return _Step(candidate, float(np.abs(step).max()), before, gained, expected)
 
     def _exact(self, iterate: _Iterate) -> _Iterate:
         """Remove what the wishes have pulled from the requirements, by the smallest changes."""

@@ -5,7 +5,7 @@
     DIR/scenario.yaml      the scenario with every default and override, ready to run again
     DIR/stages/*.json      what each stage found, written as soon as it is known
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
-    DIR/motion-NAME.h5     planned motion of somebody else who walks there
+    DIR/motion-NAME.h5     planned motion of another walker
     DIR/summary.json       written when every stage is done
     DIR/report.html        verdict, requirements, figures and numbers in one page that needs no other file
     DIR/motion.bvh         drawn from the files above, for animation programs
@@ -14,7 +14,7 @@
 Each file is written atomically, so an interrupted run leaves whole files of the stages that were done.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from manikin.balance import pseudo_wrench
+from manikin.balance import WrenchPolytope, pseudo_wrench
 from manikin.balance.zmp import ZmpPath, contact_wrench, zmp_path
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, StanceSequence
@@ -32,12 +32,12 @@ from manikin.motion import Motion
 from manikin.motion.file import MotionFile, read_motions
 from manikin.motion.motion import PhaseTable, com_velocity, effector_positions, phases_of
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.com import CentroidalProblem, CentroidalTrajectory
 from manikin.planning.com.com_certificate import phase_margins, phase_times
 from manikin.planning.com.feasibility import polytopes_of
 from manikin.runtime.display import Displayed
 from manikin.runtime.files import FIGURES, ResultDirectory, read_json, write_result
-from manikin.scenarios import Scenario, load_scenario
+from manikin.scenarios import load_scenario
 from manikin.scene import Scene
 
 COM_TRAJECTORY = "com_trajectory.json"
@@ -192,23 +192,27 @@ def read_run(directory: str | Path) -> RunRecord:
         real = _first_phases(scenario.build_sequence(), len(trajectory.schedule.sequence))
         schedule = ContactSchedule(real, trajectory.schedule.instants)
         content = MotionFile(scene=scenario.build_scene(), schedule=schedule)
-    plan = point_mass_track(scenario, trajectory)
+    problem = scenario.build_centroidal_problem()
+    polytopes = polytopes_of(problem)[: len(trajectory.schedule.sequence)]
+    plan = point_mass_track(problem, trajectory, polytopes)
     return RunRecord(_label(folder), content, summary, trajectory.mass, plan, _read_walks(folder))
 
 
-def point_mass_track(scenario: Scenario, trajectory: CentroidalTrajectory) -> ComTrack:
-    """The planned CoM every millisecond, its margin measured as the scenario asks."""
-    problem = scenario.build_centroidal_problem()
-    polytopes = polytopes_of(problem)[: len(trajectory.schedule.sequence)]
+def point_mass_track(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> ComTrack:
+    """The planned CoM every millisecond, with its margin.
+
+    Args:
+        problem: What the trajectory was planned for.
+        trajectory: The plan.
+        polytopes: Of the wrenches of each phase.
+    """
     time = np.concatenate(phase_times(trajectory))
-    return ComTrack(
-        time,
-        trajectory.position(time),
-        trajectory.velocity(time),
-        trajectory.acceleration(time),
-        np.concatenate(phase_margins(problem, trajectory, polytopes)),
-        problem.margin_unit,
-    )
+    derivatives = (trajectory.position, trajectory.velocity, trajectory.acceleration)
+    position, velocity, acceleration = (evaluate(time) for evaluate in derivatives)
+    margin = np.concatenate(phase_margins(problem, trajectory, polytopes))
+    return ComTrack(time, position, velocity, acceleration, margin, problem.margin_unit)
 
 
 def _label(folder: Path) -> str:
@@ -228,7 +232,7 @@ def _check_is_run(folder: Path) -> None:
 
 
 def _read_walks(folder: Path) -> dict[str, FloatArray]:
-    """Routes over the floor, (n, 4) each; none where nobody walks."""
+    """Routes over the floor, (n, 4) each; empty without a walk."""
     path = folder / STAGES / f"{WALK_PATHS}.json"
     with _undamaged(path):
         return {

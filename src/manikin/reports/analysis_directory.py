@@ -28,8 +28,7 @@ from manikin.balance import motion_margin, pseudo_wrench
 from manikin.errors import InputError, ManikinError
 from manikin.motion.file import MotionFile, write_motions
 from manikin.numerics.spatial import FloatArray
-from manikin.pipeline.run_directory import MOTION, SUMMARY, ComTrack, RunRecord
-from manikin.planning.com.com_certificate import phase_margins, phase_times
+from manikin.pipeline.run_directory import MOTION, SUMMARY, ComTrack, RunRecord, point_mass_track
 from manikin.reports.analysis_sheet import recording_sheet
 from manikin.reports.comparison.compare import RunComparison, compare_runs
 from manikin.reports.pages import analysis_page, render
@@ -129,12 +128,7 @@ def _planned_track(found: Replan) -> ComTrack | None:
     trajectory = found.com.trajectory
     if trajectory is None:
         return None
-    trajectory = replace(trajectory, turning=None)
-    time = np.concatenate(phase_times(trajectory))
-    margin = np.concatenate(phase_margins(found.com.problem, trajectory, found.com.polytopes))
-    derivatives = trajectory.position, trajectory.velocity, trajectory.acceleration
-    position, velocity, acceleration = (evaluate(time) for evaluate in derivatives)
-    return ComTrack(time, position, velocity, acceleration, margin, found.com.problem.margin_unit)
+    return point_mass_track(found.com.problem, replace(trajectory, turning=None), found.com.polytopes)
 
 
 SHEET = "Postures, supports, forces, margins, height and scores over time"

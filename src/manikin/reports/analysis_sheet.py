@@ -73,7 +73,7 @@ class SvgDrawing:
         """Text of the drawing, an element of a page of HTML.
 
         Args:
-            words: What it shows, for who does not see it.
+            words: Alternative text.
         """
         size = f'viewBox="0 0 {_tenths(self.width)} {_tenths(self.height)}"'
         head = f'<svg {size} role="img" aria-label="{escape(words)}"'
@@ -154,7 +154,7 @@ def recording_sheet(analysis: Analysis, words: str) -> str:
 
     Args:
         analysis: The recording.
-        words: What the sheet shows, for who does not see it.
+        words: Alternative text.
 
     Returns:
         An SVG element.
@@ -307,7 +307,7 @@ class _Postures:
 
 
 def _drawn(body: BodyModel) -> list[str]:
-    """Segments whose bones are drawn: from each parent to all, then of those that are nobody's parent."""
+    """Segments whose bones are drawn: from each parent to all, then those without children."""
     parents = {segment.parent for segment in body.segments}
     return [item.name for item in body.segments[1:]] + [
         item.name for item in body.segments[1:] if item.name not in parents

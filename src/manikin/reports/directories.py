@@ -1,7 +1,7 @@
 """Result directories of push maps, statistics of recordings and partitions into words.
 
-Directions of a map and slices of a partition are kept as soon as they are known, so that an interrupted
-search goes on where it was.
+Directions of a map and slices of a partition are kept as soon as they are known, so that an
+interrupted search can be continued.
 
 ::
 

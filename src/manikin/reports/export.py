@@ -126,7 +126,7 @@ _ROOT_ORDER = "YXZ"  # yaw, pitch, roll: the singularity is a pelvis that looks 
 
 
 @dataclass(frozen=True, eq=False)
-class _Joint:
+class _BvhJoint:
     """Channels of one segment.
 
     Attributes:
@@ -176,7 +176,7 @@ def _frame_time(motion: Motion) -> float:
     return float(motion.duration / len(steps))
 
 
-def _joints(body: BodyModel) -> dict[str, _Joint]:
+def _joints(body: BodyModel) -> dict[str, _BvhJoint]:
     joints, column = {}, 0
     for segment in body.segments:
         joints[segment.name] = _joint(segment, column)
@@ -184,19 +184,19 @@ def _joints(body: BodyModel) -> dict[str, _Joint]:
     return joints
 
 
-def _joint(segment: Segment, first_column: int) -> _Joint:
+def _joint(segment: Segment, first_column: int) -> _BvhJoint:
     order, signs = "", []
     for hinge in segment.hinges:
         axis = TO_BVH @ hinge.axis
         nearest = int(np.argmax(np.abs(axis)))
         if not np.isclose(abs(axis[nearest]), 1.0, rtol=0.0, atol=1e-12) or "XYZ"[nearest] in order:
             # Oblique or repeated axes cannot be channels; the whole rotation is split instead.
-            return _Joint(segment, "ZXY", None, (1.0, 1.0, 1.0))
+            return _BvhJoint(segment, "ZXY", None, (1.0, 1.0, 1.0))
         order += "XYZ"[nearest]
         signs.append(float(np.sign(axis[nearest])))
     missing = [axis for axis in "ZXY" if axis not in order]
     columns = tuple(range(first_column, first_column + len(signs))) + (None,) * len(missing)
-    return _Joint(segment, order + "".join(missing), columns, (*signs, *(1.0 for _ in missing)))
+    return _BvhJoint(segment, order + "".join(missing), columns, (*signs, *(1.0 for _ in missing)))
 
 
 def _children(body: BodyModel, name: str) -> list[Segment]:
@@ -212,7 +212,7 @@ def _depth_first(body: BodyModel) -> list[Segment]:
     return order
 
 
-def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _Joint], depth: int) -> None:
+def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _BvhJoint], depth: int) -> None:
     indent, inner = "\t" * depth, "\t" * (depth + 1)
     root = segment.parent is None
     order = _ROOT_ORDER if root else joints[segment.name].order
@@ -240,7 +240,7 @@ def _root_channels(motion: Motion) -> FloatArray:
     return np.hstack([position, _euler(rotation, _ROOT_ORDER)])
 
 
-def _angles(joint: _Joint, body: BodyModel, motion: Motion) -> FloatArray:
+def _angles(joint: _BvhJoint, body: BodyModel, motion: Motion) -> FloatArray:
     """(n, 3) channel values of a segment [deg]."""
     hinges = motion.q[:, 7:]
     if joint.columns is not None:

@@ -91,8 +91,8 @@ def walking_supports(footprints: Footprints, scenario: Scenario) -> Scenario:
 def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
     """A scenario with a walk before its own supports, all in one motion.
 
-    The walk ends on the first stance of the supports, and the plan goes on from there without a stop being
-    asked for. The constraints on the centre of mass stay; it starts as high as in the scenario.
+    The walk ends on the first stance of the supports, from which the plan continues; no stop is asked for.
+    The constraints on the centre of mass stay; it starts as high as in the scenario.
 
     Args:
         footprints: Of a walk that ends on the feet of the scenario's first phase.

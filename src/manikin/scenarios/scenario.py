@@ -149,7 +149,7 @@ class Scenario(Displayed, ScenarioValues):
         return Scenario(file, self.source, self.folder, changed.lines)
 
     def moved(self, x: float, y: float, yaw_deg: float) -> Scenario:
-        """Return the same scenario at another place in the world, its coordinates written anew.
+        """Return the same scenario at another place in the world, with its coordinates there.
 
         Args:
             x: Where the origin of this scenario comes to lie [m].

@@ -298,7 +298,7 @@ class ScenarioValues:
             raise ScenarioError(f"{place(self.source, path, self.lines)}: {error}") from None
 
     def error(self, path: KeyPath, text: str) -> ScenarioError:
-        """An error that begins with the place of the key and goes on with the text."""
+        """Error whose message is the place of the key and the text."""
         return ScenarioError(f"{place(self.source, path, self.lines)} {text}")
 
     def _com(self, end: str) -> tuple[float, float, float]:

@@ -96,7 +96,7 @@ def recover(
         InputError: If the body lies or leans, its soles are not level, or a number is not usable.
         BodyError: If it does not stand on two legs.
     """
-    run = _Run(body, task, settings or RecoverySettings(), scene)
+    run = _RecoveryRun(body, task, settings or RecoverySettings(), scene)
     with _quiet_engine():
         return run.run(progress)
 
@@ -115,7 +115,7 @@ def _quiet_engine() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-class _Run:
+class _RecoveryRun:
     """One recovery, from its set-up to its verdict."""
 
     def __init__(

@@ -65,7 +65,7 @@ def serve_drive(
     """Let the user steer a walker with keys and sliders, in real time, until Ctrl-C.
 
     Args:
-        scene: Drawn around the walker, who does not look at it.
+        scene: Drawn around the walker, but not seen by it.
         port, announce: As of :func:`serve`.
 
     Raises:

@@ -194,11 +194,11 @@ class _Task:
         self, com: FloatArray, acceleration: FloatArray, turning: FloatArray, scales: FitScales
     ) -> ConfigurationSpline:
         """Fit to a centre of mass [m], its acceleration and a rate of angular momentum [N.m], (n, 3) each."""
-        return self.job.solve(_Goal(self, com, acceleration, turning), scales)[1].spline
+        return self.job.solve(_AdaptationGoal(self, com, acceleration, turning), scales)[1].spline
 
 
 @dataclass(frozen=True, eq=False)
-class _Goal:
+class _AdaptationGoal:
     """A centre of mass (n, 3) with its acceleration and a rate of angular momentum for recorded postures."""
 
     task: _Task

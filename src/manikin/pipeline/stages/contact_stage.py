@@ -69,7 +69,7 @@ SEARCHES_AGAIN = 60
 """Postures that are looked for along every guide after the first, which the others are much like."""
 
 
-class _Search:
+class _ContactSearch:
     """Search for contacts between start and goal of a scenario."""
 
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
@@ -84,7 +84,7 @@ class _Search:
         )  # fmt: skip
 
 
-class _FootSearch(_Search):
+class _FootSearch(_ContactSearch):
     """Search for the contacts of a human on its feet."""
 
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
@@ -199,7 +199,7 @@ NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
 
-class _LimbSearch(_Search):
+class _LimbSearch(_ContactSearch):
     """Search for contacts of the limbs that a scenario names, all limbs where it names none."""
 
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:

@@ -227,7 +227,7 @@ def _summary(act: Act, largest: BracedForces | None, forces: BracedForces | None
 def execute_motion(
     context: RunContext, report: Report, planned: PlannedMotion, requirements: ExecutionRequirements
 ) -> Execution:
-    """Execute a motion, with the scenario's push and its act, and measure what became of it.
+    """Execute a motion, with the scenario's push and its act, and measure the result.
 
     A body that may be pushed is ready for it, but not told when or whence; see
     :mod:`manikin.control.plan_return`.

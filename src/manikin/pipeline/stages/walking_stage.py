@@ -169,7 +169,7 @@ def _apart(stance: dict[str, tuple[FloatArray, float]]) -> float:
 
 
 def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
-    """The walk whose last step is that of the foot that stays when the plan goes on; the shorter of two."""
+    """Walk whose last step is that of the foot that stays in the next phase; the shorter of two."""
     phases = scenario.explicit_supports().resolved_phases()
     stays = [foot for foot in FEET if len(phases) > 1 and phases[1].get(foot) == phases[0][foot]]
     fitting = [one for one in choices if one.steps[-1].effector in stays] or choices
@@ -259,7 +259,7 @@ def plan_walks(
         goal: (3,) The same at the end.
 
     Raises:
-        ScenarioError: If a way cannot be asked for: no floor, a start in an obstacle, a waypoint in vain.
+        ScenarioError: If a route is impossible: no floor, a start in an obstacle, a useless waypoint.
     """
     scenario, section = context.scenario, _section(context.scenario)
     with scenario.refusing(("scene",)):

@@ -65,7 +65,7 @@ def with_key_postures(context: RunContext, report: Report, planned: CentroidalRe
 
     Args:
         context: With supports.
-        report: Takes the ``centroidal`` block anew.
+        report: Takes the ``centroidal`` block again.
         planned: The plan; it is returned as it is where it failed.
     """
     if planned.trajectory is None:

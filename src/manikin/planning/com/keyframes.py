@@ -83,7 +83,7 @@ def plan_com_through_key_frames(problem: KeyframeProblem) -> KeyframeResult:
     certificate, measured every millisecond, gets key frames until it does or no sample of the
     recording is left that would help; then the result says which requirement could not be met.
     """
-    return _Search(problem).run()
+    return _KeyFrameSearch(problem).run()
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class _Attempt:
 
 
 @dataclass
-class _Search:
+class _KeyFrameSearch:
     """The rounds of one problem."""
 
     problem: KeyframeProblem

@@ -283,7 +283,7 @@ class NearKeyFramesResult(CentroidalResult):
 
 
 @dataclass(frozen=True, eq=False)
-class _Attempt:
+class _NearAttempt:
     frames: tuple[int, ...]
     points: FloatArray
     trajectory: CentroidalTrajectory
@@ -306,10 +306,10 @@ def plan_com_near_key_frames(problem: KeyframeProblem) -> NearKeyFramesResult:
         InputError: If the problem has conditions on the ends, or a margin in the space of forces.
     """
     _check(problem)
-    return _Search(problem).run()
+    return _NearSearch(problem).run()
 
 
-class _Search:
+class _NearSearch:
     """The rounds of one problem."""
 
     def __init__(self, problem: KeyframeProblem) -> None:
@@ -339,7 +339,7 @@ class _Search:
             added=tuple(frame for frame in frames if frame not in changes), distance=distance,
         )  # fmt: skip
 
-    def _attempts(self) -> Iterator[_Attempt]:
+    def _attempts(self) -> Iterator[_NearAttempt]:
         frames, start = tuple(self.recording.key_frames.tolist()), None
         for _ in range(FRAME_ROUNDS):
             attempt = self._solve(frames, start)
@@ -351,10 +351,10 @@ class _Search:
                 return
             frames, start = tuple(sorted({*frames, *further})), attempt.points
 
-    def _order(self, attempt: _Attempt) -> tuple[bool, float]:
+    def _order(self, attempt: _NearAttempt) -> tuple[bool, float]:
         return not attempt.certificate.within(), float(np.sqrt(np.mean(self._distance(attempt) ** 2)))
 
-    def _solve(self, frames: tuple[int, ...], start: FloatArray | None) -> _Attempt | None:
+    def _solve(self, frames: tuple[int, ...], start: FloatArray | None) -> _NearAttempt | None:
         """Linearise and solve until nothing moves and the margin is kept between the instants as well."""
         index, required = list(frames), self.problem.requirements.required_margin
         shares = np.minimum(self.recording.time[index] / self.recording.time[-1], 1.0)
@@ -377,7 +377,7 @@ class _Search:
             margin += np.where(missing > 0.0, missing + 0.5 * SPARE, 0.0)
         return self._measured(frames, points)
 
-    def _measured(self, frames: tuple[int, ...], points: FloatArray) -> _Attempt:
+    def _measured(self, frames: tuple[int, ...], points: FloatArray) -> _NearAttempt:
         asked = self.problem.requirements
         trajectory = CentroidalTrajectory(
             asked.mass, self.programme.spline(points), self.recording.schedule,
@@ -386,18 +386,18 @@ class _Search:
         problem = replace(asked, start_com=points[0, :3], goal_com=points[-1, :3])
         measured = [measure(problem, way, self.polytopes) for way in _ways(trajectory)]
         worst = min(measured, key=lambda certificate: certificate.min_margin)
-        return _Attempt(frames, points, trajectory, problem, worst)
+        return _NearAttempt(frames, points, trajectory, problem, worst)
 
-    def _margins(self, attempt: _Attempt) -> list[FloatArray]:
+    def _margins(self, attempt: _NearAttempt) -> list[FloatArray]:
         """Margins of each phase, the lesser of the point mass and of the body that turns [N.m]."""
         both = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
         return [np.minimum.reduce(margins) for margins in zip(*both, strict=True)]
 
-    def _distance(self, attempt: _Attempt) -> FloatArray:
+    def _distance(self, attempt: _NearAttempt) -> FloatArray:
         offset = attempt.trajectory.position(self.recording.time) - self.recording.com
         return np.linalg.norm(offset, axis=1)
 
-    def _straying(self, attempt: _Attempt) -> list[int]:
+    def _straying(self, attempt: _NearAttempt) -> list[int]:
         """The farthest sample between each two key frames, where it is too far off and not too near them."""
         distance, time, frames = self._distance(attempt), self.recording.time, []
         for before, after in zip(attempt.frames[:-1], attempt.frames[1:], strict=True):
@@ -407,7 +407,7 @@ class _Search:
                 frames.append(int(np.argmax(usable)))
         return frames
 
-    def _explain(self, best: _Attempt | None) -> Failure | None:
+    def _explain(self, best: _NearAttempt | None) -> Failure | None:
         if best is None:
             return Failure(
                 "balance margin", "no smooth centre of mass near the key frames keeps its balance all along"

@@ -141,11 +141,11 @@ def find_braced_posture(
         feet_by: What feet prefer; EFORT when omitted.
         reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
     """
-    search = _Search(body, scene, samples, act, settings or BraceSettings(), reference)
+    search = _BraceSearch(body, scene, samples, act, settings or BraceSettings(), reference)
     return search.run(np.append(near, level), hands_by or act.hand_heuristic(), feet_by or Efort())
 
 
-class _Search:
+class _BraceSearch:
     def __init__(
         self,
         body: BodyModel,

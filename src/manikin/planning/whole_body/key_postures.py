@@ -142,7 +142,7 @@ def find_key_postures(
     """
     instants = trajectory.schedule.instants
     time = instants[trajectory.binds(instants)]
-    search = _Search(
+    search = _KeyPostureSearch(
         body, scene, trajectory, time, manner, (requirements or WholeBodyRequirements()).clearance,
         range_margin, replace(SETTINGS, tolerance=tolerance), leaning_pairs(body, padded),
         None if known is None else align_quaternions(np.array(known[: len(time)])),
@@ -150,7 +150,7 @@ def find_key_postures(
     return KeyPostures(search.run())
 
 
-class _Search:
+class _KeyPostureSearch:
     """The search for one plan, each posture starting from the one before."""
 
     def __init__(

@@ -164,7 +164,7 @@ class RefineResult(Displayed):
 
 
 @dataclass(frozen=True, eq=False)
-class _Goal:
+class _RefineGoal:
     """Keys and contacts at one timing.
 
     Attributes:
@@ -257,15 +257,15 @@ class Refinement:
             began: Reading of the clock from which the wall time counts [s].
             progress: Called with the share of the fits that are done.
         """
-        goal = _Goal(self, path, schedule)
+        goal = _RefineGoal(self, path, schedule)
         self.variables = tuple(dict.fromkeys(phase.stance.effectors, 1.0) for phase in schedule.sequence)
         if self.settings.retime:
             share = self.settings.scales.velocity_share
-            goal = _Goal(self, *stretched_for_speed(self.body, path, schedule, share))
+            goal = _RefineGoal(self, *stretched_for_speed(self.body, path, schedule, share))
         if self.settings.contact_variables:
             goal = self._chosen(goal, goal.at_rest())
 
-        def remedy(number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal]:
+        def remedy(number: int, last: FitAttempt[_RefineGoal]) -> FitAttempt[_RefineGoal]:
             progress((number + 1) / (REPAIRS + 1))
             return self._remedy(number, last)
 
@@ -282,7 +282,7 @@ class Refinement:
             self._rooms[key] = rooms_of(schedule, friction_share)
         return self._rooms[key]
 
-    def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal]:
+    def _remedy(self, number: int, last: FitAttempt[_RefineGoal]) -> FitAttempt[_RefineGoal]:
         """The next fit after one that breaks requirements: other contacts, weights, timing or knots."""
         goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
         if self.settings.contact_variables:
@@ -306,7 +306,7 @@ class Refinement:
             near = _retimed(near, last.goal.schedule, goal.schedule)
         return job.attempt(goal, scales, fine, near)
 
-    def _hurried(self, best: FitAttempt[_Goal], share: float) -> FitAttempt[_Goal]:
+    def _hurried(self, best: FitAttempt[_RefineGoal], share: float) -> FitAttempt[_RefineGoal]:
         """Shorten phases round by round; what breaks a requirement is taken back where it does."""
         settled = frozenset[int]()
         for _ in range(ROUNDS):
@@ -314,7 +314,7 @@ class Refinement:
             factors = shortening(self.body, best.motion, goal.schedule, share, settled)
             if np.all(factors == 1.0):
                 break
-            shorter = _Goal(self, *shortened(goal.path, goal.schedule, factors))
+            shorter = _RefineGoal(self, *shortened(goal.path, goal.schedule, factors))
             near = _retimed(best.result.spline, goal.schedule, shorter.schedule)
             trial = self._job.attempt(shorter, best.scales, best.fine, near)
             if trial.broken:
@@ -324,13 +324,15 @@ class Refinement:
                 best = trial
         return best
 
-    def _chosen(self, goal: _Goal, samples: VariableSamples, resting: VariableSamples | None = None) -> _Goal:
+    def _chosen(
+        self, goal: _RefineGoal, samples: VariableSamples, resting: VariableSamples | None = None
+    ) -> _RefineGoal:
         """Choose the contact variables for a motion; another goal where a contact was let go."""
         chosen, kept = self._choice.choose(goal.schedule, samples, resting)
         self.variables = tuple({**old, **new} for old, new in zip(self.variables, chosen, strict=True))
         return goal if kept is goal.schedule else replace(goal, schedule=kept)
 
-    def _slower(self, last: FitAttempt[_Goal]) -> _Goal:
+    def _slower(self, last: FitAttempt[_RefineGoal]) -> _RefineGoal:
         """Give the worst phase more time."""
         before, path, schedule = last.goal.schedule, last.goal.path, last.goal.schedule
         for name in sorted(last.broken & _SLOWED):
@@ -338,10 +340,10 @@ class Refinement:
             when = float(np.interp(worst, before.instants, schedule.instants))
             # Factor by which a phase gets longer in which balance or speed is missed again.
             path, schedule = stretched_around(path, schedule, when, 1.3)
-        return _Goal(self, path, schedule)
+        return _RefineGoal(self, path, schedule)
 
     def _result(
-        self, found: FitAttempt[_Goal], duration: float, given: ContactSchedule, began: float
+        self, found: FitAttempt[_RefineGoal], duration: float, given: ContactSchedule, began: float
     ) -> RefineResult:
         """Measures of the input, of a spline through it and of the motion, and the verdict.
 

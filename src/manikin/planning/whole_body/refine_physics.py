@@ -260,14 +260,14 @@ def contact_slack(schedule: ContactSchedule, time: FloatArray, wrench: FloatArra
         rows = np.flatnonzero(phases == number)
         if len(phase.stance) == 0:
             continue
-        program = _Program(phase.stance)
+        program = _SlackProgram(phase.stance)
         edges = [*range(0, len(rows), TOGETHER), len(rows)]
         for start, end in pairwise(edges):
             slack[rows[start:end]] = program.solve(wrench[rows[start:end]])
     return slack
 
 
-class _Program:
+class _SlackProgram:
     """The program of one stance; its unknowns are the contacts' wrenches and the slack."""
 
     def __init__(self, stance: Stance) -> None:

@@ -167,7 +167,7 @@ def compare_with_plates(
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
+class _HeldPlate:
     """A contact and the time for which it is made [s]."""
 
     contact: Contact
@@ -175,9 +175,9 @@ class _Held:
     end: float
 
 
-def _held(schedule: ContactSchedule) -> list[_Held]:
+def _held(schedule: ContactSchedule) -> list[_HeldPlate]:
     """Contacts in the order of their beginnings; one that lasts for several phases is one."""
-    found: list[_Held] = []
+    found: list[_HeldPlate] = []
     for phase, begin, end in zip(
         schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
     ):
@@ -192,7 +192,7 @@ def _held(schedule: ContactSchedule) -> list[_Held]:
             if same:
                 found[same[0]] = replace(found[same[0]], end=float(end))
             else:
-                found.append(_Held(contact, float(begin), float(end)))
+                found.append(_HeldPlate(contact, float(begin), float(end)))
     return found
 
 

@@ -41,10 +41,10 @@ def walk_paths_figure(record: RunRecord) -> Figure:
     """Draw the ways of all who walk, with shoulders every half second, and what stands in the way.
 
     Args:
-        record: Of a run in which somebody walks.
+        record: Of a run with a walk.
 
     Raises:
-        FigureError: If nobody walks.
+        FigureError: If there is no walk.
     """
     walks = need(dict(record.walks), "a way over the floor")
     figure = new_figure(8.6, 6.4, "Ways over the floor, from above")
