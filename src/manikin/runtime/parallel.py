@@ -48,8 +48,9 @@ def side_by_side(
             yield number, result
         return
     pool = Parallel(
-        count, backend="loky", return_as="generator_unordered", batch_size=1, max_nbytes=None,
-        inner_max_num_threads=1, initializer=_prepare, initargs=(os.getpid(),),
+        count, backend="loky", return_as="generator_unordered", max_nbytes=None, inner_max_num_threads=1,
+        batch_size=1,  # type: ignore[arg-type]  # a number is allowed; the type is that of the default
+        initializer=_prepare, initargs=(os.getpid(),),
     )  # fmt: skip
     results: Any = pool(delayed(_numbered)(work, number, item) for number, item in enumerate(items))
     try:

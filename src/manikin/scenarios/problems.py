@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -228,7 +229,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
     options, seat = values.planning, values.seated_from
     rest = np.zeros(3) if options.zero_end_accelerations else None
     velocity = (0.0, 0.0, 0.0) if seat is None else values.file.task.goal.velocity_m_s
-    given = {"degree": options.degree, "samples": options.samples}
+    given: dict[str, Any] = {"degree": options.degree, "samples": options.samples}
     with values.refusing(("planning",)):
         return CentroidalProblem(
             values.moved_mass,

@@ -127,8 +127,10 @@ class CarriedPoints:
         """(k,) whether each point is on one of the segments."""
         return np.array([name in segments for name in self.segments], dtype=bool)
 
-    def __len__(self) -> int:
-        return len(self.forces)
+    def centre(self, chosen: NDArray[np.bool_]) -> FloatArray:
+        """(3,) centre of pressure of some of the points [m]."""
+        weights = self.forces[chosen]
+        return weights @ self.positions[chosen] / weights.sum()
 
 
 Pose = tuple[FloatArray, FloatArray]
@@ -167,7 +169,7 @@ class CarryingContacts:
             model: Friction cone and cap of the planned stance; without a cap, that of a body.
         """
         contacts = [planned[name] for name in gripping if name in planned]
-        left = np.ones(len(points), dtype=bool)
+        left = np.ones(len(points.forces), dtype=bool)
         for name, contact in planned.items():
             if name in gripping or contact.kind is ContactKind.GRASP:
                 continue
@@ -238,8 +240,7 @@ def _touched(
     contact: Contact, pose: Pose, points: CarriedPoints, chosen: NDArray[np.bool_]
 ) -> tuple[Contact, bool]:
     """A planned contact where it is, with what of it touches, and whether that is not all of it."""
-    weights = points.forces[chosen]
-    centre = weights @ points.positions[chosen] / weights.sum()
+    centre = points.centre(chosen)
     if contact.kind is ContactKind.POINT:
         return replace(contact, position=centre), False
     position, rotation = pose
@@ -294,9 +295,7 @@ def _height(points: FloatArray, corners: list[int], number: int) -> float:
 
 def _unplanned(name: str, points: CarriedPoints, chosen: NDArray[np.bool_]) -> Contact:
     """A contact that is not planned: its points, about the mean of their normals."""
-    weights = points.forces[chosen]
-    centre = weights @ points.positions[chosen] / weights.sum()
-    normal = weights @ points.normals[chosen]
+    centre, normal = points.centre(chosen), points.forces[chosen] @ points.normals[chosen]
     rotation = rotation_from_normal(normal / np.linalg.norm(normal), 0.0)
     local = (points.positions[chosen] - centre) @ rotation
     local[:, 2] = 0.0

@@ -171,14 +171,6 @@ def _convex_bodies(piece: MeshPiece) -> list[FloatArray]:
     return list(np.concatenate([corners, inner], axis=1))
 
 
-_GEOM_KIND = {
-    ShapeKind.SPHERE: mujoco.mjtGeom.mjGEOM_SPHERE,
-    ShapeKind.CAPSULE: mujoco.mjtGeom.mjGEOM_CAPSULE,
-    ShapeKind.BOX: mujoco.mjtGeom.mjGEOM_BOX,
-}
-_CONE = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL}
-
-
 @dataclass(frozen=True, eq=False)
 class SimulationModel:
     """A compiled body and scene with the translation of states from and to Pinocchio's.
@@ -300,7 +292,7 @@ def _set_options(spec: Any, options: PhysicsOptions) -> None:
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     spec.option.timestep = options.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = _CONE[options.cone]
+    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{options.cone.upper()}")
     spec.option.impratio = options.impratio
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
 
@@ -379,8 +371,8 @@ def _add_shape(item: Any, segment: Segment, shape: Shape, contact: dict[str, Any
     elif shape.kind == ShapeKind.BOX:
         size /= 2.0
     item.add_geom(
-        name=f"{segment.name}/{shape.name}", type=_GEOM_KIND[shape.kind], size=size, mass=0.0,
-        pos=shape.translation, quat=quaternion(shape.rotation), **contact,
+        name=f"{segment.name}/{shape.name}", type=getattr(_GEOM, f"mjGEOM_{shape.kind.name}"), size=size,
+        mass=0.0, pos=shape.translation, quat=quaternion(shape.rotation), **contact,
     )  # fmt: skip
 
 

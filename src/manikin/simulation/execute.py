@@ -267,7 +267,9 @@ class _Run:
             control_ms=1e3 * control / len(recorder.samples),
             touches=world.touches,
             counted_touches=touches,
-            fallbacks=tuple(recorder.fallbacks),
+            fallbacks=tuple(
+                (s.sensed.time, s.output.fallback) for s in recorder.samples if s.output.fallback
+            ),
             max_slip_m=recorder.max_slip,
             friction=recorder.friction_use(),
             push=push_outcome(self.pushes, recorder, self.failure),

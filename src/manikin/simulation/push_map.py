@@ -115,8 +115,8 @@ class PushMap(Displayed):
         cls, conditions: Mapping[str, Any], directions: Sequence[float], bound: Sequence[float] | None = None
     ) -> "PushMap":
         """A map of directions that have not been searched yet."""
-        bounds = None if bound is None else tuple(bound)
-        return cls(conditions, tuple(directions), (None,) * len(directions), bounds)
+        found = (None,) * len(directions)
+        return cls(conditions, tuple(directions), found, None if bound is None else tuple(bound))
 
     @property
     def missing(self) -> tuple[int, ...]:

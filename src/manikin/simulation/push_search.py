@@ -29,14 +29,10 @@ RAISED = np.array([-0.1, 0.0, 0.12])
 
 
 def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
-    """Stand on one foot, the centre of mass over the middle of its sole and no part of the body in another.
+    """(nq,) posture on one foot, the centre of mass over the middle of its sole.
 
-    Args:
-        body: A body with two legs.
-        foot: Effector of the foot that carries; it stays where it is in the standing posture.
-
-    Returns:
-        (nq,) configuration.
+    The foot, an effector of a body with two legs, stays where it is in the standing posture; no part of the
+    body is in another.
 
     Raises:
         InputError: If the body has no such foot, or cannot stand like that.
@@ -56,14 +52,11 @@ def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
 
 
 def feet_apart_posture(body: BodyModel, distance: float) -> FloatArray:
-    """Stand on both feet, as far apart as wanted and the centre of mass between them.
+    """(nq,) posture on both feet of a body with two legs, the centre of mass between them.
 
     Args:
-        body: A body with two legs.
+        body: The body.
         distance: Distance between the middles of the soles, sideways [m].
-
-    Returns:
-        (nq,) configuration.
 
     Raises:
         InputError: If the soles would overlap, or the body cannot stand like that.

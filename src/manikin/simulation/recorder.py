@@ -58,7 +58,6 @@ class Recorder:
         self._segments = segments
         self.effectors = schedule.sequence.effectors
         self.samples: list[Sample] = []
-        self.fallbacks: list[tuple[float, str]] = []
         self._intervals = {name: support_intervals(schedule, name, SWITCHING) for name in self.effectors}
         self._landings: dict[str, FloatArray | None] = dict.fromkeys(self.effectors)
         self.max_slip = 0.0
@@ -77,8 +76,6 @@ class Recorder:
         plan_time = sensed.time - output.waited
         wrenches = np.array([self._wrench(name, sensed, plan_time) for name in self.effectors])
         self.samples.append(Sample(sensed, output, wrenches, total, carried))
-        if output.fallback:
-            self.fallbacks.append((sensed.time, output.fallback))
         for name in self.effectors:
             self._measure_slip(name, output, plan_time)
 
@@ -148,14 +145,7 @@ class Recorder:
 
         Effectors that slide to their places on a seat do not count.
         """
-        firm = self._firm()
-        errors = _lengths(
-            [
-                s.output.state.frames[name].position - s.output.reference.effectors[name].position
-                for s in self.samples
-                for name in firm
-            ]
-        )
+        firm, errors = self._effector_errors(self.samples)
         if not len(errors):
             return 0.0, "", 0.0
         row, column = divmod(int(np.argmax(errors)), len(firm))
@@ -163,10 +153,19 @@ class Recorder:
 
     def last_effector_error(self) -> float:
         """Largest distance of an effector's origin from its plan in the last step [m]; counted as above."""
-        last = self.samples[-1].output
-        planned = last.reference.effectors
-        errors = [last.state.frames[name].position - planned[name].position for name in self._firm()]
-        return float(_lengths(errors).max(initial=0.0))
+        return float(self._effector_errors(self.samples[-1:])[1].max(initial=0.0))
+
+    def _effector_errors(self, samples: Sequence[Sample]) -> tuple[list[str], FloatArray]:
+        """Effectors none of whose contacts slide to their places, and their distances from the plan [m]."""
+        firm = [
+            name
+            for name in self.effectors
+            if all(item.contact.settle == 0.0 for item in self._intervals[name])
+        ]
+        return firm, _lengths([
+            s.output.state.frames[name].position - s.output.reference.effectors[name].position
+            for s in samples for name in firm
+        ])  # fmt: skip
 
     def delayed_schedule(self) -> ContactSchedule | None:
         """When the planned contacts were due; None where the plan never waited."""
@@ -177,14 +176,6 @@ class Recorder:
         instants = self._schedule.instants
         late = waited[np.minimum(np.searchsorted(planned, instants), len(waited) - 1)]
         return ContactSchedule(self._schedule.sequence, instants + late)
-
-    def _firm(self) -> list[str]:
-        """Effectors none of whose contacts slide to their places."""
-        return [
-            name
-            for name in self.effectors
-            if all(item.contact.settle == 0.0 for item in self._intervals[name])
-        ]
 
     def margins(self, mass: float) -> MotionMargin:
         """Margins of the mean measured wrenches, about the centre of mass.

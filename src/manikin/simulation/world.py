@@ -48,15 +48,16 @@ class Grip:
 
 
 class World:
-    """The physics engine with a body in a scene; states go in and come out in Pinocchio's convention."""
+    """The physics engine with a body in a scene; states go in and come out in Pinocchio's convention.
+
+    Attributes:
+        model: The compiled body and scene.
+        penetration: Deepest penetration of any contact since the last reset, paddings apart [m].
+        padding_compression: Deepest penetration of a padding since the last reset [m].
+    """
 
     def __init__(self, model: SimulationModel, padded: Sequence[str] = ()) -> None:
-        """Make a world at rest in the zero configuration.
-
-        Args:
-            model: The compiled body and scene.
-            padded: Obstacles that give way.
-        """
+        """Make a world at rest in the zero configuration; the padded obstacles give way."""
         self.model = model
         self._model = copy.copy(model.mujoco)
         self._data = mujoco.MjData(self._model)
@@ -74,7 +75,7 @@ class World:
         self._grips: dict[str, Grip] = {}
         self._grip_forces: dict[str, FloatArray] = {}
         self._touches: dict[tuple[str, str], Touch] = {}
-        self._depth, self._padded_depth = 0.0, 0.0
+        self.penetration, self.padding_compression = 0.0, 0.0
         self._total, self._steps = np.zeros(6), 0
         self._carried: list[tuple[NDArray, ...]] = []
         self._elliptic = self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -115,7 +116,7 @@ class World:
     def forget(self) -> None:
         """Forget unplanned touches, the deepest penetrations and the wrenches so far."""
         self._touches.clear()
-        self._depth, self._padded_depth = 0.0, 0.0
+        self.penetration, self.padding_compression = 0.0, 0.0
         self._total[:], self._steps = 0.0, 0
         self._carried.clear()
 
@@ -350,9 +351,10 @@ class World:
         ))  # fmt: skip
         if self._pads:
             padded = self._padded[geoms[:, 0]] | self._padded[geoms[:, 1]]
-            self._padded_depth = max(self._padded_depth, float(depths[padded].max(initial=0.0)))
+            deepest = float(depths[padded].max(initial=0.0))
+            self.padding_compression = max(self.padding_compression, deepest)
             depths = depths[~padded]
-        self._depth = max(self._depth, float(depths.max(initial=0.0)))
+        self.penetration = max(self.penetration, float(depths.max(initial=0.0)))
         planned = self._planned[geoms[:, 0], geoms[:, 1]]
         if planned.all():
             return
@@ -419,16 +421,6 @@ class World:
     def touches(self) -> tuple[Touch, ...]:
         """Touches that were not planned since the last reset, in order of their first time."""
         return tuple(self._touches.values())
-
-    @property
-    def penetration(self) -> float:
-        """Deepest penetration of any contact since the last reset, paddings apart [m]."""
-        return self._depth
-
-    @property
-    def padding_compression(self) -> float:
-        """Deepest penetration of a padding since the last reset [m]."""
-        return self._padded_depth
 
     @property
     def divergence(self) -> str:

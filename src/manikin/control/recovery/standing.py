@@ -164,7 +164,8 @@ def close_loop(
     wanted = np.concatenate([-frame.drift - settling * frame.twist for frame in frames])
     held = len(wanted)
     factors = np.linalg.qr(jacobian.T, mode="complete")
-    full, upper = factors.Q, factors.R
+    full: FloatArray = factors.Q
+    upper: FloatArray = factors.R
     drift = full[:, :held] @ np.linalg.solve(upper[:held].T, wanted)
     basis = full[:, held:]
     momentum_rate = state.centroidal_map @ basis

@@ -297,9 +297,9 @@ class CentroidalProblem:
         for end in ("start", "goal"):
             for name, unit in (("com", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
                 vector = getattr(self, f"{end}_{name}")
-                if vector is not None or name == "com":
-                    text = f"centroidal {end}_{name} [{unit}]"
-                    values[f"{end}_{name}"] = frozen_array(vector, text, (3,))
+                if name != "com" and vector is None:
+                    continue
+                values[f"{end}_{name}"] = frozen_array(vector, f"centroidal {end}_{name} [{unit}]", (3,))
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

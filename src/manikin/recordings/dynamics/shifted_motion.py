@@ -366,8 +366,9 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
     ])  # fmt: skip
     linear = np.concatenate([-(aside.T @ axes.base), np.full(len(frames), PRICE)])
     bound = np.concatenate([np.full(3 * count, LARGEST_SHIFT), np.full(len(frames), np.inf)])
+    rows = sparse.csc_matrix(sparse.hstack([*facets.taken(spline), excess]))
     solution = solve_sparse_qp(
-        quadratic, linear, sparse.hstack([*facets.taken(spline), excess]), None, facets.base,
+        quadratic, linear, rows, None, facets.base,
         (np.where(np.isinf(bound), 0.0, -bound), bound), tolerance=1e-8,
     )  # fmt: skip
     return solution.x[: 3 * count].reshape(3, count).T if solution.solved else None
