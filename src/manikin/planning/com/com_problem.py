@@ -296,10 +296,10 @@ class CentroidalProblem:
                 values[name] = finite_number(getattr(self, name), f"centroidal {name} [{unit}]", above=0.0)
         for end in ("start", "goal"):
             for name, unit in (("com", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
-                vector: Any = getattr(self, f"{end}_{name}")
-                if vector is not None or name == "com":
-                    text = f"centroidal {end}_{name} [{unit}]"
-                    values[f"{end}_{name}"] = frozen_array(vector, text, (3,))
+                vector = getattr(self, f"{end}_{name}")
+                if name != "com" and vector is None:
+                    continue
+                values[f"{end}_{name}"] = frozen_array(vector, f"centroidal {end}_{name} [{unit}]", (3,))
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
