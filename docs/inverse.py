@@ -70,9 +70,9 @@ of the ACCAD Open Motion Project are reduced to the middle of the shoulders and 
 weights is fitted to all of them at once (`docs/identify_objective.py`). By `docs/inverse.py`.
 
 * *Walks*: the classes {classes} of `clips_locomotion.csv` without runs, and two clips from standing to
-  walking and back. Of turns, the window and {around:g} s on both sides, for the recordings are told where
+  walking and back. Of turns, the window and {around:g} s on both sides, as these people were instructed where
   to turn; of others, the whole clip without standing. {resting} of them begin or end at rest; the others
-  pass through the ends, and the velocities there are asked of the prediction too.
+  pass through the ends, and the velocities there are required of the prediction too.
 * *Filter*: low-pass at half the Nyquist frequency as in the thesis (4.3.4), then at {sway:g} Hz, which
   takes the sway of the strides out.
 * *Fit*: squared distances at the same instants, at {rate:g} Hz of all, an error of heading of one radian as
@@ -107,11 +107,11 @@ LIMITS = """
 
 * The fit has more than one optimum, as paths leap from one way to another when weights change; intervals
   hold about each. How far the lateral weight is above the forward one differs between them.
-* Turns alone and the other walks ask for different weights: one criterion for both is a compromise. What
+* Turns alone and the other walks need different weights: one criterion for both is a compromise. What
   either predicts of goals at rest: [holonomic, nonholonomic, holonomic](patterns.md), where the identified
   weights are options, `recorded` and `recorded-turns`.
-* Nobody in these recordings was asked to walk to a target; the end of a window is taken for the goal. The
-  weight of looking at the goal is told least.
+* The recorded people had no target; the end of a window is taken as the goal. The weight of looking at the
+  goal is observed most weakly.
 * Long walks at an even speed are not optimal under (5.6) for any weights: it pays to speed up and to slow
   down again.
 

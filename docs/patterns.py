@@ -86,7 +86,7 @@ END = """
 
 * Under the weights of the thesis, in either order, H-N-H is rare at any distance: walks are H-N, for the end
   is an arc. Another fade alone does not make it the rule.
-* `recorded-turns`, the weights that [recorded people](inverse.md) ask for who turn a corner, make H-N-H the
+* `recorded-turns`, the weights of [recorded people](inverse.md) who turn a corner, make H-N-H the
   most frequent pattern up to 3 m, which is where the thesis' goals are, and that of more than half of the
   goals of the nine categories. They were identified without a look at these patterns, and picked as an
   option for them. Farther away the final turn becomes a part of the walk.

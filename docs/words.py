@@ -79,7 +79,7 @@ mirrored words. Goals on the axis of symmetry have two mirrored best paths and a
 Farther away more arcs appear (six from 12 m on): the ends of long paths swing about the straight way between
 them, less and less.
 
-Checked afresh: the system integrated in 3000 steps under u ends within {position:.0e} m of each goal; u
+Independent check: the system integrated in 3000 steps under u ends within {position:.0e} m of each goal; u
 differs from the adjoint of the maximum principle by at most {adjoint:.0e} of its largest value, and the
 Hamiltonian from zero by {hamiltonian:.0e}. On {checked} random goals, {random} further random guesses for
 each turn found {better} cheaper path.
