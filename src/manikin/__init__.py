@@ -7,7 +7,7 @@ used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from manikin.runtime.version import __version__
+from manikin.runtime import __version__
 
 if TYPE_CHECKING:
     from manikin.api import (

@@ -33,9 +33,9 @@ from manikin.motion.description import (
     schedule_from,
 )
 from manikin.motion.motion import Motion
+from manikin.runtime import __version__
 from manikin.runtime.display import Displayed
 from manikin.runtime.files import atomic_path
-from manikin.runtime.version import __version__
 from manikin.scene import Scene
 
 FORMAT = "manikin-motion"

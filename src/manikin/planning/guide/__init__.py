@@ -11,8 +11,8 @@ from manikin.planning.guide.guide import (
     GuideWorld,
     offline_roadmap,
     plan_guide,
+    plan_guide_with_restarts,
 )
-from manikin.planning.guide.guide_restarts import plan_guide_with_restarts
 from manikin.planning.guide.roadmap import Roadmap, RoadmapSettings, Route, request
 from manikin.planning.guide.root_path import RootLimits, RootPath, ShortcutSettings
 from manikin.planning.guide.root_pose import root_pose

@@ -18,14 +18,17 @@ from manikin.reports.figures.compare_runs import (
 )
 from manikin.reports.figures.contacts import ChoicePanel, contact_choice_figure, contacts_figure
 from manikin.reports.figures.effectors import effectors_figure, flights_figure, tracking_figure
-from manikin.reports.figures.ergonomics import ergonomics_figure
-from manikin.reports.figures.ground import footprint_figure, zmp_figure
+from manikin.reports.figures.ground import footprint_figure, push_map_figure, zmp_figure
 from manikin.reports.figures.phase_statistics import phase_durations_figure, placements_figure
-from manikin.reports.figures.push_map import push_map_figure
 from manikin.reports.figures.scene import postures_figure, scene_figure
-from manikin.reports.figures.timeline import margin_figure, timing_figure
-from manikin.reports.figures.walks import holonomic_ends_figure, holonomic_zone_figure, walking_paths_figure
-from manikin.reports.figures.words import equal_paths_figure, words_figure
+from manikin.reports.figures.timeline import ergonomics_figure, margin_figure, timing_figure
+from manikin.reports.figures.walks import (
+    equal_paths_figure,
+    holonomic_ends_figure,
+    holonomic_zone_figure,
+    walking_paths_figure,
+    words_figure,
+)
 from manikin.reports.figures.write_figures import COMPARISONS, FIGURES, write_comparison, write_figures
 
 __all__ = [
