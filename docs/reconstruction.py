@@ -28,21 +28,21 @@ Every C3D and TRC file of walks, sitting down and a drop jump on force plates, w
 `docs/reconstruction.py`.
 
 * *Frames*: reconstructed of recorded; frames at the ends that see less than half of the markers are left out.
-* *Residual*: distance of a marker from its place on our human, over all markers and frames. Places of
-  markers are learnt from the same file, so this says how well a chain of rigid segments with our joints
-  follows, not where the joints are.
+* *Residual*: distance of a marker from its place on our human, over all markers and frames. The
+  places of markers come from the same file, so this measures how well a chain of rigid segments with our
+  joints follows, not where the joints are.
 * *Other programs' joints*: median distance of our hips, knees, ankles, shoulders, elbows and wrists from
   those that another program wrote into the file and that are not followed. Elbows and wrists of Plug-in Gait
   are 3 to 4 cm off ours. The legs of `PlugInC3D` differ by 7 cm in thigh and shank each; our human is
   symmetric and has their mean.
-* *Untold*: what stays as in standing, toes and hands apart.
+* *Untold*: unmeasured parts, which stay as in standing, toes and hands not counted.
 * *Time*: of the processor, with placing the markers.
 
 """
 
 
 def parts(neutral: tuple[str, ...]) -> str:
-    """Which parts of the body no marker tells."""
+    """Parts of the body without markers."""
     groups = {"trunk": "thorax", "head": "neck", "arms": "left_upper_arm", "legs": "left_thigh"}
     return ", ".join(name for name, segment in groups.items() if segment in neutral) or "-"
 

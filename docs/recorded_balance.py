@@ -95,7 +95,7 @@ Stances, forces, torques and margins of recorded people (Qiu 2012, 4.4), beside 
 friction {FRICTION:g}; postures are low-passed at {CUTOFF:g} Hz (second order, no delay), rising to
 {TOUCH_DOWN_CUTOFF:g} Hz within {1e3 * TOUCH_DOWN_WIDTH:.0f} ms of a touch-down, the same for all files, and
 differentiated twice. Segment masses lie off the lines between joints (Dumas, Chèze and Verriest, 2007), a
-trunk without markers tilts so that its upper end has a third of what is fast in the pelvis' motion. Nothing
+trunk without markers tilts so that its upper end has a third of the pelvis' fast motion. Nothing
 is fitted to the plates but the mass of the person; the cutoff at touch-downs was chosen with them.
 
 `manikin analyze` measures the motion as recorded. *Shifted* is the whole body moved by the smooth path
@@ -154,7 +154,7 @@ frames whose margin is not positive although shifted, by what they are put down 
   the wrench; the low-pass spreads the impact over that time.
 * *End*: of the recording, half of that period, where derivatives look to one side.
 * *Flight*: no support was found.
-* *Untold*: another frame of a recording without markers on trunk or arms.
+* *Untold*: another frame of a recording without markers on trunk or arms (unmeasured).
 * *Model*: none of these.
 
 """
@@ -729,9 +729,9 @@ def clip_text(found: list[tuple[Trial, np.ndarray]], walks: list[Trial], heads: 
 
 
 CONTROL = """
-### What a shift can tell
+### What a shift can show
 
-The least shift is no cure for everything. With stances that begin and end too late it grows, until it meets
+The least shift does not repair everything. With stances that begin and end too late it grows, until it meets
 its bound and the margin stays negative. Median over the level walks of both tables:
 
 """

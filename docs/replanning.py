@@ -1,4 +1,4 @@
-"""Plan recorded motions anew, and execute them: writes ``replanning.md`` and its figures.
+"""Re-plan recorded motions and execute them: writes ``replanning.md`` and its figures.
 
 Run ``python docs/replanning.py FOLDER``, where FOLDER holds the recordings named below: walks over force
 plates (btk, OpenSim, OpenCap) and motions of the ACCAD Open Motion Project and the CMU Graphics Lab.

@@ -61,10 +61,10 @@ holonomic. *Left*, *right*: share of the frames in which that shoulder goes ahea
 """
 LINES = """
 Function 1 has no case of its own for turns on the spot. Figure 4.3 (d) calls both shoulders nonholonomic
-then, also the one that goes back; so do the constraint (1.1) and the quotient (4.1), which has no quadrants.
+then, also the one that moves back; so do the constraint (1.1) and the quotient (4.1), which has no quadrants.
 With `either_way` of the rule, off-line agreement is {turns} on turns on the spot, {walks} on walks,
-{all} on walks and runs, and walks backward become nonholonomic ({back} of their frames). So what
-keeps these turns from agreeing is the drift aside, not the sense. The default stays the direction.
+{all} on walks and runs, and walks backward become nonholonomic ({back} of their frames). So these
+turns disagree because of the drift aside, not because of the sense. The default is the direction.
 """
 
 

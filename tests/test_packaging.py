@@ -46,7 +46,8 @@ def declared(*extras):
 
 @pytest.mark.parametrize(("folder", "extras"), [("src", ("mocap",)), ("tests", ("test", "mocap"))])
 def test_every_import_is_declared(folder, extras):
-    known = {*declared(*extras), "manikin", "tests"}
+    scripts = {path.stem.replace("_", "-") for path in (ROOT / "docs").glob("*.py")}
+    known = {*declared(*extras), *scripts, "manikin", "tests"}
     assert {name: str(path) for name, path in imported(folder).items() if name not in known} == {}
 
 

@@ -325,10 +325,10 @@ def replace_places(placement, places):
     return replace(placement, clips=tuple(map(str, range(len(places)))), places=places)
 
 
-def test_who_does_not_move_tells_no_direction():
+def test_without_motion_there_is_no_direction():
     clip = walker()
     still = replace(clip, com=np.tile(clip.com[0], (len(clip.time), 1)))
-    with pytest.raises(InputError, match="tells no direction"):
+    with pytest.raises(InputError, match="without a direction"):
         first_stance(still)
     (found,) = statistics_of([still]).values()
     assert list(found.unplaced) == ["walker"]

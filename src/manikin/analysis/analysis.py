@@ -455,7 +455,7 @@ class Analysis(Displayed):
 
 
 def _later(numbers: Any, start: float) -> Any:
-    """The same with instants, by keys that end in ``at_s``, on a clock that shows ``start`` at their zero."""
+    """Numbers with instants, by keys that end in ``at_s``, on a clock that shows ``start`` at their zero."""
     if not isinstance(numbers, dict):
         return numbers
     return {

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from manikin.analysis.analysis import (
     Analysis,
@@ -40,6 +39,7 @@ from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import reconstruct
 from manikin.recordings.supports.recorded_stances import FRICTION, recorded_schedule
+from manikin.recordings.supports.support_levels import effector_places
 from manikin.recordings.supports.supports import supports_of
 from manikin.walking.segments.segmentation import PathSegments, ShoulderPaths, segment_path
 
@@ -72,16 +72,8 @@ def walked_segments(found: Reconstruction) -> PathSegments | None:
 
 def _places(found: Reconstruction, postures: FloatArray) -> FloatArray:
     """(n, 3, 3) left shoulder, right shoulder and pelvis [m]."""
-    body = found.body
-    model, data = body.pinocchio, body.pinocchio.createData()
-    frames = [body.segment_frame(name) for name in SHOULDERS]
-    places = np.empty((len(postures), 3, 3))
-    for number, q in enumerate(postures):
-        pin.framesForwardKinematics(model, data, q)
-        for shoulder, frame in enumerate(frames):
-            places[number, shoulder] = data.oMf[frame].translation
-    places[:, 2] = postures[:, :3]
-    return places
+    shoulders = effector_places(found.body, postures, SHOULDERS)
+    return np.stack([*shoulders, postures[:, :3]], axis=1)
 
 
 @dataclass(frozen=True)

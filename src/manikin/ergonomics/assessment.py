@@ -160,13 +160,11 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
     body_held = held(motion.time, angles.trunk_and_legs())
     arms_held = {side: held(motion.time, angles.arm(side)) for side in SIDES}
     known = body_held is not None
-    static = {
-        side: (_or(body_held, circumstances.static), _or(arms_held[side], circumstances.static))
-        for side in SIDES
-    }
+    given_static = np.asarray(circumstances.static)
     in_rula, in_reba = rula_steps(angles, bearing, circumstances), reba_steps(angles, bearing, circumstances)
     rula, reba = {}, {}
-    for side, (trunk, arm) in static.items():
+    for side in SIDES:
+        trunk, arm = (given_static if x is None else x for x in (body_held, arms_held[side]))
         rula[side] = rula_score(
             in_rula[side],
             muscle_arm=arm | circumstances.repeated,
@@ -185,8 +183,3 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
         Assessment("RULA", time, rula, in_rula, ACTIONS, rula_action_level, known),
         Assessment("REBA", time, reba, in_reba, RISKS, reba_action_level, known),
     )  # fmt: skip
-
-
-def _or(found: np.ndarray | None, otherwise: bool) -> np.ndarray:
-    """What was found, or what was given where nothing could be."""
-    return np.asarray(otherwise) if found is None else found

@@ -317,7 +317,7 @@ def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynami
 
 
 def with_mass(found: Reconstruction, mass: float) -> Reconstruction:
-    """The same postures of a body of another mass [kg], its shares of segments and its effectors kept.
+    """Postures of a body of another mass [kg], its shares of segments and its effectors kept.
 
     Raises:
         BodyError: If it is not the mass of an adult.

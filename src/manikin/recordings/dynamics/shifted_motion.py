@@ -274,11 +274,11 @@ class _Rows:
         return cls(*(np.concatenate(column) for column in zip(*each, strict=True)))
 
     def scaled(self, unit: float) -> "_Rows":
-        """The same in another unit of length."""
+        """Rows in another unit of length."""
         return _Rows(self.frame, self.base / unit, self.on_shift / unit, self.on_bend / unit)
 
     def turned(self, axes: FloatArray) -> "_Rows":
-        """The same for shifts along the columns of ``axes`` (3, 3)."""
+        """Rows for shifts along the columns of ``axes`` (3, 3)."""
         return _Rows(self.frame, self.base, self.on_shift @ axes, self.on_bend @ axes)
 
     def taken(self, spline: "_Spline") -> list[sparse.csr_array]:

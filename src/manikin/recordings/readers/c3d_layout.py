@@ -93,7 +93,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class C3dLayout:
-    """What a C3D file holds.
+    """Layout of a C3D file.
 
     Attributes:
         file: Its path, for messages.

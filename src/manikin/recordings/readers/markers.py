@@ -283,7 +283,7 @@ class MarkerRecording(Displayed):
             ) from None
 
     def chosen(self, names: Sequence[str]) -> "MarkerRecording":
-        """The same recording with these markers only, in this order.
+        """Recording with some markers only, in a given order.
 
         Raises:
             InputError: If one is not there or twice.
@@ -308,7 +308,7 @@ class MarkerRecording(Displayed):
         )
 
     def with_gaps_filled(self, longest: float = LONGEST_GAP) -> "MarkerRecording":
-        """The same with short gaps filled by interpolation, see ``filled``.
+        """Recording with short gaps filled by interpolation, see :func:`filled`.
 
         :attr:`gaps` of the result are those that are left: longer ones, and those at the ends.
 

@@ -159,7 +159,7 @@ class Recording(Displayed):
             ) from None
 
     def cut(self, start: int, stop: int) -> "Recording":
-        """The same skeleton with the frames from ``start`` up to, not with, ``stop``.
+        """Recording of the frames from ``start`` up to, not with, ``stop``.
 
         Raises:
             InputError: If no frame is left.

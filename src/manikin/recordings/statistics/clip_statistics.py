@@ -190,11 +190,7 @@ def group_statistics(
 def statistics_of(
     clips: Sequence[RecordedClip], settings: StatisticsSettings | None = None
 ) -> dict[str, GroupStatistics]:
-    """Measures of each group of motions, in the order in which groups appear.
-
-    Raises:
-        InputError: As :func:`group_statistics`.
-    """
+    """:func:`group_statistics` of each group of motions, in the order in which groups appear."""
     groups: dict[str, list[RecordedClip]] = {}
     for clip in clips:
         groups.setdefault(clip.group, []).append(clip)
@@ -202,7 +198,7 @@ def statistics_of(
 
 
 def published_statistics() -> dict[str, GroupStatistics]:
-    """The same of the published motions: each configuration, left foot first, and all of them.
+    """Statistics of the published motions: each configuration, left foot first, and all of them.
 
     ``all`` has the sequences of Table 3.2 and the distances of Table 3.5.
     """

@@ -68,8 +68,8 @@ class RecordedClip:
 
     @property
     def phases(self) -> PhaseSequence:
-        """Phases of all supports."""
-        return PhaseSequence.of(self.name, self.group, self.supports)
+        """Phases of all supports; the recording cuts the first and the last."""
+        return PhaseSequence(self.name, self.group, self.supports.phases)
 
 
 def clip_of(
@@ -85,9 +85,6 @@ def clip_of(
         cutoff: Of the postures [Hz], see :func:`~manikin.recordings.dynamics.recorded_dynamics.smoothed`.
         supports: Where they are known; those of :func:`~manikin.recordings.supports.supports.supports_of` if
             None.
-
-    Raises:
-        InputError: As these two.
     """
     known = supports_of(found, start=start) if supports is None else supports
     still = smoothed(found, cutoff)

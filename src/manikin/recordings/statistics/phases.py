@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from manikin.errors import InputError
 from manikin.numerics.signals import Spread
-from manikin.recordings.supports.recorded_supports import RecordedSupports, SupportPhase
+from manikin.recordings.supports.recorded_supports import SupportPhase
 from manikin.recordings.supports.supports import FEET
 
 FLIGHT = "flight"
@@ -43,11 +43,6 @@ class PhaseSequence:
     start_seen: bool = False
     end_seen: bool = False
 
-    @classmethod
-    def of(cls, name: str, group: str, supports: RecordedSupports) -> "PhaseSequence":
-        """Phases of a recording, of which the first and the last are cut off by it."""
-        return cls(name, group, supports.phases)
-
     def of_effectors(self, active: Collection[str]) -> "PhaseSequence":
         """The phases of the supports of some effectors only; equal neighbours become one.
 
@@ -60,7 +55,7 @@ class PhaseSequence:
         return replace(self, phases=_merged(kept))
 
     def without_short(self, shortest: float) -> "PhaseSequence":
-        """The same without phases shorter than ``shortest`` [s], whose time goes to the one before."""
+        """Sequence without phases shorter than ``shortest`` [s], whose time goes to the one before."""
         kept = list(self.phases[:1])
         for phase in self.phases[1:]:
             if phase.duration < shortest:
@@ -214,7 +209,7 @@ class SequenceConsistency:
 
     @property
     def mirrored_counts(self) -> Mapping[Supporting, int]:
-        """As ``counts``, with a sequence and its mirror image counted as one, the more frequent of both."""
+        """Motions of each sequence, with its mirror image counted as the more frequent of both."""
         merged: Counter[Supporting] = Counter()
         for sequence, count in self.counts.items():
             image = mirror_image(sequence)

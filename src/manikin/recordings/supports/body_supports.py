@@ -18,7 +18,6 @@ the body; a hand that carries a load moves with the body. Neither supports.
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.numerics.signals import lasting, mask_runs, switch
@@ -30,6 +29,7 @@ from manikin.recordings.supports.support_levels import (
     JOINTS,
     SHORTEST_REST,
     Track,
+    com_path,
     effector_places,
     track,
 )
@@ -210,8 +210,8 @@ def seat_supports(
     body = found.body
     if SEAT not in body.effectors:
         return ()
-    buttocks, com = _places(found, found.q)
-    standing = float(_places(found, body.standing_posture()[None])[0][0, 2])
+    com, (buttocks,) = com_path(body, found.q), effector_places(body, found.q, (SEAT,))
+    standing = float(effector_places(body, body.standing_posture()[None], (SEAT,))[0, 0, 2])
     seat = track(buttocks, rate, cutoff)
     height = seat.positions[:, 2]
     floor = np.min([end[:, 2] for both in soles.values() for end in both], axis=0)
@@ -235,18 +235,6 @@ def lying(found: Reconstruction) -> NDArray[np.bool_]:
     pelvis, neck = effector_places(found.body, found.q, ("pelvis", "neck"))
     up = (neck - pelvis)[:, 2] / np.linalg.norm(neck - pelvis, axis=1)
     return up < np.cos(TILTED)
-
-
-def _places(found: Reconstruction, postures: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) buttocks and (n, 3) centre of mass [m]."""
-    model = found.body.pinocchio
-    data, frame = model.createData(), found.body.effector_frame(SEAT)
-    places = np.empty((2, len(postures), 3))
-    for number, q in enumerate(postures):
-        pin.framesForwardKinematics(model, data, q)
-        places[0, number] = data.oMf[frame].translation
-        places[1, number] = pin.centerOfMass(model, data, q)
-    return places[0], places[1]
 
 
 def _beyond(com: FloatArray, heel: FloatArray, toes: FloatArray) -> FloatArray:

@@ -19,7 +19,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.numerics.signals import mask_runs
@@ -27,7 +26,7 @@ from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.supports.recorded_supports import Support, median_place
 from manikin.recordings.supports.support_levels import CUTOFF as SUPPORT_LEVELS_CUTOFF
-from manikin.recordings.supports.support_levels import Track, slowest_speed, track
+from manikin.recordings.supports.support_levels import Track, com_path, slowest_speed, track
 
 FREE = 0.8
 """Downward acceleration over gravity from which, as a median, nothing carries: a tenth of a second of free
@@ -59,10 +58,7 @@ def vertical_acceleration(
     found: Reconstruction, rate: float, cutoff: float = SUPPORT_LEVELS_CUTOFF
 ) -> FloatArray:
     """(n,) upward acceleration of the centre of mass, low-passed at a cutoff [Hz], at a rate [Hz] [m/s^2]."""
-    model = found.body.pinocchio
-    data = model.createData()
-    com = np.array([pin.centerOfMass(model, data, q).copy() for q in found.q])
-    height = track(com, rate, cutoff).positions[:, 2]
+    height = track(com_path(found.body, found.q), rate, cutoff).positions[:, 2]
     return np.gradient(np.gradient(height, 1.0 / rate), 1.0 / rate)
 
 
@@ -87,7 +83,7 @@ AWAY = 0.10
 """Height above where a foot stood, or above a surface, up to which it can be what carries [m]."""
 
 NEAR = 0.02
-"""The same beside an end of the recording [m]: the fall that would bound the support is not seen."""
+"""AWAY beside an end of the recording [m]: the fall that would bound the support is not seen."""
 
 SHORTEST = 0.08
 """Shorter times between two falls are noise [s]."""

@@ -44,6 +44,12 @@ def effector_places(body: BodyModel, q: FloatArray, names: Sequence[str]) -> Flo
     return np.ascontiguousarray(places.transpose(1, 0, 2))
 
 
+def com_path(body: BodyModel, q: FloatArray) -> FloatArray:
+    """(n, 3) centre of mass in postures (n, nq) [m]."""
+    data = body.pinocchio.createData()
+    return np.array([pin.centerOfMass(body.pinocchio, data, posture).copy() for posture in q])
+
+
 CUTOFF = 5.0
 """Cutoff of the low-pass of positions, of second order, forward and backward ([Qiu2012]_ 3.2.1) [Hz]."""
 

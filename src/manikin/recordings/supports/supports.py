@@ -50,7 +50,7 @@ AWAY = 0.10
 """Distance from a surface beyond which a point has left it [m]. Below it, the sole of a model is stiff."""
 
 NEAR_LYING, AWAY_LYING = 0.13, 0.18
-"""The same where a person crawls or lies, whose feet lean on the ground with any side [m]."""
+"""NEAR and AWAY of a person who crawls or lies, whose feet lean on the ground with any side [m]."""
 
 MOVES = 0.25
 """Speed of the slowest point of a sole above which the foot is on its way [m/s]."""
@@ -59,7 +59,7 @@ SHORTEST = 0.08
 """Shorter supports, and shorter interruptions of one, are noise [s]."""
 
 SHORTEST_CUT = 0.04
-"""The same of a support that the recording cuts, of which a part is missing [s]."""
+"""Shortest support that the recording cuts, of which a part is missing [s]."""
 
 
 def supports_of(
