@@ -33,8 +33,8 @@ from manikin.recordings.dynamics.recorded_dynamics import (
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
 from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import least_shift
-from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.read import READERS, read_recording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import reconstruct

@@ -207,7 +207,7 @@ class Controller:
         return build_qp(
             state, self.tasks(state, reference, supports, deviation), loaded, bounds, self._damping,
             period=settings.period, acceleration_weight=settings.weights.acceleration,
-            force_weight=settings.weights.force,
+            force_weight=settings.weights.force, sum_cap=self.schedule.stance_at(time).normal_force_cap,
         )  # fmt: skip
 
     def tasks(

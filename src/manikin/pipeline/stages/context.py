@@ -16,13 +16,13 @@ from manikin.contact import Contact, ContactSchedule, Stance, StanceSequence
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
-from manikin.motion.passage import Passage
+from manikin.motion.passage import Passage, measure_passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import MOTION, RunDirectory
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
-from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings, measure_passage
+from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario

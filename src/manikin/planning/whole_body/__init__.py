@@ -7,7 +7,6 @@ from manikin.planning.whole_body.certificate import (
     WholeBodyRequirements,
 )
 from manikin.planning.whole_body.fit_scales import FitScales, RefineScales
-from manikin.planning.whole_body.head_clearance import head_segments, measure_passage
 from manikin.planning.whole_body.key_postures import (
     Eligibility,
     KeyPosture,
@@ -41,8 +40,6 @@ __all__ = [
     "continue_seated",
     "find_eligible_plan",
     "find_key_postures",
-    "head_segments",
-    "measure_passage",
     "plan_whole_body",
     "refine_motion",
 ]
