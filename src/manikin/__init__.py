@@ -31,24 +31,9 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "__version__",
-    "analyze",
-    "balance",
-    "compare",
-    "creature",
-    "grasp",
-    "human",
-    "plan",
-    "point",
-    "push",
-    "read",
-    "run",
-    "scene",
-    "simulate",
-    "sole",
-    "stance",
-    "walk",
-]
+    "__version__", "analyze", "balance", "compare", "creature", "grasp", "human", "plan", "point", "push",
+    "read", "run", "scene", "simulate", "sole", "stance", "walk",
+]  # fmt: skip
 
 
 _PACKAGES = ("balance", "scene")

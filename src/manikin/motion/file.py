@@ -71,8 +71,6 @@ class MotionFile(Displayed):
         planned: Motion as planned.
         executed: Motion as simulated.
         body: The moving body.
-        scene: Its surroundings.
-        schedule: Its contacts in time.
         recorded: Motion of a recorded person, reconstructed.
         shifted: The recorded motion after the least shift onto its contacts.
     """

@@ -53,15 +53,9 @@ class Passage:
 
     @classmethod
     def of(
-        cls,
-        time: FloatArray,
-        com: FloatArray,
-        floor: FloatArray | float,
-        *,
-        tops: Mapping[str, float] | None = None,
-        room: float | None = None,
-        overhead: float | None = None,
-    ) -> "Passage":
+        cls, time: FloatArray, com: FloatArray, floor: FloatArray | float, *,
+        tops: Mapping[str, float] | None = None, room: float | None = None, overhead: float | None = None,
+    ) -> "Passage":  # fmt: skip
         """Measure the path of a centre of mass.
 
         Args:

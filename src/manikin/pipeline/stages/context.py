@@ -294,7 +294,6 @@ class Report:
 
         Args:
             stage: Stage whose result was measured.
-            table: Its requirements.
         """
         self._tables[stage] = table
 
@@ -396,15 +395,10 @@ class RunResult:
 
     @classmethod
     def of(
-        cls,
-        report: Report,
-        centroidal: CentroidalResult | None = None,
-        wholebody: WholeBodyResult | RefineResult | None = None,
-        execution: Execution | None = None,
-        *,
-        planned: Motion | None = None,
-        recovery: Recovery | None = None,
-    ) -> "RunResult":
+        cls, report: Report, centroidal: CentroidalResult | None = None,
+        wholebody: WholeBodyResult | RefineResult | None = None, execution: Execution | None = None, *,
+        planned: Motion | None = None, recovery: Recovery | None = None,
+    ) -> "RunResult":  # fmt: skip
         """Close the report of a run and gather what its stages returned.
 
         Args:

@@ -152,10 +152,7 @@ def offline_roadmap(world: GuideWorld, rng: np.random.Generator) -> Roadmap:
 
 
 def plan_guide(
-    world: GuideWorld,
-    task: GuideTask,
-    rng: np.random.Generator,
-    roadmap: Roadmap | None = None,
+    world: GuideWorld, task: GuideTask, rng: np.random.Generator, roadmap: Roadmap | None = None
 ) -> GuideResult:
     """Plan a path of the root.
 
@@ -187,11 +184,7 @@ def plan_guide(
 
 
 def _search(
-    world: GuideWorld,
-    task: GuideTask,
-    roadmap: Roadmap,
-    planner: LocalPlanner,
-    rng: np.random.Generator,
+    world: GuideWorld, task: GuideTask, roadmap: Roadmap, planner: LocalPlanner, rng: np.random.Generator
 ) -> Route:
     """Grow the roadmap until start and goal are joined, and ask it for the way."""
     sampler = PoseSampler(planner.checker, world.region, world.settings.sampler)

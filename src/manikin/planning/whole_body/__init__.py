@@ -21,25 +21,8 @@ from manikin.planning.whole_body.seated import SeatedContinuation, continue_seat
 from manikin.planning.whole_body.swing_planner import PlannedSwing
 
 __all__ = [
-    "Eligibility",
-    "FitScales",
-    "KeyPosture",
-    "KeyPostures",
-    "MotionCertificate",
-    "PlannedSwing",
-    "RefineMeasures",
-    "RefineRequirements",
-    "RefineResult",
-    "RefineScales",
-    "RefineSettings",
-    "SeatedContinuation",
-    "WholeBodyFailure",
-    "WholeBodyRequirements",
-    "WholeBodyResult",
-    "WholeBodySettings",
-    "continue_seated",
-    "find_eligible_plan",
-    "find_key_postures",
-    "plan_whole_body",
-    "refine_motion",
-]
+    "Eligibility", "FitScales", "KeyPosture", "KeyPostures", "MotionCertificate", "PlannedSwing",
+    "RefineMeasures", "RefineRequirements", "RefineResult", "RefineScales", "RefineSettings",
+    "SeatedContinuation", "WholeBodyFailure", "WholeBodyRequirements", "WholeBodyResult", "WholeBodySettings",
+    "continue_seated", "find_eligible_plan", "find_key_postures", "plan_whole_body", "refine_motion",
+]  # fmt: skip

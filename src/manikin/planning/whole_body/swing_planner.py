@@ -172,14 +172,9 @@ class FlightPlanner:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        trajectory: CentroidalTrajectory,
-        limits: SwingLimits,
-        rng: np.random.Generator,
-        reference: Callable[[float], FloatArray],
-    ) -> None:
+        self, body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, limits: SwingLimits,
+        rng: np.random.Generator, reference: Callable[[float], FloatArray],
+    ) -> None:  # fmt: skip
         self._body, self._scene, self._trajectory = body, scene, trajectory
         self._limits, self._rng, self._reference = limits, rng, reference
         self._proximity = Proximity(body, scene)
