@@ -15,10 +15,7 @@ from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, 
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 BODY = human()
-BOXES = {
-    "threshold": ((0.05, 1.5, 0.3), (0.35, 0.75, 0.15)),
-    "platform": ((1.1, 1.5, 0.2), (0.9, 0.75, 0.1)),
-}
+BOXES = {"threshold": ((0.05, 1.5, 0.3), (0.35, 0.75, 0.15)), "platform": ((1.1, 1.5, 0.2), (0.9, 0.75, 0.1))}
 SCENE = Scene([Obstacle(name, Box(size), translation=place) for name, (size, place) in BOXES.items()])
 FACING_Y = rotation_from_yaw(np.pi / 2)
 START, GOAL = make_pose((0.2, 0.4, 0), FACING_Y), make_pose((0.5, 0.65, 0.2), FACING_Y)

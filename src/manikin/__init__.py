@@ -7,7 +7,7 @@ used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from manikin.runtime.version import __version__
+from manikin.runtime import __version__
 
 if TYPE_CHECKING:
     from manikin.api import (
@@ -31,24 +31,9 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "__version__",
-    "analyze",
-    "balance",
-    "compare",
-    "creature",
-    "grasp",
-    "human",
-    "plan",
-    "point",
-    "push",
-    "read",
-    "run",
-    "scene",
-    "simulate",
-    "sole",
-    "stance",
-    "walk",
-]
+    "__version__", "analyze", "balance", "compare", "creature", "grasp", "human", "plan", "point", "push",
+    "read", "run", "scene", "simulate", "sole", "stance", "walk",
+]  # fmt: skip
 
 
 _PACKAGES = ("balance", "scene")

@@ -136,10 +136,7 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["run", ""], "is empty"),
         (["run", "platform", "--variant", "low"], "has no variant 'low'; valid: slippery"),
         (["run", "platform@low"], "has no variant 'low'; valid: slippery"),
-        (
-            ["run", "platform", "--set", "supports.frictoin=1"],
-            "did you mean 'friction'? valid: ",
-        ),
+        (["run", "platform", "--set", "supports.frictoin=1"], "did you mean 'friction'? valid: "),
         (["run", "platform", "--set", "scene.rof.box.0=1"], "or roof, threshold, platform"),
         (["compare", "none"], "Missing argument"),
         (["compare", "none", "none"], "no such directory"),

@@ -33,10 +33,7 @@ class Platform:
     def problem(self, key, **options):
         """Requirements at key instant 0 to 7."""
         left, right = STANCES[key]
-        contacts = (
-            foot("left_foot", LEFT[left], np.pi / 2),
-            foot("right_foot", RIGHT[right], np.pi / 2),
-        )
+        contacts = (foot("left_foot", LEFT[left], np.pi / 2), foot("right_foot", RIGHT[right], np.pi / 2))
         under = [(c.effector, "floor" if c.position[2] < 0.1 else "platform") for c in contacts]
         return PostureProblem(
             self.body,

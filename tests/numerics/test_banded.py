@@ -32,11 +32,7 @@ def test_solution_equals_the_dense_normal_equations():
     for order in range(3):
         jacobian = rng.normal(size=(n, 6, d))
         residual = rng.normal(size=(n, 6))
-        system.add(
-            jacobian.transpose(0, 2, 1) @ jacobian,
-            np.einsum("nrd,nr->nd", jacobian, residual),
-            order,
-        )
+        system.add(jacobian.transpose(0, 2, 1) @ jacobian, np.einsum("nrd,nr->nd", jacobian, residual), order)
         for k, row in enumerate(identity(time, nu=order)):
             full = np.kron(row[None], jacobian[k])
             dense += full.T @ full

@@ -85,8 +85,7 @@ def test_a_violated_row_of_zeros_makes_a_polytope_empty():
 
 
 @pytest.mark.parametrize(
-    ("H", "h"),
-    [([[1.0, 0.0]], [1.0, 2.0]), ([1.0, 0.0], [1.0]), ([[np.nan]], [1.0]), ([[1.0]], [np.inf])],
+    ("H", "h"), [([[1.0, 0.0]], [1.0, 2.0]), ([1.0, 0.0], [1.0]), ([[np.nan]], [1.0]), ([[1.0]], [np.inf])]
 )
 def test_malformed_rows_are_refused(H, h):
     with pytest.raises(PolytopeError, match="valid"):

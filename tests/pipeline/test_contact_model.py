@@ -52,11 +52,7 @@ def worst(model, schedule, time, names, forces):
 @pytest.mark.parametrize("model", FRICTION_MODELS)
 def test_forces_of_every_stage_lie_in_the_cone_that_was_asked_for(model, tmp_path):
     """On a slippery floor all the pyramids matter: with the outer one alone 0.278 of 0.212 was planned."""
-    settings = [
-        f"supports.friction={FRICTION}",
-        f"planning.friction_model={model}",
-        "planning.min_margin=8",
-    ]
+    settings = [f"supports.friction={FRICTION}", f"planning.friction_model={model}", "planning.min_margin=8"]
     run = runner.run("platform", out=tmp_path / model, overrides=settings)
     summary = run.summary
     assert run.centroidal.trajectory is not None

@@ -99,10 +99,7 @@ def test_the_same_seed_has_the_same_contacts(found):
 
 @pytest.mark.parametrize(
     ("name", "where", "reason"),
-    [
-        ("climb-wall@bare", "guide", "reaches no usable surface"),
-        ("insect-books@gap", "guide", "walled off"),
-    ],
+    [("climb-wall@bare", "guide", "reaches no usable surface"), ("insect-books@gap", "guide", "walled off")],
 )
 def test_what_no_limb_can_reach_is_explained(name, where, reason):
     result, _, _ = search(name)

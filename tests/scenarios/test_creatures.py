@@ -80,16 +80,8 @@ def test_one_contact_of_a_creature_from_the_command_line(write, capsys):
 @pytest.mark.parametrize(
     ("body", "keys", "match"),
     [
-        (
-            {**DOG, "mass_kg": 3},
-            {},
-            "mass_kg does not apply to a creature from URDF; valid: model, urdf",
-        ),
-        (
-            {"model": "insect", "sex": "male"},
-            {},
-            "sex does not apply to an insect; valid: model, length_m",
-        ),
+        ({**DOG, "mass_kg": 3}, {}, "mass_kg does not apply to a creature from URDF; valid: model, urdf"),
+        ({"model": "insect", "sex": "male"}, {}, "sex does not apply to an insect; valid: model, length_m"),
         ({"model": "human", "urdf": "dog.urdf"}, {}, "body.urdf does not apply to a human"),
         ({"urdf": "dog.urdf"}, {}, "body.limbs is missing; valid: urdf: FILE and limbs"),
         ({"model": "urdf"}, {}, "body.urdf is missing"),

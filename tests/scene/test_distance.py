@@ -35,11 +35,7 @@ TIGHT, ROUGH = 1e-7, 1e-5
 coordinate = st.floats(-1.0, 1.0)
 point = st.tuples(coordinate, coordinate, coordinate).map(np.array)
 rotation = st.tuples(*[st.floats(-3.1, 3.1)] * 3).map(lambda rpy: rotation_from_rpy(*rpy))
-PROBES = {
-    "sphere": coal.Sphere(0.1),
-    "capsule": coal.Capsule(0.08, 0.3),
-    "box": coal.Box(0.2, 0.1, 0.06),
-}
+PROBES = {"sphere": coal.Sphere(0.1), "capsule": coal.Capsule(0.08, 0.3), "box": coal.Box(0.2, 0.1, 0.06)}
 
 
 def measure(free_body, pose, geometry, shape, place, turn=None, obstacle_place=None):

@@ -7,12 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from manikin.errors import InputError
-from manikin.walking.path.walking_model import (
-    body_motion,
-    state_derivative,
-    to_body,
-    to_world,
-)
+from manikin.walking.path.walking_model import body_motion, state_derivative, to_body, to_world
 
 numbers = st.floats(-10.0, 10.0)
 

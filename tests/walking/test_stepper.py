@@ -63,10 +63,7 @@ def check(footprints, path, rule):
 
 @settings(max_examples=12)
 @given(
-    st.floats(0.5, 4.0),
-    st.floats(-np.pi, np.pi),
-    st.floats(-np.pi, np.pi),
-    st.sampled_from((None, *FEET)),
+    st.floats(0.5, 4.0), st.floats(-np.pi, np.pi), st.floats(-np.pi, np.pi), st.sampled_from((None, *FEET))
 )
 def test_feet_reach_every_goal_within_the_limits_of_the_hips(distance, direction, heading, first):
     """Whatever way the path goes, feet neither cross nor overlap nor turn beyond their limits."""

@@ -6,23 +6,6 @@ from manikin.api.runs import Comparison, Run, compare, plan, push, simulate, wal
 from manikin.body import human
 
 __all__ = [
-    "Balance",
-    "Comparison",
-    "RecordedMotion",
-    "Run",
-    "analyze",
-    "balance",
-    "compare",
-    "creature",
-    "grasp",
-    "human",
-    "plan",
-    "point",
-    "push",
-    "read",
-    "scene",
-    "simulate",
-    "sole",
-    "stance",
-    "walk",
-]
+    "Balance", "Comparison", "RecordedMotion", "Run", "analyze", "balance", "compare", "creature", "grasp",
+    "human", "plan", "point", "push", "read", "scene", "simulate", "sole", "stance", "walk",
+]  # fmt: skip

@@ -32,7 +32,6 @@ class Balance(Displayed):
     """Balance of a stance: its margins, and what gives way first.
 
     Attributes:
-        stance: The contacts.
         com: (3,) [m].
         report: Every criterion.
     """

@@ -78,11 +78,7 @@ class MeasuredRecording(Displayed):
 
 @dataclass(frozen=True)
 class Drawing:
-    """An SVG drawing, which notebooks show.
-
-    Attributes:
-        svg: The text of the drawing.
-    """
+    """An SVG drawing, which notebooks show."""
 
     svg: str
 

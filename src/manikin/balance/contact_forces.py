@@ -63,7 +63,6 @@ class ContactGenerators:
         """Generators of all contacts of a stance in its friction model.
 
         Args:
-            stance: The contacts.
             points: Of each contact, (k, 3) points of the contact frame that carry force [m]; those of the
                 contact when omitted.
             grasp_moments: Whether grasps may use their moments.
@@ -222,7 +221,6 @@ class FrictionUse:
         model: Friction model that the use is measured in.
         share: Of the pyramid; 1 is on one of its sides, 0 without soles and points.
         time: [s].
-        effector: Its name.
     """
 
     model: FrictionModel

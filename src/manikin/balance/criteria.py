@@ -243,7 +243,6 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     ``tau = g(q) - sum J^T w`` and the six rows of the root in equilibrium.
 
     Args:
-        body: The body.
         q: (nq,) posture that holds the contacts.
         stance: The contacts that carry it, with a cap as in :func:`static_room`.
 

@@ -29,19 +29,12 @@ from manikin.scene.distance import moves_by_joint
 
 
 def full_motion(
-    body: BodyModel,
-    schedule: ContactSchedule,
-    polytopes: Sequence[WrenchPolytope],
-    time: FloatArray,
-    q: FloatArray,
-    v: FloatArray,
-    a: FloatArray,
-) -> tuple[Motion, FloatArray]:
+    body: BodyModel, schedule: ContactSchedule, polytopes: Sequence[WrenchPolytope], time: FloatArray,
+    q: FloatArray, v: FloatArray, a: FloatArray,
+) -> tuple[Motion, FloatArray]:  # fmt: skip
     """Share the contact forces of a motion and measure it.
 
     Args:
-        body: The body.
-        schedule: Its contacts in time.
         polytopes: Of each phase.
         time: (n,) [s].
         q: (n, nq) configurations.
@@ -77,7 +70,6 @@ def carried_motion(
     Args:
         body: With empty hands.
         motion: Its motion.
-        schedule: Its contacts in time.
         mass: Of the load [kg].
         hand: ``"left"``, ``"right"`` or ``"both"``.
 
@@ -197,12 +189,7 @@ class _Generators(ContactGenerators):
 
 
 def plan_forces(
-    body: BodyModel,
-    schedule: ContactSchedule,
-    time: FloatArray,
-    q: FloatArray,
-    v: FloatArray,
-    a: FloatArray,
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray
 ) -> ContactForces:
     """Distribute the contact forces of a motion and compute its joint torques, see :func:`full_motion`."""
     dynamics, load = FreeDynamics.of(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
@@ -317,15 +304,9 @@ def _centred(generators: _Generators, wrench: FloatArray) -> tuple[FloatArray, F
 
 
 def _share_within_limits(
-    generators: _Generators,
-    matrix: FloatArray,
-    target: FloatArray,
-    cost: FloatArray,
-    needed: FloatArray,
-    joint_map: FloatArray,
-    torque_lower: FloatArray,
-    torque_upper: FloatArray,
-) -> FloatArray | None:
+    generators: _Generators, matrix: FloatArray, target: FloatArray, cost: FloatArray, needed: FloatArray,
+    joint_map: FloatArray, torque_lower: FloatArray, torque_upper: FloatArray,
+) -> FloatArray | None:  # fmt: skip
     """Magnitudes (g,) that keep the joints' torques and the grasps' forces within their limits, or None.
 
     Args:

@@ -130,9 +130,7 @@ def _series(
 
 
 def _polytopes(
-    stances: Sequence[Stance],
-    present: Sequence[int],
-    given: Sequence[WrenchPolytope | None] | None,
+    stances: Sequence[Stance], present: Sequence[int], given: Sequence[WrenchPolytope | None] | None
 ) -> dict[int, WrenchPolytope]:
     """Polytopes of the phases that have samples and contacts, by number."""
     held = [number for number in present if len(stances[number])]

@@ -174,15 +174,9 @@ class Anthropometry:
     lengths: Mapping[str, float]
 
     def __init__(
-        self,
-        stature: float,
-        mass: float,
-        sex: str,
-        *,
-        sole_length: float | None = None,
-        sole_width: float | None = None,
-        lengths: Mapping[str, float] | None = None,
-    ) -> None:
+        self, stature: float, mass: float, sex: str, *, sole_length: float | None = None,
+        sole_width: float | None = None, lengths: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
         if sex not in list(Sex):
             raise BodyError(f"body sex is {sex!r}; valid: {', '.join(Sex)}")
         height = _within(stature, "body stature [m]", STATURE_RANGE)

@@ -62,17 +62,10 @@ _STANDING_DEG = MappingProxyType(
 
 
 def human(
-    stature: float = 1.75,
-    mass: float = 79.0,
-    sex: str = "male",
-    *,
-    age: float = DEFAULT_AGE,
-    strength: float = 1.0,
-    sole_length: float | None = None,
-    sole_width: float | None = None,
-    lengths: Mapping[str, float] | None = None,
-    off_axis_masses: bool = False,
-) -> BodyModel:
+    stature: float = 1.75, mass: float = 79.0, sex: str = "male", *, age: float = DEFAULT_AGE,
+    strength: float = 1.0, sole_length: float | None = None, sole_width: float | None = None,
+    lengths: Mapping[str, float] | None = None, off_axis_masses: bool = False,
+) -> BodyModel:  # fmt: skip
     """Make a human body of 19 segments and 45 degrees of freedom ([Qiu2012]_ Table 2.1, B.1).
 
     The free pelvis carries the legs and the spine (lumbar, thorax, neck, 3 hinges each; the

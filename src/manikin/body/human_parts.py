@@ -76,7 +76,6 @@ def off_axis(size: Anthropometry, name: str, side: str = "") -> FloatArray:
     """(3,) offset of the centre of mass of a part in the frame of its segment, x forward, y left [m].
 
     Args:
-        size: The person.
         name: A row of de Leva's table; those without an offset have none.
         side: ``"left"`` or ``"right"`` of a limb, empty for the trunk.
     """

@@ -31,6 +31,12 @@ def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
     return children[0] if leaf else None
 
 
+def hangs(body: BodyModel, effector: str) -> bool:
+    """Whether an effector is at the end of a limb, so that it can reach by itself."""
+    root = next(segment.name for segment in body.segments if segment.parent is None)
+    return body.effector(effector).segment != root
+
+
 def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
     """Names of the segments with which an effector touches: its own and the one hanging on it."""
     own = body.effector(effector).segment

@@ -79,7 +79,6 @@ class BallRange:
     """A ball joint's volume within the intervals of its hinges.
 
     Attributes:
-        volume: The volume.
         lower: (3,) smallest angles [rad].
         upper: (3,) largest angles [rad].
         radius: Of the largest ball of angles that is inside both [rad].
@@ -107,7 +106,6 @@ class NaturalRange:
     over that radius (over half the interval), times the square root of 3 at worst where the grid is coarse.
 
     Attributes:
-        limb: The limb.
         balls: Its ball joints: the columns of their angles and their ranges.
         columns: (h,) columns of the other hinges.
     """

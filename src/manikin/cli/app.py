@@ -27,8 +27,8 @@ from manikin.cli.view import view
 from manikin.cli.walk import walk
 from manikin.cli.words import words
 from manikin.errors import InputError, ManikinError
+from manikin.runtime import __version__
 from manikin.runtime.progress import Interruption
-from manikin.runtime.version import __version__
 
 app = typer.Typer(
     name="manikin",

@@ -48,7 +48,6 @@ class JobOutcome:
     """Summary and files of a job.
 
     Attributes:
-        summary: Of the run.
         page: The report page, or None if nothing was written.
         viewable: Directory of the run if it holds a motion to watch, else None.
     """

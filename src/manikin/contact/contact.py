@@ -186,19 +186,10 @@ class Contact(Displayed):
 
 
 def sole(
-    effector: str,
-    position: ArrayLike,
-    yaw: float = 0.0,
-    *,
-    length: float,
-    width: float,
-    friction: float,
-    normal: ArrayLike | None = None,
-    rotation: ArrayLike | None = None,
-    normal_force_cap: float | None = None,
-    torsion_limit: float | None = None,
-    settle: float = 0.0,
-) -> Contact:
+    effector: str, position: ArrayLike, yaw: float = 0.0, *, length: float, width: float, friction: float,
+    normal: ArrayLike | None = None, rotation: ArrayLike | None = None,
+    normal_force_cap: float | None = None, torsion_limit: float | None = None, settle: float = 0.0,
+) -> Contact:  # fmt: skip
     """Make a rectangular sole: four corner points with friction pyramids.
 
     Args:

@@ -14,18 +14,7 @@ from manikin.control.supports import SupportMode, SupportState
 from manikin.control.tasks import AccelerationTask, ForceWish
 
 __all__ = [
-    "AccelerationTask",
-    "ControlOutput",
-    "ControlProblem",
-    "ControlSettings",
-    "Controller",
-    "ForceWish",
-    "Impedance",
-    "Impedances",
-    "ReturnSettings",
-    "SupportMode",
-    "SupportSettings",
-    "SupportState",
-    "TaskWeights",
-    "build_qp",
-]
+    "AccelerationTask", "ControlOutput", "ControlProblem", "ControlSettings", "Controller", "ForceWish",
+    "Impedance", "Impedances", "ReturnSettings", "SupportMode", "SupportSettings", "SupportState",
+    "TaskWeights", "build_qp",
+]  # fmt: skip

@@ -89,21 +89,15 @@ class Controller:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        motion: Motion,
-        schedule: ContactSchedule,
-        settings: ControlSettings | None = None,
-        *,
-        joint_damping: ArrayLike | None = None,
+        self, body: BodyModel, motion: Motion, schedule: ContactSchedule,
+        settings: ControlSettings | None = None, *, joint_damping: ArrayLike | None = None,
         wishes: Sequence[ForceWish] = (),
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Prepare the controller.
 
         Args:
             body: Whose motion it is.
             motion: What to follow.
-            schedule: Its contacts in time.
             settings: Weights, gains and limits; the defaults when omitted.
             joint_damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; none when omitted.
             wishes: Forces that effectors in contact should feel, at most one of each.
@@ -207,7 +201,7 @@ class Controller:
         return build_qp(
             state, self.tasks(state, reference, supports, deviation), loaded, bounds, self._damping,
             period=settings.period, acceleration_weight=settings.weights.acceleration,
-            force_weight=settings.weights.force,
+            force_weight=settings.weights.force, sum_cap=self.schedule.stance_at(time).normal_force_cap,
         )  # fmt: skip
 
     def tasks(

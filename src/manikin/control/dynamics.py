@@ -70,7 +70,6 @@ class Dynamics:
         """Choose the frames to evaluate.
 
         Args:
-            body: The body.
             frames: Pinocchio frame indices by the name they get in ``DynamicsState.frames``.
         """
         self._model = body.pinocchio

@@ -38,7 +38,6 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
     """Find the points of the body that carry the forces of a contact.
 
     Args:
-        body: The body.
         contact: A contact of one of its effectors.
         inset: Distance kept from the edge of the sole [m].
 

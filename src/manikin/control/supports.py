@@ -44,7 +44,6 @@ class SupportState:
     """State of one effector at one control step.
 
     Attributes:
-        effector: Its name.
         mode: Swing, landing or stance.
         contact: The planned contact in landing and stance; None in flight.
         load_share: Share of the contact's force limits that it may use after its touch-down,

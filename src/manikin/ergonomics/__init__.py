@@ -16,28 +16,8 @@ from manikin.ergonomics.scoring import Circumstances
 from manikin.ergonomics.strength import CumulativeEffort, JointStrength, cumulative_effort, joint_strength
 
 __all__ = [
-    "ArmAngles",
-    "Assessment",
-    "Bearing",
-    "Circumstances",
-    "CumulativeEffort",
-    "Ergonomics",
-    "JointStrength",
-    "LowestMargin",
-    "PosturalAngles",
-    "PosturalAssessment",
-    "RebaSteps",
-    "RulaSteps",
-    "assess_posture",
-    "bearing_of",
-    "cumulative_effort",
-    "ergonomics_of",
-    "joint_strength",
-    "lowest_margin",
-    "postural_angles",
-    "reba_action_level",
-    "reba_score",
-    "rula_action_level",
-    "rula_score",
-    "upright_neck",
-]
+    "ArmAngles", "Assessment", "Bearing", "Circumstances", "CumulativeEffort", "Ergonomics", "JointStrength",
+    "LowestMargin", "PosturalAngles", "PosturalAssessment", "RebaSteps", "RulaSteps", "assess_posture",
+    "bearing_of", "cumulative_effort", "ergonomics_of", "joint_strength", "lowest_margin", "postural_angles",
+    "reba_action_level", "reba_score", "rula_action_level", "rula_score", "upright_neck",
+]  # fmt: skip

@@ -30,7 +30,6 @@ class ReachVolume:
     """Convex hull of the positions of an effector, in the frame of the segment the limb is fixed to.
 
     Attributes:
-        limb: The limb.
         segment: Name of the segment that carries it: the parent of the limb's first segment.
         vertices: (n, 3) corners [m].
         faces: (m, 3) triangles, counter-clockwise seen from outside.
@@ -95,7 +94,6 @@ def reach_volume(
     """Sample the reach of a limb within its joint ranges ([Tonneau2015]_ 4.3.4).
 
     Args:
-        body: The body.
         limb: One of its limbs.
         rng: Source of randomness.
         count: Number of samples, at least :data:`MIN_COUNT`; a limb without joints needs none.
@@ -140,7 +138,6 @@ class LimbKinematics:
     """A limb as a chain of hinges on fixed offsets, in the limb's frame.
 
     Attributes:
-        limb: The limb.
         slots: (k,) indices of its hinges in the configuration vector.
         lower: (k,) smallest angles [rad].
         upper: (k,) largest angles [rad].

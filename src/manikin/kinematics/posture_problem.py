@@ -133,7 +133,6 @@ class PostureProblem:
     """Requirements and preferences of one posture.
 
     Attributes:
-        body: The body.
         contacts: Contacts held: a sole's whole pose, a point's or grasp's position.
         placements: Further effectors that must be somewhere, by name.
         com: (3,) centre of mass [m]; NaN leaves an axis free; None leaves it wholly free.

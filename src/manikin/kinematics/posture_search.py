@@ -24,10 +24,7 @@ from numpy.typing import ArrayLike
 from manikin.body.configuration import Configuration
 from manikin.errors import BodyError
 from manikin.kinematics.posture_problem import PostureProblem, place_over_contacts, without_one
-from manikin.kinematics.posture_terms import (
-    ClearanceTerm,
-    Linearised,
-)
+from manikin.kinematics.posture_terms import ClearanceTerm, Linearised
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.scene.distance import Pair

@@ -229,7 +229,6 @@ def centroidal_motion(body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArr
     """Wrench that the scene must apply to a body in motion, by the rate of its centroidal momentum.
 
     Args:
-        body: The body.
         q: (n, nq) configurations.
         v: (n, nv) velocities.
         a: (n, nv) accelerations.
@@ -294,14 +293,9 @@ class CarriedForces:
 
     @classmethod
     def of(
-        cls,
-        body: BodyModel,
-        schedule: ContactSchedule,
-        time: FloatArray,
-        q: FloatArray,
-        v: FloatArray,
+        cls, body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, v: FloatArray,
         a: FloatArray,
-    ) -> "CarriedForces | None":
+    ) -> "CarriedForces | None":  # fmt: skip
         """Of the point masses that a motion carries in some phases; None where it carries nothing.
 
         Args:

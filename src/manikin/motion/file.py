@@ -33,9 +33,9 @@ from manikin.motion.description import (
     schedule_from,
 )
 from manikin.motion.motion import Motion
+from manikin.runtime import __version__
 from manikin.runtime.display import Displayed
 from manikin.runtime.files import atomic_path
-from manikin.runtime.version import __version__
 from manikin.scene import Scene
 
 FORMAT = "manikin-motion"
@@ -71,8 +71,6 @@ class MotionFile(Displayed):
         planned: Motion as planned.
         executed: Motion as simulated.
         body: The moving body.
-        scene: Its surroundings.
-        schedule: Its contacts in time.
         recorded: Motion of a recorded person, reconstructed.
         shifted: The recorded motion after the least shift onto its contacts.
     """

@@ -45,17 +45,10 @@ class QPSolution:
 
 
 def solve_qp(
-    hessian: FloatArray,
-    gradient: FloatArray,
-    rows: FloatArray,
-    rows_lower: FloatArray | None,
-    rows_upper: FloatArray | None,
-    bounds: tuple[FloatArray, FloatArray] | None = None,
-    *,
-    equalities: int = 0,
-    softness: float | None = None,
-    tolerance: float = 1e-6,
-) -> QPSolution:
+    hessian: FloatArray, gradient: FloatArray, rows: FloatArray, rows_lower: FloatArray | None,
+    rows_upper: FloatArray | None, bounds: tuple[FloatArray, FloatArray] | None = None, *,
+    equalities: int = 0, softness: float | None = None, tolerance: float = 1e-6,
+) -> QPSolution:  # fmt: skip
     """Solve one dense program.
 
     Args:
@@ -84,16 +77,10 @@ def solve_qp(
 
 
 def solve_sparse_qp(
-    hessian: SparseMatrix,
-    gradient: FloatArray,
-    rows: SparseMatrix,
-    rows_lower: FloatArray | None,
-    rows_upper: FloatArray,
-    bounds: tuple[FloatArray, FloatArray],
-    *,
-    equalities: int = 0,
+    hessian: SparseMatrix, gradient: FloatArray, rows: SparseMatrix, rows_lower: FloatArray | None,
+    rows_upper: FloatArray, bounds: tuple[FloatArray, FloatArray], *, equalities: int = 0,
     tolerance: float | None = None,
-) -> QPSolution:
+) -> QPSolution:  # fmt: skip
     """Solve one sparse program.
 
     Args:

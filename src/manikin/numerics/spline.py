@@ -89,15 +89,9 @@ class BSpline:
 
     @classmethod
     def fit(
-        cls,
-        degree: int,
-        knots: ArrayLike,
-        t: ArrayLike,
-        values: ArrayLike,
-        *,
-        first: ArrayLike | None = None,
-        last: ArrayLike | None = None,
-    ) -> "BSpline":
+        cls, degree: int, knots: ArrayLike, t: ArrayLike, values: ArrayLike, *,
+        first: ArrayLike | None = None, last: ArrayLike | None = None,
+    ) -> "BSpline":  # fmt: skip
         """Least-squares fit with some of the first and last control points given.
 
         Args:

@@ -31,16 +31,10 @@ from manikin.scenarios import Scenario, load_scenario
 
 
 def run(
-    scenario: str | Path | Scenario,
-    *,
-    variant: str | None = None,
-    overrides: Sequence[str] = (),
-    out: str | Path | None = None,
-    seed: int | None = None,
-    settings: WholeBodySettings | None = None,
-    requirements: ExecutionRequirements | None = None,
-    progress: Progress | None = None,
-) -> RunResult:
+    scenario: str | Path | Scenario, *, variant: str | None = None, overrides: Sequence[str] = (),
+    out: str | Path | None = None, seed: int | None = None, settings: WholeBodySettings | None = None,
+    requirements: ExecutionRequirements | None = None, progress: Progress | None = None,
+) -> RunResult:  # fmt: skip
     """Plan a scenario, execute it in the physics engine and report.
 
     Args:

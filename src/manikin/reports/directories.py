@@ -52,8 +52,8 @@ from manikin.reports.figures import (
     words_figure,
 )
 from manikin.reports.figures.write_figures import save_figure
+from manikin.runtime import __version__
 from manikin.runtime.files import ResultDirectory, atomic_path, csv_text, to_json, writing
-from manikin.runtime.version import __version__
 from manikin.simulation import PushMap, PushTrials
 from manikin.walking.words import (
     HEADINGS,

@@ -130,7 +130,6 @@ class _BvhJoint:
     """Channels of one segment.
 
     Attributes:
-        segment: The segment.
         order: Rotation axes of its three channels, such as ``"XZY"``.
         columns: Index among the hinges of each channel's angle, or None without one.
         signs: +1 or -1 for a hinge about the negative axis.

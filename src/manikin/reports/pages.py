@@ -14,9 +14,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from manikin.analysis import Analysis
 from manikin.pipeline.run_directory import REPORT, read_summary
 from manikin.reports.summary_table import verdict_line
+from manikin.runtime import __version__
 from manikin.runtime.files import FIGURES, write_result
 from manikin.runtime.palette import readable
-from manikin.runtime.version import __version__
 
 FIRST = ("scene", "postures", "margin", "com", "contacts")
 """Figures that come first, in this order; the others follow by name."""

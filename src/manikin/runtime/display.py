@@ -64,7 +64,6 @@ def html_table(title: str, rows: Mapping[str, str]) -> str:
     """Two-column HTML table with a title.
 
     Args:
-        title: Above the rows.
         rows: Label and text of each row.
     """
     lines = "".join(

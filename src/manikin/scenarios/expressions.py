@@ -179,7 +179,6 @@ class SupportLevel:
 
         Args:
             x: Float, array or CasADi expression [m].
-            y: The same.
         """
         line = self.goal - self.start
         length_squared = float(line @ line)

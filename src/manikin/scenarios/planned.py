@@ -233,15 +233,10 @@ def walk_task(
 
 
 def push_task(
-    force: float,
-    direction: float,
-    *,
-    duration: float = 0.1,
-    name: str | None = None,
-    body: Mapping[str, Any] | None = None,
-    recovery: Mapping[str, Any] | None = None,
+    force: float, direction: float, *, duration: float = 0.1, name: str | None = None,
+    body: Mapping[str, Any] | None = None, recovery: Mapping[str, Any] | None = None,
     where: Mapping[tuple[str | int, ...], str] | None = None,
-) -> Scenario:
+) -> Scenario:  # fmt: skip
     """A push of a standing body, which lasts until the body may be at rest again.
 
     Args:

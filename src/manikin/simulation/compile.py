@@ -264,7 +264,6 @@ def compile_model(
     exactly: every other pair is excluded by name and MuJoCo's own filter of parents is off.
 
     Args:
-        body: The body.
         scene: Obstacles and floor; None for an empty world without a floor.
         options: Settings; defaults when None.
         held: Effectors that are welded to the world, with rotation (3, 3) and position (3,) [m]; their

@@ -70,26 +70,15 @@ def default_physics(body: BodyModel, schedule: ContactSchedule) -> PhysicsOption
 
 
 def execute(
-    body: BodyModel,
-    scene: Scene,
-    motion: Motion,
-    schedule: ContactSchedule,
-    *,
-    settings: ControlSettings | None = None,
-    physics: PhysicsOptions | None = None,
-    hold: float = 1.0,
-    pushes: Sequence[Push] = (),
-    padded: Sequence[str] = (),
-    wishes: Sequence[ForceWish] = (),
+    body: BodyModel, scene: Scene, motion: Motion, schedule: ContactSchedule, *,
+    settings: ControlSettings | None = None, physics: PhysicsOptions | None = None, hold: float = 1.0,
+    pushes: Sequence[Push] = (), padded: Sequence[str] = (), wishes: Sequence[ForceWish] = (),
     progress: Callable[[float], None] | None = None,
-) -> Execution:
+) -> Execution:  # fmt: skip
     """Execute a planned motion and stand for a while after its end.
 
     Args:
-        body: The body.
-        scene: Its surroundings.
         motion: Planned motion.
-        schedule: Its contacts in time.
         settings: Settings of the controller; the defaults when omitted.
         physics: Settings of the engine; :func:`default_physics` when omitted.
         hold: Time to stand at the end [s]. With none, the last step of a motion that ends at speed is left
@@ -117,17 +106,10 @@ class _Run:
     """One execution, from its set-up to its report."""
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        motion: Motion,
-        schedule: ContactSchedule,
-        settings: ControlSettings | None,
-        physics: PhysicsOptions | None,
-        pushes: Sequence[Push],
-        padded: Sequence[str] = (),
-        wishes: Sequence[ForceWish] = (),
-    ) -> None:
+        self, body: BodyModel, scene: Scene, motion: Motion, schedule: ContactSchedule,
+        settings: ControlSettings | None, physics: PhysicsOptions | None, pushes: Sequence[Push],
+        padded: Sequence[str] = (), wishes: Sequence[ForceWish] = (),
+    ) -> None:  # fmt: skip
         self.body, self.plan, self.schedule = body, motion, schedule
         settings = settings or ControlSettings()
         physics = physics or default_physics(body, schedule)

@@ -61,7 +61,6 @@ def push_near_com(
     It acts on the trunk's segment at whose height the centre of mass is in the posture, at that point.
 
     Args:
-        body: The body.
         force: (3,) in the world, at its largest [N].
         start: [s].
         duration: [s].
@@ -95,7 +94,6 @@ def push_on_the_way(
     """Push on the thorax of a body that carries out a motion.
 
     Args:
-        motion: The motion.
         force: Size, of a sine its amplitude [N].
         direction: Counter-clockwise from the forward axis that the pelvis has in the plan then [deg].
         start: In the motion's time [s].

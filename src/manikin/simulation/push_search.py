@@ -55,7 +55,6 @@ def feet_apart_posture(body: BodyModel, distance: float) -> FloatArray:
     """(nq,) posture on both feet of a body with two legs, the centre of mass between them.
 
     Args:
-        body: The body.
         distance: Distance between the middles of the soles, sideways [m].
 
     Raises:
@@ -103,7 +102,6 @@ class PushTrials:
     """One body in one stance, to be pushed again and again from different directions.
 
     Attributes:
-        body: The body.
         task: Its stance; the pushes and the duration are those of each trial.
         settings: Settings of the controller.
         push_duration: Duration of every push [s]; its force is the impulse divided by this.

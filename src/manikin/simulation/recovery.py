@@ -126,16 +126,9 @@ class Recovery(Displayed):
 
 
 def judge(
-    controller: BalanceRecovery,
-    trace: RecoveryTrace,
-    pushes: Sequence[Push],
-    feet: str,
-    fallen: str,
-    touches: Sequence[Touch],
-    wall: float,
-    steps: tuple[StepTaken, ...] = (),
-    refused: str = "",
-) -> Recovery:
+    controller: BalanceRecovery, trace: RecoveryTrace, pushes: Sequence[Push], feet: str, fallen: str,
+    touches: Sequence[Touch], wall: float, steps: tuple[StepTaken, ...] = (), refused: str = "",
+) -> Recovery:  # fmt: skip
     """Outcome of a push.
 
     Args:
@@ -181,12 +174,7 @@ def judge(
 
 
 def _requirements(
-    motion: Motion,
-    fallen: str,
-    propped: Sequence[Touch],
-    rests_from: float | None,
-    moved: float,
-    most: float,
+    motion: Motion, fallen: str, propped: Sequence[Touch], rests_from: float | None, moved: float, most: float
 ) -> RequirementTable:
     end, first = float(motion.time[-1]), propped[0] if propped else None
     return RequirementTable((

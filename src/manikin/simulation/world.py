@@ -133,15 +133,9 @@ class World:
         self._load = dict(masses)
 
     def apply_push(
-        self,
-        segment: str,
-        force: ArrayLike,
-        start: float,
-        duration: float,
-        *,
-        point: ArrayLike | None = None,
-        frequency: float = 0.0,
-    ) -> None:
+        self, segment: str, force: ArrayLike, start: float, duration: float, *,
+        point: ArrayLike | None = None, frequency: float = 0.0,
+    ) -> None:  # fmt: skip
         """Push a segment; the arguments are those of :class:`~manikin.simulation.push_force.Push`.
 
         Raises:
@@ -195,9 +189,7 @@ class World:
         self._model.geom_conaffinity[mask] = affinity if enabled else affinity & 1
 
     def plan_touches(
-        self,
-        pairs: Sequence[tuple[Sequence[str], str]],
-        leaning: Sequence[tuple[Sequence[str], str]] = (),
+        self, pairs: Sequence[tuple[Sequence[str], str]], leaning: Sequence[tuple[Sequence[str], str]] = ()
     ) -> None:
         """Set which touches are planned from now on; all others are reported.
 

@@ -14,8 +14,8 @@ from manikin.planning.guide.guide import (
     GuideWorld,
     offline_roadmap,
     plan_guide,
+    plan_guide_with_restarts,
 )
-from manikin.planning.guide.guide_restarts import plan_guide_with_restarts
 from manikin.planning.guide.roadmap import RoadmapSettings, request
 from manikin.planning.guide.root_path import (
     RootLimits,

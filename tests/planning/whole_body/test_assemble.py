@@ -239,10 +239,7 @@ def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_mot
     assert found.time_s == certificate[key].time_s
 
 
-@given(
-    st.lists(st.floats(0.02, 1.0), min_size=1, max_size=6),
-    st.floats(0.02, 0.2),
-)
+@given(st.lists(st.floats(0.02, 1.0), min_size=1, max_size=6), st.floats(0.02, 0.2))
 def test_refined_knots_keep_the_old_ones_and_halve_the_spans_at_key_instants(durations, spacing):
     """The spline space grows: whatever was fitted before can still be fitted."""
     instants = np.concatenate([[0.0], np.cumsum(durations)])

@@ -5,7 +5,7 @@ import pytest
 
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
 from manikin.motion import Motion
-from manikin.planning.whole_body import head_segments, measure_passage
+from manikin.motion.passage import head_segments, measure_passage
 from manikin.scene import Box, Obstacle, Scene
 
 LEFT = sole("left_foot", (0.0, 0.1, 0.2), length=0.28, width=0.12, friction=0.7)

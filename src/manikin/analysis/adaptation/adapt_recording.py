@@ -289,15 +289,9 @@ class Replan:
 
 
 def adapt_recording(
-    found: Reconstruction,
-    supports: RecordedSupports,
-    *,
-    method: Method = "keyframes",
-    execute: bool = False,
-    rolling: bool = True,
-    required_margin: float = 0.0,
-    friction: float = FRICTION,
-) -> Replan:
+    found: Reconstruction, supports: RecordedSupports, *, method: Method = "keyframes",
+    execute: bool = False, rolling: bool = True, required_margin: float = 0.0, friction: float = FRICTION,
+) -> Replan:  # fmt: skip
     """Re-plan a recorded motion on the stances it was recorded on, and execute it if asked to.
 
     Args:

@@ -26,28 +26,8 @@ from manikin.control.recovery.strategy import (
 from manikin.control.recovery.turning import Turning, edge_limits, held_impulse
 
 __all__ = [
-    "BalanceRecovery",
-    "ClosedLoop",
-    "FeltPush",
-    "JointGroups",
-    "LinearMap",
-    "Objective",
-    "RecoveryOutput",
-    "RecoverySettings",
-    "Standing",
-    "Strategy",
-    "StrategySwitch",
-    "SupportArea",
-    "Turning",
-    "capture_point",
-    "close_loop",
-    "com_law",
-    "edge_limits",
-    "held_impulse",
-    "joint_groups",
-    "leg_symmetry",
-    "posture_control",
-    "sole_at",
-    "zmp_of",
-    "zmp_rows",
-]
+    "BalanceRecovery", "ClosedLoop", "FeltPush", "JointGroups", "LinearMap", "Objective", "RecoveryOutput",
+    "RecoverySettings", "Standing", "Strategy", "StrategySwitch", "SupportArea", "Turning", "capture_point",
+    "close_loop", "com_law", "edge_limits", "held_impulse", "joint_groups", "leg_symmetry", "posture_control",
+    "sole_at", "zmp_of", "zmp_rows",
+]  # fmt: skip

@@ -67,7 +67,6 @@ def held_posture(
     ("stable PD", Tan et al. 2011).
 
     Args:
-        state: Of the body.
         standing: Whose posture is held.
         groups: Of the joints.
         settings: Stiffnesses and the period.
@@ -126,15 +125,9 @@ class BalanceRecovery:
     """Keeps a standing body upright; holds the choice of strategy and the solver's start."""
 
     def __init__(
-        self,
-        body: BodyModel,
-        q: ArrayLike,
-        settings: RecoverySettings | None = None,
-        *,
-        support: Sequence[str] | None = None,
-        friction: float = 0.7,
-        joint_damping: ArrayLike | None = None,
-    ) -> None:
+        self, body: BodyModel, q: ArrayLike, settings: RecoverySettings | None = None, *,
+        support: Sequence[str] | None = None, friction: float = 0.7, joint_damping: ArrayLike | None = None,
+    ) -> None:  # fmt: skip
         """Prepare the controller for a posture on both feet or on one.
 
         Args:

@@ -289,7 +289,6 @@ def com_law(
     """Find the wanted acceleration of the centre of mass.
 
     Args:
-        state: Of the body.
         home: (3,) centre of mass to return to [m].
         area: Admissible area of the ZMP.
         settings: Gains.

@@ -4,11 +4,5 @@ from manikin.control.stepping.step_placement import StepGoal, StepSettings, capt
 from manikin.control.stepping.stepping import SteppingRecovery, StepTaken, SwingFoot
 
 __all__ = [
-    "StepGoal",
-    "StepSettings",
-    "StepTaken",
-    "SteppingRecovery",
-    "SwingFoot",
-    "capture_after",
-    "step_goals",
-]
+    "StepGoal", "StepSettings", "StepTaken", "SteppingRecovery", "SwingFoot", "capture_after", "step_goals",
+]  # fmt: skip

@@ -16,13 +16,13 @@ from manikin.contact import Contact, ContactSchedule, Stance, StanceSequence
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
-from manikin.motion.passage import Passage
+from manikin.motion.passage import Passage, measure_passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import MOTION, RunDirectory
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
-from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings, measure_passage
+from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
@@ -294,7 +294,6 @@ class Report:
 
         Args:
             stage: Stage whose result was measured.
-            table: Its requirements.
         """
         self._tables[stage] = table
 
@@ -396,15 +395,10 @@ class RunResult:
 
     @classmethod
     def of(
-        cls,
-        report: Report,
-        centroidal: CentroidalResult | None = None,
-        wholebody: WholeBodyResult | RefineResult | None = None,
-        execution: Execution | None = None,
-        *,
-        planned: Motion | None = None,
-        recovery: Recovery | None = None,
-    ) -> "RunResult":
+        cls, report: Report, centroidal: CentroidalResult | None = None,
+        wholebody: WholeBodyResult | RefineResult | None = None, execution: Execution | None = None, *,
+        planned: Motion | None = None, recovery: Recovery | None = None,
+    ) -> "RunResult":  # fmt: skip
         """Close the report of a run and gather what its stages returned.
 
         Args:

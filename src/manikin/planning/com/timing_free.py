@@ -359,14 +359,9 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
 
 
 def missed_margin(
-    problem: CentroidalProblem,
-    trajectory: CentroidalTrajectory,
-    polytopes: Sequence[WrenchPolytope],
-    phase: int,
-    time: float,
-    what: str,
-    tried: str = "",
-) -> Failure:
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope],
+    phase: int, time: float, what: str, tried: str = "",
+) -> Failure:  # fmt: skip
     """Failure that names the contact limiting the margin of the best trajectory.
 
     Args:

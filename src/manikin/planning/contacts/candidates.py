@@ -171,15 +171,9 @@ class SurfaceTable:
 
 
 def find_candidates(
-    table: SurfaceTable,
-    numbers: IntArray,
-    situation: Situation,
-    samples: LimbSamples,
-    *,
-    tolerance: float,
-    max_tilt: float,
-    footprint: FloatArray,
-) -> Candidates:
+    table: SurfaceTable, numbers: IntArray, situation: Situation, samples: LimbSamples, *, tolerance: float,
+    max_tilt: float, footprint: FloatArray,
+) -> Candidates:  # fmt: skip
     """Select the samples in contact (step 2, [Tonneau2015]_ 4.3): near the plane and over the polygon.
 
     Args:

@@ -152,14 +152,9 @@ class Stage:
 
     @classmethod
     def of(
-        cls,
-        body: BodyModel,
-        contacts: Mapping[str, Contact],
-        q: FloatArray,
-        min_duration: float,
-        com_room: tuple[float, float, float] = COM_ROOM,
-        via: FloatArray | None = None,
-    ) -> "Stage":
+        cls, body: BodyModel, contacts: Mapping[str, Contact], q: FloatArray, min_duration: float,
+        com_room: tuple[float, float, float] = COM_ROOM, via: FloatArray | None = None,
+    ) -> "Stage":  # fmt: skip
         """Stage with the centre of mass of its posture."""
         com = frozen_array(Configuration(body, q).com, "com [m]", (3,))
         kept = MappingProxyType(dict(contacts))

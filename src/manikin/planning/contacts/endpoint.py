@@ -64,15 +64,9 @@ class Endpoints:
     """Finds starts and goals of a body on its feet or a seat in one scene."""
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        friction: float,
-        reference: FloatArray | None = None,
-        *,
-        natural: bool = False,
-        friction_model: FrictionModel = "outer",
-    ) -> None:
+        self, body: BodyModel, scene: Scene, friction: float, reference: FloatArray | None = None, *,
+        natural: bool = False, friction_model: FrictionModel = "outer",
+    ) -> None:  # fmt: skip
         """Prepare a scene.
 
         Args:

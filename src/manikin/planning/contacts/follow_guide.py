@@ -246,14 +246,9 @@ class _FootMoves(_Moves):
     """Steps of feet, as :class:`~manikin.planning.contacts.depth_first.Moves`."""
 
     def __init__(
-        self,
-        poser: PostureFinder,
-        guide: GuideLine,
-        settings: ExtendSettings,
-        log: SearchLog,
-        goal: Stage,
+        self, poser: PostureFinder, guide: GuideLine, settings: ExtendSettings, log: SearchLog, goal: Stage,
         friction: float,
-    ) -> None:
+    ) -> None:  # fmt: skip
         super().__init__(poser, guide, settings, log)
         self._goal, self._friction = goal, friction
         self._footholds = Footholds(poser.body, poser.scene)

@@ -159,16 +159,9 @@ class ContactGenerator:
         return self.request_several(q, limb, task, heuristic, kind=kind)[0]
 
     def request_several(
-        self,
-        q: ArrayLike,
-        limb: str,
-        task: Task,
-        heuristic: Heuristic | None = None,
-        *,
-        kind: ContactKind | None = None,
-        most: int = 1,
-        apart: float = 0.05,
-    ) -> list[GeneratedContact]:
+        self, q: ArrayLike, limb: str, task: Task, heuristic: Heuristic | None = None, *,
+        kind: ContactKind | None = None, most: int = 1, apart: float = 0.05,
+    ) -> list[GeneratedContact]:  # fmt: skip
         """Find the best contacts of one limb in different places, best first; one answer where there is none.
 
         The other arguments and errors are those of :meth:`request`.
@@ -197,15 +190,9 @@ class ContactGenerator:
         return self._choose(tools, situation, candidates, scores, touch, most, apart)
 
     def _choose(
-        self,
-        tools: "_LimbTools",
-        situation: Situation,
-        candidates: Candidates,
-        scores: FloatArray,
-        kind: ContactKind,
-        most: int,
-        apart: float,
-    ) -> list[GeneratedContact]:
+        self, tools: "_LimbTools", situation: Situation, candidates: Candidates, scores: FloatArray,
+        kind: ContactKind, most: int, apart: float,
+    ) -> list[GeneratedContact]:  # fmt: skip
         """Steps 3 and 4: best first, the first that can be aligned and are free."""
         answers: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()

@@ -132,14 +132,9 @@ class FarPairs:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        limb: Limb,
-        parts: Sequence[CollisionPart],
-        shapes: pin.GeometryModel,
-        placed: pin.GeometryData,
-        pairs: Sequence[tuple[int, int]],
-    ) -> None:
+        self, body: BodyModel, limb: Limb, parts: Sequence[CollisionPart], shapes: pin.GeometryModel,
+        placed: pin.GeometryData, pairs: Sequence[tuple[int, int]],
+    ) -> None:  # fmt: skip
         """Prepare pairs of a shape of the limb with a part of the scene or another shape of the body.
 
         Args:

@@ -249,15 +249,9 @@ class LimbPlaces:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        limbs: tuple[Limb, ...],
-        kinds: Mapping[str, ContactKind],
-        rules: ContactRules,
-        reference: FloatArray,
-        samples: Mapping[str, LimbSamples] | None = None,
-    ) -> None:
+        self, body: BodyModel, scene: Scene, limbs: tuple[Limb, ...], kinds: Mapping[str, ContactKind],
+        rules: ContactRules, reference: FloatArray, samples: Mapping[str, LimbSamples] | None = None,
+    ) -> None:  # fmt: skip
         """Prepare a scene.
 
         Args:
@@ -325,14 +319,9 @@ class LimbPlaces:
         return [replace(answers[0], contact=None, q=None, failure=Hindrance.SURFACE, message=message)]
 
     def _nearest(
-        self,
-        limb: Limb,
-        kind: ContactKind,
-        q: FloatArray,
-        wanted: FloatArray,
-        heading: float,
+        self, limb: Limb, kind: ContactKind, q: FloatArray, wanted: FloatArray, heading: float,
         others: list[GeneratedContact],
-    ) -> list[GeneratedContact]:
+    ) -> list[GeneratedContact]:  # fmt: skip
         """Places nearest to the wanted one, whether or not the limb alone can get there.
 
         The generator moves the limb alone; the whole body can often reach what it cannot.

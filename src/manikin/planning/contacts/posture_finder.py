@@ -107,18 +107,11 @@ class PostureFinder:
         self._touched: dict[Contact, str] = {}
 
     def pose(
-        self,
-        held: Mapping[str, Contact],
-        carrying: Mapping[str, Contact],
-        start: FloatArray,
-        guide: FloatArray | None = None,
-        *,
-        place: FloatArray | None = None,
-        inset: float | None = None,
-        restarts: bool = False,
-        placements: Mapping[str, Placement] | None = None,
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
+        guide: FloatArray | None = None, *, place: FloatArray | None = None, inset: float | None = None,
+        restarts: bool = False, placements: Mapping[str, Placement] | None = None,
         preferences: Preferences | None = None,
-    ) -> Posed:
+    ) -> Posed:  # fmt: skip
         """Find a posture that holds contacts and rests on some of them alone.
 
         Args:

@@ -62,15 +62,9 @@ class ContactQuestion:
 
     @staticmethod
     def of(
-        limb: str,
-        task: tuple[float, float, float],
-        role: str = "auto",
-        pulling: bool = False,
-        heuristic: str = "efort",
-        kind: str | None = None,
-        samples: int = 10_000,
-        seed: int = 0,
-    ) -> "ContactQuestion":
+        limb: str, task: tuple[float, float, float], role: str = "auto", pulling: bool = False,
+        heuristic: str = "efort", kind: str | None = None, samples: int = 10_000, seed: int = 0,
+    ) -> "ContactQuestion":  # fmt: skip
         """Question from words; an InputError if one is not known."""
         if role not in list(Role):
             raise InputError(f"role is {role!r}; valid: {', '.join(Role)}")
@@ -161,15 +155,9 @@ def check_limbs(body: BodyModel) -> None:
 
 
 def _ask(
-    generator: ContactGenerator,
-    q: FloatArray,
-    limb: Limb,
-    direction: ArrayLike,
-    role: Role,
-    heuristic: Heuristic,
-    kind: ContactKind | None,
-    pulling: bool,
-) -> tuple[Role, GeneratedContact, float | None, float]:
+    generator: ContactGenerator, q: FloatArray, limb: Limb, direction: ArrayLike, role: Role,
+    heuristic: Heuristic, kind: ContactKind | None, pulling: bool,
+) -> tuple[Role, GeneratedContact, float | None, float]:  # fmt: skip
     """Role, answer and EFORT of the best role, asked until one is positive; wall time of the requests [s]."""
     roles = (Role.BODY,) if limb.kind is ContactKind.SOLE else (Role.BODY, Role.OBJECT)
     answers: list[tuple[Role, GeneratedContact, float | None]] = []
@@ -230,15 +218,9 @@ class LiveContacts:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        q: ArrayLike,
-        *,
-        samples: int = 10_000,
-        seed: int = 0,
+        self, body: BodyModel, scene: Scene, q: ArrayLike, *, samples: int = 10_000, seed: int = 0,
         rules: ContactRules | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Begin at a configuration (nq,), with a number of samples of each limb drawn from a seed.
 
         Raises:

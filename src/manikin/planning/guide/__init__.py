@@ -11,8 +11,8 @@ from manikin.planning.guide.guide import (
     GuideWorld,
     offline_roadmap,
     plan_guide,
+    plan_guide_with_restarts,
 )
-from manikin.planning.guide.guide_restarts import plan_guide_with_restarts
 from manikin.planning.guide.roadmap import Roadmap, RoadmapSettings, Route, request
 from manikin.planning.guide.root_path import RootLimits, RootPath, ShortcutSettings
 from manikin.planning.guide.root_pose import root_pose
@@ -20,36 +20,9 @@ from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, Samplin
 from manikin.planning.guide.steering import LocalPlanner
 
 __all__ = [
-    "NO_MARGINS",
-    "Abstraction",
-    "ComfortSettings",
-    "Condition",
-    "GuideResult",
-    "GuideSettings",
-    "GuideTask",
-    "GuideWorld",
-    "LimbReach",
-    "LimbRule",
-    "LocalPlanner",
-    "Margins",
-    "PoseSampler",
-    "ReachabilityChecker",
-    "Roadmap",
-    "RoadmapSettings",
-    "RootLimits",
-    "RootPath",
-    "Route",
-    "SamplerSettings",
-    "SamplingRegion",
-    "ShortcutSettings",
-    "TrunkShape",
-    "UsableSurface",
-    "abstraction_of",
-    "nearest_fit",
-    "offline_roadmap",
-    "plan_guide",
-    "plan_guide_with_restarts",
-    "relax",
-    "request",
-    "root_pose",
-]
+    "NO_MARGINS", "Abstraction", "ComfortSettings", "Condition", "GuideResult", "GuideSettings", "GuideTask",
+    "GuideWorld", "LimbReach", "LimbRule", "LocalPlanner", "Margins", "PoseSampler", "ReachabilityChecker",
+    "Roadmap", "RoadmapSettings", "RootLimits", "RootPath", "Route", "SamplerSettings", "SamplingRegion",
+    "ShortcutSettings", "TrunkShape", "UsableSurface", "abstraction_of", "nearest_fit", "offline_roadmap",
+    "plan_guide", "plan_guide_with_restarts", "relax", "request", "root_pose",
+]  # fmt: skip

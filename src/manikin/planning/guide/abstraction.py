@@ -161,7 +161,6 @@ def abstraction_of(
     """Abstraction of a body whose trunk is held in one posture.
 
     Args:
-        body: The body.
         volumes: Reach of each limb to be used.
         angles: Hinge angles of the trunk by name [rad]; the standing posture's where left out.
         trunk_scale: Factor on the radii and sides of the trunk's shapes, > 0.

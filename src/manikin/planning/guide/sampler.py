@@ -68,15 +68,10 @@ class SamplingRegion:
 
     @classmethod
     def around(
-        cls,
-        scene: Scene,
-        poses: Sequence[FloatArray] = (),
-        *,
-        margin: float = AROUND,
-        yaw: Sequence[float] | None = None,
-        pitch: Sequence[float] | None = None,
+        cls, scene: Scene, poses: Sequence[FloatArray] = (), *, margin: float = AROUND,
+        yaw: Sequence[float] | None = None, pitch: Sequence[float] | None = None,
         roll: Sequence[float] | None = None,
-    ) -> "SamplingRegion":
+    ) -> "SamplingRegion":  # fmt: skip
         """Box around the finite obstacles and some poses (7,), ``margin`` [m] larger on every side.
 
         Raises:

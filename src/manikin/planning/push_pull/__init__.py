@@ -12,20 +12,7 @@ from manikin.planning.push_pull.braced_posture import (
 )
 
 __all__ = [
-    "Act",
-    "ActKind",
-    "Brace",
-    "BraceResult",
-    "BraceSettings",
-    "BracedForces",
-    "MeasuredAct",
-    "PlannedAct",
-    "Timing",
-    "arrival",
-    "find_braced_posture",
-    "largest_force",
-    "measure_act",
-    "plan_act",
-    "share_force",
+    "Act", "ActKind", "Brace", "BraceResult", "BraceSettings", "BracedForces", "MeasuredAct", "PlannedAct",
+    "Timing", "arrival", "find_braced_posture", "largest_force", "measure_act", "plan_act", "share_force",
     "with_hands",
-]
+]  # fmt: skip

@@ -165,14 +165,9 @@ class _Programme:
     """Variables: magnitudes of the contacts' generators, then ``F``, then the torque share."""
 
     def __init__(
-        self,
-        body: BodyModel,
-        q: FloatArray,
-        contacts: Sequence[Contact],
-        act: Act,
-        friction: float,
+        self, body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float,
         friction_model: FrictionModel,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._body, self._direction = body, act.direction
         model = ContactModel("cone" if friction_model == "outer" else friction_model)
         touching = [_touching(contact, act, friction) for contact in contacts]

@@ -46,7 +46,6 @@ class PlannedAct:
 
     Attributes:
         motion: The whole of it.
-        schedule: Its contacts in time.
         wishes: What each hand should feel.
     """
 

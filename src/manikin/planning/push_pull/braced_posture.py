@@ -119,18 +119,10 @@ class BraceResult:
 
 
 def find_braced_posture(
-    body: BodyModel,
-    scene: Scene,
-    samples: Mapping[str, LimbSamples],
-    act: Act,
-    near: FloatArray,
-    *,
-    level: float = 0.0,
-    settings: BraceSettings | None = None,
-    hands_by: Heuristic | None = None,
-    feet_by: Heuristic | None = None,
-    reference: FloatArray | None = None,
-) -> BraceResult:
+    body: BodyModel, scene: Scene, samples: Mapping[str, LimbSamples], act: Act, near: FloatArray, *,
+    level: float = 0.0, settings: BraceSettings | None = None, hands_by: Heuristic | None = None,
+    feet_by: Heuristic | None = None, reference: FloatArray | None = None,
+) -> BraceResult:  # fmt: skip
     """Find where hands and feet act with EFORT, and a posture that can.
 
     Args:
@@ -147,14 +139,9 @@ def find_braced_posture(
 
 class _BraceSearch:
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        samples: Mapping[str, LimbSamples],
-        act: Act,
-        settings: BraceSettings,
-        reference: FloatArray | None,
-    ) -> None:
+        self, body: BodyModel, scene: Scene, samples: Mapping[str, LimbSamples], act: Act,
+        settings: BraceSettings, reference: FloatArray | None,
+    ) -> None:  # fmt: skip
         self._body, self._scene, self._act, self._settings = body, scene, act, settings
         self._rules = ContactRules(friction=settings.friction)
         self._generator = ContactGenerator(body, scene, samples, rules=self._rules)

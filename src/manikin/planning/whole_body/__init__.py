@@ -7,7 +7,6 @@ from manikin.planning.whole_body.certificate import (
     WholeBodyRequirements,
 )
 from manikin.planning.whole_body.fit_scales import FitScales, RefineScales
-from manikin.planning.whole_body.head_clearance import head_segments, measure_passage
 from manikin.planning.whole_body.key_postures import (
     Eligibility,
     KeyPosture,
@@ -22,27 +21,8 @@ from manikin.planning.whole_body.seated import SeatedContinuation, continue_seat
 from manikin.planning.whole_body.swing_planner import PlannedSwing
 
 __all__ = [
-    "Eligibility",
-    "FitScales",
-    "KeyPosture",
-    "KeyPostures",
-    "MotionCertificate",
-    "PlannedSwing",
-    "RefineMeasures",
-    "RefineRequirements",
-    "RefineResult",
-    "RefineScales",
-    "RefineSettings",
-    "SeatedContinuation",
-    "WholeBodyFailure",
-    "WholeBodyRequirements",
-    "WholeBodyResult",
-    "WholeBodySettings",
-    "continue_seated",
-    "find_eligible_plan",
-    "find_key_postures",
-    "head_segments",
-    "measure_passage",
-    "plan_whole_body",
-    "refine_motion",
-]
+    "Eligibility", "FitScales", "KeyPosture", "KeyPostures", "MotionCertificate", "PlannedSwing",
+    "RefineMeasures", "RefineRequirements", "RefineResult", "RefineScales", "RefineSettings",
+    "SeatedContinuation", "WholeBodyFailure", "WholeBodyRequirements", "WholeBodyResult", "WholeBodySettings",
+    "continue_seated", "find_eligible_plan", "find_key_postures", "plan_whole_body", "refine_motion",
+]  # fmt: skip

@@ -132,21 +132,11 @@ class BiRrtResult:
 
 
 def plan_flight(
-    start: Pose,
-    goal: Pose,
-    start_time: float,
-    end_time: float,
-    feasible: Feasible,
-    rng: np.random.Generator,
-    *,
-    limits: FlightLimits | None = None,
-    zone: SamplingZone | None = None,
-    iterations: int = 2000,
-    step: float = 0.2,
-    connect: float = 0.5,
-    start_hint: Any = None,
+    start: Pose, goal: Pose, start_time: float, end_time: float, feasible: Feasible,
+    rng: np.random.Generator, *, limits: FlightLimits | None = None, zone: SamplingZone | None = None,
+    iterations: int = 2000, step: float = 0.2, connect: float = 0.5, start_hint: Any = None,
     goal_hint: Any = None,
-) -> BiRrtResult:
+) -> BiRrtResult:  # fmt: skip
     """Search a path of an effector between two timed poses.
 
     Args:
@@ -270,17 +260,9 @@ class _Search:
     """State of one search: the two trees and the counters."""
 
     def __init__(
-        self,
-        start: Pose,
-        goal: Pose,
-        start_time: float,
-        end_time: float,
-        feasible: Feasible,
-        limits: FlightLimits,
-        zone: SamplingZone,
-        step: float,
-        connect: float,
-    ) -> None:
+        self, start: Pose, goal: Pose, start_time: float, end_time: float, feasible: Feasible,
+        limits: FlightLimits, zone: SamplingZone, step: float, connect: float,
+    ) -> None:  # fmt: skip
         self.ends = (start, goal)
         self.times = (start_time, end_time)
         self.limits = limits

@@ -169,16 +169,10 @@ Worst = dict[str, tuple[float, float]]
 
 
 def certify(
-    body: BodyModel,
-    proximity: Proximity,
-    trajectory: CentroidalTrajectory,
-    motion: Motion,
-    ignored: tuple[Ignored, ...],
-    wrench: FloatArray,
-    meeting: SlidingTouchdown | None = None,
-    polytopes: Sequence[WrenchPolytope] | None = None,
-    requirements: WholeBodyRequirements | None = None,
-) -> MotionCertificate:
+    body: BodyModel, proximity: Proximity, trajectory: CentroidalTrajectory, motion: Motion,
+    ignored: tuple[Ignored, ...], wrench: FloatArray, meeting: SlidingTouchdown | None = None,
+    polytopes: Sequence[WrenchPolytope] | None = None, requirements: WholeBodyRequirements | None = None,
+) -> MotionCertificate:  # fmt: skip
     """Measure a motion against its contacts, centre of mass, limits and obstacles.
 
     Args:
@@ -205,16 +199,10 @@ def certify(
 
 
 def certify_refined(
-    body: BodyModel,
-    proximity: Proximity,
-    schedule: ContactSchedule,
-    obstacles: RefineObstacles,
-    motion: Motion,
-    violation: FloatArray,
-    balance: MotionMargin,
-    flat: Sequence[bool],
+    body: BodyModel, proximity: Proximity, schedule: ContactSchedule, obstacles: RefineObstacles,
+    motion: Motion, violation: FloatArray, balance: MotionMargin, flat: Sequence[bool],
     requirements: WholeBodyRequirements | None = None,
-) -> MotionCertificate:
+) -> MotionCertificate:  # fmt: skip
     """Measure a refined motion against its contacts, limits and obstacles.
 
     Args:
@@ -260,15 +248,9 @@ def _worst(motion: Motion, series: Mapping[str, FloatArray]) -> Worst:
 
 
 def _certificate(
-    body: BodyModel,
-    proximity: Proximity,
-    schedule: ContactSchedule,
-    motion: Motion,
-    ignored: tuple[Ignored, ...],
-    worst: Worst,
-    balance: MotionMargin,
-    requirements: WholeBodyRequirements,
-) -> MotionCertificate:
+    body: BodyModel, proximity: Proximity, schedule: ContactSchedule, motion: Motion,
+    ignored: tuple[Ignored, ...], worst: Worst, balance: MotionMargin, requirements: WholeBodyRequirements,
+) -> MotionCertificate:  # fmt: skip
     """The table of what was measured, with the clearance and the impacts."""
     closest = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     pair = closest.pair or ("", "")

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
-from manikin.body.limbs import hanging_segment
+from manikin.body.limbs import hanging_segment, hangs
 from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, SolePart
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown
-from manikin.planning.whole_body.swing_planner import PlannedSwing, hangs, touch_pairs
+from manikin.planning.whole_body.swing_planner import PlannedSwing, touch_pairs
 from manikin.scene import Scene
 
 

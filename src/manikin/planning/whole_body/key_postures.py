@@ -118,17 +118,10 @@ class KeyPostures:
 
 
 def find_key_postures(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    *,
-    manner: PostureStyle = READY,
-    requirements: WholeBodyRequirements | None = None,
-    range_margin: float = 0.0,
-    tolerance: float = SETTINGS.tolerance,
-    known: FloatArray | None = None,
-    padded: Sequence[str] = (),
-) -> KeyPostures:
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, *, manner: PostureStyle = READY,
+    requirements: WholeBodyRequirements | None = None, range_margin: float = 0.0,
+    tolerance: float = SETTINGS.tolerance, known: FloatArray | None = None, padded: Sequence[str] = (),
+) -> KeyPostures:  # fmt: skip
     """Look for a posture at every key instant until which the trajectory binds.
 
     Args:
@@ -154,18 +147,10 @@ class _KeyPostureSearch:
     """The search for one plan, each posture starting from the one before."""
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        trajectory: CentroidalTrajectory,
-        time: FloatArray,
-        manner: PostureStyle,
-        clearance: float,
-        range_margin: float,
-        settings: SolverSettings,
-        leaning: Ignored,
-        known: FloatArray | None,
-    ) -> None:
+        self, body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, time: FloatArray,
+        manner: PostureStyle, clearance: float, range_margin: float, settings: SolverSettings,
+        leaning: Ignored, known: FloatArray | None,
+    ) -> None:  # fmt: skip
         self._body, self._schedule, self._time = body, trajectory.schedule, time
         self._proximity = Proximity(body, scene)
         self._manner, self._clearance = manner, clearance

@@ -138,17 +138,11 @@ class WholeBodyResult(Displayed):
 
 
 def plan_whole_body(
-    body: BodyModel,
-    scene: Scene,
-    trajectory: CentroidalTrajectory,
-    *,
-    rng: np.random.Generator,
-    settings: WholeBodySettings | None = None,
-    padded: Sequence[str] = (),
-    key_postures: FloatArray | None = None,
-    waypoints: KeyPostures | None = None,
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, *, rng: np.random.Generator,
+    settings: WholeBodySettings | None = None, padded: Sequence[str] = (),
+    key_postures: FloatArray | None = None, waypoints: KeyPostures | None = None,
     progress: Progress | None = None,
-) -> WholeBodyResult:
+) -> WholeBodyResult:  # fmt: skip
     """Find a whole-body motion that keeps contacts, centre of mass and distances.
 
     Args:
@@ -269,16 +263,10 @@ class _Planner:
     """One planning job, with what its attempts share."""
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        trajectory: CentroidalTrajectory,
-        rng: np.random.Generator,
-        settings: WholeBodySettings,
-        leaning: Ignored = frozenset(),
-        known: Guide | None = None,
+        self, body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, rng: np.random.Generator,
+        settings: WholeBodySettings, leaning: Ignored = frozenset(), known: Guide | None = None,
         waypoints: Guide | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
         self.leaning, self.known, self.waypoints = leaning, known, waypoints
         self.proximity = Proximity(body, scene)

@@ -70,18 +70,11 @@ def guide_times(instants: FloatArray, spacing: float) -> FloatArray:
 
 
 def plan_guide(
-    body: BodyModel,
-    proximity: Proximity,
-    schedule: ContactSchedule,
-    time: FloatArray,
-    effectors: dict[str, EffectorTarget],
-    com: FloatArray,
-    ignored: tuple[Ignored, ...],
-    reference: FloatArray,
-    clearance: float,
-    preferences: Preferences | None = None,
+    body: BodyModel, proximity: Proximity, schedule: ContactSchedule, time: FloatArray,
+    effectors: dict[str, EffectorTarget], com: FloatArray, ignored: tuple[Ignored, ...],
+    reference: FloatArray, clearance: float, preferences: Preferences | None = None,
     exact: Sequence[int] = (),
-) -> Guide:
+) -> Guide:  # fmt: skip
     """Find a posture at each time, each one starting from the one before.
 
     Args:

@@ -391,17 +391,10 @@ def _retimed(
 
 
 def refine_motion(
-    body: BodyModel,
-    scene: Scene,
-    time: ArrayLike,
-    q: ArrayLike,
-    schedule: ContactSchedule,
-    *,
-    settings: RefineSettings | None = None,
-    task: Task | None = None,
-    padded: Sequence[str] = (),
+    body: BodyModel, scene: Scene, time: ArrayLike, q: ArrayLike, schedule: ContactSchedule, *,
+    settings: RefineSettings | None = None, task: Task | None = None, padded: Sequence[str] = (),
     progress: Progress | None = None,
-) -> RefineResult:
+) -> RefineResult:  # fmt: skip
     """Turn key configurations and their contacts into a smooth motion in balance and without collision.
 
     Args:

@@ -260,16 +260,10 @@ def balance_of(
 
 
 def measure(
-    body: BodyModel,
-    proximity: Proximity,
-    obstacles: RefineObstacles,
-    path: KeyPath,
-    schedule: ContactSchedule,
-    rooms: tuple[MarginCost, ...],
-    time: FloatArray,
-    q: FloatArray,
+    body: BodyModel, proximity: Proximity, obstacles: RefineObstacles, path: KeyPath,
+    schedule: ContactSchedule, rooms: tuple[MarginCost, ...], time: FloatArray, q: FloatArray,
     task: Task | None = None,
-) -> RefineMeasures:
+) -> RefineMeasures:  # fmt: skip
     """Measure every term.
 
     Args:
@@ -306,14 +300,9 @@ def measure(
 
 
 def _contact_terms(
-    body: BodyModel,
-    path: KeyPath,
-    schedule: ContactSchedule,
-    time: FloatArray,
-    q: FloatArray,
-    v: FloatArray,
-    task: Task | None,
-) -> tuple[float, float, float]:
+    body: BodyModel, path: KeyPath, schedule: ContactSchedule, time: FloatArray, q: FloatArray,
+    v: FloatArray, task: Task | None,
+) -> tuple[float, float, float]:  # fmt: skip
     """Means over time of the contact-invariant term's distance and speed, and of EFORT's cost."""
     model, data = body.pinocchio, body.pinocchio.createData()
     names = schedule.sequence.effectors

@@ -65,16 +65,9 @@ class RefineTargets:
 
 
 def refine_targets(
-    body: BodyModel,
-    scene: Scene,
-    path: KeyPath,
-    schedule: ContactSchedule,
-    time: FloatArray,
-    scales: RefineScales,
-    task: Task | None,
-    padded: tuple[str, ...] = (),
-    chosen: Variables | None = None,
-) -> RefineTargets:
+    body: BodyModel, scene: Scene, path: KeyPath, schedule: ContactSchedule, time: FloatArray,
+    scales: RefineScales, task: Task | None, padded: tuple[str, ...] = (), chosen: Variables | None = None,
+) -> RefineTargets:  # fmt: skip
     """Lay out what is to be done at ``time`` (n,) [s]; see :func:`.refine_motion`.
 
     Variables that were chosen for the phases take the place of the sequence's own, 1 while in contact: a

@@ -116,20 +116,11 @@ class SwingPlan:
 
 
 def plan_swing(
-    start: Pose,
-    goal: Pose,
-    start_time: float,
-    end_time: float,
-    clearance: Clearance,
-    *,
-    limits: SwingLimits | None = None,
-    start_normal: ArrayLike = (0.0, 0.0, 1.0),
-    end_normal: ArrayLike = (0.0, 0.0, 1.0),
-    pitch: float = 0.0,
-    refine: int = 20,
-    controls: int = 20,
+    start: Pose, goal: Pose, start_time: float, end_time: float, clearance: Clearance, *,
+    limits: SwingLimits | None = None, start_normal: ArrayLike = (0.0, 0.0, 1.0),
+    end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, refine: int = 20, controls: int = 20,
     heights: Sequence[float] = HEIGHTS,
-) -> SwingPlan:
+) -> SwingPlan:  # fmt: skip
     """Find a smooth flight from ``start`` to ``goal`` that keeps clear.
 
     Args:

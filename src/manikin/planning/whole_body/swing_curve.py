@@ -86,18 +86,10 @@ class SwingCurve:
 
     @classmethod
     def through(
-        cls,
-        start: Pose,
-        goal: Pose,
-        start_time: float,
-        end_time: float,
-        via: Sequence[tuple[float, ArrayLike]] = (),
-        *,
-        start_normal: ArrayLike = (0.0, 0.0, 1.0),
-        end_normal: ArrayLike = (0.0, 0.0, 1.0),
-        pitch: float = 0.0,
-        controls: int = 20,
-    ) -> "SwingCurve":
+        cls, start: Pose, goal: Pose, start_time: float, end_time: float,
+        via: Sequence[tuple[float, ArrayLike]] = (), *, start_normal: ArrayLike = (0.0, 0.0, 1.0),
+        end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, controls: int = 20,
+    ) -> "SwingCurve":  # fmt: skip
         """Smoothest curve (least integral of squared jerk) from ``start`` to ``goal`` through via-points.
 
         The rotation follows the shortest turn with the timing of a straight flight.
@@ -128,20 +120,10 @@ class SwingCurve:
 
     @classmethod
     def lift(
-        cls,
-        start: Pose,
-        goal: Pose,
-        start_time: float,
-        end_time: float,
-        *,
-        height: float = 0.08,
-        lateral: float = 0.0,
-        apex: float = 0.5,
-        start_normal: ArrayLike = (0.0, 0.0, 1.0),
-        end_normal: ArrayLike = (0.0, 0.0, 1.0),
-        pitch: float = 0.0,
-        controls: int = 20,
-    ) -> "SwingCurve":
+        cls, start: Pose, goal: Pose, start_time: float, end_time: float, *, height: float = 0.08,
+        lateral: float = 0.0, apex: float = 0.5, start_normal: ArrayLike = (0.0, 0.0, 1.0),
+        end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, controls: int = 20,
+    ) -> "SwingCurve":  # fmt: skip
         """Curve over one apex.
 
         Args:

@@ -182,14 +182,9 @@ class EffectorClearance:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        effector: str,
-        standing: Sequence[Contact],
-        com: CentreOfMass,
+        self, body: BodyModel, scene: Scene, effector: str, standing: Sequence[Contact], com: CentreOfMass,
         bend: Callable[[float], float] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._own = end_shapes(body, effector)
         self._bend, self._hinge = bend, _hinge_of(body, effector)
         self._fixed = [

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import end_segments
+from manikin.body.limbs import end_segments, hangs
 from manikin.contact import Contact, ContactSchedule, Swing
 from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture
 from manikin.numerics.spatial import FloatArray
@@ -172,14 +172,9 @@ class FlightPlanner:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        trajectory: CentroidalTrajectory,
-        limits: SwingLimits,
-        rng: np.random.Generator,
-        reference: Callable[[float], FloatArray],
-    ) -> None:
+        self, body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, limits: SwingLimits,
+        rng: np.random.Generator, reference: Callable[[float], FloatArray],
+    ) -> None:  # fmt: skip
         self._body, self._scene, self._trajectory = body, scene, trajectory
         self._limits, self._rng, self._reference = limits, rng, reference
         self._proximity = Proximity(body, scene)
@@ -317,12 +312,6 @@ class FlightPlanner:
             ignore=frozenset().union(*(self._touch_pairs(item) for item in touching)),
             reference=self._reference(time),
         )  # fmt: skip
-
-
-def hangs(body: BodyModel, effector: str) -> bool:
-    """Whether an effector is at the end of a limb, so that it can reach by itself."""
-    root = next(segment.name for segment in body.segments if segment.parent is None)
-    return body.effector(effector).segment != root
 
 
 def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, ...]:

@@ -210,15 +210,10 @@ class PostureCheck:
     """
 
     def __init__(
-        self,
-        effector: str,
-        problem_at: Callable[[float], PostureProblem],
-        screen: Callable[[float, Pose], bool] | None = None,
-        *,
-        rotation_weight: float | None = None,
-        quick: SolverSettings = QUICK,
-        thorough: SolverSettings = THOROUGH,
-    ) -> None:
+        self, effector: str, problem_at: Callable[[float], PostureProblem],
+        screen: Callable[[float, Pose], bool] | None = None, *, rotation_weight: float | None = None,
+        quick: SolverSettings = QUICK, thorough: SolverSettings = THOROUGH,
+    ) -> None:  # fmt: skip
         self._effector = effector
         self._problem_at = problem_at
         self._screen = screen
@@ -250,15 +245,9 @@ class ClearFlight:
     """
 
     def __init__(
-        self,
-        clearance: Clearance,
-        start: Pose,
-        goal: Pose,
-        start_time: float,
-        end_time: float,
-        limits: SwingLimits,
-        extra: float = 0.0,
-    ) -> None:
+        self, clearance: Clearance, start: Pose, goal: Pose, start_time: float, end_time: float,
+        limits: SwingLimits, extra: float = 0.0,
+    ) -> None:  # fmt: skip
         self._clearance = clearance
         self._ends = (start, goal)
         self._at_ends = (clearance(start_time, start), clearance(end_time, goal))
@@ -293,20 +282,10 @@ class SwingSearch:
 
 
 def search_swing(
-    start: Pose,
-    goal: Pose,
-    start_time: float,
-    end_time: float,
-    feasible: Feasible,
-    rng: np.random.Generator,
-    *,
-    roomy: Feasible | None = None,
-    limits: FlightLimits | None = None,
-    zone: SamplingZone | None = None,
-    iterations: int = 2000,
-    shortcuts: int = 60,
-    attempts: int = 3,
-) -> SwingSearch:
+    start: Pose, goal: Pose, start_time: float, end_time: float, feasible: Feasible,
+    rng: np.random.Generator, *, roomy: Feasible | None = None, limits: FlightLimits | None = None,
+    zone: SamplingZone | None = None, iterations: int = 2000, shortcuts: int = 60, attempts: int = 3,
+) -> SwingSearch:  # fmt: skip
     """Search a path with the Bi-RRT, shorten it and turn it into a smooth swing.
 
     Args:

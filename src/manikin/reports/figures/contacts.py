@@ -45,7 +45,6 @@ class ChoicePanel:
     """One body of the figure.
 
     Attributes:
-        title: Above the panel.
         q: (nq,) configuration.
         contacts: What was chosen, drawn as points with their normals.
         limbs: Names of the limbs to which they belong.
@@ -60,15 +59,9 @@ class ChoicePanel:
 
 
 def contact_choice_figure(
-    body: BodyModel,
-    scene: Scene,
-    panels: Sequence[ChoicePanel],
-    title: str = "Chosen contacts",
-    *,
-    elevation_deg: float = 14.0,
-    azimuth_deg: float = -68.0,
-    columns: int | None = None,
-) -> Figure:
+    body: BodyModel, scene: Scene, panels: Sequence[ChoicePanel], title: str = "Chosen contacts", *,
+    elevation_deg: float = 14.0, azimuth_deg: float = -68.0, columns: int | None = None,
+) -> Figure:  # fmt: skip
     """Draw bodies with their contacts side by side, such as before, by one heuristic and by another.
 
     Args:

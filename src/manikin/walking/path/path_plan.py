@@ -193,18 +193,11 @@ NEAREST, FARTHEST = 0.01, 100.0
 
 
 def walking_path(
-    start: ArrayLike,
-    goal: ArrayLike,
-    objective: WalkObjective = PROSE_ORDER,
-    *,
-    obstacles: Sequence[WalkObstacle] = (),
-    walker: Walker | None = None,
-    room: float = 0.05,
-    max_speed: float | None = None,
-    start_velocity: ArrayLike = (0.0, 0.0, 0.0),
-    goal_velocity: ArrayLike = (0.0, 0.0, 0.0),
-    like: WalkingPath | None = None,
-) -> WalkingPath:
+    start: ArrayLike, goal: ArrayLike, objective: WalkObjective = PROSE_ORDER, *,
+    obstacles: Sequence[WalkObstacle] = (), walker: Walker | None = None, room: float = 0.05,
+    max_speed: float | None = None, start_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    goal_velocity: ArrayLike = (0.0, 0.0, 0.0), like: WalkingPath | None = None,
+) -> WalkingPath:  # fmt: skip
     """The way a person walks from one place and heading to another ([Truong2010]_ 5.5-5.8).
 
     Every initial guess is optimised and the cheapest path is returned, whose heading may end whole turns from

@@ -157,16 +157,10 @@ class WalkRoute(SampledWalk):
 
 
 def walking_route(
-    start: ArrayLike,
-    waypoints: Sequence[Waypoint],
-    objective: WalkObjective = PROSE_ORDER,
-    *,
-    obstacles: Sequence[WalkObstacle] = (),
-    walker: Walker | None = None,
-    room: float = 0.05,
-    max_speed: float | None = None,
-    wait: float = 0.0,
-) -> WalkRoute:
+    start: ArrayLike, waypoints: Sequence[Waypoint], objective: WalkObjective = PROSE_ORDER, *,
+    obstacles: Sequence[WalkObstacle] = (), walker: Walker | None = None, room: float = 0.05,
+    max_speed: float | None = None, wait: float = 0.0,
+) -> WalkRoute:  # fmt: skip
     """Walk past waypoints: a path from each to the next, or a turn on the spot where only headings differ.
 
     The thesis predefines such routes (6.7.1); here each leg is found by the criterion, between the velocities

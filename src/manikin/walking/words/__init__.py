@@ -17,22 +17,7 @@ from manikin.walking.words.word_path import STRAIGHT, THESIS_WORDS, WordPath
 from manikin.walking.words.word_solver import WordResiduals, residuals, word_path, word_paths
 
 __all__ = [
-    "HEADINGS",
-    "STRAIGHT",
-    "THESIS_GRID",
-    "THESIS_WORDS",
-    "EqualPaths",
-    "WordGrid",
-    "WordPath",
-    "WordResiduals",
-    "WordSlice",
-    "bent_to",
-    "count_words",
-    "equal_paths",
-    "residuals",
-    "shares",
-    "solve_slice",
-    "solve_slices",
-    "word_path",
-    "word_paths",
-]
+    "HEADINGS", "STRAIGHT", "THESIS_GRID", "THESIS_WORDS", "EqualPaths", "WordGrid", "WordPath",
+    "WordResiduals", "WordSlice", "bent_to", "count_words", "equal_paths", "residuals", "shares",
+    "solve_slice", "solve_slices", "word_path", "word_paths",
+]  # fmt: skip
