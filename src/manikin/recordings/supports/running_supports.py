@@ -57,7 +57,7 @@ def while_carried(
 def vertical_acceleration(
     found: Reconstruction, rate: float, cutoff: float = SUPPORT_LEVELS_CUTOFF
 ) -> FloatArray:
-    """(n,) upward acceleration of the centre of mass, low-passed at a cutoff [Hz], at a rate [Hz] [m/s^2]."""
+    """(n,) upward acceleration of the CoM [m/s^2], with the rate and the cutoff of the low-pass in Hz."""
     height = track(com_path(found.body, found.q), rate, cutoff).positions[:, 2]
     return np.gradient(np.gradient(height, 1.0 / rate), 1.0 / rate)
 

@@ -169,7 +169,8 @@ def posture_differences(
 
     Args:
         rows: Aligned phases.
-        first, second: Motions of both runs.
+        first: Motion of the first run.
+        second: Motion of the second one.
     """
     common = [name for name in first.joint_names if name in second.joint_names]
     if not common:

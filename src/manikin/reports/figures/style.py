@@ -137,12 +137,8 @@ def new_grid(
 ) -> tuple[Figure, GridSpec]:  # fmt: skip
     """Figure of the given size [inch] whose grid has known margins, which takes half the time to draw.
 
-    Args:
-        width, height, title: Of the figure; lengths in [inch].
-        rows, columns: Of the grid.
-        left, right, top, bottom: Margins for labels and title [inch].
-        across, between: Gaps between columns and between rows [inch].
-        ratios: ``width_ratios``, ``height_ratios``.
+    The margins ``left``, ``right``, ``top`` and ``bottom`` are for labels and title, ``across`` and ``between``
+    the gaps between columns and rows, all in inches; ``ratios`` are ``width_ratios`` and ``height_ratios``.
     """
     figure = new_figure(width, height, title)
     figure.set_layout_engine("none")
