@@ -137,7 +137,7 @@ def new_grid(
 ) -> tuple[Figure, GridSpec]:  # fmt: skip
     """Figure of the given size [inch] whose grid has known margins, which takes half the time to draw.
 
-    The margins ``left``, ``right``, ``top`` and ``bottom`` are for labels and title, ``across`` and ``between``
+    The margins ``left``, ``right``, ``top``, ``bottom`` are for labels and title, ``across`` and ``between``
     the gaps between columns and rows, all in inches; ``ratios`` are ``width_ratios`` and ``height_ratios``.
     """
     figure = new_figure(width, height, title)
