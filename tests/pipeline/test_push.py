@@ -99,3 +99,15 @@ def test_the_body_of_kudoh_is_not_planned_for(write):
     task = {"start": {"at": [0, 0]}, "goal": {"at": [1, 0]}}
     with pytest.raises(ScenarioError, match="recovery is missing"):
         load_scenario(write(recovery=None, push=None, task=task))
+
+
+def test_a_pushed_body_obeys_the_friction_model_that_is_asked_for():
+    """Margins are measured in the cone asked for, control stays inside the circular cone."""
+    from manikin.control.edge_forces import inside_the_cone
+    from manikin.pipeline.stages.recovery_stage import _settings
+
+    for asked, held in (("outer", "inner"), ("inner", "inner"), ("cone", "cone")):
+        scenario = load_scenario("push-back-500", None, (f"planning.friction_model={asked}",))
+        settings = _settings(scenario, scenario.file.recovery)
+        assert settings.friction_model == asked
+        assert inside_the_cone(settings.friction_model) == held

@@ -8,13 +8,14 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, with_root
 from manikin.body.limbs import hanging_segment
-from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import (
     ContactGeometry,
     contact_force_basis,
     contact_geometry,
+    inside_the_cone,
     points_along,
     segment_key,
 )
@@ -108,9 +109,7 @@ class Controller:
         body, self._root = with_root(body)
         self.body = body
         self.schedule = schedule
-        # Where the plan has the outer pyramid control has the inner one: a foot must not slip.
-        planned = schedule.sequence[0].stance.friction_model
-        self._friction_model: FrictionModel = "cone" if planned == "cone" else "inner"
+        self._friction_model = inside_the_cone(schedule.sequence[0].stance.friction_model)
         self.settings = settings or ControlSettings()
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping

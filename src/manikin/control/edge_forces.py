@@ -115,6 +115,11 @@ class ContactForceBasis:
     upper: FloatArray
 
 
+def inside_the_cone(asked: FrictionModel) -> FrictionModel:
+    """Friction model of control: the one asked for, but ``inner`` for ``outer``: a foot must not slip."""
+    return "cone" if asked == "cone" else "inner"
+
+
 def contact_force_basis(
     contact: Contact, geometry: ContactGeometry, state: DynamicsState, *, sliding: bool = False,
     friction_share: float = 1.0, friction_model: FrictionModel = "inner",

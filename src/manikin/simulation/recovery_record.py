@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import end_segments
-from manikin.contact import Stance, default_normal_force_cap
+from manikin.contact import ContactModel, Stance
 from manikin.control.recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, skew
@@ -78,6 +78,7 @@ class RecoveryRecorder:
         self._forces: list[FloatArray] = []
         self._stances: list[Stance] = []
         self._carrying = CarryingContacts(self._ends, body.mass)
+        self._model = ContactModel.of_body(body.mass, controller.settings.friction_model)
 
     def add(
         self, time: float, output: RecoveryOutput, sensed: Sensed, wrench: FloatArray, carried: CarriedPoints,
@@ -94,7 +95,7 @@ class RecoveryRecorder:
             held: Whether the feet are welded to the ground, which is no touch.
         """
         self._stances.append(
-            Stance(output.standing.soles, default_normal_force_cap(self._body.mass))
+            Stance(output.standing.soles, model=self._model)
             if held
             else self._carrying_stance(output, carried)
         )
@@ -156,7 +157,7 @@ class RecoveryRecorder:
         frames = output.state.frames
         soles = {sole.effector: sole for sole in (*self._controller.soles, *output.standing.soles)}
         return self._carrying.stance(
-            carried, lambda name: (frames[name].position, frames[name].rotation), soles
+            carried, lambda name: (frames[name].position, frames[name].rotation), soles, model=self._model
         )
 
 

@@ -14,7 +14,13 @@ from manikin.body.limbs import end_segments
 from manikin.contact import Contact
 from manikin.control.build_qp import JointBounds, force_variables
 from manikin.control.dynamics import Dynamics, DynamicsState
-from manikin.control.edge_forces import ContactForceBasis, contact_force_basis, contact_geometry, segment_key
+from manikin.control.edge_forces import (
+    ContactForceBasis,
+    contact_force_basis,
+    contact_geometry,
+    inside_the_cone,
+    segment_key,
+)
 from manikin.control.recovery.recovery_problem import (
     ROOT,
     ArmSwing,
@@ -288,9 +294,9 @@ class BalanceRecovery:
         return alike.joined(load_row(loop, self.settings.least_load * state.mass * GRAVITY))
 
     def _contacts(self, state: DynamicsState) -> list[ContactForceBasis]:
-        share = self.settings.friction_share
+        share, model = self.settings.friction_share, inside_the_cone(self.settings.friction_model)
         return [
-            contact_force_basis(contact, geometry, state, friction_share=share)
+            contact_force_basis(contact, geometry, state, friction_share=share, friction_model=model)
             for contact, geometry in zip(self.soles, self._geometry, strict=True)
         ]
 

@@ -30,6 +30,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from manikin.contact import FrictionModel
 from manikin.control.dynamics import DynamicsState
 from manikin.control.recovery.standing import ClosedLoop, LinearMap, SupportArea
 from manikin.control.settings import Impedance
@@ -130,6 +131,8 @@ class RecoverySettings:
             point is: otherwise the stops of the joints do it, all at once.
         range: Integral over time of the angular momentum that arms, trunk and legs can have, for each
             kilogram of the body [m^2].
+        friction_model: Friction model of the soles, in which margins are measured; control stays inside the
+            cone.
         least_load: Share of the weight that the ground carries where that is possible: a body that lets
             itself drop has nothing to push against.
         stopping: Damping of all joints while the turning is stopped [1/s].
@@ -185,6 +188,7 @@ class RecoverySettings:
     ankle_stiffness: float = 0.64
     sole_inset: float = 0.005
     friction_share: float = 0.9
+    friction_model: FrictionModel = "outer"
     inner: float = 0.7
     outer: float = 0.9
     posture_area: float = 0.9

@@ -42,7 +42,7 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     scenario, body = context.scenario, context.body
     section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
-    task, settings = _task(scenario, section, body), _settings(section)
+    task, settings = _task(scenario, section, body), _settings(scenario, section)
     with scenario.refusing(("push",)):
         item = push_near_com(
             body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
@@ -70,7 +70,9 @@ def push_trials(scenario: Scenario) -> PushTrials:
     """
     section, push = _sections(scenario)
     body = scenario.build_body()
-    return PushTrials(body, _task(scenario, section, body), _settings(section), push.duration_s, push.at_s)
+    return PushTrials(
+        body, _task(scenario, section, body), _settings(scenario, section), push.duration_s, push.at_s
+    )
 
 
 def push_map_searches(
@@ -121,8 +123,9 @@ def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> Reco
         return replace(task, q=one_foot_posture(body, foot), support=(foot,))
 
 
-def _settings(section: RecoverySection) -> RecoverySettings:
+def _settings(scenario: Scenario, section: RecoverySection) -> RecoverySettings:
     return RecoverySettings(
+        friction_model=scenario.contact_model.friction,
         delay=section.delay_s, locked=tuple(section.locked), strength=section.strength,
         posture_control_only=section.posture_control_only, ankle_stiffness=section.ankle_stiffness,
         sole_inset=section.sole_inset_m,
