@@ -5,11 +5,13 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from joblib import Parallel, delayed
+from joblib.externals.loky.backend import resource_tracker
 from threadpoolctl import ThreadpoolController
 
 from manikin.errors import ManikinError
@@ -52,8 +54,10 @@ def side_by_side(
         batch_size=1,  # type: ignore[arg-type]  # a number is allowed; the type is that of the default
         initializer=_prepare, initargs=(os.getpid(),),
     )  # fmt: skip
-    results: Any = pool(delayed(_numbered)(work, number, item) for number, item in enumerate(items))
+    results: Any = None
     try:
+        with _interrupt_held():
+            results = pool(delayed(_numbered)(work, number, item) for number, item in enumerate(items))
         for result in results:
             yield result
     except BrokenProcessPool:
@@ -61,7 +65,22 @@ def side_by_side(
     finally:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of results that nobody waits for
-            results.close()
+            if results is not None:
+                results.close()
+
+
+@contextmanager
+def _interrupt_held() -> Iterator[None]:
+    """Hold Ctrl-C back while processes start: they inherit that, and an interrupted start would hang."""
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    resource_tracker.ensure_running()  # its own start would let the signal through
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _numbered(work: Callable[[T], R], number: int, item: T) -> tuple[int, R]:
