@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, with_root
 from manikin.body.limbs import hanging_segment
-from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
 from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import (
@@ -109,7 +109,7 @@ class Controller:
         body, self._root = with_root(body)
         self.body = body
         self.schedule = schedule
-        self._friction_model = inside_the_cone(schedule.sequence[0].stance.friction_model)
+        self._friction_model: FrictionModel = inside_the_cone(schedule.sequence[0].stance.friction_model)
         self.settings = settings or ControlSettings()
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
