@@ -17,7 +17,7 @@ from manikin.errors import ManikinError
 from manikin.runtime.parallel import side_by_side
 
 SCRIPT = """
-import os, time
+import os, signal, time
 from manikin.runtime.parallel import side_by_side
 
 def nap(seconds):
@@ -25,6 +25,7 @@ def nap(seconds):
     return os.getpid()
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # xdist's workers ignore it
     for _, worker in side_by_side(nap, [0, 600, 600], 2, "naps"):
         print(worker, flush=True)
 """
