@@ -36,7 +36,13 @@ def held_of(body, states, rng):
     point = np.array([[0.1, 0.2, 0.0], [0.0, -0.2, 0.0]])
     wrench = np.hstack([force, np.cross(point, force)])
     known = np.ones(len(states.q), dtype=bool)
-    return HeldForces(joints, known, np.tile(wrench, (len(states.q), 1, 1)), tuple(range(body.nv - 6)))
+    return HeldForces(
+        joints,
+        known,
+        np.tile(wrench, (len(states.q), 1, 1)),
+        tuple(range(body.nv - 6)),
+        (body.pinocchio,) * len(known),
+    )
 
 
 def local_forces(body, q, wrench, joints):
@@ -83,10 +89,13 @@ def test_derivatives_are_those_of_inverse_dynamics_with_the_forces_on_their_segm
             )
 
 
-def test_torques_with_a_motions_own_forces_are_the_motions(runs):
+@pytest.mark.parametrize(
+    "overrides", [(), ("body.load={mass_kg: 6, hand: right, from_phase: 1, until_phase: 4}",)]
+)
+def test_torques_with_a_motions_own_forces_are_the_motions(runs, overrides):
     """Torques are linear in the forces, so the planned ones come back to rounding; toes are left out."""
-    result = runs("platform")
-    scenario = load_scenario("platform")
+    result = runs("platform", overrides=overrides)
+    scenario = load_scenario("platform", None, overrides)
     body = scenario.build_body()
     content = read_motions(result.directory / "motion.h5")
     motion, rows = content.planned, np.arange(0, len(content.planned.time), 97)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
+from manikin.body.load import with_masses
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples
@@ -34,12 +35,14 @@ class HeldForces:
             still settles.
         wrench: (n, c, 6) force [N] and moment about the world origin [N.m], world axes.
         hinges: (k,) hinges whose torque counts: those that a force does not reach through toes.
+        models: n models of the body, with what it carries then.
     """
 
     joints: tuple[int, ...]
     known: NDArray[np.bool_]
     wrench: FloatArray
     hinges: tuple[int, ...]
+    models: tuple[pin.Model, ...]
 
     @classmethod
     def of(cls, body: BodyModel, schedule: ContactSchedule, motion: Motion, time: FloatArray) -> "HeldForces":
@@ -64,7 +67,15 @@ class HeldForces:
             model.joints[model.frames[body.segment_frame(toe.name)].parentJoint].idx_v - 6
             for toe in toes if toe is not None
         }  # fmt: skip
-        return cls(joints, known, wrench, tuple(k for k in range(body.nv - 6) if k not in left_out))
+        models = {id(None): model}
+        loads = [schedule.sequence[int(phase)].load for phase in phases]
+        for load in loads:
+            if load is not None and id(load) not in models:
+                models[id(load)] = with_masses(body, load.masses).pinocchio
+        return cls(
+            joints, known, wrench, tuple(k for k in range(body.nv - 6) if k not in left_out),
+            tuple(models[id(load)] for load in loads),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +102,12 @@ def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wante
         states: n states.
         wanted: Share of the strength that costs nothing.
     """
-    model, data = body.pinocchio, body.pinocchio.createData()
+    data_of = {id(model): model.createData() for model in held.models}
     n, hinges = len(states.q), np.array(held.hinges)
     torque = np.empty((n, body.nv - 6))
     external: list[pin.StdVec_Force] = []
-    for s in range(n):
+    for s, model in enumerate(held.models):
+        data = data_of[id(model)]
         pin.forwardKinematics(model, data, states.q[s])
         forces = pin.StdVec_Force()
         forces.extend([pin.Force.Zero() for _ in range(model.njoints)])
@@ -109,8 +121,9 @@ def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wante
     value, rows = excess[:, active], hinges[active]
     by_posture, by_acceleration = np.zeros((2, n, len(rows), body.nv))
     for s in np.flatnonzero(np.any(value > 0.0, axis=1)):
+        model = held.models[s]
         by_q, _, by_a = pin.computeRNEADerivatives(
-            model, data, states.q[s], states.v[s], states.a[s], external[s]
+            model, data_of[id(model)], states.q[s], states.v[s], states.a[s], external[s]
         )
         scale = (value[s] > 0.0) / limit[s, rows]
         by_posture[s] = scale[:, None] * by_q[6 + rows]
