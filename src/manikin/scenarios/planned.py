@@ -303,7 +303,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     """
     friction = scenario.contacts.friction
     # Rising legs are soon at full length: there is less room above such postures than below them.
-    rises = "buttocks" in plan.stages[0].contacts
+    rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -327,14 +327,19 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         "planning_sole": {"length_m": PLANNING_SHARE[0] * long, "width_m": PLANNING_SHARE[1] * wide},
         "phases": phases,
     }
-    task = {
+    # The centre of mass is planned up to where a seat is touched.
+    touch = next((stage for stage in plan.stages if "buttocks" in stage.contacts), None) if sits else None
+    task: dict[str, Any] = {
         "start": {"com": [float(x) for x in plan.stages[0].com]},
-        "goal": {"com": [float(x) for x in plan.goal_com]},
+        "goal": {"com": [float(x) for x in (plan.goal_com if touch is None else touch.com)]},
     }
+    if touch is not None:
+        speed = np.zeros(3) if touch.momentum is None else touch.momentum.velocity
+        task["goal"]["velocity_m_s"] = [float(x) for x in speed]
     if scenario.act is not None:
         task["act"] = scenario.act.model_dump(mode="json")
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.planning == type(scenario.planning)() and not rises:
+    if scenario.planning == type(scenario.planning)() and not (rises or sits):
         planning = PLANNING
     constraints = _constraints(scenario, plan)
     return scenario.replaced(
@@ -349,6 +354,8 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
         rpy_deg = [float(x) for x in turn]
         return {"position": position, "rpy_deg": rpy_deg, "max_force_N": contact.max_force}
     entry: dict[str, Any] = {"position": position, "yaw_deg": math.degrees(contact.yaw)}
+    if contact.kind is ContactKind.POINT:
+        entry["kind"] = "point"
     if abs(contact.normal[2] - 1.0) > 1e-12:
         entry["normal"] = [float(x) for x in contact.normal]
     if contact.friction != friction:

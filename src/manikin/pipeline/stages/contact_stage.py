@@ -35,6 +35,7 @@ from manikin.planning.contacts import (
     heading_of,
     sample_limbs,
     starts_on_limbs,
+    take_seat,
 )
 from manikin.planning.guide import (
     Abstraction,
@@ -104,17 +105,26 @@ class _FootSearch(_ContactSearch):
         if standing is not None and standing.stage is None:
             return self._tally.failed(standing.failure or "", "start")
         first = start if standing is None or standing.stage is None else standing.stage
+        before = self._places.risen(goal) if "buttocks" in goal.contacts else Endpoint(goal)
+        if before.stage is None:
+            return self._tally.failed(before.failure or "", "goal")
+        arrival = before.stage
         result = self._tally.along_guides(
             self._scenario.contacts.attempts,
-            lambda: self._guide(first, goal),
-            lambda line, number: self._follow(line, start, goal, number),
+            lambda: self._guide(first, arrival),
+            lambda line, number: self._follow(line, start, arrival, number, goal),
         )
         if result.plan is None:
             return result
         return replace(result, scenario=with_supports(self._scenario, result.plan))
 
-    def _follow(self, line: GuideLine, start: Stage, goal: Stage, before: int) -> Extension:
-        """Contacts along a guide after others, with the hands on the object where there is an act."""
+    def _follow(self, line: GuideLine, start: Stage, goal: Stage, before: int, end: Stage) -> Extension:
+        """Contacts along a guide after others, with the hands on the object where there is an act.
+
+        Args:
+            goal: On feet.
+            end: On the seat where the body sits down there, else the goal.
+        """
         options = self._scenario.contacts
         settings = ExtendSettings(stride=options.stride_m)
         if before:
@@ -124,7 +134,12 @@ class _FootSearch(_ContactSearch):
         )
         poser = PostureFinder(self._body, self._scene, self._reference, asked)
         found = follow_guide(poser, line, start, goal, settings, friction=options.friction)
-        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
+        if found.plan is None:
+            return found
+        if end is goal:
+            return replace(found, plan=self._acting(found.plan))
+        sat = take_seat(poser, found.plan, end)
+        return replace(found, plan=None, failure=sat) if isinstance(sat, str) else replace(found, plan=sat)
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""

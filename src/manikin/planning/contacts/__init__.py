@@ -48,6 +48,7 @@ from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.planning.contacts.seat import leave_seat, take_seat
 
 __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
@@ -57,6 +58,6 @@ __all__ = [
     "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage",
     "StrongEfort", "SurfaceTable", "Task", "WeightedSum", "certify_plan", "duration", "efort",
     "find_candidates", "follow_guide", "follow_guide_with_limbs", "force_ellipsoid",
-    "force_transmission_ratio", "heading_of", "manipulability", "mirrored", "pulling_efort", "sample_limb",
-    "sample_limbs", "starts_on_limbs", "velocity_ellipsoid",
+    "force_transmission_ratio", "heading_of", "leave_seat", "manipulability", "mirrored", "pulling_efort",
+    "sample_limb", "sample_limbs", "starts_on_limbs", "take_seat", "velocity_ellipsoid",
 ]  # fmt: skip

@@ -100,7 +100,7 @@ class PostureFinder:
         self.settings = settings or PostureFinderSettings()
         self.searches = 0
         standing = np.array(body.standing_posture())
-        self._model = ContactModel.of_body(body.mass, self.settings.friction_model)
+        self.model = ContactModel.of_body(body.mass, self.settings.friction_model)
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
@@ -109,8 +109,8 @@ class PostureFinder:
     def pose(
         self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
         guide: FloatArray | None = None, *, place: FloatArray | None = None, inset: float | None = None,
-        restarts: bool = False, placements: Mapping[str, Placement] | None = None,
-        preferences: Preferences | None = None,
+        com_weight: float | None = None, restarts: bool = False,
+        placements: Mapping[str, Placement] | None = None, preferences: Preferences | None = None,
     ) -> Posed:  # fmt: skip
         """Find a posture that holds contacts and rests on some of them alone.
 
@@ -121,6 +121,7 @@ class PostureFinder:
             guide: (7,) pose of the root to be near; none when omitted.
             place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
             inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
+            com_weight: Weight with which that place is only wished for [1/m^2]; it is required when omitted.
             restarts: Whether to try again from crouched postures.
             placements: Where further effectors should be, by name.
             preferences: Weights of what is not required; the default ones when omitted.
@@ -137,10 +138,10 @@ class PostureFinder:
         settings, led = self.settings, {} if guide is None else self.led(guide)
         problem = PostureProblem(
             self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
-            proximity=self._proximity, clearance=settings.clearance, self_clearance=settings.clearance,
-            ignore=self._touching(held), range_margin=settings.range_margin,
-            learnt_margin=settings.learnt_margin, reference=self._reference,
-            preferences=preferences or Preferences(),
+            com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
+            self_clearance=settings.clearance, ignore=self._touching(held),
+            range_margin=settings.range_margin, learnt_margin=settings.learnt_margin,
+            reference=self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
         once = SolverSettings(
             tolerance=settings.tolerance, iterations=settings.iterations, restarts=False, explain=False
@@ -169,6 +170,6 @@ class PostureFinder:
         """Where the body may rest; asked again and again for the same contacts."""
         key = frozenset(carrying.values())
         if key not in self._regions:
-            stance = Stance(tuple(carrying.values()), model=self._model)
+            stance = Stance(tuple(carrying.values()), model=self.model)
             self._regions[key] = StaticRegion.of(stance, self.body.mass)
         return self._regions[key]

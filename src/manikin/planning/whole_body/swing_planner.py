@@ -13,9 +13,9 @@ from functools import cache
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import end_segments, hangs
+from manikin.body.limbs import hangs
 from manikin.contact import Contact, ContactSchedule, Swing
-from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture
+from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body.birrt import Feasible, FlightLimits
@@ -329,6 +329,5 @@ def leaning_pairs(body: BodyModel, padded: Sequence[str]) -> frozenset[tuple[str
 
 
 def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
-    """Pairs of end segment and obstacle that a contact brings together."""
-    obstacle = scene.touched_obstacle(contact, tolerance=0.02)
-    return frozenset((segment, obstacle) for segment in end_segments(body, contact.effector))
+    """Pairs of segment and obstacle that a contact brings together; thighs lie on a seat as buttocks do."""
+    return touching_pairs(body, [(contact.effector, scene.touched_obstacle(contact, tolerance=0.02))])
