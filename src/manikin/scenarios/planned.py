@@ -277,6 +277,9 @@ ABOVE = 0.01
 LOWEST = 0.1
 """Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
 
+HIGHEST = 10.0
+"""Height above the lowest posture that no centre of mass reaches [m]."""
+
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
 
@@ -287,8 +290,17 @@ PLANNING = {
 }
 """Options of the planner of a body on its feet, where the file keeps the defaults; our choice.
 
-A body that leaves a seat keeps the defaults: its trunk cannot follow a path that is planned for ease alone.
+A body that sits down keeps the defaults.
 """
+
+PLANNING_RISING = {
+    "degree": 5,
+    "weights": {"margin": 0.2, "smoothness": 10.0, "duration": 5.0, "acceleration": [1.0, 1.0, 1.0]},
+}
+"""Options of the planner of a body that leaves a seat, likewise: a seated trunk cannot follow any path."""
+
+SEATED_LONGER = 1.5
+"""Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
 
 
 def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
@@ -312,6 +324,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
             for name, contact in stage.contacts.items()
         }
         phase["min_duration_s"] = stage.min_duration
+        if rises and "buttocks" in stage.contacts:
+            phase["max_duration_s"] = SEATED_LONGER * stage.min_duration
         if number:
             x, y, z = (float(value) for value in stage.com)
             drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
@@ -339,8 +353,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     if scenario.act is not None:
         task["act"] = scenario.act.model_dump(mode="json")
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.planning == type(scenario.planning)() and not (rises or sits):
-        planning = PLANNING
+    if scenario.planning == type(scenario.planning)() and not sits:
+        planning = PLANNING_RISING if rises else PLANNING
     constraints = _constraints(scenario, plan)
     return scenario.replaced(
         supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning
@@ -371,6 +385,10 @@ def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, An
         given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
     if values.act is not None and "height_band" not in keys:
         given.append({"height_band": _below_postures(plan)})
+    elif "buttocks" in plan.stages[0].contacts and "height_band" not in keys:
+        # Who has left a seat does not go down again: the pelvis would meet it.
+        lowest = min(float(stage.com[2]) - stage.com_room[2] for stage in plan.stages)
+        given.append({"height_band": {"lower": f"{lowest:.4f}", "upper": f"{lowest + HIGHEST:.4f}"}})
     return given
 
 

@@ -9,7 +9,7 @@ hands that push on armrests, a table or the seat.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -200,8 +200,8 @@ def _room_ahead(seat: Surface, at: FloatArray, heading: FloatArray) -> float:
 LEANING = (0.25, 0.5, 0.75, 0.92)
 """Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
 
-LEANING_TIME = 0.12
-"""Shortest time between two of them [s]."""
+LEANING_TIMES = (1.3, 0.9)
+"""Time of that way, to where the body comes to rest over its feet and to where it goes on in motion [s]."""
 
 SEAT_OFF_INSET = 0.015
 """Distance of the centre of mass to the edge of where it may rest on the feet when a seat is left [m]."""
@@ -317,17 +317,33 @@ def _rising(
     changes: Sequence[tuple[Mapping[str, Contact], FloatArray, Momentum | None]], risen: FloatArray,
 ) -> Leaving:  # fmt: skip
     """Stages that lean up to the first change and then have the contacts of each, up to standing."""
-    body, stages = poser.body, [start]
-    there = Configuration(body, changes[0][1]).com[:2]
-    for share in LEANING:
+    body, stages, moving = poser.body, [start], changes[0][2] is not None
+    there, before = Configuration(body, changes[0][1]).com[:2], 0.0
+    for share in (*LEANING, 1.0):
+        time = _leaning_time(share, moving)
+        stages[-1] = replace(stages[-1], min_duration=time - before)
         place = (1.0 - share) * start.com[:2] + share * there
-        posed = poser.pose(start.contacts, start.contacts, stages[-1].q, place=place)
-        if posed.q is not None:
-            stages.append(Stage.of(body, start.contacts, posed.q, LEANING_TIME, SEATED_ROOM))
+        posed = poser.pose(start.contacts, start.contacts, stages[-1].q, place=place) if share < 1.0 else None
+        if posed is not None and posed.q is not None:
+            stages.append(Stage.of(body, start.contacts, posed.q, 0.0, SEATED_ROOM))
+            before = time
     for contacts, q, momentum in changes:
         stages.append(Stage.of(body, contacts, q, RISING_TIME, SEATED_ROOM, momentum=momentum))
     stages.append(Stage.of(body, changes[-1][0], risen, SETTLING_TIME))
     return Leaving(tuple(stages))
+
+
+def _leaning_time(share: float, moving: bool) -> float:
+    """Time at which a lean of least jerk, which ends at rest or not, has come a share of its way [s]."""
+    shares = np.linspace(0.0, 1.0, 101)
+    # Half of a way twice as long ends with its largest speed.
+    half = 0.5 if moving else 1.0
+    way = _least_jerk(half * shares) / _least_jerk(np.array(half))
+    return float(LEANING_TIMES[moving] * np.interp(share, way, shares))
+
+
+def _least_jerk(share: FloatArray) -> FloatArray:
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
 HAND_AHEAD, HAND_ASIDE, HAND_ABOVE = 0.08, 0.17, 0.13
