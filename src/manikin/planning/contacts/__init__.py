@@ -48,6 +48,7 @@ from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPosture, TrunkPostures
 from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
 __all__ = [
@@ -56,7 +57,9 @@ __all__ = [
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "GuideLine", "Habit", "Heuristic",
     "Hindrance", "LimbCollisions", "LimbExtendSettings", "LimbPlaces", "LimbSamples", "Manipulability",
     "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage",
-    "StrongEfort", "SurfaceTable", "Task", "WalkSearch", "WalkSettings", "WeightedSum", "certify_plan", "duration", "efort",
+    "StrongEfort", "SurfaceTable", "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures", "WalkSearch",
+    "WalkSettings", "WeightedSum",
+    "certify_plan", "duration", "efort",
     "find_candidates", "follow_guide", "follow_guide_with_limbs", "force_ellipsoid",
     "force_transmission_ratio", "heading_of", "manipulability", "mirrored", "pulling_efort", "sample_limb",
     "sample_limbs", "starts_on_limbs", "velocity_ellipsoid",

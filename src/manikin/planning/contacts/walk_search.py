@@ -9,36 +9,25 @@ search goes on with the next best way; so is a pair that a later stage could not
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, sole
-from manikin.kinematics import reach_volume
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import Extension, SearchLog
 from manikin.planning.contacts.endpoint import stand_up
 from manikin.planning.contacts.footing import Foothold, Footing
-from manikin.planning.contacts.footsteps import FootstepSearch
+from manikin.planning.contacts.footsteps import STEP, FootstepSearch
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
-from manikin.planning.guide.abstraction import abstraction_of
-from manikin.planning.guide.checker import Margins, ReachabilityChecker
+from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
+from manikin.scene import Scene
 
 FEET = ("left_foot", "right_foot")
-
-BENT = (
-    (1.0, 0.0, 0.0),
-    (0.94, 0.35, 0.15),
-    (0.85, 0.6, 0.4),
-    (0.72, 0.8, 0.8),
-    (0.6, 0.9, 1.2),
-    (0.5, 1.0, 1.8),
-)
-"""Heights of the root, of a standing one's, leans of the trunk forward [rad] and what a step in them costs [s]."""
 
 COLUMN = (0.12, 0.5, 0.9)
 """Radius, lowest and highest end of the column that has to be free above the ground, of a body of 1.75 m [m]."""
@@ -71,45 +60,40 @@ class BodyRoom:
 
     Attributes:
         body: The body.
-        checker: Tests the trunk.
+        scene: What is around it.
     """
 
     body: BodyModel
-    checker: ReachabilityChecker
-    _known: dict[tuple[int, int], tuple[float, FloatArray]] = field(init=False, default_factory=dict)
+    scene: Scene
 
     def __post_init__(self) -> None:
-        q = np.array(self.body.standing_posture())
-        self._height = float(q[2])
-
-    def poses(self, left: Foothold, right: Foothold) -> list[tuple[float, FloatArray]]:
-        """Costs [s] and poses (7,) of the root between two footholds, the cheapest first."""
-        x = math.cos(left.yaw) + math.cos(right.yaw)
-        y = math.sin(left.yaw) + math.sin(right.yaw)
-        yaw = math.atan2(y, x)
-        middle = 0.5 * (left.position + right.position)
-        low = min(float(left.position[2]), float(right.position[2]))
-        ground = low + 0.4 * (float(middle[2]) - low)
-        found = []
-        for share, lean, cost in BENT:
-            back = 0.3 * self._height * math.sin(lean)
-            place = [middle[0] - back * math.cos(yaw), middle[1] - back * math.sin(yaw)]
-            turn = Rotation.from_euler("ZYX", [yaw, lean, 0.0]).as_quat()
-            found.append((cost, np.array([*place, ground + share * self._height, *turn])))
-        return found
+        self._postures = TrunkPostures.of(self.body)
+        self._clearance = TrunkClearance(self._postures, self.scene)
+        self._costs = self._postures.costs - 1.0
 
     def cost(self, left: Foothold, right: Foothold) -> float:
-        """Cost of the cheapest free pose [s]; infinite where there is none."""
-        return self.free(left, right)[0]
+        """Cost of a step in the cheapest posture that is free, beyond upright [s]; infinite without one."""
+        place = self._place(left, right)
+        number = int(self._clearance.cheapest(place[None])[0])
+        return STEP * float(self._costs[number]) if number >= 0 else math.inf
 
-    def free(self, left: Foothold, right: Foothold) -> tuple[float, FloatArray]:
-        """Cost [s] and pose (7,) of the root, the cheapest that is free; infinite where none is."""
-        key = id(left), id(right)
-        if key not in self._known:
-            options = self.poses(left, right)
-            free = ((cost, pose) for cost, pose in options if self.checker.trunk_is_free(pose))
-            self._known[key] = next(free, (math.inf, options[0][1]))
-        return self._known[key]
+    def posture(self, left: Foothold, right: Foothold) -> FloatArray:
+        """(nq,) cheapest free posture there, on level ground; upright where none is free."""
+        place = self._place(left, right)
+        number = max(int(self._clearance.cheapest(place[None])[0]), 0)
+        q = np.array(self._postures[number].q)
+        turn = Rotation.from_euler("z", place[3])
+        q[:3] = place[:3] + turn.apply(q[:3])
+        q[3:7] = (turn * Rotation.from_quat(q[3:7])).as_quat()
+        return q
+
+    def _place(self, left: Foothold, right: Foothold) -> FloatArray:
+        """(4,) x, y and height of the ground [m] and heading [rad] between two feet."""
+        yaw = math.atan2(math.sin(left.yaw) + math.sin(right.yaw), math.cos(left.yaw) + math.cos(right.yaw))
+        middle = 0.5 * (left.position + right.position)
+        low = min(float(left.position[2]), float(right.position[2]))
+        # A foot that stands high folds its leg; the body is as high as the other one lets it.
+        return np.array([middle[0], middle[1], low + 0.4 * (float(middle[2]) - low), yaw])
 
 
 @dataclass
@@ -134,10 +118,7 @@ class WalkSearch:
         body, scene = self.poser.body, self.poser.scene
         self._log = SearchLog(self.poser, self.settings.searches)
         scale = stature_of(body) / 1.75
-        legs = [limb for limb in body.limbs if limb.effector in FEET]
-        volumes = [reach_volume(body, limb, np.random.default_rng(0)) for limb in legs]
-        checker = ReachabilityChecker(abstraction_of(body, volumes), scene, margins=Margins(0.01, 0.0))
-        self._room = BodyRoom(body, checker)
+        self._room = BodyRoom(body, scene)
         first = self.goal.contacts[FEET[0]]
         steepest = min(math.radians(30.0), math.atan(0.8 * self.friction))
         self._footing = Footing(scene, (first.length, first.width), steepest)
@@ -156,8 +137,8 @@ class WalkSearch:
 
     def run(self) -> Extension:
         """The best way whose postures exist, or why there is none."""
-        upright = self._room.poses(*self._holds(self.start))[0][1]
-        first = stand_up(self.poser, self.start, frozenset(FEET), upright, self._log)
+        upright = self._room.posture(*self._holds(self.start))
+        first = stand_up(self.poser, self.start, frozenset(FEET), upright[:7], self._log)
         if first is None:
             left = ", ".join(set(self.start.contacts) - set(FEET))
             return self._failed(f"cannot leave {left}")
@@ -206,12 +187,11 @@ class WalkSearch:
                 continue
             lifted = self._posed(names[k : k + 2], way[k : k + 2], 1, q)
             if lifted.q is None:
-                return self._refuse(way[k], way[k + 1], f"{names[k]} cannot be lifted: {lifted.reason}", k)
+                return self._refuse(way[k], way[k + 1], f"{names[k]} cannot be lifted: {lifted.reason}")
             landed = self._posed(names[k + 1 : k + 3], way[k + 1 : k + 3], 0, lifted.q)
             if landed.q is None:
-                return self._refuse(
-                    way[k + 1], way[k + 2], f"{landing.effector} cannot be put down: {landed.reason}", k + 1
-                )
+                why = f"{landing.effector} cannot be put down: {landed.reason}"
+                return self._refuse(way[k + 1], way[k + 2], why)
             distance = float(np.linalg.norm(landing.position - leaving.position))
             flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
             body = self.poser.body
@@ -227,15 +207,9 @@ class WalkSearch:
             return None
         return ContactPlan.of(self.poser.body, stages, posed.q, self.settings.hinge_pace)
 
-    def _refuse(self, stand: int, step: int, reason: str, where: int) -> None:
+    def _refuse(self, stand: int, step: int, reason: str) -> None:
         self.reasons[reason] += 1
         self.search.close(stand, step)
-
-    def _pose(self, first: int, second: int, side: int) -> FloatArray:
-        """(7,) pose of the root between two footholds, ``side`` 0 where the first one is left."""
-        a, b = self.search.hold(first), self.search.hold(second)
-        left, right = (a, b) if side == 0 else (b, a)
-        return self._room.free(left, right)[1]
 
     def _posed(self, names: Sequence[str], way: Sequence[int], rests: int, q: FloatArray) -> Posed:
         """Posture on a pair of footholds that rests on one of them; looked for once."""
@@ -244,10 +218,11 @@ class WalkSearch:
             return self._postures[key]
         held = {name: self._contact(name, number) for name, number in zip(names, way, strict=True)}
         carrying: Mapping[str, Contact] = {names[rests]: held[names[rests]]}
-        pose = self._pose(way[0], way[1], 0 if names[0] == FEET[0] else 1)
-        posed = self.poser.pose(held, carrying, q, pose)
+        pair = [self.search.hold(number) for number in way]
+        wished = self._room.posture(*(pair if names[0] == FEET[0] else pair[::-1]))
+        posed = self.poser.pose(held, carrying, q, wished[:7])
         if posed.q is None:
-            posed = self.poser.pose(held, carrying, np.concatenate([pose, q[7:]]), pose, restarts=True)
+            posed = self.poser.pose(held, carrying, wished, wished[:7], restarts=True)
         self._postures[key] = posed
         return posed
 
