@@ -61,6 +61,15 @@ GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 A way costs at most the factor more than the cheapest one.
 """
 
+TURN_COST = 0.9
+"""Cost of a turn [s/rad]: two steps turn a body by a right angle."""
+
+TURN_WAY = 0.6
+"""Way on which going backwards costs as much as a turn by two radians [m]."""
+
+LOOK = 5
+"""Cells of the way that tell where it leads."""
+
 _REQUEST = coal.CollisionRequest()
 
 
@@ -109,7 +118,10 @@ class FootstepSearch:
         self._closed: set[tuple[int, int]] = set()
         self._offsets = _offsets(self.scale)
         self._field = _Field(self.footing, self.start, self.goal, self.column, self.stride * self.scale)
-        self._ahead = self._field.costs(np.array([hold.position for hold in self._holds])).tolist()
+        places = np.array([hold.position for hold in self._holds])
+        self._ahead: list[float] = self._field.costs(
+            places, np.array([hold.yaw for hold in self._holds])
+        ).tolist()
 
     def close(self, stand: int, step: int) -> None:
         """Close a pair of footholds, which has no posture."""
@@ -160,7 +172,8 @@ class FootstepSearch:
             ends = self._at_goal(node)
             for number, step_cost in self._steps(node):
                 after = _Node(number, -node.side, ends)
-                if after in parents or (node.hold, number) in self._closed:
+                closed = after in parents or (node.hold, number) in self._closed
+                if closed or not math.isfinite(self._ahead[number]):
                     continue
                 count += 1
                 total = cost + step_cost
@@ -238,7 +251,7 @@ class FootstepSearch:
                 fresh.append(row)
             # A place close by stands for the one that was asked for.
             steps[number] = min(steps.get(number, math.inf), float(costs[1 + row]))
-        self._ahead.extend(self._field.costs(found.positions[fresh]).tolist())
+        self._ahead.extend(self._field.costs(found.positions[fresh], found.yaws[fresh]).tolist())
         self._next[key] = list(steps.items())
         return self._next[key]
 
@@ -337,20 +350,45 @@ class _Field:
         graph = csr_array((length + 1e-9, (near[:, 0], near[:, 1])), shape=(size, size))
         middle = 0.5 * (goal[0].position + goal[1].position)
         _, root = self._tree.query(middle)
-        self._cost = dijkstra(graph, directed=False, indices=int(root))
+        self._cost, before = dijkstra(graph, directed=False, indices=int(root), return_predecessors=True)
         self._pace = pace
+        self._yaw = _middle_yaw(goal[0].yaw, goal[1].yaw)
+        # Where the way leads from each cell, and how far it is.
+        ahead = np.arange(size)
+        for _ in range(LOOK):
+            ahead = np.where(before[ahead] >= 0, before[ahead], ahead)
+        way = self._points[ahead, :2] - self._points[:, :2]
+        self._heading = np.arctan2(way[:, 1], way[:, 0])
+        self._way = np.linalg.norm(self._points[:, :2] - middle[:2], axis=1)
 
-    def costs(self, places: FloatArray) -> FloatArray:
-        """(k,) estimates of the costs from places (k, 3) [m] to the goal [s]."""
+    def costs(self, places: FloatArray, yaws: FloatArray) -> FloatArray:
+        """(k,) estimates of the costs from places (k, 3) [m] with headings (k,) [rad] to the goal [s]."""
         if not len(places):
             return np.zeros(0)
         gap, rows = self._tree.query(places, k=4)
-        return (self._cost[rows] + self._pace * gap).min(axis=1)
+        costs = self._cost[rows] + self._pace * gap
+        pick = np.argmin(costs, axis=1)
+        row = rows[np.arange(len(places)), pick]
+        there, here = self._heading[row], np.asarray(yaws)
+        # To turn to where the way leads and back, or to go as one stands: aside or backwards is slower.
+        straight = _angle(here - there) + _angle(there - self._yaw)
+        across = _angle(here - self._yaw) + self._way[row] / TURN_WAY * (1.0 - np.cos(here - there))
+        return costs[np.arange(len(places)), pick] + TURN_COST * np.minimum(straight, across)
 
     @property
     def is_reachable(self) -> bool:
         """Whether any way is known at all."""
         return bool(np.isfinite(self._cost).any())
+
+
+def _angle(difference: FloatArray) -> FloatArray:
+    """Size of angles [rad], at most half a turn."""
+    return np.abs(np.mod(difference + math.pi, 2.0 * math.pi) - math.pi)
+
+
+def _middle_yaw(first: float, second: float) -> float:
+    """Heading between two [rad]."""
+    return math.atan2(math.sin(first) + math.sin(second), math.cos(first) + math.cos(second))
 
 
 def _column_is_free(scene: Scene, places: FloatArray, column: tuple[float, float, float]) -> np.ndarray:
