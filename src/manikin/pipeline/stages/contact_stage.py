@@ -21,14 +21,14 @@ from manikin.planning.contacts import (
     ContactPlan,
     Endpoint,
     Endpoints,
-    LimbExtendSettings,
+    ExtendSettings,
     LimbPlaces,
     PostureFinder,
     PostureFinderSettings,
     Stage,
     WalkSearch,
     WalkSettings,
-    follow_guide_with_limbs,
+    follow_guide,
     heading_of,
     sample_limbs,
     starts_on_limbs,
@@ -186,19 +186,19 @@ class _LimbSearch(_ContactSearch):
         return self._tally.along_guides(
             self._scenario.contacts.attempts,
             lead,
-            lambda line, _: follow_guide_with_limbs(self._poser, self._places, line, stages[-1], settings),
+            lambda line, _: follow_guide(self._poser, self._places, line, stages[-1], settings),
         )
 
     @property
     def _climbs(self) -> bool:
         return self._scenario.file.task.goal.posture == CLIMBING
 
-    def _settings(self) -> LimbExtendSettings:
+    def _settings(self) -> ExtendSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
-        options, plain = self._scenario.contacts, LimbExtendSettings()
+        options, plain = self._scenario.contacts, ExtendSettings()
         size, pace = self._size, float(np.sqrt(self._size))
         human = self._body.stature is not None
-        return LimbExtendSettings(
+        return ExtendSettings(
             stride=options.stride_m * size if human else STRIDE * self._places.reach,
             same_place=plain.same_place * size,
             lift=plain.lift * max(size, SMALLEST),

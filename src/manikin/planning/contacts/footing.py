@@ -1,8 +1,8 @@
 """Places on which a sole can lie: candidates of a footstep search, snapped to the surfaces of a scene.
 
-A candidate is a place and a heading seen from above.  It is put onto every surface below it; where a part of
-the sole would hang over an edge, or something stands in its way, it is shifted by up to :data:`SHIFT` to where
-more of it lies.
+A candidate is a place and a heading seen from above.  It is put onto every surface below it; where a part
+of the sole would hang over an edge, or something stands in its way, it is shifted by up to :data:`SHIFT` to
+where more of it lies.
 """
 
 import math
@@ -35,7 +35,7 @@ FOOT_CLEARANCE = 0.015
 """Distance of the foot to what stands beside it [m]; our choice."""
 
 ON_PLANE = 0.02
-"""Height up to which a neighbouring surface is no hindrance to a foot [m]; the foot itself is tested exactly."""
+"""Height up to which a neighbouring surface is no hindrance to a foot [m]; the foot has a test of its own."""
 
 _REQUEST = coal.CollisionRequest()
 _ALONG, _ACROSS = 8, 3  # points of a sole that stand for its area
@@ -212,8 +212,9 @@ class Footing:
             rising = (above > ON_PLANE) & (above < 2.0 * FOOT_HEIGHT)
             if rising.any():
                 hit |= rising & other.covers(points)
-        clear = on[:, self._middle].all(axis=1) & ~hit.reshape(len(places), -1).any(axis=1)
-        return on.mean(axis=1), clear
+        clear = on[:, self._middle].all(axis=1)
+        clear &= ~hit.reshape(len(places), -1).any(axis=1)
+        return on.mean(axis=1), np.asarray(clear)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,6 +250,6 @@ class _Ground:
     def covers(self, places: FloatArray) -> NDArray[np.bool_]:
         if self.walls is not None:
             out, offsets = self.walls
-            return (places @ out.T <= offsets).all(axis=1)
+            return np.asarray((places @ out.T <= offsets).all(axis=1))
         flat = np.column_stack([places, self.height(places)])
         return self.surface.outside(flat) <= 1e-9

@@ -1,12 +1,13 @@
 """Footsteps from start to goal: a best-first search over single footholds.
 
-A node is a foothold that carries while the other foot moves; an edge is a pair of footholds in which the body
-passes from one to the other.  What a step costs is about the time that a person takes for it.  The estimate of
-the cost that is left is the length of the shortest way over the ground for a thin column, so that ways round
-obstacles, over steps and across gaps are known from the start ([Kuffner2001]_; lazy tests as in [Dellin2016]_).
+A node is a foothold that carries while the other foot moves; an edge is a pair of footholds in which the
+body passes from one to the other.  What a step costs is about the time that a person takes for it.  The
+estimate of the cost that is left is the length of the shortest way over the ground for a thin column, so that
+ways round obstacles, over steps and across gaps are known from the start.
 
-Whether a pair of footholds has postures is tested by whom the search is for; a pair that has none is closed with
-:meth:`FootstepSearch.close`, and the next best way is found.
+Tests of the foot and the trunk come when a step is about to be taken (lazily).  Whether a pair of footholds has
+postures is tested by the caller; a pair that has none is closed with :meth:`FootstepSearch.close`, and the next
+best way is found.
 """
 
 import heapq
@@ -29,7 +30,7 @@ STEP = 0.7
 """Time of a short step [s]; our choice, as the next ones."""
 
 EASY = 3.0**0.25
-"""Way of a step that costs twice as much as a short one, by the cheapest over the ground: a quartic has it there."""
+"""Way at which a step costs twice as much as a short one, over that of the cheapest gait: of a quartic."""
 
 LONGEST = 0.80
 """Longest way between the middles of two soles, of a body of 1.75 m [m]."""
@@ -96,7 +97,7 @@ class FootstepSearch:
         goal: At the goal.
         scale: Size of the body relative to one of 1.75 m.
         pair_cost: Cost of the body between two footholds.
-        column: Radius, lowest and highest end above the ground of what has to be free for the body to pass [m].
+        column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
     """
 

@@ -1,9 +1,9 @@
 """Contacts of a body that goes on its feet, from start to goal.
 
-Footsteps are searched for with cheap tests (:mod:`manikin.planning.contacts.footsteps`); whole postures are looked
-for along the best way only, two for each pair of footholds: one that rests on the foot that stands, the other
-already down, and one that rests on the other, the first about to leave.  A pair without a posture is closed, and the
-search goes on with the next best way; so is a pair that a later stage could not use (:class:`Refusal`).
+Footsteps are searched for with cheap tests (:mod:`manikin.planning.contacts.footsteps`); whole postures are
+looked for along the best way only, two for each pair of footholds: one that rests on the foot that stands, the
+other already down, and one that rests on the other, the first about to leave.  A pair without a posture is
+closed, and the search goes on with the next best way.
 """
 
 import math
@@ -30,7 +30,7 @@ from manikin.scene import Scene
 FEET = ("left_foot", "right_foot")
 
 COLUMN = (0.12, 0.5, 0.9)
-"""Radius, lowest and highest end of the column that has to be free above the ground, of a body of 1.75 m [m]."""
+"""Radius, lowest and highest end above the ground of what has to be free, of a body of 1.75 m [m]."""
 
 
 @dataclass(frozen=True)
