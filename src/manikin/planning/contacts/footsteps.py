@@ -5,8 +5,8 @@ body passes from one to the other.  What a step costs is about the time that a p
 estimate of the cost that is left is the length of the shortest way over the ground for a thin column, so that
 ways round obstacles, over steps and across gaps are known from the start.
 
-Tests of the foot and the trunk come when a step is about to be taken (lazily).  Whether a pair of footholds has
-postures is tested by the caller; a pair that has none is closed with :meth:`FootstepSearch.close`, and the next
+Tests of the foot and the trunk come when a step is about to be taken (lazily).  Whether a pair of footholds
+has postures is tested by the caller; a pair without is closed with :meth:`FootstepSearch.close`, and the next
 best way is found.
 """
 
@@ -182,9 +182,14 @@ class FootstepSearch:
                 heapq.heappush(open_, (rank, count, total, after, node, False))
         return None, True
 
-    def farthest(self) -> float:
-        """Least cost that was left at a foothold which was reached [s]."""
-        return min((self._ahead[stand] for stand, _ in self._next), default=math.inf)
+    def farthest(self) -> tuple[float, Foothold]:
+        """Least cost that was left at a foothold which was reached [s], and that foothold."""
+        return min(((self._ahead[n], self._holds[n]) for n, _ in self._next), key=lambda item: item[0])
+
+    @property
+    def walled_off(self) -> bool:
+        """Whether no way over the ground leads from the start to the goal, whatever the steps."""
+        return not math.isfinite(min(self._ahead[:2]))
 
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
@@ -268,13 +273,13 @@ class FootstepSearch:
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
         # A leg that goes up or down has less of its length to go ahead.
         reach = LONGEST * size * np.sqrt(np.maximum(0.0, 1.0 - (rise / (1.25 * HIGHEST * size)) ** 2))
-        made = (rise <= HIGHEST * size) & (turned >= -0.45) & (turned <= 1.1)
+        made = (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= np.hypot(ahead, aside) <= reach
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
         cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
         cost += 1.2 * rise + 8.0 * np.maximum(0.0, rise - 0.2 * size) + 0.25 * np.abs(turned) + (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
-        cost += 1.5 * np.maximum(0.0, 0.15 * size - aside)
+        cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
         return np.where(made, cost, np.inf)
 
 
@@ -375,11 +380,6 @@ class _Field:
         straight = _angle(here - there) + _angle(there - self._yaw)
         across = _angle(here - self._yaw) + self._way[row] / TURN_WAY * (1.0 - np.cos(here - there))
         return costs[np.arange(len(places)), pick] + TURN_COST * np.minimum(straight, across)
-
-    @property
-    def is_reachable(self) -> bool:
-        """Whether any way is known at all."""
-        return bool(np.isfinite(self._cost).any())
 
 
 def _angle(difference: FloatArray) -> FloatArray:

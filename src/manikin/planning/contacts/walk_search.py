@@ -1,9 +1,9 @@
 """Contacts of a body that goes on its feet, from start to goal.
 
 Footsteps are searched for with cheap tests (:mod:`manikin.planning.contacts.footsteps`); whole postures are
-looked for along the best way only, two for each pair of footholds: one that rests on the foot that stands, the
-other already down, and one that rests on the other, the first about to leave.  A pair without a posture is
-closed, and the search goes on with the next best way.
+looked for along the best way only, two for each pair of footholds: one that rests on the foot that stands,
+the other already down, and one that rests on the other, the first about to leave.
+A pair without a posture is closed, and the search goes on with the next best way.
 """
 
 import math
@@ -145,6 +145,12 @@ class WalkSearch:
         self._risen = first.stages
         while not self._log.is_spent:
             way = self.search.best()
+            if way is None and self.search.walled_off:
+                low, high = self.search.column[1:]
+                return self._failed(
+                    "the goal is walled off from the start: no way over the ground with room between "
+                    f"{low:.2f} and {high:.2f} m above it leads there"
+                )
             if way is None:
                 return self._failed("no footsteps lead to the goal")
             plan = self._planned(way)
@@ -156,9 +162,10 @@ class WalkSearch:
     def _failed(self, what: str) -> Extension:
         most = self.reasons.most_common(1)
         why = f"; most often: {most[0][0]}" if most else ""
-        left = self.search.farthest()
-        near = f", {left:.1f} s before it" if math.isfinite(left) else ""
-        return Extension(None, self._log.searches, self.replanned, f"{what}{near}{why}", 0.0)
+        if not self.search.walled_off and self.search.expanded:
+            place = self.search.farthest()[1].position
+            what += f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
+        return Extension(None, self._log.searches, self.replanned, f"{what}{why}", 0.0)
 
     def _holds(self, stage: Stage) -> tuple[Foothold, Foothold]:
         left, right = (stage.contacts[foot] for foot in FEET)
