@@ -44,6 +44,16 @@ def polygon_of_halfplanes(A: ArrayLike, b: ArrayLike) -> FloatArray:
     return _without_twins(polygon)
 
 
+def fewer_corners(polygon: FloatArray, most: int) -> FloatArray:
+    """A convex polygon (k, 2) with at most so many corners, without those that cut off least."""
+    corners = polygon
+    while len(corners) > most:
+        before, after = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
+        cut = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+        corners = np.delete(corners, int(np.argmin(cut)), axis=0)
+    return corners
+
+
 def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
     """(...) distance to the boundary of a convex polygon, positive inside, negative outside [m].
 

@@ -202,7 +202,7 @@ def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> No
                 )
         for contact in stance:
             with values.refusing(("supports", "phases", number, contact.effector)):
-                scene.touched_obstacle(contact, tolerance)
+                scene.touched_obstacles(contact, tolerance)
 
 
 def _contact(values: ScenarioValues, effector: str, entry: ContactSection, planning: bool) -> Contact:

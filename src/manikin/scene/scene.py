@@ -13,8 +13,9 @@ from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.collision import Meter, collision_parts, part_meter
+from manikin.scene.merging import COPLANAR, merged_surfaces
 from manikin.scene.obstacle import HalfSpace, Obstacle
-from manikin.scene.surface import Surface, surfaces_of
+from manikin.scene.surface import Surface
 
 FLOOR = "floor"
 """Name of the floor obstacle."""
@@ -80,8 +81,11 @@ class Scene(Displayed):
 
     @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
-        """Every flat face of every obstacle, in order."""
-        return tuple(surface for item in self.obstacles for surface in surfaces_of(item))
+        """Every flat place of the scene, coplanar faces that touch joined and what is hidden left out.
+
+        See :func:`manikin.scene.merging.merged_surfaces`; in the order of the obstacles.
+        """
+        return merged_surfaces(self.obstacles)
 
     def surfaces_facing(self, direction: Sequence[float], max_angle: float) -> tuple[Surface, ...]:
         """Surfaces whose normal is within ``max_angle`` [rad] of ``direction`` (3,)."""
@@ -117,23 +121,20 @@ class Scene(Displayed):
         """
         if not self.obstacles:
             raise SceneError("scene is empty, so nothing is nearest; valid: at least one obstacle")
-        place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
-        distances = [
-            (min(meter(place, other)[0] for meter, other in meters), name)
-            for name, meters in self._point_meters.items()
-        ]
-        distance, name = min(distances, key=lambda item: item[0])
+        distance, name = self._distances(point)[0]
         return name, distance
 
-    def touched_obstacle(self, contact: Contact, tolerance: float = 0.005) -> str:
-        """Name of the obstacle that a contact touches; ContactError if there is none.
+    def touched_obstacles(self, contact: Contact, tolerance: float = 0.005) -> tuple[str, ...]:
+        """Names of the obstacles that a contact touches; ContactError if there is none.
 
-        A sole or point lies on a surface, see :meth:`supporting_surface`; a grasp has the fingers around
-        something within :data:`GRASP_REACH` of its position.
+        A sole or point lies on a surface, see :meth:`supporting_surface`, and touches all obstacles that the
+        surface belongs to: what is coplanar beside it is never in its way. A grasp has the fingers around
+        what is within :data:`GRASP_REACH` of its position, nearest to it, several where they meet there.
         """
         if contact.kind is not ContactKind.GRASP:
-            return self.supporting_surface(contact, tolerance).obstacle
-        name, distance = self.nearest(contact.position) if self.obstacles else ("", np.inf)
+            return self.supporting_surface(contact, tolerance).obstacles
+        near = self._distances(contact.position) if self.obstacles else [(np.inf, "")]
+        distance, name = near[0]
         if distance > GRASP_REACH:
             place = np.round(contact.position, 4).tolist()
             away = f"the nearest, {name!r}, is {distance * 1000:.1f} mm away"
@@ -142,7 +143,16 @@ class Scene(Displayed):
                 f"grasp '{contact.effector}' at {place} m holds on to nothing: {nearest}; "
                 f"valid: within {GRASP_REACH * 1000:g} mm of an obstacle"
             )
-        return name
+        return tuple(other for away, other in near if away <= distance + COPLANAR)
+
+    def _distances(self, point: ArrayLike) -> list[tuple[float, str]]:
+        """Signed distance [m] of a (3,) world point to each obstacle, and its name; the nearest first."""
+        place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
+        distances = [
+            (min(meter(place, other)[0] for meter, other in meters), name)
+            for name, meters in self._point_meters.items()
+        ]
+        return sorted(distances, key=lambda item: item[0])
 
     @cached_property
     def _point_meters(self) -> dict[str, list[tuple[Meter, coal.Transform3s]]]:
@@ -173,8 +183,9 @@ class Scene(Displayed):
         worst = float(height[np.argmax(np.abs(height))])
         side = "above" if worst >= 0 else "below"
         beside = f" and {over * 1000:.1f} mm beyond its edge" if over > tolerance else ""
+        names = " and ".join(nearest.obstacles)
         return (
-            f"{where} lies on no surface: the nearest, of '{nearest.obstacle}', has a contact point "
+            f"{where} lies on no surface: the nearest, of '{names}', has a contact point "
             f"{abs(worst) * 1000:.1f} mm {side} it{beside}; {remedy}"
         )
 

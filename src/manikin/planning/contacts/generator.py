@@ -70,7 +70,7 @@ class GeneratedContact:
 
     Attributes:
         q: (nq,) the body with this limb in contact and all else as asked, or None.
-        obstacle: Name of the obstacle touched, or None.
+        obstacles: Names of the obstacles touched; coplanar ones that touch are one surface.
         score: Score of the candidate; minus infinity without one.
         candidates: Number of samples in contact (Table 8.2).
         tried: How many of them were tried, or, without a contact, were found impossible.
@@ -83,7 +83,7 @@ class GeneratedContact:
     limb: str
     contact: Contact | None
     q: FloatArray | None
-    obstacle: str | None
+    obstacles: tuple[str, ...]
     score: float
     candidates: int
     tried: int
@@ -95,6 +95,11 @@ class GeneratedContact:
     def found(self) -> bool:
         """Whether there is a contact."""
         return self.contact is not None
+
+    @property
+    def obstacle(self) -> str | None:
+        """The obstacles in words, or None."""
+        return " and ".join(self.obstacles) or None
 
 
 class ContactGenerator:
@@ -183,7 +188,9 @@ class ContactGenerator:
             max_tilt=self.settings.max_tilt, footprint=footprint(self.body, tools.limb, touch, self.rules),
         )  # fmt: skip
         if not len(candidates):
-            names = ", ".join(sorted({self._table.surfaces[number].obstacle for number in near}))
+            names = ", ".join(
+                sorted({name for number in near for name in self._table.surfaces[number].obstacles})
+            )
             message = f"no sample of {limb} lies flat on a surface of {names}, though these are near"
             return [_failure(limb, Hindrance.SURFACE, message)]
         scores = (heuristic or Efort()).score(situation, candidates)
@@ -220,7 +227,7 @@ class ContactGenerator:
                 continue
             q[tools.chain.slots] = aligned.angles
             surface = int(candidates.surfaces[row])
-            hit = tools.collisions.first(q, self._table.surfaces[surface].obstacle)
+            hit = tools.collisions.first(q, self._table.surfaces[surface].obstacles)
             if hit is not None:
                 faults[hit] += 1
                 continue
@@ -232,7 +239,7 @@ class ContactGenerator:
                 self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
             )
             answers.append(GeneratedContact(
-                tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacle,
+                tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacles,
                 float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
             ))  # fmt: skip
             if len(answers) == most:
@@ -317,7 +324,7 @@ def _order(scores: FloatArray) -> NDArray[np.int64]:
 def _failure(
     limb: str, kind: Hindrance, message: str, candidates: int = 0, tried: int = 0
 ) -> GeneratedContact:
-    return GeneratedContact(limb, None, None, None, -np.inf, candidates, tried, kind, message)
+    return GeneratedContact(limb, None, None, (), -np.inf, candidates, tried, kind, message)
 
 
 def _none_fits(limb: str, faults: Counter[tuple[str, str]], candidates: int) -> GeneratedContact:

@@ -344,7 +344,7 @@ class LimbPlaces:
                     continue
                 contact = make_contact(self._body, limb, kind, spot, rotation, self._rules)
                 score = -float(np.linalg.norm(spot - wanted)) / (ROOM * self.reach)
-                item = GeneratedContact(limb.name, contact, q, surface.obstacle, score, 0, 0)
+                item = GeneratedContact(limb.name, contact, q, surface.obstacles, score, 0, 0)
                 offers.append((-score + (0.1 if turn else 0.0), item))
         return [item for cost, item in sorted(offers, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
 
