@@ -1,6 +1,7 @@
 """Samples of limbs and requests for contacts: `pytest benchmarks/bench_contact_planning.py`.
 
 Four scenes like those of Tonneau (2015), Table 8.1. A round asks for every limb at 20 places of the root.
+Then questions as of ``manikin contact`` about random bodies, scenes, limbs and directions.
 """
 
 import time
@@ -8,9 +9,11 @@ import time
 import numpy as np
 import pytest
 
-from manikin.body import human, insect, integrate
+from manikin.body import human, insect, integrate, with_knees_and_elbows
 from manikin.contact import ContactKind
+from manikin.numerics.spatial import rotation_from_rpy
 from manikin.planning.contacts import ContactGenerator, Task, sample_limb, sample_limbs
+from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
 from manikin.scene import Box, Obstacle, Scene
 
 PLACES = 20
@@ -96,3 +99,60 @@ def test_requests(benchmark, make, count):
     benchmark.extra_info["worst_ms"] = 1e3 * float(np.max(took))
     benchmark.extra_info["found"] = float(np.mean(found))
     benchmark.extra_info["candidates"] = float(np.mean(candidates))
+
+
+def random_body(rng):
+    """A person in six of eight draws, or an insect."""
+    kind = rng.integers(8)
+    if kind < 6:
+        stature = rng.uniform(1.5, 1.95)
+        mass = rng.uniform(19.0, 32.0) * stature**2
+        return with_knees_and_elbows(human(stature, mass, "male" if kind < 3 else "female"))
+    return insect(*((0.4, 2.0) if kind == 6 else (0.25, 0.6)))
+
+
+def random_scene(q, rng):
+    """Up to twelve boxes of any heading around the body, every fourth of them leaning, on the floor."""
+    size = float(q[2])
+    boxes = []
+    for number in range(rng.integers(1, 13)):
+        lean = rng.uniform(-0.5, 0.5, 2) if number % 4 == 3 else np.zeros(2)
+        turn = rotation_from_rpy(*lean, rng.uniform(-np.pi, np.pi))
+        away, angle = size * rng.uniform(0.3, 0.9), rng.uniform(-np.pi, np.pi)
+        place = [q[0] + away * np.cos(angle), q[1] + away * np.sin(angle), size * rng.uniform(0.0, 1.8)]
+        boxes.append(Obstacle(f"box{number}", Box(size * rng.uniform(0.05, 0.7, 3)), turn, place))
+    return Scene(boxes)
+
+
+def random_question(body, rng, count):
+    limb = body.limbs[rng.integers(len(body.limbs))].name
+    role = ("auto", "auto", "body", "object")[rng.integers(4)]
+    return ContactQuestion.of(
+        limb, tuple(rng.normal(size=3)), role=role, samples=count, seed=int(rng.integers(1000))
+    )
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_random_questions(benchmark, seed):
+    """Wall time of single questions, their average, worst and how they ended, is in ``extra_info`` [ms]."""
+    rng = np.random.default_rng(seed)
+    answers = []
+
+    def ask():
+        for _ in range(100):
+            body = random_body(rng)
+            q = body.standing_posture()
+            scene = random_scene(q, rng)
+            answers.append(find_contact(body, scene, q, random_question(body, rng, 10_000)))
+
+    benchmark.pedantic(ask, rounds=1)
+    took = [1e3 * item.wall_s for item in answers]
+    ends = [str(item.result.failure or "found") for item in answers]
+    benchmark.extra_info["average_ms"] = float(np.mean(took))
+    benchmark.extra_info["worst_ms"] = float(np.max(took))
+    benchmark.extra_info["ends"] = {name: ends.count(name) for name in sorted(set(ends))}
+    benchmark.extra_info["average_ms_by_end"] = {
+        name: float(np.mean([t for t, end in zip(took, ends, strict=True) if end == name]))
+        for name in sorted(set(ends))
+    }
+    assert all(item.efort >= item.usable for item in answers if item.result.found)

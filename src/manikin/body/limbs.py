@@ -232,6 +232,17 @@ def limb_hinges(body: BodyModel, limb: Limb) -> tuple[Hinge, ...]:
     return tuple(hinge for name in limb.segments for hinge in body.segment(name).hinges)
 
 
+def moving_segments(body: BodyModel, limb: Limb) -> set[str]:
+    """Segments of the limb and what hangs on them; of one on the trunk, the root alone."""
+    moving = set(limb.segments)
+    if body.segments[0].name in moving:
+        return moving
+    for segment in body.segments:
+        if segment.parent in moving:
+            moving.add(segment.name)
+    return moving
+
+
 def limb_slots(body: BodyModel, limb: Limb) -> np.ndarray:
     """(k,) places of the limb's hinges in the configuration vector ``q``."""
     return np.array([7 + body.joint_index(hinge.name) for hinge in limb_hinges(body, limb)], dtype=np.int64)

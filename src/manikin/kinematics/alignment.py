@@ -29,19 +29,20 @@ class AlignmentStep:
         normal: (3,) unit target of the effector's z axis, in.
         moved: (k,) angles after the step, out [rad].
         rotation: (9,) the effector's axes at ``q`` in the limb's frame one after the other, out.
+        product: (9,) ``J J^T`` of the effector's translation at ``q``, out [m^2].
     """
 
     def __init__(self, chain: LimbKinematics, *, level: bool) -> None:
         """Compile the step of one limb, which turns the effector to the normal too if it is to be level."""
         self.q, self.moved = np.zeros(len(chain)), np.zeros(len(chain))
         self.point, self.normal = np.zeros(3), np.zeros(3)
-        self.rotation = np.zeros(9)
+        self.rotation, self.product = np.zeros(9), np.zeros(9)
         self._missing = np.zeros(2)
         function = _step(chain, level=level)
         self._buffer, self._evaluate = cast(Any, function).buffer()
         for number, item in enumerate((self.q, self.point, self.normal)):
             self._buffer.set_arg(number, item.data)
-        for number, item in enumerate((self.moved, self._missing, self.rotation)):
+        for number, item in enumerate((self.moved, self._missing, self.rotation, self.product)):
             self._buffer.set_res(number, item.data)
         self._read = self._missing.data
 
@@ -58,14 +59,15 @@ def _step(chain: LimbKinematics, *, level: bool) -> ca.Function:
     tilt = _tilt(turn[:, 2], turn[:, 0], normal)
     none = ca.SX(3, 0)  # the columns of a limb without joints
     jacobian = ca.horzcat(none, *[ca.cross(a, place - h) for a, h in zip(axes, hinges, strict=True)])
-    missing = gap
+    missing, product = gap, jacobian @ jacobian.T
     if level:
         z = turn[:, 2]
         across = ca.horzcat(none, *[a - z * ca.dot(z, a) for a in axes])
         jacobian, missing = ca.vertcat(jacobian, LEVER * across), ca.vertcat(gap, LEVER * tilt)
     moved = _moved(chain, q, jacobian, missing)
     lengths = ca.vertcat(ca.sqrt(ca.sumsqr(gap)), ca.sqrt(ca.sumsqr(tilt)))
-    return ca.Function("step", [q, point, normal], [moved, lengths, ca.vec(turn)], {"cse": True})
+    outputs = [moved, lengths, ca.vec(turn), ca.densify(ca.vec(product))]
+    return ca.Function("step", [q, point, normal], outputs, {"cse": True})
 
 
 def _forward(chain: LimbKinematics, q: Any) -> tuple[Any, Any, list[Any], list[Any]]:
@@ -151,12 +153,14 @@ class Alignment:
         rotation: (3, 3) from the effector's axes to the limb frame's.
         error: Distance of the effector to its point [m].
         tilt: Angle between the effector's z axis and the normal [rad].
+        product: (3, 3) ``J J^T`` of the effector's translation in the limb's frame [m^2].
     """
 
     angles: FloatArray
     rotation: FloatArray
     error: float
     tilt: float
+    product: FloatArray
 
     def lies(self, max_tilt: float, max_error: float = POSITION_TOLERANCE) -> bool:
         """Whether the effector is at its point, to ``max_error`` [m] and upright, to ``max_tilt`` [rad]."""
@@ -206,4 +210,5 @@ def _descend(
         last = left
         step.q[:] = step.moved
         error, tilt = step()
-    return Alignment(step.q.copy(), step.rotation.reshape(3, 3).T.copy(), error, tilt)
+    turn, product = step.rotation.reshape(3, 3).T.copy(), step.product.reshape(3, 3).copy()
+    return Alignment(step.q.copy(), turn, error, tilt, product)

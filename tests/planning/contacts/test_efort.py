@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import spearmanr
 
+from manikin.body import human, limb_named, with_further_contacts
+from manikin.body.limbs import moving_segments
 from manikin.errors import InputError
 from manikin.kinematics import LimbKinematics
 from manikin.planning.contacts import (
@@ -20,8 +22,10 @@ from manikin.planning.contacts import (
     force_ellipsoid,
     force_transmission_ratio,
     pulling_efort,
+    sample_limb,
     velocity_ellipsoid,
 )
+from manikin.planning.contacts.efort import MOST_RATIO, usable_efort
 
 SEEDS = st.integers(0, 10_000)
 SCRIPT = Path(__file__).parents[3] / "docs/heuristics.py"
@@ -204,3 +208,26 @@ def test_efort_prefers_the_face_that_can_carry_the_force(person, person_samples,
     ]
     assert force[0] > force[2] > force[3] - 1e-9
     assert force[3] <= 1e-6
+
+
+@pytest.mark.parametrize("name", ["left_arm", "left_leg", "left_knee", "pelvis"])
+def test_a_contact_that_carries_its_limb_at_the_joints_strength_has_a_usable_efort(name):
+    """The force ``f v``, every joint within its own strength, times the cosine, against the weight."""
+    body = with_further_contacts(human(1.6, 60.0, "female"))
+    limb = limb_named(body, name)
+    samples = sample_limb(body, limb, np.random.default_rng(0), 2000)
+    if not samples.angles.shape[1]:
+        assert usable_efort(body, limb) == pytest.approx(
+            MOST_RATIO * body.segment(limb.segments[0]).mass / body.mass
+        )
+        return
+    chain, v = LimbKinematics(body, limb), np.array([0.6, 0.0, 0.8])
+    torque = np.einsum("nik,i->nk", chain.place(samples.angles).jacobians, v)
+    limit = np.where(torque > 0.0, -chain.torque_lower, chain.torque_upper)
+    force = np.min(limit / np.maximum(np.abs(torque), 1e-9), axis=1)
+    normals = np.random.default_rng(1).standard_normal((2000, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    weight = 9.81 * sum(body.segment(name).mass for name in moving_segments(body, limb))
+    alpha, carries = efort(samples.products, v, normals), force * (normals @ v) >= 1.01 * weight
+    assert carries.any()
+    assert (alpha[carries] >= usable_efort(body, limb)).all()

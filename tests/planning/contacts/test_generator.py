@@ -29,7 +29,8 @@ from manikin.planning.contacts import (
     find_candidates,
     sample_limbs,
 )
-from manikin.planning.contacts.generator import NATURAL_SLACK, _order
+from manikin.planning.contacts.efort import usable_efort
+from manikin.planning.contacts.generator import NATURAL_SLACK, UsableEfort, _order
 from manikin.planning.contacts.limb_collisions import TOUCH, DeepSamples, yielding
 from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
 from manikin.scenarios import load_scenario
@@ -109,6 +110,46 @@ def test_hands_that_push_go_to_the_wall_and_not_to_the_table(person, person_samp
     assert (pushing.obstacle, closest.obstacle) == ("wall", "table")
     rising = generator.request(q, "right_arm", UP)
     assert rising.obstacle == "table"
+
+
+def test_no_answer_has_less_than_the_usable_efort(person):
+    """Who sits before a backrest and looks for help upwards gets none from its upright face.
+
+    Random directions, heuristics and limbs on a chair: what is found is usable, or the best is said.
+    """
+    chair = [SEAT, Obstacle("back", Box((0.05, 0.5, 0.5)), translation=(-0.3, 0.0, 0.7))]
+    scene, q, rng = Scene(chair), sitting(person), np.random.default_rng(4)
+    asked = [ContactQuestion.of("left_arm", (0.0, 0.0, 1.0), role="body", samples=2000)]
+    asked += [
+        ContactQuestion.of(
+            person.limbs[rng.integers(6)].name, tuple(rng.normal(size=3)),
+            heuristic=("efort", "distance", "random")[number % 3], samples=500, seed=number,
+        )
+        for number in range(18)
+    ]  # fmt: skip
+    causes = set()
+    for question in asked:
+        answer = find_contact(person, scene, q, question)
+        assert answer.usable == usable_efort(person, limb_named(person, question.limb)) > 0.1
+        if answer.result.found:
+            assert answer.efort >= answer.usable
+        causes.add(answer.result.failure)
+        if answer.result.failure is Hindrance.DIRECTION:
+            assert "the best EFORT is" in answer.result.message
+            assert f"usable {answer.usable:.2g}" in answer.result.message
+    assert causes >= {None, Hindrance.DIRECTION}
+
+
+def test_a_nearer_surface_that_does_not_push_is_no_answer(person, person_samples):
+    """By the closest distance alone a pushing hand goes to the table under it, which pushes it up."""
+    table = Obstacle("table", Box((0.4, 3.0, 0.05)), translation=(0.3, 0.0, 0.85))
+    generator = ContactGenerator(person, Scene([*wall_scene().obstacles[1:], table]), person_samples)
+    usable = UsableEfort(usable_efort(person, limb_named(person, "right_arm")))
+    asked = person.standing_posture(), "right_arm", PUSH, ClosestDistance()
+    assert generator.request(*asked).obstacle == "table"
+    answer = generator.request(*asked, usable=usable)
+    assert answer.obstacle == "wall"
+    assert answer.efort >= usable.least
 
 
 def test_without_its_own_direction_a_pushing_hand_would_score_negative(person, at_wall):
@@ -497,7 +538,7 @@ def test_leaving_deep_samples_out_changes_no_answer(person, person_samples, monk
 
 
 @pytest.mark.parametrize(
-    ("name", "limb", "task"), [("climb-wall", "left_arm", UP), ("stairs", "right_leg", PUSH)]
+    ("name", "limb", "task"), [("climb-wall", "left_arm", UP), ("stairs", "right_leg", UP)]
 )
 @pytest.mark.parametrize("heuristic", ["efort", "distance", "random"])
 def test_the_answer_for_a_moved_scenario_is_the_moved_answer(name, limb, task, heuristic):

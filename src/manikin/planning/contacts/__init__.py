@@ -48,6 +48,7 @@ from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPosture, TrunkPostures
 
 __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
@@ -55,7 +56,8 @@ __all__ = [
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "GuideLine", "Habit", "Heuristic",
     "Hindrance", "LimbCollisions", "LimbExtendSettings", "LimbPlaces", "LimbSamples", "Manipulability",
     "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage",
-    "StrongEfort", "SurfaceTable", "Task", "WeightedSum", "certify_plan", "duration", "efort",
+    "StrongEfort", "SurfaceTable", "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures", "WeightedSum",
+    "certify_plan", "duration", "efort",
     "find_candidates", "follow_guide", "follow_guide_with_limbs", "force_ellipsoid",
     "force_transmission_ratio", "heading_of", "manipulability", "mirrored", "pulling_efort", "sample_limb",
     "sample_limbs", "starts_on_limbs", "velocity_ellipsoid",

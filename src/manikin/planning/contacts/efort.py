@@ -10,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from manikin.body import BodyModel, Limb
+from manikin.body.limbs import limb_hinges, moving_segments
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
 
 MOST_RATIO = 1e6
 """Ratio at which EFORT takes a limb that needs no torque, which has an infinite one [N per N.m]."""
@@ -94,6 +96,28 @@ def efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> Fl
 def pulling_efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:
     """EFORT of what holds on to a surface and pulls at it: ``-alpha`` (5.13), (n,)."""
     return -efort(products, direction, normals)
+
+
+def usable_efort(body: BodyModel, limb: Limb) -> float:
+    """Least EFORT of a contact that is of use: where the limb, at all its strength, carries its own weight.
+
+    EFORT is the force along the task per norm of the joint torques, and the torques of a limb have at most
+    the norm ``T`` of its joints' strengths, so that ``alpha T`` bounds the force along the task.  Where that
+    is less than the weight ``m g`` of the limb and what hangs on it, the contact takes nothing off the
+    rest of the body: ``alpha < m g / T``.  Our own derivation; the thesis takes any contact.
+
+    For a limb without joints the body's whole weight ``M g`` on the surface takes the place of the torques:
+    ``v . n < m / M``, at the ratio :data:`MOST_RATIO`.
+
+    Returns:
+        [N per N.m], > 0.
+    """
+    weight = GRAVITY * sum(body.segment(name).mass for name in moving_segments(body, limb))
+    hinges = limb_hinges(body, limb)
+    if not hinges:
+        return MOST_RATIO * weight / (GRAVITY * body.mass)
+    strengths = [max(-hinge.torque_lower, hinge.torque_upper) for hinge in hinges]
+    return weight / float(np.linalg.norm(strengths))
 
 
 @dataclass(frozen=True, eq=False)

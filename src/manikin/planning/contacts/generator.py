@@ -1,8 +1,8 @@
 """The request for one contact: reach, samples in contact, order, choice ([Tonneau2015]_ 5.3.2)."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -17,7 +17,7 @@ from manikin.kinematics.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Ali
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.candidates import Candidates, Situation, SurfaceTable, find_candidates
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
-from manikin.planning.contacts.efort import Task
+from manikin.planning.contacts.efort import Task, efort
 from manikin.planning.contacts.heuristics import Efort, Heuristic
 from manikin.planning.contacts.limb_collisions import DeepSamples, LimbCollisions
 from manikin.planning.contacts.samples import LimbSamples
@@ -27,8 +27,9 @@ _GROWTH = 0.15
 """How much longer each step down the order is than the one before."""
 _STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
 _FEW, _SOME, _BLOCK = 4, 16, 64  # candidates looked at together: first, later, and where many collide
+_NO_DIRECTION = np.zeros(3)
 _LOOKED_AT = 8  # candidates for each that may be tried
-_TILTED, _UNNATURAL = ("", "tilted"), ("", "unnatural")
+_TILTED, _UNNATURAL, _WEAK = ("", "tilted"), ("", "unnatural"), ("", "weak")
 NATURAL_SLACK = 0.1
 """Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
 
@@ -44,6 +45,25 @@ class Hindrance(StrEnum):
     """Every contact that was tried collides."""
     ALIGNMENT = "alignment"
     """No effector that was tried can be put flat onto its surface."""
+    DIRECTION = "direction"
+    """Surfaces are within reach, but none has a usable EFORT in the direction that is asked for."""
+
+
+@dataclass(frozen=True)
+class UsableEfort:
+    """EFORT that an answer has at least, whatever the heuristic prefers.
+
+    Attributes:
+        least: See :func:`manikin.planning.contacts.efort.usable_efort` [N per N.m].
+        pulling: Whether the limb holds on and pulls at the surface (5.13).
+    """
+
+    least: float
+    pulling: bool = False
+
+    def signed(self, alpha: float) -> float:
+        """EFORT of what the limb does, from that of a limb that presses."""
+        return -alpha if self.pulling else alpha
 
 
 @dataclass(frozen=True)
@@ -78,6 +98,7 @@ class GeneratedContact:
         message: The failure in words, or an empty text.
         gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it, at most the
             settings' tolerance for a limb without joints, which touches where the root puts it.
+        efort: EFORT (5.12) of the posture ``q`` as of a limb that presses, None without one [N per N.m].
     """
 
     limb: str
@@ -90,6 +111,7 @@ class GeneratedContact:
     failure: Hindrance | None = None
     message: str = ""
     gap: float = 0.0
+    efort: float | None = None
 
     @property
     def found(self) -> bool:
@@ -136,14 +158,9 @@ class ContactGenerator:
         }
 
     def request(
-        self,
-        q: ArrayLike,
-        limb: str,
-        task: Task,
-        heuristic: Heuristic | None = None,
-        *,
-        kind: ContactKind | None = None,
-    ) -> GeneratedContact:
+        self, q: ArrayLike, limb: str, task: Task, heuristic: Heuristic | None = None, *,
+        kind: ContactKind | None = None, usable: UsableEfort | None = None,
+    ) -> GeneratedContact:  # fmt: skip
         """Find the best contact of one limb ([Tonneau2015]_ algorithm 2).
 
         Each candidate is aligned with its surface and then tested for collision: the print tests before
@@ -156,12 +173,31 @@ class ContactGenerator:
             q: (nq,) the body; all but the limb stays as it is.
             heuristic: What to prefer; EFORT when omitted.
             kind: How the effector touches; the limb's own way when omitted.
+            usable: EFORT that the answer has at least, at its sample and in its posture; any when omitted.
 
         Raises:
             BodyError: If there are no samples of such a limb or ``q`` does not fit.
             ContactError: If a sole is asked for of a body without soles.
         """
-        return self.request_several(q, limb, task, heuristic, kind=kind)[0]
+        return self.request_first(q, limb, [task], heuristic, kind=kind, usable=usable)[0]
+
+    def request_first(
+        self, q: ArrayLike, limb: str, tasks: Sequence[Task], heuristic: Heuristic | None = None, *,
+        kind: ContactKind | None = None, usable: UsableEfort | None = None,
+    ) -> list[GeneratedContact]:  # fmt: skip
+        """Answers of one limb to tasks in the order of preference, up to the first that has a contact.
+
+        The samples in contact are looked up once. Other arguments and errors are those of :meth:`request`.
+        """
+        near = self._samples_in_contact(q, limb, kind)
+        if isinstance(near, GeneratedContact):
+            return [near]
+        answers: list[GeneratedContact] = []
+        for task in tasks:
+            answers += self._choose(near, task, heuristic or Efort(), usable)
+            if answers[-1].found:
+                break
+        return answers
 
     def request_several(
         self, q: ArrayLike, limb: str, task: Task, heuristic: Heuristic | None = None, *,
@@ -175,41 +211,63 @@ class ContactGenerator:
             most: Largest number of contacts.
             apart: Distance between two of them [m].
         """
+        near = self._samples_in_contact(q, limb, kind)
+        if isinstance(near, GeneratedContact):
+            return [near]
+        return self._choose(near, task, heuristic or Efort(), None, most, apart)
+
+    def _samples_in_contact(
+        self, q: ArrayLike, limb: str, kind: ContactKind | None
+    ) -> "_SamplesInContact | GeneratedContact":
+        """Steps 1 and 2: the limb's samples on surfaces, whatever the task, or why there are none."""
         if limb not in self._tools:
             raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
         tools = self._tools[limb]
         touch = kind or tools.limb.kind
-        situation = Situation.of(self._state.update(q), tools.limb, task.reaction_on(limb))
+        situation = Situation.of(self._state.update(q), tools.limb, _NO_DIRECTION)
         near = self._table.within_reach(situation, tools.samples, self.settings.tolerance)
         if not len(near):
-            return [_failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")]
+            return _failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")
+        sole = footprint(self.body, tools.limb, touch, self.rules)
         candidates = find_candidates(
             self._table, near, situation, tools.samples, tolerance=self.settings.tolerance,
-            max_tilt=self.settings.max_tilt, footprint=footprint(self.body, tools.limb, touch, self.rules),
+            max_tilt=self.settings.max_tilt, footprint=sole,
         )  # fmt: skip
         if not len(candidates):
-            names = ", ".join(
-                sorted({name for number in near for name in self._table.surfaces[number].obstacles})
+            message = (
+                f"no sample of {limb} lies flat on a surface of {self._names(near)}, though these are near"
             )
-            message = f"no sample of {limb} lies flat on a surface of {names}, though these are near"
-            return [_failure(limb, Hindrance.SURFACE, message)]
-        scores = (heuristic or Efort()).score(situation, candidates)
-        return self._choose(tools, situation, candidates, scores, touch, most, apart)
+            return _failure(limb, Hindrance.SURFACE, message)
+        return _SamplesInContact(tools, situation, candidates, touch, sole)
+
+    def _names(self, surfaces: NDArray[np.int64]) -> str:
+        """Names of the obstacles of some surfaces."""
+        near = (self._table.surfaces[number] for number in np.unique(surfaces))
+        return ", ".join(sorted({name for surface in near for name in surface.obstacles}))
 
     def _choose(
-        self, tools: "_LimbTools", situation: Situation, candidates: Candidates, scores: FloatArray,
-        kind: ContactKind, most: int, apart: float,
+        self, near: "_SamplesInContact", task: Task, heuristic: Heuristic, usable: UsableEfort | None,
+        most: int = 1, apart: float = 0.0,
     ) -> list[GeneratedContact]:  # fmt: skip
-        """Steps 3 and 4: best first, the first that can be aligned and are free."""
+        """Steps 3 and 4: best first, the first that can be aligned, are usable and free."""
+        tools, candidates, kind = near.tools, near.candidates, near.kind
+        situation = replace(near.situation, reaction=task.reaction_on(tools.limb.name))
+        rows = np.arange(len(candidates))
+        if usable is not None:
+            values = Efort(usable.pulling).score(situation, candidates)
+            rows = np.flatnonzero(values >= usable.least)
+            if not len(rows):
+                return [self._wrong_direction(near, float(values.max()), usable)]
+        scores = heuristic.score(situation, candidates)
         answers: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()
         flat = kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
-        sole = footprint(self.body, tools.limb, kind, self.rules)
         tools.collisions.begin(situation)
         q = np.array(situation.state.q)
+        direction = situation.reaction @ situation.rotation
         tried = 0
-        order = _order(scores)[: _LOOKED_AT * self.settings.tries]
+        order = rows[_order(scores[rows])[: _LOOKED_AT * self.settings.tries]]
         for row, goal in self._worth_trying(tools, situation, candidates, order, faults):
             if tried == self.settings.tries:
                 break
@@ -232,8 +290,12 @@ class ContactGenerator:
                 faults[hit] += 1
                 continue
             turn = situation.rotation @ aligned.rotation
-            if flat and not self._table.carries_one(point + sole @ turn.T, surface):
+            if flat and not self._table.carries_one(point + near.footprint @ turn.T, surface):
                 faults[_TILTED] += 1
+                continue
+            alpha = float(efort(aligned.product[None], direction, goal[2][None])[0])
+            if usable is not None and usable.signed(alpha) < usable.least:
+                faults[_WEAK] += 1
                 continue
             contact = make_contact(
                 self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
@@ -241,10 +303,23 @@ class ContactGenerator:
             answers.append(GeneratedContact(
                 tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacles,
                 float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
+                efort=alpha,
             ))  # fmt: skip
             if len(answers) == most:
                 break
-        return answers or [_none_fits(tools.limb.name, faults, len(candidates))]
+        return answers or [_none_fits(tools.limb.name, faults, len(candidates), usable)]
+
+    def _wrong_direction(
+        self, near: "_SamplesInContact", best: float, usable: UsableEfort
+    ) -> GeneratedContact:
+        """Failure of a limb that reaches surfaces of which none pushes it, or holds it, the asked way."""
+        does = "holds" if usable.pulling else "pushes"
+        limb, candidates = near.tools.limb.name, near.candidates
+        message = (
+            f"no surface in reach of {limb} ({self._names(candidates.surfaces)}) {does} it that way: "
+            f"the best EFORT is {best:.2g} N per N.m, usable {usable.least:.2g}"
+        )
+        return _failure(limb, Hindrance.DIRECTION, message, len(candidates))
 
     def _worth_trying(
         self,
@@ -271,6 +346,17 @@ class ContactGenerator:
             goals = tools.goals(situation, candidates, rows)
             yield from zip(rows.tolist(), zip(*goals, strict=True), strict=True)
             size = max(size, _SOME)
+
+
+@dataclass(frozen=True, eq=False)
+class _SamplesInContact:
+    """Samples of a limb on surfaces, before a task orders them; the situation has no direction yet."""
+
+    tools: "_LimbTools"
+    situation: Situation
+    candidates: Candidates
+    kind: ContactKind
+    footprint: FloatArray
 
 
 class _LimbTools:
@@ -327,16 +413,24 @@ def _failure(
     return GeneratedContact(limb, None, None, (), -np.inf, candidates, tried, kind, message)
 
 
-def _none_fits(limb: str, faults: Counter[tuple[str, str]], candidates: int) -> GeneratedContact:
+def _none_fits(
+    limb: str, faults: Counter[tuple[str, str]], candidates: int, usable: UsableEfort | None
+) -> GeneratedContact:
     tried = sum(faults.values())
-    tilted, unnatural = faults.pop(_TILTED, 0), faults.pop(_UNNATURAL, 0)
+    tilted, unnatural, weak = (faults.pop(kind, 0) for kind in (_TILTED, _UNNATURAL, _WEAK))
     collided = sum(faults.values())
-    kind = Hindrance.COLLISION if collided > tilted else Hindrance.ALIGNMENT
+    counts = {
+        Hindrance.ALIGNMENT: tilted + unnatural, Hindrance.COLLISION: collided, Hindrance.DIRECTION: weak
+    }  # fmt: skip
+    kind = max(counts, key=lambda item: counts[item])
     what = [f"{tilted} cannot lie flat on the surface"] if tilted else []
     if unnatural:
         what.append(f"{unnatural} are beyond the range of motion")
+    if weak:
+        what.append(f"{weak} have too little EFORT in their posture")
     if collided:
         (shape, other), count = faults.most_common(1)[0]
         what.append(f"{collided} collide, {count} by {shape} in {other}")
-    message = f"none of {tried} contacts of {limb} out of {candidates} is possible: {', '.join(what)}"
+    which = "" if usable is None else f" with an EFORT of {usable.least:.2g} N per N.m or more"
+    message = f"none of {tried} contacts of {limb}{which} out of {candidates} is possible: {', '.join(what)}"
     return _failure(limb, kind, message, candidates, tried)

@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Limb, Shape, ShapeKind
+from manikin.body.limbs import moving_segments
 from manikin.contact import ContactKind
 from manikin.kinematics import LimbKinematics
 from manikin.numerics.spatial import FloatArray
@@ -53,7 +54,7 @@ class LimbCollisions:
         self._data = self._model.createData()
         parts = [part for obstacle in scene for part in collision_parts(obstacle)]
         self._shapes = _with_scene(body, parts)
-        moving = _moving_segments(body, limb)
+        moving = moving_segments(body, limb)
         count = len(body.geometry.geometryObjects)
         names = [item.name for item in self._shapes.geometryObjects]
         own = [number for number, name in enumerate(names[:count]) if segment_of(name) in moving]
@@ -203,17 +204,6 @@ def _radius(item: pin.GeometryObject) -> float:
     item.geometry.computeLocalAABB()
     box = item.geometry.aabb_local
     return float(np.linalg.norm(np.maximum(np.abs(box.min_), np.abs(box.max_))))
-
-
-def _moving_segments(body: BodyModel, limb: Limb) -> set[str]:
-    """Segments of the limb and what hangs on them; of one on the trunk, the root alone."""
-    moving = set(limb.segments)
-    if body.segments[0].name in moving:
-        return moving
-    for segment in body.segments:
-        if segment.parent in moving:
-            moving.add(segment.name)
-    return moving
 
 
 def yielding(body: BodyModel, limb: Limb) -> tuple[tuple[str, ...], float]:

@@ -62,6 +62,11 @@ class LimbSamples:
         return np.ascontiguousarray(self.rotations[:, :, 2])
 
     @cached_property
+    def leaves(self) -> "SampleLeaves":
+        """The samples in small groups that are near each other, for the look-up of those at a surface."""
+        return SampleLeaves.of(self.positions, self.upward)
+
+    @cached_property
     def hull(self) -> tuple[FloatArray, float]:
         """Corners (h, 3) of the reach in the limb's frame, and the largest distance of one [m]."""
         corners = self.reach.vertices - self.origin
@@ -73,6 +78,61 @@ class LimbSamples:
         if not self.angles.shape[1]:
             return rigid_reach(self.limb, self.segment, self.positions[0] + self.origin, self.rotations[0])
         return hull_of(self.limb, self.segment, self.positions + self.origin)
+
+
+_LEAF = 16
+"""Largest number of samples in a leaf."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampleLeaves:
+    """Samples in l groups of k that are alike in position and direction, the ends of a k-d tree.
+
+    Attributes:
+        rows: (l, k) rows of the samples; -1 where a group has fewer.
+        positions: (l, k, 3) of the effector [m]; NaN where there is none.
+        upward: (l, k, 3) its z axes.
+        centres: (l, 3) middle of the box about the positions [m].
+        radii: (l,) of a ball about it that holds them [m].
+        axes: (l, 3) unit direction in the middle of the z axes.
+        spreads: (l,) largest angle of a z axis to it [rad].
+    """
+
+    rows: NDArray[np.int64]
+    positions: FloatArray
+    upward: FloatArray
+    centres: FloatArray
+    radii: FloatArray
+    axes: FloatArray
+    spreads: FloatArray
+
+    @staticmethod
+    def of(positions: FloatArray, upward: FloatArray) -> "SampleLeaves":
+        """Halve the samples again and again across the widest of the six coordinates."""
+        radius = 0.5 * float(np.ptp(positions, axis=0).max(initial=0.0))
+        features = np.concatenate([positions, radius * upward], axis=1)
+        levels = max(0, int(np.ceil(np.log2(len(positions) / _LEAF))))
+        size = int(np.ceil(len(positions) / 2**levels)) * 2**levels
+        rows = np.full(size, -1, dtype=np.int64)
+        rows[: len(positions)] = np.arange(len(positions))
+        rows = rows[None]
+        for _ in range(levels):
+            values = np.where(rows[..., None] >= 0, features[rows], np.nan)
+            widest = np.argmax(np.nanmax(values, axis=1) - np.nanmin(values, axis=1), axis=1)
+            along = np.take_along_axis(values, widest[:, None, None], axis=2)[..., 0]
+            order = np.argsort(along, axis=1, kind="stable")  # what is missing comes last
+            rows = np.take_along_axis(rows, order, axis=1).reshape(2 * len(rows), -1)
+        missing = (rows < 0)[..., None]
+        places = np.where(missing, np.nan, positions[rows])
+        directions = np.where(missing, np.nan, upward[rows])
+        centres = 0.5 * (np.nanmin(places, axis=1) + np.nanmax(places, axis=1))
+        radii = np.sqrt(np.nanmax(((places - centres[:, None]) ** 2).sum(axis=2), axis=1))
+        axes = np.nanmean(directions, axis=1)
+        axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-12)
+        cosines = np.nanmin(np.einsum("lki,li->lk", directions, axes), axis=1)
+        return SampleLeaves(
+            rows, places, directions, centres, radii, axes, np.arccos(np.clip(cosines, -1.0, 1.0))
+        )
 
 
 def manipulability(products: FloatArray) -> FloatArray:

@@ -2,39 +2,49 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.body import BodyModel, Configuration, Limb, limb_named
-from manikin.body.limbs import parent_segment
+from manikin.body import BodyModel, Limb, limb_named
 from manikin.contact import ContactKind
 from manikin.errors import BodyError, InputError
-from manikin.kinematics import LimbKinematics
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts.contact_plan import ContactRules
-from manikin.planning.contacts.efort import Task, efort, unit_direction
-from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact
+from manikin.planning.contacts.efort import Task, unit_direction, usable_efort
+from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact, Hindrance, UsableEfort
 from manikin.planning.contacts.heuristics import Heuristic, heuristic_named
 from manikin.planning.contacts.samples import sample_limb, sample_limbs
 from manikin.scene import Scene
-
-SOME_EFORT = 1e-9
-"""What is less comes from rounding, as on a face along the task [N per N.m]."""
 
 
 class Role(StrEnum):
     """Use that a limb makes of its contact; it decides the sign of EFORT's direction."""
 
     AUTO = "auto"
-    """The body where some contact scores above zero that way, else the object; feet: the body."""
+    """The body where some contact is usable that way, else the object; feet: the body."""
     BODY = "body"
     """Moves or braces the body along the task."""
     OBJECT = "object"
     """Pushes an object along the task."""
+
+    @property
+    def infinitive(self) -> str:
+        """What is done, in words."""
+        return "to move the body" if self is Role.BODY else "to act on an object"
+
+
+_FARTHEST = (
+    Hindrance.REACH,
+    Hindrance.SURFACE,
+    Hindrance.DIRECTION,
+    Hindrance.ALIGNMENT,
+    Hindrance.COLLISION,
+)
+"""How far a request came before it failed."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +91,9 @@ class ContactAnswer:
     Attributes:
         q: (nq,) the body before.
         role: The role that was taken, never ``auto``.
-        efort: EFORT of the posture found, with the sign of that role [N per N.m]; None without one.
+        efort: EFORT of the posture found, with the sign of that role, usable or more [N per N.m]; None
+            without one.
+        usable: See :func:`manikin.planning.contacts.efort.usable_efort` [N per N.m].
         prepare_wall_s: Wall time of the samples, the scene's preparation and a first request [s].
         wall_s: Wall time of the request, made again [s].
     """
@@ -91,6 +103,7 @@ class ContactAnswer:
     result: GeneratedContact
     role: Role
     efort: float | None
+    usable: float
     prepare_wall_s: float
     wall_s: float
 
@@ -103,6 +116,7 @@ class ContactAnswer:
             "normal": None if contact is None else contact.normal,
             "obstacle": result.obstacle,
             "efort": self.efort,
+            "usable_efort": self.usable,
             "candidates": result.candidates,
             "wall_ms": 1e3 * self.wall_s,
             "failure": None if result.found else result.message,
@@ -141,11 +155,13 @@ def find_contact(
     started = time.perf_counter()
     samples = sample_limb(body, limb, np.random.default_rng(question.seed), question.samples)
     generator = ContactGenerator(body, scene, {limb.name: samples}, rules=rules)
-    asked = generator, q, limb, question.task, question.role, heuristic, kind, question.pulling
-    _ask(*asked)  # as in a dialogue, where caches are filled
+    usable = UsableEfort(usable_efort(body, limb), question.pulling)
+    asked = _Asked(limb, question.task, question.role, heuristic, kind, usable)
+    asked.of(generator, q)  # as in a dialogue, where caches are filled
     prepared = time.perf_counter()
-    role, result, score, wall = _ask(*asked)
-    return ContactAnswer(question, np.array(q), result, role, score, prepared - started, wall)
+    role, result, value = asked.of(generator, q)
+    wall = time.perf_counter() - prepared
+    return ContactAnswer(question, np.array(q), result, role, value, usable.least, prepared - started, wall)
 
 
 def check_limbs(body: BodyModel) -> None:
@@ -154,38 +170,39 @@ def check_limbs(body: BodyModel) -> None:
         raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
 
 
-def _ask(
-    generator: ContactGenerator, q: FloatArray, limb: Limb, direction: ArrayLike, role: Role,
-    heuristic: Heuristic, kind: ContactKind | None, pulling: bool,
-) -> tuple[Role, GeneratedContact, float | None, float]:  # fmt: skip
-    """Role, answer and EFORT of the best role, asked until one is positive; wall time of the requests [s]."""
-    roles = (Role.BODY,) if limb.kind is ContactKind.SOLE else (Role.BODY, Role.OBJECT)
-    answers: list[tuple[Role, GeneratedContact, float | None]] = []
-    wall = 0.0
-    for tried in roles if role is Role.AUTO else (role,):
-        task = Task(direction, {limb.name} if tried is Role.OBJECT else ())
-        started = time.perf_counter()
-        result = generator.request(q, limb.name, task, heuristic, kind=kind)
-        wall += time.perf_counter() - started
-        answers.append((tried, result, reached_efort(generator.body, result, task, pulling=pulling)))
-        if (answers[-1][2] or 0.0) > SOME_EFORT:
-            break
-    return *max(answers, key=lambda item: -np.inf if item[2] is None else item[2]), wall
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What one limb is asked for."""
+
+    limb: Limb
+    direction: ArrayLike
+    role: Role
+    heuristic: Heuristic
+    kind: ContactKind | None
+    usable: UsableEfort
+
+    def of(self, generator: ContactGenerator, q: FloatArray) -> tuple[Role, GeneratedContact, float | None]:
+        """First role with a usable contact, the answer, and its EFORT with the sign of the role [N per N.m].
+
+        A failure in both roles says both causes; the hindrance is that of the role that came farthest.
+        """
+        both = self.role is Role.AUTO and self.limb.kind is not ContactKind.SOLE
+        one = Role.BODY if self.role is Role.AUTO else self.role
+        roles = (Role.BODY, Role.OBJECT) if both else (one,)
+        name = self.limb.name
+        tasks = [Task(self.direction, {name} if role is Role.OBJECT else ()) for role in roles]
+        answers = generator.request_first(q, name, tasks, self.heuristic, kind=self.kind, usable=self.usable)
+        result = answers[-1]
+        if result.efort is not None:
+            return roles[len(answers) - 1], result, self.usable.signed(result.efort)
+        farthest = max(range(len(answers)), key=lambda row: _progress(answers[row]))
+        causes = [f"{role.infinitive}, {item.message}" for role, item in zip(roles, answers, strict=False)]
+        message = "; ".join(causes) if len(answers) > 1 else result.message
+        return roles[farthest], replace(answers[farthest], message=message), None
 
 
-def reached_efort(
-    body: BodyModel, result: GeneratedContact, task: Task, *, pulling: bool = False
-) -> float | None:
-    """EFORT (5.12) of the posture of a contact that was found, or None without one [N per N.m]."""
-    if result.q is None or result.contact is None:
-        return None
-    limb = limb_named(body, result.limb)
-    chain = LimbKinematics(body, limb)
-    jacobian = chain.place(result.q[None, chain.slots]).jacobians[0]
-    turn, _ = Configuration(body, result.q).segment_placement(parent_segment(body, limb))
-    direction, normal = task.reaction_on(limb.name) @ turn, result.contact.normal @ turn
-    value = float(efort((jacobian @ jacobian.T)[None], direction, normal[None])[0])
-    return -value if pulling else value
+def _progress(failed: GeneratedContact) -> int:
+    return _FARTHEST.index(failed.failure or Hindrance.COLLISION)
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,12 +283,11 @@ class LiveContacts:
         kind = ContactKind.GRASP if self.pulling else None
         q, answers, efforts = np.array(self.q), {}, {}
         for name in self.limbs:
-            limb, asked = (
-                limb_named(self.body, name),
-                (self.direction, self.role, heuristic, kind, self.pulling),
-            )
-            _, answers[name], effort, _ = _ask(self._generator, q, limb, *asked)
-            efforts |= {} if effort is None else {name: effort}
+            limb = limb_named(self.body, name)
+            usable = UsableEfort(usable_efort(self.body, limb), self.pulling)
+            asked = _Asked(limb, self.direction, self.role, heuristic, kind, usable)
+            _, answers[name], value = asked.of(self._generator, q)
+            efforts |= {} if value is None else {name: value}
             reached = answers[name].q
             q = q if reached is None else np.array(reached)
         return LiveAnswer(q, answers, efforts, time.perf_counter() - started)

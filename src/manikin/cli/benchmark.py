@@ -1,0 +1,75 @@
+"""``manikin benchmark``: how many random everyday scenes are planned and proved, and how fast."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from manikin.cli.console import DONE, JobsOption, JsonOption, OutOption, bars, directory_of, print_json
+from manikin.errors import InputError
+
+
+def benchmark(
+    context: typer.Context,
+    families: Annotated[
+        str, typer.Option(metavar="all|A,B", help="Families of scenes; --list shows them.")
+    ] = "all",
+    seeds: Annotated[int, typer.Option(metavar="N", min=1, max=100_000, help="Scenes of each.")] = 5,
+    first_seed: Annotated[int, typer.Option(metavar="N", min=0, help="Number of the first scene.")] = 0,
+    stage: Annotated[
+        str, typer.Option(metavar="contacts|all", help="Contacts alone, or whole runs.")
+    ] = "contacts",
+    jobs: JobsOption = None,
+    time_limit: Annotated[
+        float, typer.Option(metavar="S", min=1.0, help="Processor time after which a task is ended [s].")
+    ] = 600.0,
+    out: OutOption = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Do tasks again that the directory has already.")
+    ] = False,
+    write_scenes: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Only write the scenes as scenario files there.")
+    ] = None,
+    list_families: Annotated[bool, typer.Option("--list", help="Only list the families.")] = False,
+    json: JsonOption = False,
+) -> int:
+    """Plan families of random everyday scenes, and count what is found, planned and proved."""
+    from manikin.pipeline import benchmark as tasks
+    from manikin.scenarios.families import FAMILIES, chosen_families
+
+    chosen = chosen_families(families)
+    numbers = range(first_seed, first_seed + seeds)
+    if stage not in tasks.STAGES:
+        raise InputError(f"--stage is {stage!r}; valid: {', '.join(tasks.STAGES)}")
+    if list_families:
+        descriptions = {name: family.description for name, family in FAMILIES.items()}
+        if json:
+            print_json({"families": descriptions})
+        else:
+            width = max(map(len, descriptions))
+            typer.echo("\n".join(f"{name:{width}}  {text}" for name, text in descriptions.items()))
+        return DONE
+    if write_scenes is not None:
+        tasks.write_scenes(chosen, numbers, write_scenes)
+        typer.echo(f"{len(chosen) * seeds} scenes in {write_scenes}", err=True)
+        return DONE
+    directory = directory_of(out, "benchmark", json=json)
+    with bars(context.obj) as progress:
+
+        def report(entry: Mapping[str, Any], done: int, count: int) -> None:
+            progress("benchmark", done / count, f"{done} of {count}, {entry['family']}-{entry['seed']}")
+
+        result = tasks.run_benchmark(
+            chosen, numbers, stage=cast("tasks.StageName", stage), path=directory, jobs=jobs,
+            time_limit=time_limit, fresh=fresh, report=report,
+        )  # fmt: skip
+    from manikin.reports.benchmark_tables import failure_lines, text_table
+
+    if json:
+        print_json(result)
+        return DONE
+    typer.echo(text_table(result))
+    for line in failure_lines(result):
+        typer.echo(line)
+    return DONE

@@ -1,0 +1,58 @@
+"""Results of a benchmark in words: one row for each family, and every failure with its reason."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from manikin.reports.summary_table import NOTHING, number
+
+HEADER = (
+    "family", "tasks", "contacts", "certified", "planned", "proved", "contacts [s]: median", "95 %",
+    "motion [s]", "computing / motion", "failures by stage",
+)  # fmt: skip
+"""Columns of the table; times are processor time, of motions the median."""
+
+
+def family_rows(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """One row of texts for each family under :data:`HEADER`, all of them together last.
+
+    Args:
+        result: As :func:`manikin.pipeline.benchmark.run_benchmark` returns it.
+    """
+    rows = [*result["families"].items(), ("all", result["total"])]
+    return [_row(name, counts, whole=result["stage"] == "all") for name, counts in rows]
+
+
+def _row(name: str, counts: Mapping[str, Any], *, whole: bool) -> tuple[str, ...]:
+    seconds = counts["contacts_s"]
+    return (
+        name,
+        str(counts["tasks"]),
+        str(counts["contacts"]),
+        NOTHING if counts["checked"] is None else str(counts["checked"]),
+        *(str(counts[key]) if whole else NOTHING for key in ("planned", "proved")),
+        number(seconds["median"], 2),
+        number(seconds["p95"], 2),
+        number(counts["duration_s"], 1),
+        number(counts["computing_over_motion"], 1),
+        ", ".join(f"{stage} {count}" for stage, count in counts["failures"].items()) or NOTHING,
+    )
+
+
+def text_table(result: Mapping[str, Any]) -> str:
+    """The table in columns of equal width."""
+    rows = [HEADER, *family_rows(result)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(HEADER))]
+    lines = (
+        "  ".join(cell.ljust(width) if column in (0, len(HEADER) - 1) else cell.rjust(width)
+                  for column, (cell, width) in enumerate(zip(row, widths, strict=True)))
+        for row in rows
+    )  # fmt: skip
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def failure_lines(result: Mapping[str, Any]) -> Iterator[str]:
+    """Every task that failed with its stage and reason."""
+    for entry in result["tasks"]:
+        if entry["failure"] is not None:
+            failure = entry["failure"]
+            yield f"{entry['family']}-{entry['seed']} ({failure['stage']}): {failure['reason']}"
