@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from manikin.contact.contact import MOST_CORNERS
 from manikin.numerics.polygon import convex_polygon, fewer_corners
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, cross
 from manikin.scene.surface import Surface
 
 LEAST_SHARE = 0.6
 """Least share of a sole's area that has to lie on its surface."""
-MOST_CORNERS = 8
-"""Most corners of a contact polygon; the smallest corners are cut until there are so many."""
 WHOLE = 1.0 - 1e-6
 """Share from which on a sole lies on its surface with all of it."""
 
@@ -42,7 +41,7 @@ class Footing:
     _points: FloatArray  # (p, 2) what spans the polygons of soles that hang over, in the effector's frame
 
     def polygon(self, row: int) -> FloatArray:
-        """(k, 2) contact polygon in the effector's frame [m], counter-clockwise, 3 to :data:`MOST_CORNERS`.
+        """(k, 2) contact polygon in the effector's frame [m], counter-clockwise, 3 to 8.
 
         The footprint itself, in its own order, where all of it lies on the surface; no corners where nothing.
         """
@@ -151,9 +150,9 @@ class FootingTable:
         normals = self._normals[numbers]
         height = (self._offsets[numbers] - np.einsum("ki,ki->k", normals[:, :2], xy[rows])) / normals[:, 2]
         across = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))])[rows]
-        forward = np.cross(across, normals)
+        forward = cross(across, normals)
         forward /= np.linalg.norm(forward, axis=1, keepdims=True)
-        rotations = np.stack([forward, np.cross(normals, forward), normals], axis=2)
+        rotations = np.stack([forward, cross(normals, forward), normals], axis=2)
         return Places(rows, numbers, np.column_stack([xy[rows], height]), rotations)
 
     def _edges(
