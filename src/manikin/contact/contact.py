@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.errors import ContactError
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polygon import convex_polygon
 from manikin.numerics.spatial import (
     GRAVITY,
     FloatArray,
@@ -222,8 +222,8 @@ def sole(
         normal_force_cap: Largest normal force on this sole [N].
         torsion_limit: Largest moment about the normal [N.m].
         settle: Time after the touch-down in which it may still slide to its place [s].
-        polygon: (k, 2) convex corners of what of the rectangle touches, in the contact frame [m], its middle
-            inside; all of it when omitted.
+        polygon: (k, 2) convex corners of what of the rectangle touches, in the contact frame [m];
+            all of it when omitted.
 
     Raises:
         ContactError: If a value is not finite or out of its range.
@@ -259,8 +259,6 @@ def _part_of_sole(polygon: ArrayLike, half: FloatArray, where: str) -> FloatArra
             f"{where} polygon has {len(given)} corners, {len(hull)} on its hull; "
             f"valid: 3 to {MOST_CORNERS} corners of a convex polygon"
         )
-    if float(signed_distance(np.zeros(2), hull)) <= 0.0:
-        raise ContactError(f"{where} polygon leaves out the middle of the sole; valid: one around it")
     return np.column_stack([hull, np.zeros(len(hull))])
 
 
