@@ -8,7 +8,7 @@ import trimesh
 from manikin.contact import sole
 from manikin.errors import ContactError
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
-from manikin.scene import Box, FootingTable, HalfSpace, Mesh, Obstacle, Scene, Surface
+from manikin.scene import Box, Capsule, Cylinder, FootingTable, HalfSpace, Mesh, Obstacle, Scene, Surface
 
 FOOT = {"length": 0.28, "width": 0.10, "friction": 0.7}
 SOLE = np.array([[0.14, 0.05], [0.14, -0.05], [-0.14, -0.05], [-0.14, 0.05]])
@@ -135,3 +135,33 @@ def test_footing_is_the_overlap_of_sole_and_surface():
             assert hull.buffer(1e-9).contains(shapely.Polygon(polygon))
         kinds.add((share > 0.0) + (share > 0.6) + (share > 1.0 - 1e-6))
     assert kinds == {0, 1, 2, 3}
+
+
+def test_bars_that_a_hand_can_close_round_have_grasp_lines():
+    """Rails of up to 51 mm, square ones of up to 40 mm; not beams, nor where a post or wall is in the way."""
+    turn = rotation_from_rpy(0.0, np.pi / 2, 0.3)
+    items = [
+        Obstacle("rail", Cylinder(0.02, 2.0), turn, (0.0, 0.0, 0.9)),
+        Obstacle("post", Box((0.06, 0.06, 0.88)), translation=(0.0, 0.0, 0.44)),
+        Obstacle("rung", Box((0.03, 0.4, 0.03)), translation=(2.0, 0.0, 1.0)),
+        Obstacle("pipe", Capsule(0.03, 1.0), translation=(3.0, 0.0, 1.0)),
+        Obstacle("beam", Box((0.10, 2.0, 0.05)), translation=(4.0, 0.0, 1.0)),
+        Obstacle("wall", Box((0.1, 2.0, 2.0)), translation=(5.0, 0.0, 1.0)),
+        Obstacle("tight", Cylinder(0.02, 1.0), rotation_from_rpy(np.pi / 2, 0.0, 0.0), (4.92, 0.0, 1.0)),
+    ]
+    scene = Scene(items)
+    assert [line.obstacle for line in scene.grasp_lines] == ["rail", "rail", "rung"]
+    first, second, rung = scene.grasp_lines
+    assert rung.length == pytest.approx(0.4 - 0.085)
+    assert not rung.round
+    # 2 m less half a hand at both ends, and less what is around the post.
+    ends = np.array([first.start, first.end, second.start, second.end]) @ turn[:, 2]
+    assert np.abs(ends).max() == pytest.approx(1.0 - 0.0425)
+    assert 0.05 < np.sort(np.abs(ends))[0] < 0.12
+    strips = scene.holds[len(scene.surfaces) :]
+    assert len(strips) == 16
+    for strip in strips:
+        axis_point = first.nearest(strip.centre) if strip.centre @ turn[:, 2] * ends[0] > 0 else None
+        if axis_point is not None:
+            assert (strip.centre - axis_point) @ strip.normal == pytest.approx(0.02)
+        assert abs(strip.normal @ turn[:, 2]) < 1e-9

@@ -13,6 +13,7 @@ from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.collision import Meter, collision_parts, part_meter
+from manikin.scene.grasp_line import GraspLine, grasp_lines, grasp_strips
 from manikin.scene.merging import COPLANAR, merged_surfaces
 from manikin.scene.obstacle import HalfSpace, Obstacle
 from manikin.scene.surface import Surface
@@ -86,6 +87,16 @@ class Scene(Displayed):
         See :func:`manikin.scene.merging.merged_surfaces`; in the order of the obstacles.
         """
         return merged_surfaces(self.obstacles)
+
+    @cached_property
+    def grasp_lines(self) -> tuple[GraspLine, ...]:
+        """Pieces of rails, rungs and other bars that a hand can close round, in order."""
+        return grasp_lines(self.obstacles, self._distances)
+
+    @cached_property
+    def holds(self) -> tuple[Surface, ...]:
+        """The surfaces, and after them narrow faces around the round bars, on which only a palm can lie."""
+        return (*self.surfaces, *grasp_strips(self.grasp_lines, self.obstacles))
 
     def surfaces_facing(self, direction: Sequence[float], max_angle: float) -> tuple[Surface, ...]:
         """Surfaces whose normal is within ``max_angle`` [rad] of ``direction`` (3,)."""

@@ -152,7 +152,8 @@ class ContactGenerator:
         self.settings = settings or GeneratorSettings()
         self.rules = rules or ContactRules()
         self._state = Configuration(body)
-        self._table = SurfaceTable(scene.surfaces)
+        self._table = SurfaceTable(scene.holds)
+        self._faces = len(scene.surfaces)
         self._tools = {
             name: _LimbTools(body, limb_named(body, name), scene, item) for name, item in samples.items()
         }
@@ -226,6 +227,8 @@ class ContactGenerator:
         touch = kind or tools.limb.kind
         situation = Situation.of(self._state.update(q), tools.limb, _NO_DIRECTION)
         near = self._table.within_reach(situation, tools.samples, self.settings.tolerance)
+        if touch is not ContactKind.GRASP:
+            near = near[near < self._faces]  # on what is round only a palm can lie
         if not len(near):
             return _failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")
         sole = footprint(self.body, tools.limb, touch, self.rules)

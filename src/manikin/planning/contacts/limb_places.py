@@ -274,7 +274,7 @@ class LimbPlaces:
         }  # fmt: skip
         self._body, self._rules = body, rules
         self._level = scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
-        self._edges = Edges(tuple(surface.polygon for surface in scene.surfaces), FINGERS)
+        self._edges = Edges(tuple(surface.polygon for surface in scene.holds), FINGERS)
         state = Configuration(body, reference)
         root = pin.XYZQUATToSE3(reference[:7])
         self._wanted = {
