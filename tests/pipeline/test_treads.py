@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from manikin.errors import ScenarioError
 from manikin.numerics.spatial import GRAVITY
 from manikin.planning.com import plan_com
 from manikin.scenarios import Scenario, load_scenario
 from manikin.scenarios.sequence import stance_sequence
-from manikin.scene import FootingTable
 
 TREAD = 0.25
 RISE = 0.15
@@ -50,17 +50,13 @@ def stair_scenario(polygon) -> Scenario:
 def scenario():
     plain = stair_scenario(None)
     contact = stance_sequence(plain)[2].stance["right_foot"]
-    surfaces = plain.build_scene().surfaces_facing((0.0, 0.0, 1.0), 0.1)
-    table = FootingTable(surfaces, SOLE)
-    places = table.under(contact.position[None, :2], np.zeros(1))
-    footing = table.place(places.numbers, places.positions, places.rotations)
-    (row,) = np.flatnonzero(footing.stands & (np.abs(places.positions[:, 2] - RISE) < 1e-9))
-    assert footing.share[row] == pytest.approx((0.535 - 0.30) / 0.28)
-    return stair_scenario(footing.polygon(int(row)).tolist())
+    polygon, share = plain.build_scene().contact_polygon(contact)
+    assert share == pytest.approx((0.535 - 0.30) / 0.28)
+    return stair_scenario(polygon.tolist())
 
 
 def test_a_sole_longer_than_its_tread_is_refused_whole_and_accepted_in_part(scenario):
-    with pytest.raises(Exception, match="beyond its edge"):
+    with pytest.raises(ScenarioError, match=r"45.0 mm beyond its edge.*84 % of it that does, polygon: "):
         stair_scenario(None).check_contacts(stair_scenario(None).build_scene())
     scenario.check_contacts(scenario.build_scene())
     again = type(scenario)(scenario.file, "again", scenario.folder, {})

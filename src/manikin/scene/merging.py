@@ -82,8 +82,9 @@ def _joined(members: Sequence[Surface], solids: "Sequence[_Solid]") -> list[tupl
     for group in _touching(shapes):
         names = tuple(dict.fromkeys(members[number].obstacles[0] for number in sorted(group)))
         whole = shapes[group[0]] if len(group) == 1 else _union([shapes[number] for number in group])
-        free = whole.difference(hidden, grid_size=GRID) if whole.intersects(hidden) else whole
-        if whole.area - free.area >= SMALLEST_AREA or len(group) > 1:
+        cut = not hidden.is_empty and whole.intersection(hidden, grid_size=GRID).area >= SMALLEST_AREA
+        free = whole.difference(hidden, grid_size=GRID) if cut else whole
+        if cut or len(group) > 1:
             parts = frame.surfaces(free, names)
             found += [_of_members(part, frame, members, shapes, group) for part in parts]
         else:
@@ -140,7 +141,8 @@ def _hidden(frame: PlaneFrame, shapes: Sequence[Geometry], solids: "Sequence[_So
         for solid in solids
         if solid.meets(frame, np.array([low_x, low_y]), np.array([high_x, high_y]))
     ]
-    return shapely.union_all([item for item in slices if not item.is_empty], grid_size=GRID)
+    some = [item for item in slices if not item.is_empty]
+    return shapely.union_all(some, grid_size=GRID) if len(some) != 1 else some[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +171,10 @@ class _Solid:
     def meets(self, frame: PlaneFrame, low: FloatArray, high: FloatArray) -> bool:
         """Whether its box in the plane's coordinates meets the plane between two corners (2,) [m]."""
         if self.endless is not None:
-            return True
+            slope = frame.rotation[:, :2].T @ self.endless[:3]
+            lowest = float(np.minimum(slope * low, slope * high).sum())
+            middle = frame.origin + _ABOVE * frame.rotation[:, 2]
+            return float(middle @ self.endless[:3]) + lowest < self.endless[3]
         local = (self.vertices - frame.origin) @ frame.rotation
         least, most = local.min(axis=0), local.max(axis=0)
         level = least[2] < _ABOVE < most[2]

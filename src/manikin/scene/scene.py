@@ -13,6 +13,7 @@ from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.collision import Meter, collision_parts, part_meter
+from manikin.scene.footing import FootingTable
 from manikin.scene.grasp_line import GraspLine, grasp_lines, grasp_strips
 from manikin.scene.merging import COPLANAR, merged_surfaces
 from manikin.scene.obstacle import HalfSpace, Obstacle
@@ -124,6 +125,34 @@ class Scene(Displayed):
             return aligned[int(np.argmin(worst))]
         raise ContactError(self._off_surface(contact, aligned, tolerance))
 
+    def contact_polygon(self, contact: Contact, tolerance: float = 0.005) -> tuple[FloatArray, float]:
+        """What of a sole lies on the scene, and the share of its area that this is.
+
+        For many places use a :class:`~manikin.scene.footing.FootingTable`, which says the same.
+
+        Args:
+            contact: A sole; its points are what could touch.
+            tolerance: Largest height of its middle over the surface [m].
+
+        Returns:
+            (k, 2) corners in the contact frame [m] on the surface that has most of it, none where it cannot
+            stand there; the share.
+        """
+        surfaces = [
+            surface for surface in self._aligned(contact, _ALIGNED)
+            if abs(float(surface.height(contact.position[None])[0])) <= tolerance
+        ]  # fmt: skip
+        if not surfaces:
+            return np.zeros((0, 2)), 0.0
+        count = len(surfaces)
+        rotations = np.broadcast_to(contact.rotation_contact_to_world, (count, 3, 3))
+        footing = FootingTable(surfaces, contact.outline).place(
+            np.arange(count), np.broadcast_to(contact.position, (count, 3)), rotations
+        )
+        row = int(np.argmax(footing.share))
+        share = float(footing.share[row])
+        return (footing.polygon(row) if footing.stands[row] else np.zeros((0, 2))), share
+
     def nearest(self, point: ArrayLike) -> tuple[str, float]:
         """Name of the obstacle nearest to a (3,) world point, and its signed distance [m].
 
@@ -195,6 +224,10 @@ class Scene(Displayed):
         side = "above" if worst >= 0 else "below"
         beside = f" and {over * 1000:.1f} mm beyond its edge" if over > tolerance else ""
         names = " and ".join(nearest.obstacles)
+        if beside and abs(worst) <= tolerance and contact.kind is ContactKind.SOLE:
+            polygon, share = self.contact_polygon(contact, tolerance)
+            part = np.round(polygon, 4).tolist()
+            remedy += f", or, with the {100 * share:.0f} % of it that does, polygon: {part}" if part else ""
         return (
             f"{where} lies on no surface: the nearest, of '{names}', has a contact point "
             f"{abs(worst) * 1000:.1f} mm {side} it{beside}; {remedy}"
