@@ -1,7 +1,7 @@
 """Places of one foot relative to the other for which one posture of the body holds both.
 
-The set is sampled like a region of the centre of mass (:mod:`manikin.kinematics.com_reach`), the place of the
-second foot being one more unknown. Of humans it scales with the stature, and that of each sex is shipped:
+The set is sampled like a region of the centre of mass (:mod:`manikin.kinematics.reach_sampler`), the place of
+the second foot being one more unknown. Of humans it scales with the stature, and that of each sex is shipped:
 ``docs/step_reach.py`` makes the file.
 """
 
@@ -18,11 +18,11 @@ from scipy.spatial import ConvexHull
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind, SolePart
 from manikin.errors import BodyError
-from manikin.kinematics.com_reach import (
+from manikin.kinematics.reach_sampler import (
     BEYOND,
     SAMPLES,
-    ComReach,
     LocalContact,
+    ReachBody,
     ReachSampler,
     segment_distance,
 )
@@ -73,7 +73,7 @@ class StepReach:
         Raises:
             BodyError: If the body has no legs like those of a human.
         """
-        return cls(*_StepSampler(ComReach.of(body), heels, rounds).polytope())
+        return cls(*_StepSampler(ReachBody(body), heels, rounds).polytope())
 
     @staticmethod
     def of(body: BodyModel, heels: Heels = "down") -> "StepReach":
@@ -123,57 +123,58 @@ def _step_reach_of(body: BodyModel, heels: Heels) -> StepReach:
 
 
 class _StepSampler(ReachSampler):
-    """The sampling of places of the right foot, with the left one at the origin."""
+    """The sampling of places of the right foot, with the left one at the origin.
 
-    def __init__(self, reach: ComReach, heels: Heels, rounds: int) -> None:
-        half = 0.5 * (reach.body.sole_length or 0.28 * reach.scale)
+    The last four unknowns are the place.
+    """
+
+    def __init__(self, parts: ReachBody, heels: Heels, rounds: int) -> None:
+        body, scale = parts.body, parts.scale
+        if parts.legs is None:
+            raise BodyError(f"body {body.name!r} has no legs like those of a human; valid: a human")
+        half = 0.5 * (body.sole_length or 0.28 * scale)
         left = SolePart.FULL if heels == "down" else SolePart.TOES
         right = SolePart.TOES if heels == "both up" else SolePart.FULL
         self._moved = LocalContact("right_foot", ContactKind.SOLE, right, np.zeros(3), np.eye(3), half)
         standing = LocalContact("left_foot", ContactKind.SOLE, left, np.zeros(3), np.eye(3), half)
-        self.outward = rounds
-        super().__init__(reach, [standing, self._moved])
-        if self._legs is None:
-            raise BodyError(f"body {reach.body.name!r} has no legs like those of a human; valid: a human")
+        directions = np.random.default_rng(0).normal(size=(FACES, 4))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        super().__init__(parts, [standing, self._moved], directions, rounds)
+        self._width = body.sole_width or 0.12 * scale
         self._half = half - 0.5 * self._width
-
-    def _first(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """About standing upright."""
-        middle = np.zeros(len(low))
-        middle[1], middle[2], middle[-3] = -0.1, 0.8 * self._radius(self._moved), -0.22
-        middle *= [*[self._scale] * 3, *np.ones(len(low) - 7), *[self._scale] * 3, 1.0]
-        fresh = middle + 0.08 * (high - low) * self._rng.normal(size=(SAMPLES, len(low)))
-        return np.clip(fresh, low, high)
-
-    @property
-    def _width(self) -> float:
-        return self._body.sole_width or 0.12 * self._scale
 
     def polytope(self) -> tuple[FloatArray, FloatArray]:
         """Rows and offsets of the set of places."""
-        low, high = self._bounds()
-        far = np.array([1.3, 1.0, 0.9, 1.5]) * [*[self._scale] * 3, 1.0]
-        low, high = np.concatenate([low, -far]), np.concatenate([high, far])
-        high[-3] = 0.0
-        normals = np.random.default_rng(0).normal(size=(FACES, 4))
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
-        _, places, missed = self.held(low, high, normals)
-        if missed > 0.0:
-            raise BodyError(f"body {self._body.name!r} cannot stand on both feet; valid: legs that can")
-        rows = ConvexHull(places[np.unique(np.argmax(places @ normals.T, axis=0))]).equations
+        held = self.held()
+        if held.missed > 0.0:
+            raise BodyError(f"body {self._parts.body.name!r} cannot stand on both feet; valid: legs that can")
+        outermost = np.unique(np.argmax(held.projections, axis=0))
+        rows = ConvexHull(self._places(held.unknowns[outermost])).equations
         A = rows[:, :4] * [1.0, 1.0, 1.0, TURN_LENGTH]
         lengths = np.linalg.norm(rows[:, :4], axis=1)
         return frozen_array(A / lengths[:, None], "A"), frozen_array(-rows[:, 4] / lengths, "b")
 
-    def measured(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Places (n, 4) of the right foot, the turn as a length, and the violation (n,)."""
-        _, violation = self.evaluate(x)
+    @staticmethod
+    def _places(x: FloatArray) -> FloatArray:
+        """(n, 4) places, the turn as a length [m]."""
+        return x[:, -4:] * [1.0, 1.0, 1.0, TURN_LENGTH]
+
+    def _first(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """About standing upright."""
+        scale, middle = self._parts.scale, np.zeros(len(low))
+        middle[:3] = 0.0, -0.1 * scale, 0.8 * self._radius(self._moved)
+        middle[-3] = -0.22 * scale
+        fresh = middle + 0.08 * (high - low) * self._rng.normal(size=(2 * SAMPLES, len(low)))
+        return np.clip(fresh, low, high)
+
+    def _evaluate(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far the places are out (n, m), and the largest violation (n,) of unknowns (n, d)."""
+        _, violation = self._legs(x, x[:, :3], rotations(x[:, 3], x[:, 4], x[:, 5]))
         place, rotation = self._placed(self._moved, x)
-        along, ahead = self._half * rotation[..., 0], np.array([self._half, 0.0, 0.0])
-        here = np.broadcast_to(ahead, along.shape)
+        along, here = self._half * rotation[..., 0], np.tile([self._half, 0.0, 0.0], (len(x), 1))
         apart = segment_distance(place - along, place + along, -here, here)
         violation = np.maximum(violation, BEYOND * (self._width - apart))
-        return np.column_stack([place, TURN_LENGTH * x[:, -1]]), violation
+        return self._places(x) @ self._normals.T, violation
 
     def _placed(self, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         if contact is not self._moved:
@@ -183,7 +184,7 @@ class _StepSampler(ReachSampler):
 
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
         low, high = super()._bounds()
-        radius = self._radius(self._moved)
-        low[:3], high[:3] = -radius, radius
-        low[2] = 0.25 * radius
-        return low, high
+        radius, scale = self._radius(self._moved), self._parts.scale
+        low[:3], high[:3] = (-radius, -radius, 0.25 * radius), radius
+        far = np.array([1.3 * scale, 1.0 * scale, 0.9 * scale, 1.5])
+        return np.concatenate([low, -far]), np.concatenate([high, far * [1.0, 0.0, 1.0, 1.0]])

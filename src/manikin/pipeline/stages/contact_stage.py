@@ -361,6 +361,7 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     if result.plan is None:
         report.fail("contacts", result.failure or "", where=result.where)
         return None
+    report.keep_contact_plan(result.plan)
     planned = replace(context, plan=result.plan)
     if not scenario.refines and result.scenario is not None:
         planned = planned.with_supports(result.scenario)
