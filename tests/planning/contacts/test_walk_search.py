@@ -168,6 +168,28 @@ def test_a_guide_counts_turns_on_the_spot():
     np.testing.assert_allclose(line.at(9.0), poses[-1], atol=1e-12)
 
 
+@pytest.mark.parametrize("seam", [None, 0.0])
+def test_a_body_stands_beside_and_across_coplanar_boxes(seam):
+    """The ground as a box beside the floor, two boxes that meet below a foot: none is in the way."""
+    if seam is None:
+        scene = Scene([Obstacle("ground", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, -0.5))])
+    else:  # under the middle of the left foot
+        sides = {"left": (0.1, 1.1), "right": (-0.9, 0.1)}
+        scene = Scene([
+            Obstacle(name, Box((2.0, high - low, 0.2)), translation=(seam, 0.5 * (low + high), 0.1))
+            for name, (low, high) in sides.items()
+        ])  # fmt: skip
+    stage = Endpoints(BODY, scene, 0.7).find(np.zeros(2), 0.0, Habit.STANDING).stage
+    assert stage is not None
+    contact = stage.contacts["left_foot"]
+    assert set(scene.touched_obstacles(contact)) == (
+        {"floor", "ground"} if seam is None else {"left", "right"}
+    )
+    state = Configuration(BODY, stage.q)
+    for name, held in stage.contacts.items():
+        assert np.linalg.norm(state.effector_placement(name)[1] - held.position) < 1e-3
+
+
 @pytest.mark.parametrize("seat", [0.36, 0.42, 0.48])
 def test_a_seated_start_touches_seat_and_floor(seat):
     scene = Scene([Obstacle("seat", Box((0.4, 0.5, seat)), translation=(-0.08, 0.0, seat / 2))])

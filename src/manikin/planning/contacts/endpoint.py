@@ -138,7 +138,9 @@ class Endpoints:
         q = self._body.posture({**self._body.standing_angles, **_SITTING})
         q[3:7] = _level_turn(heading)
         sitting = Configuration(self._body, q).effector_placement("buttocks")[1]
-        for floor in self._levels(at, None):
+        # Below the seat there may be no floor: it is looked for where the feet may be.
+        ahead = [at + distance * size * turn[:2, 0] for distance in FEET_BEFORE_SEAT[::5]]
+        for floor in sorted({level for place in ahead for level in self._levels(place, None)}):
             for seat in self._levels(at, height):
                 if not low <= seat - floor <= high:
                     continue

@@ -274,7 +274,7 @@ class LimbPlaces:
         }  # fmt: skip
         self._body, self._rules = body, rules
         self._level = scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
-        self._edges = Edges(tuple(surface.polygon for surface in scene.surfaces), FINGERS)
+        self._edges = Edges(tuple(surface.polygon for surface in scene.holds), FINGERS)
         state = Configuration(body, reference)
         root = pin.XYZQUATToSE3(reference[:7])
         self._wanted = {
@@ -344,7 +344,7 @@ class LimbPlaces:
                     continue
                 contact = make_contact(self._body, limb, kind, spot, rotation, self._rules)
                 score = -float(np.linalg.norm(spot - wanted)) / (ROOM * self.reach)
-                item = GeneratedContact(limb.name, contact, q, surface.obstacle, score, 0, 0)
+                item = GeneratedContact(limb.name, contact, q, surface.obstacles, score, 0, 0)
                 offers.append((-score + (0.1 if turn else 0.0), item))
         return [item for cost, item in sorted(offers, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
 
