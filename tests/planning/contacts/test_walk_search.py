@@ -1,5 +1,7 @@
 """Contacts of a walk: balanced, free, on surfaces, one change at a time; or an explained failure."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -121,16 +123,15 @@ def test_a_step_that_no_leg_can_make_is_explained():
 
 
 @given(x=st.floats(-0.2, 1.8), y=st.floats(-0.3, 0.3), yaw=st.floats(-3.1, 3.1), height=st.floats(0.0, 0.3))
-def test_footholds_carry_the_whole_sole_and_leave_the_foot_free(x, y, yaw, height):
-    holds = Footholds(BODY, STEPS)
-    wanted = np.array([x, y, height])
-    found = holds.near("left_foot", wanted, yaw, 0.7)
-    away = [(contact.position - wanted) * [1.0, 1.0, holds.settings.height_weight] for contact in found]
-    costs = np.linalg.norm(away, axis=1).tolist() if away else []
-    assert costs == pytest.approx(sorted(costs))
+def test_footholds_carry_most_of_the_sole_and_leave_the_foot_free(x, y, yaw, height):
+    """At least 60 % of it; the corners of the foot, 5 cm up, are 1 cm from everything."""
+    found = list(islice(Footholds(BODY, STEPS).near("left_foot", np.array([x, y, height]), yaw, 0.7), 4))
     for contact in found:
-        STEPS.supporting_surface(contact, 1e-9)  # refuses a sole that is not on one
-        corners = contact.points_in_world + np.array([0.0, 0.0, 0.05])
+        STEPS.supporting_surface(contact, 1e-9)  # refuses points that are not on one
+        assert STEPS.contact_polygon(contact)[1] >= 0.6
+        length, width = 0.5 * contact.length, 0.5 * contact.width
+        corners = np.array([[x, y, 0.05] for x in (-length, length) for y in (-width, width)])
+        corners = contact.position + corners @ contact.rotation_contact_to_world.T
         assert all(STEPS.nearest(corner)[1] > 0.01 for corner in corners)
 
 

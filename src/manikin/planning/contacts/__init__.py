@@ -22,6 +22,7 @@ from manikin.planning.contacts.follow_guide import (
     ExtendSettings,
     follow_guide,
 )
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import (
     ContactGenerator,
     GeneratedContact,
@@ -43,7 +44,7 @@ from manikin.planning.contacts.heuristics import (
     duration,
 )
 from manikin.planning.contacts.limb_collisions import LimbCollisions
-from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
+from manikin.planning.contacts.limb_places import LimbPlaces
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPosture, TrunkPostures

@@ -18,8 +18,9 @@ from manikin.contact import Contact, FrictionModel, sole
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.depth_first import PartialPlan, SearchLog
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import GeneratedContact
-from manikin.planning.contacts.limb_places import Footholds, LimbPlaces, stature_of
+from manikin.planning.contacts.limb_places import LimbPlaces, stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.scene import Scene, Surface
 
@@ -180,7 +181,7 @@ class Endpoints:
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""
         levels: set[float] = set()
-        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.settings.steepest):
+        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
             level = _height_at(surface, at)
             if level is not None and (height is None or abs(level - height) < 0.05):
                 levels.add(round(level, 6))

@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.contacts.footing import Foothold, Footing
+from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import collision_parts
 
@@ -92,7 +92,8 @@ class FootstepSearch:
     """Search for footsteps of one body in one scene.
 
     Attributes:
-        footing: Finds footholds.
+        scene: What is around.
+        footholds: Finds footholds.
         start: Left and right foothold at the start.
         goal: At the goal.
         scale: Size of the body relative to one of 1.75 m.
@@ -101,7 +102,8 @@ class FootstepSearch:
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
     """
 
-    footing: Footing
+    scene: Scene
+    footholds: Footholds
     start: tuple[Foothold, Foothold]
     goal: tuple[Foothold, Foothold]
     scale: float
@@ -118,7 +120,9 @@ class FootstepSearch:
         self._next: dict[tuple[int, int], list[tuple[int, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
         self._offsets = _offsets(self.scale)
-        self._field = _Field(self.footing, self.start, self.goal, self.column, self.stride * self.scale)
+        self._field = _Field(
+            self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale
+        )
         places = np.array([hold.position for hold in self._holds])
         self._ahead: list[float] = self._field.costs(
             places, np.array([hold.yaw for hold in self._holds])
@@ -210,7 +214,7 @@ class FootstepSearch:
             return math.inf
         if pair not in self._pairs:
             if node.hold not in self._free:
-                self._free[node.hold] = self.footing.is_free(self._holds[node.hold])
+                self._free[node.hold] = self.footholds.is_free(self._holds[node.hold])
             if not self._free[node.hold]:
                 self._pairs[pair] = math.inf
             else:
@@ -232,7 +236,7 @@ class FootstepSearch:
         places = stand.position[:2] + ahead[:, None] * turn + across[:, None] * side
         yaws = stand.yaw + out * turns
         goal = 3 if node.side > 0 else 2
-        found = self.footing.lay(places, yaws, float(stand.position[2]), HIGHEST * self.scale)
+        found = self.footholds.lay(places, yaws, float(stand.position[2]), HIGHEST * self.scale)
         ends = self._holds[goal]
         costs = self._step_costs(
             stand, out,
@@ -253,7 +257,7 @@ class FootstepSearch:
         for row, label in zip(rows.tolist(), map(tuple, keys.tolist()), strict=True):
             number = self._keys.setdefault(label, len(self._holds))
             if number == len(self._holds):
-                self._holds.append(self.footing.hold(found, row))
+                self._holds.append(self.footholds.hold(found, row))
                 fresh.append(row)
             # A place close by stands for the one that was asked for.
             steps[number] = min(steps.get(number, math.inf), float(costs[1 + row]))
@@ -304,7 +308,8 @@ class _Field:
 
     def __init__(
         self,
-        footing: Footing,
+        scene: Scene,
+        footholds: Footholds,
         start: tuple[Foothold, Foothold],
         goal: tuple[Foothold, Foothold],
         column: tuple[float, float, float],
@@ -316,11 +321,7 @@ class _Field:
         counts = np.ceil((high - low) / CELL).astype(int) + 1
         axes = [low[axis] + CELL * np.arange(counts[axis]) for axis in range(2)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        cells, heights = [], []
-        for rows, height in footing.levels(grid):
-            cells.append(rows)
-            heights.append(height)
-        rows, height = np.concatenate(cells), np.concatenate(heights)
+        rows, height = footholds.levels(grid)
         # What lies close under something else on which a foot can stand is not reached.
         order = np.lexsort((height, rows))
         rows, height = rows[order], height[order]
@@ -331,11 +332,11 @@ class _Field:
         rows, height = rows[keep], height[keep]
         self._points = np.column_stack([grid[rows], height])
         radius, low_end, high_end = column
-        self._points = self._points[_column_is_free(footing.scene, self._points, column)]
+        self._points = self._points[_column_is_free(scene, self._points, column)]
         slow = np.ones(len(self._points))
         for share, more in ((1.35, 0.8), (1.8, 0.5)):
             taller = radius, low_end, share * high_end
-            slow[~_column_is_free(footing.scene, self._points, taller)] += more
+            slow[~_column_is_free(scene, self._points, taller)] += more
         self._tree = cKDTree(self._points)
         flat = cKDTree(self._points[:, :2])
         near = flat.query_pairs(1.6 * CELL, output_type="ndarray")

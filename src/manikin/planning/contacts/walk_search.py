@@ -15,12 +15,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
-from manikin.contact import Contact, sole
+from manikin.contact import Contact
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import Extension, SearchLog
 from manikin.planning.contacts.endpoint import stand_up
-from manikin.planning.contacts.footing import Foothold, Footing
+from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.planning.contacts.footsteps import STEP, FootstepSearch
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
@@ -121,13 +121,20 @@ class WalkSearch:
         self._room = BodyRoom(body, scene)
         first = self.goal.contacts[FEET[0]]
         steepest = min(math.radians(30.0), math.atan(0.8 * self.friction))
-        self._footing = Footing(scene, (first.length, first.width), steepest)
+        self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
         self._contacts: dict[tuple[str, int], Contact] = {}
         self._postures: dict[tuple[int, int, bool], Posed] = {}
         radius, low, high = (scale * value for value in COLUMN)
         start, goal = (self._holds(stage) for stage in (self.start, self.goal))
         self.search = FootstepSearch(
-            self._footing, start, goal, scale, self._room.cost, (radius, low, high), self.settings.stride
+            scene,
+            self._footholds,
+            start,
+            goal,
+            scale,
+            self._room.cost,
+            (radius, low, high),
+            self.settings.stride,
         )
         for number, (stage, foot) in enumerate((s, f) for s in (self.start, self.goal) for f in FEET):
             self._contacts[foot, number] = stage.contacts[foot]
@@ -169,17 +176,12 @@ class WalkSearch:
 
     def _holds(self, stage: Stage) -> tuple[Foothold, Foothold]:
         left, right = (stage.contacts[foot] for foot in FEET)
-        return _hold_of(left), _hold_of(right)
+        return Foothold.of(left), Foothold.of(right)
 
     def _contact(self, foot: str, number: int) -> Contact:
         key = foot, number
         if key not in self._contacts:
-            hold = self.search.hold(number)
-            length, width = self._footing.size
-            self._contacts[key] = sole(
-                foot, hold.position, length=length, width=width, friction=self.friction,
-                rotation=hold.rotation,
-            )  # fmt: skip
+            self._contacts[key] = self._footholds.contact(foot, self.search.hold(number), self.friction)
         return self._contacts[key]
 
     def _planned(self, way: Sequence[int]) -> ContactPlan | None:
@@ -232,8 +234,3 @@ class WalkSearch:
             posed = self.poser.pose(held, carrying, wished, wished[:7], restarts=True)
         self._postures[key] = posed
         return posed
-
-
-def _hold_of(contact: Contact) -> Foothold:
-    """Foothold of a contact that is given."""
-    return Foothold(contact.position, contact.yaw, contact.normal)
