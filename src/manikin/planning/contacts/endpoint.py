@@ -17,8 +17,9 @@ from manikin.contact import Contact, FrictionModel
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.depth_first import PartialPlan, SearchLog
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import GeneratedContact
-from manikin.planning.contacts.limb_places import Footholds, LimbPlaces, stature_of
+from manikin.planning.contacts.limb_places import LimbPlaces, stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.seat import FEET, Sitter, Sitting, hand_supports, leave_seat
 from manikin.scene import Scene, Surface
@@ -27,6 +28,9 @@ UP = np.array([0.0, 0.0, 1.0])
 
 SEAT_HEIGHTS = (0.12, 0.40)
 """Lowest and greatest height of a seat above the feet [statures]; our choice."""
+
+FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)
+"""Distances before the middle of the buttocks at which a floor for the feet is looked for [statures]."""
 
 SITTING_TIME = 0.35
 """Shortest time for which a body sits before it moves [s]."""
@@ -131,7 +135,10 @@ class Endpoints:
         low, high = (share * self._stature for share in SEAT_HEIGHTS)
         sitter = Sitter(self._body, self._footholds, self._friction)
         reasons: list[str] = []
-        for floor in self._levels(at, None):
+        # Below the seat there may be no floor: it is looked for where the feet may be.
+        forward = self._stature * rotation_from_yaw(heading)[:2, 0]
+        ahead = [at + distance * forward for distance in FEET_BEFORE_SEAT]
+        for floor in sorted({level for place in ahead for level in self._levels(place, None)}):
             for seat in self._surfaces(at, height):
                 place = np.array([*at, _height_at(seat, at)])
                 if not low <= place[2] - floor <= high:
@@ -151,7 +158,7 @@ class Endpoints:
         for item in sittings:
             hands = hand_supports(
                 self._scene, item.contacts["buttocks"], self._stature, self._friction,
-                self._footholds.settings.steepest,
+                self._footholds.steepest,
             )  # fmt: skip
             if hands:
                 yield {**item.contacts, **hands}, item.guess
@@ -193,7 +200,7 @@ class Endpoints:
     def _surfaces(self, at: FloatArray, height: float | None) -> list[Surface]:
         """Surfaces below and above a place, the lowest first; those near a height, where one is given."""
         found: list[tuple[float, Surface]] = []
-        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.settings.steepest):
+        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
             level = _height_at(surface, at)
             if level is not None and (height is None or abs(level - height) < 0.05):
                 found.append((level, surface))

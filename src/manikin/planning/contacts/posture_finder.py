@@ -104,7 +104,7 @@ class PostureFinder:
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
-        self._touched: dict[Contact, str] = {}
+        self._touched: dict[Contact, tuple[str, ...]] = {}
 
     def pose(
         self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
@@ -131,7 +131,7 @@ class PostureFinder:
                 near = np.asarray(Configuration(self.body, start).com[:2])
             else:  # over the root of a person, and over what a creature has ahead of its root
                 near = guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
-            place = self._region(carrying).nearest(near, self.settings.inset if inset is None else inset)
+            place = self.resting_place(carrying, near, self.settings.inset if inset is None else inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1
@@ -154,6 +154,17 @@ class PostureFinder:
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
 
+    def resting_place(
+        self, carrying: Mapping[str, Contact], near: FloatArray, inset: float
+    ) -> FloatArray | None:
+        """(2,) place nearest to another where the centre of mass can rest on contacts; None without any.
+
+        Args:
+            near: (2,) [m].
+            inset: Distance to the edges of where it may rest [m].
+        """
+        return self._region(carrying).nearest(near, inset)
+
     def led(self, guide: FloatArray) -> dict[str, Placement]:
         """Wish for the root to be near a (7,) pose, by the root's effector."""
         pose, settings = pin.XYZQUATToSE3(guide), self.settings
@@ -163,8 +174,9 @@ class PostureFinder:
     def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
         for contact in held.values():
             if contact not in self._touched:
-                self._touched[contact] = self.scene.touched_obstacle(contact)
-        return touching_pairs(self.body, [(name, self._touched[item]) for name, item in held.items()])
+                self._touched[contact] = self.scene.touched_obstacles(contact)
+        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
+        return touching_pairs(self.body, touched)
 
     def _region(self, carrying: Mapping[str, Contact]) -> StaticRegion:
         """Where the body may rest; asked again and again for the same contacts."""

@@ -21,7 +21,8 @@ from manikin.contact import Contact, Stance, point, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
-from manikin.planning.contacts.limb_places import Footholds, stature_of
+from manikin.planning.contacts.footholds import Footholds
+from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.transition import Momentum, momentum_to_rest
 from manikin.scene import Scene, Surface
@@ -58,6 +59,9 @@ CALF_ROOM = 0.016
 
 SEAT_THICKNESS = 0.05
 """Depth below the top of a seat at which calves keep that distance [m]; our choice."""
+
+FEET_SPACING = 0.01
+"""Distance of the places that are tried for the feet [m]."""
 
 TRIED = 6
 """Sittings that are tried with the whole body."""
@@ -119,29 +123,33 @@ class Sitter:
         size, turn = self.stature, rotation_from_yaw(heading)
         room = _room_ahead(seat, at, turn[:, 0])
         tried: list[tuple[float, float]] = []
+        feet: dict[int, dict[str, Contact]] = {}
         for cost, forward, ahead in self._compared(float(at[2]) - floor, room):
             if len(tried) == TRIED:
                 return
             if any(abs(forward - other) < 0.02 and abs(ahead - foot) < 0.02 for other, foot in tried):
                 continue
-            place = at + forward * turn[:, 0]
-            buttocks = sole(
-                "buttocks", place, heading, length=SEAT_LENGTH * size, width=SEAT_WIDTH * size,
-                friction=SEAT_FRICTION,
-            )  # fmt: skip
-            contacts = {"buttocks": buttocks}
-            for foot, side in zip(FEET, (1.0, -1.0), strict=True):
-                wanted = place + turn @ np.array([ahead, side * APART * size, 0.0])
-                wanted[2] = floor
-                near = (
-                    contact for contact in self._footholds.near(foot, wanted, heading, self._friction)
-                    if float(np.linalg.norm(contact.position - wanted)) < 0.03
+            row = round((forward + ahead) / FEET_SPACING)
+            if row not in feet:
+                wanted = at + row * FEET_SPACING * turn[:, 0]
+                feet[row] = self._feet(np.array([*wanted[:2], floor]), heading)
+            if len(feet[row]) == len(FEET):
+                buttocks = sole(
+                    "buttocks", at + forward * turn[:, 0], heading, length=SEAT_LENGTH * size,
+                    width=SEAT_WIDTH * size, friction=SEAT_FRICTION,
                 )  # fmt: skip
-                if (contact := next(near, None)) is not None:
-                    contacts[foot] = contact
-            if len(contacts) == 3:
                 tried.append((forward, ahead))
-                yield Sitting(contacts, self._guess(buttocks, heading), cost)
+                yield Sitting({"buttocks": buttocks, **feet[row]}, self._guess(buttocks, heading), cost)
+
+    def _feet(self, middle: FloatArray, heading: float) -> dict[str, Contact]:
+        """Footholds beside a place (3,) between the feet, as far as there are any close enough."""
+        found: dict[str, Contact] = {}
+        for foot, side in zip(FEET, (1.0, -1.0), strict=True):
+            wanted = middle + rotation_from_yaw(heading) @ [0.0, side * APART * self.stature, 0.0]
+            contact = next(iter(self._footholds.near(foot, wanted, heading, self._friction)), None)
+            if contact is not None and float(np.linalg.norm(contact.position - wanted)) < 0.03:
+                found[foot] = contact
+        return found
 
     def _compared(self, height: float, room: float) -> list[tuple[float, float, float]]:
         """Cost, way of the buttocks forward and place of the soles before them [m], the cheapest first.
@@ -206,6 +214,14 @@ LEANING_TIMES = (1.3, 0.9)
 SEAT_OFF_INSET = 0.015
 """Distance of the centre of mass to the edge of where it may rest on the feet when a seat is left [m]."""
 
+BEHIND = (0.0, 0.02, 0.04)
+"""How far behind where it could rest the centre of mass is when a seat is left, tried in order [m]."""
+
+LEANING_HINGES = ("lumbar_flexion", "thorax_flexion", "hip_flexion")
+
+LEAN_ROOM = 0.12
+"""Angle of these to the ends of their ranges that a lean should keep, so that the trunk can follow [rad]."""
+
 LEAN_WEIGHT = 300.0
 """Weight of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice."""
 
@@ -251,32 +267,82 @@ def leave_seat(
     pushing = {name: contact for name, contact in start.contacts.items() if name not in SEATED_ON}
     if len(pushing) > len(held):
         return _pushed_up(poser, start, pushing, held, risen.q)
-    off = poser.pose(start.contacts, held, start.q, inset=SEAT_OFF_INSET, restarts=True)
-    if off.q is not None:
-        weak = _too_weak(poser, off.q, held)
-        return Leaving((start,), weak) if weak else _rising(poser, start, [(held, off.q, None)], risen.q)
-    return _in_motion(poser, start, held, risen.q, off.reason)
+    leans = list(_leans(poser, start, held, risen.q))
+    for lean in leans:
+        if lean.q is not None and lean.failure is None and lean.room >= LEAN_ROOM:
+            return _rising(poser, start, [(held, lean.q, lean.momentum)], risen.q)
+    for lean in leans:
+        if lean.q is not None and lean.failure is None:
+            return _rising(poser, start, [(held, lean.q, lean.momentum)], risen.q)
+    return Leaving((start,), leans[-1].failure)
 
 
-def _in_motion(
-    poser: PostureFinder, start: Stage, held: Mapping[str, Contact], risen: FloatArray, reason: str
-) -> Leaving:
-    """Leave a seat with the weight behind the feet; the reason is why that is not possible at rest."""
+@dataclass(frozen=True, eq=False)
+class _Lean:
+    """A posture in which a seat is left for the feet, or why not there.
+
+    Attributes:
+        q: (nq,) or None.
+        momentum: Its motion; None at rest.
+        room: Least angle of the trunk's and hips' hinges to the ends of their ranges [rad].
+        failure: None, or the reason in one line.
+    """
+
+    q: FloatArray | None
+    momentum: Momentum | None = None
+    room: float = 0.0
+    failure: str | None = None
+
+
+def _leans(
+    poser: PostureFinder, start: Stage, held: Mapping[str, Contact], risen: FloatArray
+) -> Iterator[_Lean]:
+    """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
     body = poser.body
     rest = Configuration(body, risen).com
-    off = poser.pose(start.contacts, held, start.q, place=rest[:2], com_weight=LEAN_WEIGHT)
-    if off.q is None:
-        return Leaving((start,), off.reason)
-    com = Configuration(body, off.q).com
-    momentum = momentum_to_rest(Stance(list(held.values()), model=poser.model), body.mass, com, rest)
-    if momentum is None:
-        behind = float(np.linalg.norm(com[:2] - rest[:2]))
-        return Leaving(
-            (start,), f"the farthest lean leaves the centre of mass {behind:.3f} m behind the middle of the "
-            f"feet, from where no speed carries it over them; at rest: {reason}",
-        )  # fmt: skip
-    weak = _too_weak(poser, off.q, held, momentum)
-    return Leaving((start,), weak) if weak else _rising(poser, start, [(held, off.q, momentum)], risen)
+    over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSET)
+    if over is None:
+        yield _Lean(None, failure=f"{', '.join(held)} cannot carry the body at rest")
+        return
+    back = start.com[:2] - rest[:2]
+    back /= max(float(np.linalg.norm(back)), 1e-9)
+    reason, q = "", start.q
+    for behind in BEHIND:
+        posed = poser.pose(start.contacts, held, q, place=over + behind * back, restarts=behind == 0.0)
+        if posed.q is None:
+            reason = reason or posed.reason
+            continue
+        q = posed.q
+        lean = _lean(poser, q, held, rest, moving=behind > 0.0)
+        yield lean
+        if lean.failure is None and lean.room >= LEAN_ROOM:
+            return
+    # The farthest lean, wherever that is.
+    posed = poser.pose(start.contacts, held, q, place=over, com_weight=LEAN_WEIGHT)
+    if posed.q is None:
+        yield _Lean(None, failure=reason or posed.reason)
+        return
+    lean = _lean(poser, posed.q, held, rest, moving=True)
+    yield lean if lean.failure is None else replace(lean, failure=f"{lean.failure}; at rest: {reason}")
+
+
+def _lean(
+    poser: PostureFinder, q: FloatArray, held: Mapping[str, Contact], rest: FloatArray, *, moving: bool
+) -> _Lean:
+    """A posture with its motion to rest, its room, and whether the joints are strong enough."""
+    body, momentum = poser.body, None
+    if moving:
+        com = Configuration(body, q).com
+        momentum = momentum_to_rest(Stance(list(held.values()), model=poser.model), body.mass, com, rest)
+        if momentum is None:
+            behind = float(np.linalg.norm(com[:2] - rest[:2]))
+            return _Lean(q, failure=(
+                f"a lean leaves the centre of mass {behind:.3f} m behind the middle of the feet, from where "
+                "no speed carries it over them"
+            ))  # fmt: skip
+    leaning = np.array([name.endswith(LEANING_HINGES) for name in body.joint_names])
+    slack = np.minimum(q[7:] - body.lower, body.upper - q[7:])[leaning]
+    return _Lean(q, momentum, float(slack.min()), _too_weak(poser, q, held, momentum))
 
 
 def _pushed_up(

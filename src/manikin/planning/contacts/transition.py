@@ -15,9 +15,10 @@ import numpy as np
 from scipy.optimize import linprog
 
 from manikin.balance import WrenchPolytope, wrench_polytope
-from manikin.balance.criteria import support_height
+from manikin.balance.criteria import admissible_com_polygon, support_height
 from manikin.balance.margin import wrench_levers
 from manikin.contact import Stance
+from manikin.numerics.polygon import signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
 
 FORWARD_SPEEDS = (0.0, 0.15, 0.3, 0.45, 0.6)
@@ -34,6 +35,9 @@ MARGIN = 3.0
 
 STEEPEST_LIFT = 4.0
 """Largest upward or downward acceleration on the way [m/s^2]; people who rise reach 3; our choice."""
+
+CARRIED_ROOM = 0.03
+"""How far outside of where it could rest the velocity may seem to carry the centre of mass [m]."""
 
 SAMPLES = 12
 """Instants of the way at which balance is imposed."""
@@ -88,8 +92,14 @@ def momentum_to_rest(
     least = MARGIN * mass / 75.0 if least is None else least
     ahead = (rest - com) * [1.0, 1.0, 0.0]
     ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
+    resting = admissible_com_polygon(polytope, mass)
+    height = max(float(com[2]) - support_height(staying), 0.0)
     for forward, upward, duration in product(FORWARD_SPEEDS, UPWARD_SPEEDS, DURATIONS):
         velocity = forward * ahead + upward * np.array([0.0, 0.0, 1.0])
+        # Where the velocity would carry it must be where it can rest, or nearly so for a rising body.
+        carried = com[:2] + velocity[:2] * np.sqrt(height / GRAVITY)
+        if len(resting) < 3 or signed_distance(carried, resting) < -CARRIED_ROOM:
+            continue
         way = _way(polytope, mass, com, velocity, rest, duration)
         if way is not None and way.margin >= least:
             return way
@@ -108,7 +118,7 @@ def _way(
     place, bend = _basis(share), _second(share) / duration**2
     gravity = np.array([0.0, 0.0, -GRAVITY])
     rows, bounds = [], []
-    for at, turn in zip(place, bend, strict=True):
+    for number, (at, turn) in enumerate(zip(place, bend, strict=True)):
         known, push = at @ points, turn @ points - gravity
         # c x b with c = known + at_2 y and b = push + turn_2 y: the product of y with itself is zero.
         force, moment = mass * turn[2] * np.eye(3), mass * (turn[2] * skew(known) - at[2] * skew(push))
@@ -118,7 +128,8 @@ def _way(
         bounds.append(polytope.h - polytope.H @ wrench)
         lift = float(push[2]) - GRAVITY
         rows.append(np.array([[0.0, 0.0, turn[2], 0.0], [0.0, 0.0, -turn[2], 0.0]]))
-        bounds.append(np.array([STEEPEST_LIFT - lift, STEEPEST_LIFT + lift]))
+        # At first it does not fall: legs too weak to rise could seem strong enough.
+        bounds.append(np.array([STEEPEST_LIFT - lift, (STEEPEST_LIFT if number else 0.0) + lift]))
     solution = linprog(
         [0.0, 0.0, 0.0, -1.0], A_ub=np.vstack(rows), b_ub=np.concatenate(bounds),
         bounds=[(-2.0, 2.0)] * 3 + [(None, None)], method="highs",

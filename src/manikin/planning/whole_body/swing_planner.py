@@ -330,4 +330,5 @@ def leaning_pairs(body: BodyModel, padded: Sequence[str]) -> frozenset[tuple[str
 
 def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
     """Pairs of segment and obstacle that a contact brings together; thighs lie on a seat as buttocks do."""
-    return touching_pairs(body, [(contact.effector, scene.touched_obstacle(contact, tolerance=0.02))])
+    touched = scene.touched_obstacles(contact, tolerance=0.02)
+    return touching_pairs(body, [(contact.effector, obstacle) for obstacle in touched])
