@@ -142,7 +142,7 @@ class SearchTally:
             reason = extension.failure or ""
         return self.failed(reason, "contacts")
 
-    def found(self, plan: ContactPlan, guide: GuideLine) -> ContactSearch:
+    def found(self, plan: ContactPlan, guide: GuideLine | None = None) -> ContactSearch:
         """A search that found contacts."""
         self.summary.update(steps=plan.steps, phases=len(plan.stages))
         return ContactSearch(None, plan, guide, self._done())

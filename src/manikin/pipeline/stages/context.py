@@ -19,7 +19,7 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.motion.passage import Passage, measure_passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
-from manikin.pipeline.run_directory import MOTION, RunDirectory
+from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, RunDirectory
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings
@@ -28,6 +28,7 @@ from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
 from manikin.scene import Scene
 from manikin.simulation import Execution, Recovery
+from manikin.verification import PlannedContacts, PlannedStage
 
 _PLACE = re.compile(r"\[(-?\d[\d.e+-]*(?:, -?\d[\d.e+-]*){1,2})\]")
 """A position as the stages write it into their reasons: two or three numbers in brackets."""
@@ -91,6 +92,23 @@ def trajectory_in_world(
         turning=None if turning is None
         else BSpline(turning.degree, turning.knots, transform.directions(turning.control_points)),
     )  # fmt: skip
+
+
+def plan_in_world(plan: ContactPlan, transform_task_to_world: PlanarTransform) -> PlannedContacts:
+    """A contact plan as other programs and the check read it, in the world."""
+    transform = transform_task_to_world
+    moved: dict[int, Contact] = {}
+    for contact in (contact for stage in plan.stages for contact in stage.contacts.values()):
+        moved.setdefault(id(contact), contact_in_world(contact, transform))
+    stages = [
+        PlannedStage(
+            {name: moved[id(contact)] for name, contact in stage.contacts.items()},
+            transform.poses(stage.q), transform.points(stage.com),
+            via=None if stage.via is None else transform.poses(stage.via), duration=stage.min_duration,
+        )
+        for stage in plan.stages
+    ]  # fmt: skip
+    return PlannedContacts(tuple(stages), transform.poses(plan.goal), transform.points(plan.goal_com))
 
 
 def reason_in_world(reason: str, transform_task_to_world: PlanarTransform) -> str:
@@ -311,6 +329,13 @@ class Report:
         """Keep a scenario of the task frame with the supports that were found, in the world."""
         if self._directory is not None:
             self._directory.write_scenario(scenario.from_task_frame(self.transform).to_yaml())
+
+    def keep_contact_plan(self, plan: ContactPlan) -> None:
+        """Keep a contact plan of the task frame as a contact-plan file, in the world."""
+        if self._directory is not None:
+            context = self._context
+            content = plan_in_world(plan, self.transform).to_dict(context.body, context.given)
+            self._directory.write(CONTACT_PLAN, content)
 
     def keep_motions(
         self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None,

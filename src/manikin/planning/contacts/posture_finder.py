@@ -107,7 +107,7 @@ class PostureFinder:
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
-        self._touched: dict[Contact, str] = {}
+        self._touched: dict[Contact, tuple[str, ...]] = {}
 
     def pose(
         self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
@@ -167,8 +167,9 @@ class PostureFinder:
     def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
         for contact in held.values():
             if contact not in self._touched:
-                self._touched[contact] = self.scene.touched_obstacle(contact)
-        return touching_pairs(self.body, [(name, self._touched[item]) for name, item in held.items()])
+                self._touched[contact] = self.scene.touched_obstacles(contact)
+        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
+        return touching_pairs(self.body, touched)
 
     def _region(self, carrying: Mapping[str, Contact]) -> StaticRegion:
         """Where the body may rest; asked again and again for the same contacts."""
