@@ -87,6 +87,13 @@ def test_the_polytope_of_a_stance_over_edges_is_that_of_forces_at_the_corners():
         assert -found.fun == pytest.approx(highest, rel=1e-6, abs=1e-6)
 
 
+def test_a_polygon_of_the_whole_sole_is_the_sole():
+    plain = sole("left_foot", (0, 0, 0), friction=0.7, **SIZE)
+    whole = sole("left_foot", (0, 0, 0), friction=0.7, polygon=plain.points[[2, 0, 3, 1], :2], **SIZE)
+    assert not whole.hangs_over
+    assert np.array_equal(plain.points, whole.points)
+
+
 def test_a_sole_over_an_edge_lands_and_leaves_flat():
     hanging = sole("left_foot", (0, 0.2, 0), polygon=[(-0.1, -0.05), (0.14, -0.05), (0.14, 0.05)],
                    friction=0.7, **SIZE)  # fmt: skip

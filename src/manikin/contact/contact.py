@@ -234,7 +234,9 @@ def sole(
     signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))
     corners = [[a * half_length, b * half_width, 0.0] for a, b in signs]
     if polygon is not None:
-        corners = _part_of_sole(polygon, np.array([half_length, half_width]), where)
+        part = _part_of_sole(polygon, np.array([half_length, half_width]), where)
+        whole = np.abs(part[:, :2]) >= np.array([half_length, half_width]) - 1e-9
+        corners = corners if len(part) == 4 and whole.all() else part
     made = _frictional(
         ContactKind.SOLE, effector, position, corners, yaw, friction, normal, rotation, normal_force_cap
     )

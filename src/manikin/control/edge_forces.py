@@ -86,7 +86,8 @@ def _parts(polygon: FloatArray, line: float) -> tuple[FloatArray, FloatArray]:
     behind, ahead = polygon[polygon[:, 0] <= line], polygon[polygon[:, 0] > line]
     if len(behind) and len(ahead) and (ends := chord(polygon, line)) is not None:
         behind = np.vstack([behind, [[line, y] for y in ends]])
-    return tuple(np.column_stack([part, np.zeros(len(part))]) for part in (behind, ahead))
+    heel, tips = (np.column_stack([part, np.zeros(len(part))]) for part in (behind, ahead))
+    return heel, tips
 
 
 def points_along(body: BodyModel, geometry: ContactGeometry) -> FloatArray:

@@ -119,6 +119,21 @@ def test_a_step_that_no_leg_can_make_is_explained():
     assert found.searches <= 62
 
 
+def test_a_step_that_a_later_stage_refused_is_not_taken_again():
+    """Nor one much like it: 8 cm; the start, of no step, cannot be refused."""
+    ends = Endpoints(BODY, STEPS, 0.7)
+    start, goal = (ends.find(np.array([x, 0.0]), 0.0, Habit.STANDING).stage for x in (0.0, 1.5))
+    search = WalkSearch(PostureFinder(BODY, STEPS), start, goal)
+    first = search.run().plan
+    assert not search.refuse(0)
+    assert search.refuse(3)
+    refused = {name: contact.position for name, contact in first.stages[4].contacts.items()}
+    second = search.run().plan
+    for stage in second.stages:
+        away = [np.linalg.norm(c.position - refused[name]) for name, c in stage.contacts.items()]
+        assert len(away) < 2 or max(away) >= 0.08
+
+
 # --- the parts -------------------------------------------------------------------------------
 
 

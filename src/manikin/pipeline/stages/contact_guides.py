@@ -82,6 +82,8 @@ class ContactSearch:
         summary: The ``contacts`` block of the run's summary.
         failure: None, or the reason in one line.
         where: Stage of the search that failed.
+        again: Searches on for a plan without the step of a phase, which failed for a reason; None where the
+            search cannot.
     """
 
     scenario: Scenario | None
@@ -90,6 +92,7 @@ class ContactSearch:
     summary: Mapping[str, Any]
     failure: str | None = None
     where: str = ""
+    again: "Callable[[int, str], ContactSearch] | None" = None
 
     def to_dict(self, transform_task_to_world: PlanarTransform) -> dict[str, Any]:
         """Guide and postures in plain values, in the world."""

@@ -22,6 +22,7 @@ from manikin.planning.contacts import (
     Endpoint,
     Endpoints,
     ExtendSettings,
+    Extension,
     LimbPlaces,
     PostureFinder,
     PostureFinderSettings,
@@ -74,6 +75,7 @@ class _FootSearch(_ContactSearch):
         self._reference = posture_style_of(scenario.manner).posture(body)
         self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
+        self._walk: WalkSearch | None = None
 
     def run(self) -> ContactSearch:
         start = stage_at(self._places, self._scenario, "start")
@@ -82,14 +84,25 @@ class _FootSearch(_ContactSearch):
         goal = self._goal(start)
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
-        found = self._search(start, goal).run()
-        self._tally.summary["attempts"] = 1 + found.backtracks
-        self._tally.summary["postures"] += found.searches
-        self._tally.summary["backtracks"] += found.backtracks
+        self._walk = self._search(start, goal)
+        return self._result(self._walk.run())
+
+    def _again(self, phase: int, reason: str) -> ContactSearch:
+        """Another plan, without the step of a phase of the last one."""
+        if self._walk is None or not self._walk.refuse(phase):
+            return self._tally.failed(reason, "contacts")
+        return self._result(self._walk.run())
+
+    def _result(self, found: Extension) -> ContactSearch:
+        self._tally.summary["attempts"] += 1
+        self._tally.summary["postures"] = found.searches
+        self._tally.summary["backtracks"] = found.backtracks
         if found.plan is None:
             return self._tally.failed(found.failure or "", "contacts")
         plan = self._acting(found.plan)
-        return replace(self._tally.found(plan), scenario=with_supports(self._scenario, plan))
+        return replace(
+            self._tally.found(plan), scenario=with_supports(self._scenario, plan), again=self._again
+        )
 
     def _search(self, start: Stage, goal: Stage) -> WalkSearch:
         options = self._scenario.contacts
@@ -301,14 +314,39 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
         raise scenario.error(("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs")
     report.progress("contacts", 0.0)
     result = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
-    report.summary["contacts"] = dict(result.summary)
+    return _with_contacts(context, report, result)
+
+
+def plan_contacts_again(context: RunContext, report: Report, phase: int) -> RunContext | None:
+    """Plan the supports again without the step of a phase, for which a later stage failed.
+
+    Args:
+        context: With the supports that failed.
+        report: Takes the ``contacts`` block again, in which the refused step is told.
+        phase: Index of the phase.
+
+    Returns:
+        None where there is no other plan; the failure of the later stage stays then.
+    """
+    failure, again = report.failure, context.search_again
+    if failure is None or again is None or context.plan is None:
+        return None
+    result = again(phase, failure.reason)
+    if result.plan is None:
+        return None
+    report.try_again(phase)
+    return _with_contacts(context, report, result)
+
+
+def _with_contacts(context: RunContext, report: Report, result: ContactSearch) -> RunContext | None:
+    report.summary["contacts"] = {**result.summary, "refused": report.refused}
     report.keep("contacts", result.to_dict(report.transform))
     if result.plan is None:
         report.fail("contacts", result.failure or "", where=result.where)
         return None
     report.keep_contact_plan(result.plan)
-    planned = replace(context, plan=result.plan)
-    if not scenario.refines and result.scenario is not None:
+    planned = replace(context, plan=result.plan, search_again=result.again)
+    if not context.scenario.refines and result.scenario is not None:
         planned = planned.with_supports(result.scenario)
         report.keep_scenario(result.scenario)
     report.progress("contacts", 1.0)

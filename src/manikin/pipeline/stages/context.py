@@ -20,6 +20,7 @@ from manikin.motion.passage import Passage, measure_passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, RunDirectory
+from manikin.pipeline.stages.contact_guides import ContactSearch
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings
@@ -154,6 +155,7 @@ class RunContext:
     settings: WholeBodySettings
     problem: CentroidalProblem | KeyframeProblem | None = None
     plan: ContactPlan | None = None
+    search_again: Callable[[int, str], ContactSearch] | None = None
 
     @classmethod
     def of(cls, scenario: Scenario, settings: WholeBodySettings | None = None) -> "RunContext":
@@ -252,6 +254,7 @@ class Report:
         failure: Why the run is no success so far, or None.
         planned: Whether a plan keeps every requirement of its certificate; None for a run without a plan.
         proved: Whether the body moved in the physics engine and kept every requirement.
+        refused: Failures after which other contacts were tried: phase and failure of each.
     """
 
     def __init__(
@@ -272,6 +275,7 @@ class Report:
         self.failure: StageFailure | None = None
         self.planned: bool | None = False
         self.proved = False
+        self.refused: list[dict[str, Any]] = []
         self._tables: dict[str, RequirementTable] = {}
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
@@ -306,6 +310,19 @@ class Report:
             where: Phase, contact, limb or pair.
         """
         self.failure = StageFailure(stage, reason_in_world(reason, self.transform), float(time), where)
+
+    def try_again(self, phase: int) -> None:
+        """Begin again with other contacts after a failure, which is kept among the refused ones.
+
+        Args:
+            phase: Index of the phase of the contacts that failed.
+        """
+        if self.failure is not None:
+            self.refused.append({"phase": phase, **self.failure.as_dict()})
+        self.failure, self.planned, self.proved = None, False, False
+        self._tables = {}
+        for stage in ("centroidal", "wholebody", "act", "execution"):
+            self.summary[stage] = None
 
     def require(self, stage: str, table: RequirementTable) -> None:
         """Take the requirements of a stage's result into the summary, in place of earlier ones.
@@ -356,7 +373,7 @@ class Report:
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
-        self._judge()
+        self.judge()
         failure, required = self.failure, self._context.scenario.execution_required
         word = "failed" if failure is not None else "proved" if required else "planned"
         self.summary |= {
@@ -371,7 +388,7 @@ class Report:
             self._directory.write_summary(self.summary)
         return self.summary
 
-    def _judge(self) -> None:
+    def judge(self) -> None:
         """A run that broke a requirement, or did not come to what was asked for, has failed."""
         for stage, table in self._tables.items():
             if self.failure is None and (broken := table.first_broken) is not None:

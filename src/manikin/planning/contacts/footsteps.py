@@ -62,6 +62,9 @@ GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 A way costs at most the factor more than the cheapest one.
 """
 
+ALIKE = 0.08
+"""Distance of footholds up to which a step is much like one that was refused [m]; our choice."""
+
 TURN_COST = 0.9
 """Cost of a turn [s/rad]: two steps turn a body by a right angle."""
 
@@ -119,6 +122,7 @@ class FootstepSearch:
         self._pairs: dict[tuple[int, int], float] = {}
         self._next: dict[tuple[int, int], list[tuple[int, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
+        self._refused: list[tuple[FloatArray, FloatArray]] = []
         self._offsets = _offsets(self.scale)
         self._field = _Field(
             self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale
@@ -131,6 +135,11 @@ class FootstepSearch:
     def close(self, stand: int, step: int) -> None:
         """Close a pair of footholds, which has no posture."""
         self._closed.add((stand, step))
+
+    def refuse(self, stand: int, step: int) -> None:
+        """Close all steps that are much like one, with which a later stage failed."""
+        self._refused.append((self._holds[stand].position, self._holds[step].position))
+        self._pairs = {pair: cost for pair, cost in self._pairs.items() if not self._is_refused(*pair)}
 
     def hold(self, number: int) -> Foothold:
         """Foothold of a number."""
@@ -210,7 +219,7 @@ class FootstepSearch:
     def _tested(self, parent: _Node, node: _Node) -> float:
         """Cost of the body's room at a step; infinite where the foot or the body has none."""
         pair = parent.hold, node.hold
-        if pair in self._closed:
+        if pair in self._closed or self._is_refused(*pair):
             return math.inf
         if pair not in self._pairs:
             if node.hold not in self._free:
@@ -222,6 +231,12 @@ class FootstepSearch:
                 left, right = (stand, step) if parent.side > 0 else (step, stand)
                 self._pairs[pair] = self.pair_cost(left, right)
         return self._pairs[pair]
+
+    def _is_refused(self, stand: int, step: int) -> bool:
+        first, last = self._holds[stand].position, self._holds[step].position
+        return any(
+            np.linalg.norm(first - a) < ALIKE and np.linalg.norm(last - b) < ALIKE for a, b in self._refused
+        )
 
     def _steps(self, node: _Node) -> list[tuple[int, float]]:
         """Footholds to which the other foot may go, with the cost of the step alone."""

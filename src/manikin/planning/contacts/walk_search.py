@@ -147,6 +147,7 @@ class WalkSearch:
         for number, (stage, foot) in enumerate((s, f) for s in (self.start, self.goal) for f in FEET):
             self._contacts[foot, number] = stage.contacts[foot]
         self._risen: tuple[Stage, ...] = ()
+        self._steps: list[tuple[int, int] | None] = []
         self.reasons: Counter[str] = Counter()
         self.replanned = 0
 
@@ -174,6 +175,14 @@ class WalkSearch:
             self.replanned += 1
         return self._failed(f"no contacts after {self._log.searches} postures")
 
+    def refuse(self, phase: int) -> bool:
+        """Close the step of a phase of the last plan, and what is much like it; False where it has none."""
+        pair = self._steps[phase] if phase < len(self._steps) else None
+        if pair is None:
+            return False
+        self.search.refuse(*pair)
+        return True
+
     def _failed(self, what: str) -> Extension:
         most = self.reasons.most_common(1)
         why = f"; most often: {most[0][0]}" if most else ""
@@ -195,6 +204,7 @@ class WalkSearch:
     def _planned(self, way: Sequence[int]) -> ContactPlan | None:
         """Plan of a way; None where a pair had no posture, which is closed then."""
         stages = list(self._risen)
+        self._steps = [None] * len(stages)
         feet = FEET if way[0] == 0 else (FEET[1], FEET[0])
         names = [feet[k % 2] for k in range(len(way))]
         pairs = [self._pair(names[k], way[k : k + 2]) for k in range(len(way) - 1)]
@@ -217,6 +227,7 @@ class WalkSearch:
             stages.append(Stage.of(body, {standing.effector: standing}, lifted.q, flight))
             both = {standing.effector: standing, landing.effector: landing}
             stages.append(Stage.of(body, both, landed.q, self.settings.shift_duration))
+            self._steps += [(way[k + 1], way[k + 2])] * 2
             q = landed.q
         contacts = stages[-1].contacts
         posed = self.poser.pose(contacts, contacts, self.goal.q, self.goal.q[:7], restarts=True)
