@@ -27,12 +27,14 @@ from manikin.pipeline.batch import usable_cores
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import Report, RunContext
 from manikin.pipeline.stages.contact_stage import plan_contacts
+from manikin.pipeline.stages.context import plan_in_world
 from manikin.planning.contacts import ContactPlan
 from manikin.runtime import __version__
 from manikin.runtime.files import ResultDirectory
 from manikin.runtime.parallel import processor_time_limit, side_by_side
 from manikin.scenarios import Scenario
 from manikin.scenarios.families import FAMILIES, Family, draw_scene
+from manikin.verification import check_contact_plan
 
 BENCHMARK = "benchmark.json"
 SCENES = "scenes"
@@ -150,9 +152,21 @@ def _whole(scenario: Scenario, stages: _StageClock) -> dict[str, Any]:
     return run(scenario, progress=stages).summary
 
 
-def check_contacts(_context: RunContext, _plan: ContactPlan) -> dict[str, Any] | None:
-    """Verdict of an independent check of a contact plan; None as long as there is none."""
-    return None
+def check_contacts(context: RunContext, plan: ContactPlan) -> dict[str, Any]:
+    """Verdict of the independent check of a contact plan.
+
+    Args:
+        plan: In the frame of the task.
+
+    Returns:
+        ``certified``, ``verdict`` in one line, ``broken`` (keys of the requirements that do not hold) and
+        ``room_m`` of the centre of mass.
+    """
+    result = check_contact_plan(context.given, plan_in_world(plan, context.transform_task_to_world))
+    return {
+        "certified": result.held, "verdict": result.verdict, "broken": sorted(result.requirements.broken),
+        "room_m": result.room,
+    }  # fmt: skip
 
 
 def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
