@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.contact import Contact
+from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import Extension, SearchLog
@@ -140,6 +141,7 @@ class WalkSearch:
             start,
             goal,
             scale,
+            StepReach.of(body),
             self._room.cost,
             (radius, low, high),
             self.settings.stride,
