@@ -126,7 +126,7 @@ class BodyShapes:
         pairs: dict[int, list[tuple[int, int, int]]] = {0: [], 1: [], 2: []}
         for number, names in enumerate(self.body.collision_pairs):
             ordered = sorted((index[name] for name in names), key=self._is_box)
-            pairs[sum(map(self._is_box, ordered))].append((number, *ordered))
+            pairs[sum(map(self._is_box, ordered))].append((number, ordered[0], ordered[1]))
         for kind, numbers in pairs.items():
             if numbers:
                 which, a, b = np.array(numbers).T
