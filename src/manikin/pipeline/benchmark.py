@@ -8,6 +8,7 @@ order of the tasks nor on the number of processes. Only times differ.
     DIR/benchmark.json         options, families with their counts, entries of all tasks
     DIR/tasks/FAMILY-SEED.json the entry of a task, written as soon as it is known
     DIR/scenes/FAMILY-SEED.yaml its scenario, for manikin run and for other planners, with its meshes
+    DIR/report.html            the counts, and every task with its body, times and reason
 """
 
 import hashlib
