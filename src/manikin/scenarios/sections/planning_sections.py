@@ -79,7 +79,7 @@ class ContactsSection(Section):
 
     friction: Positive = preset(0.7, "Coulomb coefficient of the soles")
     sole: SoleSection = preset(SoleSection(length_m=0.28, width_m=0.12), "size of the soles")
-    stride_m: Positive = preset(0.36, "length of a step [m] of a body of 1.75 m, scaled to the actual one")
+    stride_m: Positive = preset(0.4, "length of a step [m] of a body of 1.75 m, scaled to the actual one")
     limbs: list[Text] | None = optional(
         "names of the limbs that make contacts, hands as grasps (default: a human's feet, in "
         "steps on surfaces that carry the whole sole; all limbs of other bodies)"
@@ -94,7 +94,7 @@ class ContactsSection(Section):
         "volumes learnt from recorded motion as well",
     )
     attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = preset(
-        3, "guides that are tried before giving up"
+        3, "contact plans, or guides of a body on any limbs, that are tried before giving up"
     )
 
 
