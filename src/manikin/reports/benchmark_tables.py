@@ -56,8 +56,10 @@ def text_table(result: Mapping[str, Any]) -> str:
 
 
 def failure_lines(result: Mapping[str, Any]) -> Iterator[str]:
-    """Every task that failed with its stage and reason."""
+    """Every task that failed with its stage and reason, and every one whose contacts the check refuses."""
     for entry in result["tasks"]:
+        if entry["checked"] is not None and not entry["checked"]["held"]:
+            yield f"{entry['family']}-{entry['seed']} (check): {entry['checked']['verdict']}"
         if entry["failure"] is not None:
             failure = entry["failure"]
             yield f"{entry['family']}-{entry['seed']} ({failure['stage']}): {failure['reason']}"
