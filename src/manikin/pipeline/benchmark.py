@@ -162,14 +162,21 @@ def _whole(scenario: Scenario, stages: _StageClock) -> dict[str, Any]:
 def checked_contacts(scenario: Scenario, plan: PlannedContacts | Path) -> dict[str, Any]:
     """Verdict of the independent check of a contact plan.
 
+    Args:
+        plan: In the world, or its file.
+
     Returns:
-        ``held``, ``verdict`` in one line, ``complete`` (whether all postures were there), ``room_m``.
+        ``certified``, ``verdict`` in one line, ``broken`` (keys of the requirements that do not hold) and
+        ``room_m`` of the centre of mass.
     """
     try:
-        verdict = check_contact_plan(scenario, plan).to_dict()
+        result = check_contact_plan(scenario, plan)
     except ManikinError as error:
-        return {"held": False, "verdict": f"refused: {error}", "complete": False, "room_m": None}
-    return {key: verdict[key] for key in ("held", "verdict", "complete", "room_m")}
+        return {"certified": False, "verdict": f"refused: {error}", "broken": [], "room_m": None}
+    return {
+        "certified": result.held, "verdict": result.verdict, "broken": sorted(result.requirements.broken),
+        "room_m": result.room,
+    }  # fmt: skip
 
 
 def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
@@ -322,7 +329,7 @@ def counted(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _counts(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     found = [entry["processor_s"]["contacts"] for entry in entries if "contacts" in entry["processor_s"]]
     moved = [entry for entry in entries if entry["duration_s"] and entry["planned"]]
-    verdicts = [entry["checked"]["held"] for entry in entries if entry["checked"] is not None]
+    verdicts = [entry["checked"]["certified"] for entry in entries if entry["checked"] is not None]
     failures = [entry["failure"]["stage"] for entry in entries if entry["failure"] is not None]
     return {
         "tasks": len(entries),

@@ -58,7 +58,7 @@ def text_table(result: Mapping[str, Any]) -> str:
 def failure_lines(result: Mapping[str, Any]) -> Iterator[str]:
     """Every task that failed with its stage and reason, and every one whose contacts the check refuses."""
     for entry in result["tasks"]:
-        if entry["checked"] is not None and not entry["checked"]["held"]:
+        if entry["checked"] is not None and not entry["checked"]["certified"]:
             yield f"{entry['family']}-{entry['seed']} (check): {entry['checked']['verdict']}"
         if entry["failure"] is not None:
             failure = entry["failure"]
