@@ -85,14 +85,17 @@ def benchmark(
             chosen, numbers, stage=cast("tasks.StageName", stage), path=directory, jobs=jobs,
             time_limit=time_limit, fresh=fresh, report=report,
         )  # fmt: skip
-    from manikin.reports.benchmark_tables import failure_lines, text_table
+    from manikin.reports.benchmark_tables import failure_lines, text_table, write_benchmark_page
 
+    page = None if directory is None else write_benchmark_page(directory, result)
     if json:
         print_json(result)
         return DONE
     typer.echo(text_table(result))
     for line in failure_lines(result):
         typer.echo(line)
+    if page is not None:
+        typer.echo(f"report: {page}")
     return DONE
 
 
