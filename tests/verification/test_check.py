@@ -10,7 +10,7 @@ import pytest
 
 from manikin.body import Configuration
 from manikin.contact import sole
-from manikin.errors import ScenarioError
+from manikin.errors import ContactError, ScenarioError
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.verification import check_contact_plan, load_contact_plan, parse_contact_plan
 from manikin.verification.equilibrium import CentreState, dynamic_shortfall, rest
@@ -185,6 +185,14 @@ def test_a_broken_plan_is_refused_with_the_true_cause(rising, spoil):
     assert broken is not None
     assert broken.key == BREAKS[spoil]
     assert broken.measured == pytest.approx(MEASURED.get(spoil, broken.measured), abs=1e-6)
+
+
+def test_numbers_that_are_none_are_refused(rising):
+    """A plan made in memory is held to finite numbers as a file is."""
+    contact = last_foot(rising[1])
+    broken = replace(contact, position=np.array([np.nan, 0.0, 0.0]))
+    with pytest.raises(ContactError, match=r"contacts.left_foot is \[nan, 0.0, 0.0\]; valid: finite"):
+        with_contact(rising[1], contact, broken)
 
 
 def test_a_file_read_back_is_the_same_plan(rising):
