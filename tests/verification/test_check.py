@@ -238,12 +238,28 @@ def test_bad_files_are_refused_in_one_line(path, value, said):
     assert "\n" not in message
 
 
-def test_the_example_of_the_documentation_is_certified_as_far_as_contacts_go():
-    """A step by hand, without postures."""
+def example():
+    """Plan of the documentation: one step, without postures."""
     page = (Path(__file__).parents[2] / "docs" / "contact-plan.md").read_text()
     (text,) = re.findall(r"<!-- example: contact plan -->\n```json\n(.*?)```", page, re.DOTALL)
-    result = check_contact_plan(*parse_contact_plan(json.loads(text), "example.json"))
+    return json.loads(text)
+
+
+def test_the_example_of_the_documentation_is_certified_as_far_as_contacts_go():
+    """A step by hand, without postures."""
+    result = check_contact_plan(*parse_contact_plan(example(), "example.json"))
     assert result.verdict.startswith("certified without postures")
+
+
+def test_feet_that_no_posture_reaches_are_refused():
+    """Feet 1.5 m apart are nearer than the legs are long, and yet no joint goes so far with flat soles."""
+    content = example()
+    content["stages"][2]["contacts"]["left_foot"]["position"][0] = 1.54
+    content["scenario"]["task"]["goal"]["at"] = [0.79, 0.0]
+    content["goal"]["com"][0] = 0.79
+    broken = check_contact_plan(*parse_contact_plan(content, "split.json")).requirements.first_broken
+    assert broken.key == "max_reach_gap_m"
+    assert "stages[2]" in broken.where
 
 
 # --- balance ------------------------------------------------------------------------------------------------
