@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 import coal
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
+from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
@@ -32,8 +33,8 @@ STEP = 0.7
 EASY = 3.0**0.25
 """Way at which a step costs twice as much as a short one, over that of the cheapest gait: of a quartic."""
 
-LONGEST = 0.80
-"""Longest way between the middles of two soles, of a body of 1.75 m [m]."""
+REACH_MARGIN = 0.02
+"""Distance that steps keep to the end of what the body reaches [m]; our choice."""
 
 HIGHEST = 0.48
 """Largest difference in height of two soles, of a body of 1.75 m [m]."""
@@ -100,6 +101,7 @@ class FootstepSearch:
         start: Left and right foothold at the start.
         goal: At the goal.
         scale: Size of the body relative to one of 1.75 m.
+        reach: Places of one foot relative to the other that the body reaches.
         pair_cost: Cost of the body between two footholds.
         column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
@@ -110,6 +112,7 @@ class FootstepSearch:
     start: tuple[Foothold, Foothold]
     goal: tuple[Foothold, Foothold]
     scale: float
+    reach: StepReach
     pair_cost: PairCost
     column: tuple[float, float, float]
     stride: float = 0.4
@@ -199,10 +202,11 @@ class FootstepSearch:
         """Least cost that was left at a foothold which was reached [s], and that foothold."""
         return min(((self._ahead[n], self._holds[n]) for n, _ in self._next), key=lambda item: item[0])
 
-    @property
-    def walled_off(self) -> bool:
-        """Whether no way over the ground leads from the start to the goal, whatever the steps."""
-        return not math.isfinite(min(self._ahead[:2]))
+    def walled_off(self) -> str | None:
+        """Why no way over the ground leads from the start to the goal; None where one does."""
+        return (
+            None if math.isfinite(min(self._ahead[:2])) else self._field.walled_off(self._holds[0].position)
+        )
 
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
@@ -290,10 +294,9 @@ class FootstepSearch:
         turned = out * (np.mod(yaws - stand.yaw + math.pi, 2.0 * math.pi) - math.pi)
         rise, size = np.abs(away[:, 2]), self.scale
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
-        # A leg that goes up or down has less of its length to go ahead.
-        reach = LONGEST * size * np.sqrt(np.maximum(0.0, 1.0 - (rise / (1.25 * HIGHEST * size)) ** 2))
-        made = (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
-        made &= np.hypot(ahead, aside) <= reach
+        apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
+        made = self.reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
+        made &= (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
         cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
         cost += 1.2 * rise + 8.0 * np.maximum(0.0, rise - 0.2 * size) + 0.25 * np.abs(turned) + (1.0 - shares)
@@ -363,16 +366,17 @@ class _Field:
             near = np.vstack([near, edge[far]])
         away = self._points[near[:, 0]] - self._points[near[:, 1]]
         rise = np.abs(away[:, 2])
-        passable = rise <= HIGHEST * 1.1
-        near, away, rise = near[passable], away[passable], rise[passable]
         pace = STEP * (1.0 + 1.0 / 3.0) / stride
         slower = 0.5 * (slow[near[:, 0]] + slow[near[:, 1]])
         length = pace * slower * np.linalg.norm(away[:, :2], axis=1) + 1.2 * rise
         size = len(self._points)
+        self._near, self._rise = near, rise
+        passable = rise <= HIGHEST
+        near, length = near[passable], length[passable]
         graph = csr_array((length + 1e-9, (near[:, 0], near[:, 1])), shape=(size, size))
         middle = 0.5 * (goal[0].position + goal[1].position)
-        _, root = self._tree.query(middle)
-        self._cost, before = dijkstra(graph, directed=False, indices=int(root), return_predecessors=True)
+        self._root = int(self._tree.query(middle)[1])
+        self._cost, before = dijkstra(graph, directed=False, indices=self._root, return_predecessors=True)
         self._pace = pace
         self._yaw = _middle_yaw(goal[0].yaw, goal[1].yaw)
         # Where the way leads from each cell, and how far it is.
@@ -382,6 +386,22 @@ class _Field:
         way = self._points[ahead, :2] - self._points[:, :2]
         self._heading = np.arctan2(way[:, 1], way[:, 0])
         self._way = np.linalg.norm(self._points[:, :2] - middle[:2], axis=1)
+
+    def walled_off(self, place: FloatArray) -> str:
+        """Why no way leads from a place (3,) to the goal: a step that is too high, or no room."""
+        size = len(self._points)
+        graph = csr_array((self._rise + 1e-6, (self._near[:, 0], self._near[:, 1])), shape=(size, size))
+        way = minimum_spanning_tree(graph)
+        costs, before = dijkstra(way, directed=False, indices=self._root, return_predecessors=True)
+        row = int(self._tree.query(place)[1])
+        if not math.isfinite(costs[row]):
+            return "no way over the ground has room for the body"
+        # The way with the lowest highest step is in a minimum spanning tree.
+        highest = 0.0
+        while before[row] >= 0:
+            highest = max(highest, abs(float(self._points[row, 2] - self._points[before[row], 2])))
+            row = int(before[row])
+        return f"every way over the ground has a step of {highest:.2f} m; feet make at most {HIGHEST:.2f} m"
 
     def costs(self, places: FloatArray, yaws: FloatArray) -> FloatArray:
         """(k,) estimates of the costs from places (k, 3) [m] with headings (k,) [rad] to the goal [s]."""
