@@ -217,11 +217,6 @@ SEAT_OFF_INSET = 0.015
 BEHIND = (0.0, 0.02, 0.04)
 """How far behind where it could rest the centre of mass is when a seat is left, tried in order [m]."""
 
-LEANING_HINGES = ("lumbar_flexion", "thorax_flexion", "hip_flexion")
-
-LEAN_ROOM = 0.12
-"""Angle of these to the ends of their ranges that a lean should keep, so that the trunk can follow [rad]."""
-
 LEAN_WEIGHT = 300.0
 """Weight of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice."""
 
@@ -267,14 +262,12 @@ def leave_seat(
     pushing = {name: contact for name, contact in start.contacts.items() if name not in SEATED_ON}
     if len(pushing) > len(held):
         return _pushed_up(poser, start, pushing, held, risen.q)
-    leans = list(_leans(poser, start, held, risen.q))
-    for lean in leans:
-        if lean.q is not None and lean.failure is None and lean.room >= LEAN_ROOM:
-            return _rising(poser, start, [(held, lean.q, lean.momentum)], risen.q)
-    for lean in leans:
+    failure = None
+    for lean in _leans(poser, start, held, risen.q):
         if lean.q is not None and lean.failure is None:
             return _rising(poser, start, [(held, lean.q, lean.momentum)], risen.q)
-    return Leaving((start,), leans[-1].failure)
+        failure = lean.failure
+    return Leaving((start,), failure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,13 +277,11 @@ class _Lean:
     Attributes:
         q: (nq,) or None.
         momentum: Its motion; None at rest.
-        room: Least angle of the trunk's and hips' hinges to the ends of their ranges [rad].
         failure: None, or the reason in one line.
     """
 
     q: FloatArray | None
     momentum: Momentum | None = None
-    room: float = 0.0
     failure: str | None = None
 
 
@@ -313,10 +304,7 @@ def _leans(
             reason = reason or posed.reason
             continue
         q = posed.q
-        lean = _lean(poser, q, held, rest, moving=behind > 0.0)
-        yield lean
-        if lean.failure is None and lean.room >= LEAN_ROOM:
-            return
+        yield _lean(poser, q, held, rest, moving=behind > 0.0)
     # The farthest lean, wherever that is.
     posed = poser.pose(start.contacts, held, q, place=over, com_weight=LEAN_WEIGHT)
     if posed.q is None:
@@ -329,7 +317,7 @@ def _leans(
 def _lean(
     poser: PostureFinder, q: FloatArray, held: Mapping[str, Contact], rest: FloatArray, *, moving: bool
 ) -> _Lean:
-    """A posture with its motion to rest, its room, and whether the joints are strong enough."""
+    """A posture with its motion to rest, where the joints are strong enough."""
     body, momentum = poser.body, None
     if moving:
         com = Configuration(body, q).com
@@ -340,9 +328,7 @@ def _lean(
                 f"a lean leaves the centre of mass {behind:.3f} m behind the middle of the feet, from where "
                 "no speed carries it over them"
             ))  # fmt: skip
-    leaning = np.array([name.endswith(LEANING_HINGES) for name in body.joint_names])
-    slack = np.minimum(q[7:] - body.lower, body.upper - q[7:])[leaning]
-    return _Lean(q, momentum, float(slack.min()), _too_weak(poser, q, held, momentum))
+    return _Lean(q, momentum, _too_weak(poser, q, held, momentum))
 
 
 def _pushed_up(
