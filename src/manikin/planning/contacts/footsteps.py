@@ -21,6 +21,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
@@ -32,8 +33,8 @@ STEP = 0.7
 EASY = 3.0**0.25
 """Way at which a step costs twice as much as a short one, over that of the cheapest gait: of a quartic."""
 
-LONGEST = 0.80
-"""Longest way between the middles of two soles, of a body of 1.75 m [m]."""
+REACH_MARGIN = 0.02
+"""Distance that steps keep to the end of what the body reaches [m]; our choice."""
 
 HIGHEST = 0.48
 """Largest difference in height of two soles, of a body of 1.75 m [m]."""
@@ -100,6 +101,7 @@ class FootstepSearch:
         start: Left and right foothold at the start.
         goal: At the goal.
         scale: Size of the body relative to one of 1.75 m.
+        reach: Places of one foot relative to the other that the body reaches.
         pair_cost: Cost of the body between two footholds.
         column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
@@ -110,6 +112,7 @@ class FootstepSearch:
     start: tuple[Foothold, Foothold]
     goal: tuple[Foothold, Foothold]
     scale: float
+    reach: StepReach
     pair_cost: PairCost
     column: tuple[float, float, float]
     stride: float = 0.4
@@ -290,10 +293,9 @@ class FootstepSearch:
         turned = out * (np.mod(yaws - stand.yaw + math.pi, 2.0 * math.pi) - math.pi)
         rise, size = np.abs(away[:, 2]), self.scale
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
-        # A leg that goes up or down has less of its length to go ahead.
-        reach = LONGEST * size * np.sqrt(np.maximum(0.0, 1.0 - (rise / (1.25 * HIGHEST * size)) ** 2))
-        made = (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
-        made &= np.hypot(ahead, aside) <= reach
+        apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
+        made = self.reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
+        made &= (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
         cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
         cost += 1.2 * rise + 8.0 * np.maximum(0.0, rise - 0.2 * size) + 0.25 * np.abs(turned) + (1.0 - shares)

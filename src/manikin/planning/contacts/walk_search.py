@@ -12,10 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.contact import Contact
+from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import Extension, SearchLog
@@ -77,15 +78,23 @@ class BodyRoom:
         number = int(self._clearance.cheapest(place[None])[0])
         return STEP * float(self._costs[number]) if number >= 0 else math.inf
 
-    def posture(self, left: Foothold, right: Foothold) -> FloatArray:
-        """(nq,) cheapest free posture there, on level ground; upright where none is free."""
-        place = self._place(left, right)
-        number = max(int(self._clearance.cheapest(place[None])[0]), 0)
-        q = np.array(self._postures[number].q)
-        turn = Rotation.from_euler("z", place[3])
-        q[:3] = place[:3] + turn.apply(q[:3])
-        q[3:7] = (turn * Rotation.from_quat(q[3:7])).as_quat()
-        return q
+    def postures(self, pairs: Sequence[tuple[Foothold, Foothold]]) -> NDArray[np.int64]:
+        """(k,) postures to take one after the other between pairs of footholds, left and right.
+
+        Where no sequence of them passes, the cheapest that is free at each pair, upright where none is.
+        """
+        places = np.array([self._place(*pair) for pair in pairs])
+        along = self._clearance.along(places)
+        return np.maximum(self._clearance.cheapest(places), 0) if along is None else along
+
+    def guide(self, number: int, left: Foothold, right: Foothold) -> FloatArray:
+        """Guide of a posture there, on level ground: (7,) pose of the root upright, else the (nq,) whole.
+
+        Upright arms hang as the manner wants; otherwise they have to be where the posture has room for them.
+        """
+        posture = self._postures[number]
+        q = posture.at(self._place(left, right))
+        return q[:7] if posture.cost <= 1.0 else q
 
     def _place(self, left: Foothold, right: Foothold) -> FloatArray:
         """(4,) x, y and height of the ground [m] and heading [rad] between two feet."""
@@ -123,7 +132,7 @@ class WalkSearch:
         steepest = min(math.radians(30.0), math.atan(0.8 * self.friction))
         self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
         self._contacts: dict[tuple[str, int], Contact] = {}
-        self._postures: dict[tuple[int, int, bool], Posed] = {}
+        self._postures: dict[tuple[int, int, bool, int], Posed] = {}
         radius, low, high = (scale * value for value in COLUMN)
         start, goal = (self._holds(stage) for stage in (self.start, self.goal))
         self.search = FootstepSearch(
@@ -132,6 +141,7 @@ class WalkSearch:
             start,
             goal,
             scale,
+            StepReach.of(body),
             self._room.cost,
             (radius, low, high),
             self.settings.stride,
@@ -145,8 +155,8 @@ class WalkSearch:
 
     def run(self) -> Extension:
         """The best way whose postures exist, or why there is none."""
-        upright = self._room.posture(*self._holds(self.start))
-        first = stand_up(self.poser, self.start, frozenset(FEET), upright[:7], self._log)
+        upright = self._room.guide(0, *self._holds(self.start))
+        first = stand_up(self.poser, self.start, frozenset(FEET), upright, self._log)
         if first is None:
             left = ", ".join(set(self.start.contacts) - set(FEET))
             return self._failed(f"cannot leave {left}")
@@ -199,15 +209,17 @@ class WalkSearch:
         self._steps = [None] * len(stages)
         feet = FEET if way[0] == 0 else (FEET[1], FEET[0])
         names = [feet[k % 2] for k in range(len(way))]
+        pairs = [self._pair(names[k], way[k : k + 2]) for k in range(len(way) - 1)]
+        trunks = self._room.postures(pairs).tolist()
         q = stages[-1].q
         for k in range(len(way) - 2):
             leaving, standing, landing = (self._contact(names[k + j], way[k + j]) for j in range(3))
             if leaving.same_place(landing):
                 continue
-            lifted = self._posed(names[k : k + 2], way[k : k + 2], 1, q)
+            lifted = self._posed(names[k : k + 2], way[k : k + 2], 1, trunks[k], q)
             if lifted.q is None:
                 return self._refuse(way[k], way[k + 1], f"{names[k]} cannot be lifted: {lifted.reason}")
-            landed = self._posed(names[k + 1 : k + 3], way[k + 1 : k + 3], 0, lifted.q)
+            landed = self._posed(names[k + 1 : k + 3], way[k + 1 : k + 3], 0, trunks[k + 1], lifted.q)
             if landed.q is None:
                 why = f"{landing.effector} cannot be put down: {landed.reason}"
                 return self._refuse(way[k + 1], way[k + 2], why)
@@ -231,17 +243,24 @@ class WalkSearch:
         self.reasons[reason] += 1
         self.search.close(stand, step)
 
-    def _posed(self, names: Sequence[str], way: Sequence[int], rests: int, q: FloatArray) -> Posed:
-        """Posture on a pair of footholds that rests on one of them; looked for once."""
-        key = way[0], way[1], bool(rests)
+    def _pair(self, first: str, numbers: Sequence[int]) -> tuple[Foothold, Foothold]:
+        """Left and right of two footholds, the first of which is one foot's."""
+        one, other = (self.search.hold(number) for number in numbers)
+        return (one, other) if first == FEET[0] else (other, one)
+
+    def _posed(
+        self, names: Sequence[str], way: Sequence[int], rests: int, trunk: int, q: FloatArray
+    ) -> Posed:
+        """Posture on a pair of footholds that rests on one of them; looked for once with each trunk."""
+        key = way[0], way[1], bool(rests), trunk
         if key in self._postures:
             return self._postures[key]
         held = {name: self._contact(name, number) for name, number in zip(names, way, strict=True)}
         carrying: Mapping[str, Contact] = {names[rests]: held[names[rests]]}
-        pair = [self.search.hold(number) for number in way]
-        wished = self._room.posture(*(pair if names[0] == FEET[0] else pair[::-1]))
-        posed = self.poser.pose(held, carrying, q, wished[:7])
+        guide = self._room.guide(trunk, *self._pair(names[0], way))
+        posed = self.poser.pose(held, carrying, q, guide)
         if posed.q is None:
-            posed = self.poser.pose(held, carrying, wished, wished[:7], restarts=True)
+            start = np.concatenate([guide, q[len(guide) :]])
+            posed = self.poser.pose(held, carrying, start, guide, restarts=True)
         self._postures[key] = posed
         return posed
