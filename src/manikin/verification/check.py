@@ -19,7 +19,7 @@ from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.sequence import friction_of
-from manikin.verification.equilibrium import CentreState, dynamic_shortfall, rest
+from manikin.verification.equilibrium import CentreState, dynamic_shortfall, rest, torque_share
 from manikin.verification.holding import HeldPosture, HoldingRows, Kinematics
 from manikin.verification.plan_file import PlannedContacts, PlannedStage, load_contact_plan
 from manikin.verification.reach import ReachBounds
@@ -78,7 +78,7 @@ class ContactPlanCheck(Displayed):
         return {
             "held": self.held, "verdict": self.verdict, "stages": self.stages, "postures": self.postures,
             "complete": self.complete, "room_m": self.room,
-            "requirements": [row.as_dict("contact-plan") for row in self.requirements],
+            "requirements": [row.as_dict("contacts") for row in self.requirements],
         }  # fmt: skip
 
 
@@ -236,6 +236,7 @@ class _Check:
         lacking = Worst(
             "max_dynamic_shortfall", "share of the weight missing on the way", "", "<=", SHORTFALL
         )
+        effort = Worst("max_torque_share", "share of the strength that rest takes", "", "<=", 1.0, 1e-6)
         room = np.inf
         for change in self._changes:
             if change.dynamic:
@@ -252,10 +253,13 @@ class _Check:
             off.take(shift, f"{change.where} on {names}")
             if com is not None:
                 room = min(room, result.room)
+            if change.q is not None and result.shift <= BALANCE:
+                share = torque_share(self._body, change.q, contacts, self._cap)
+                effort.take(share, f"{change.where} on {names}")
         for number, stage in enumerate(self._plan.stages):
             if stage.dynamic:
                 lacking.take(self._shortfall(number, stage), f"stages[{number}]")
-        return [off.row, lacking.row], room
+        return [off.row, lacking.row, effort.row], room
 
     def _shortfall(self, number: int, stage: PlannedStage) -> float:
         """Of one dynamic stage; a whole weight where an end of it is not given."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import coal
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from manikin.kinematics.step_reach import StepReach
@@ -202,10 +202,11 @@ class FootstepSearch:
         """Least cost that was left at a foothold which was reached [s], and that foothold."""
         return min(((self._ahead[n], self._holds[n]) for n, _ in self._next), key=lambda item: item[0])
 
-    @property
-    def walled_off(self) -> bool:
-        """Whether no way over the ground leads from the start to the goal, whatever the steps."""
-        return not math.isfinite(min(self._ahead[:2]))
+    def walled_off(self) -> str | None:
+        """Why no way over the ground leads from the start to the goal; None where one does."""
+        return (
+            None if math.isfinite(min(self._ahead[:2])) else self._field.walled_off(self._holds[0].position)
+        )
 
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
@@ -365,16 +366,17 @@ class _Field:
             near = np.vstack([near, edge[far]])
         away = self._points[near[:, 0]] - self._points[near[:, 1]]
         rise = np.abs(away[:, 2])
-        passable = rise <= HIGHEST * 1.1
-        near, away, rise = near[passable], away[passable], rise[passable]
         pace = STEP * (1.0 + 1.0 / 3.0) / stride
         slower = 0.5 * (slow[near[:, 0]] + slow[near[:, 1]])
         length = pace * slower * np.linalg.norm(away[:, :2], axis=1) + 1.2 * rise
         size = len(self._points)
+        self._near, self._rise = near, rise
+        passable = rise <= HIGHEST
+        near, length = near[passable], length[passable]
         graph = csr_array((length + 1e-9, (near[:, 0], near[:, 1])), shape=(size, size))
         middle = 0.5 * (goal[0].position + goal[1].position)
-        _, root = self._tree.query(middle)
-        self._cost, before = dijkstra(graph, directed=False, indices=int(root), return_predecessors=True)
+        self._root = int(self._tree.query(middle)[1])
+        self._cost, before = dijkstra(graph, directed=False, indices=self._root, return_predecessors=True)
         self._pace = pace
         self._yaw = _middle_yaw(goal[0].yaw, goal[1].yaw)
         # Where the way leads from each cell, and how far it is.
@@ -384,6 +386,22 @@ class _Field:
         way = self._points[ahead, :2] - self._points[:, :2]
         self._heading = np.arctan2(way[:, 1], way[:, 0])
         self._way = np.linalg.norm(self._points[:, :2] - middle[:2], axis=1)
+
+    def walled_off(self, place: FloatArray) -> str:
+        """Why no way leads from a place (3,) to the goal: a step that is too high, or no room."""
+        size = len(self._points)
+        graph = csr_array((self._rise + 1e-6, (self._near[:, 0], self._near[:, 1])), shape=(size, size))
+        way = minimum_spanning_tree(graph)
+        costs, before = dijkstra(way, directed=False, indices=self._root, return_predecessors=True)
+        row = int(self._tree.query(place)[1])
+        if not math.isfinite(costs[row]):
+            return "no way over the ground has room for the body"
+        # The way with the lowest highest step is in a minimum spanning tree.
+        highest = 0.0
+        while before[row] >= 0:
+            highest = max(highest, abs(float(self._points[row, 2] - self._points[before[row], 2])))
+            row = int(before[row])
+        return f"every way over the ground has a step of {highest:.2f} m; feet make at most {HIGHEST:.2f} m"
 
     def costs(self, places: FloatArray, yaws: FloatArray) -> FloatArray:
         """(k,) estimates of the costs from places (k, 3) [m] with headings (k,) [rad] to the goal [s]."""

@@ -163,14 +163,12 @@ class WalkSearch:
         self._risen = first.stages
         while not self._log.is_spent:
             way = self.search.best()
-            if way is None and self.search.walled_off:
-                low, high = self.search.column[1:]
-                return self._failed(
-                    "the goal is walled off from the start: no way over the ground with room between "
-                    f"{low:.2f} and {high:.2f} m above it leads there"
-                )
             if way is None:
-                return self._failed("no footsteps lead to the goal")
+                why = self.search.walled_off()
+                return self._failed(
+                    "no footsteps lead to the goal" if why is None
+                    else f"the goal is walled off from the start: {why}"
+                )  # fmt: skip
             plan = self._planned(way)
             if plan is not None:
                 return Extension(plan, self._log.searches, self.replanned)
@@ -188,7 +186,7 @@ class WalkSearch:
     def _failed(self, what: str) -> Extension:
         most = self.reasons.most_common(1)
         why = f"; most often: {most[0][0]}" if most else ""
-        if not self.search.walled_off and self.search.expanded:
+        if self.search.walled_off() is None and self.search.expanded:
             place = self.search.farthest()[1].position
             what += f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
         return Extension(None, self._log.searches, self.replanned, f"{what}{why}", 0.0)
