@@ -12,8 +12,11 @@ from manikin.body import Configuration
 from manikin.contact import point, sole
 from manikin.errors import ContactError, ScenarioError
 from manikin.numerics.spatial import rotation_from_rpy
+from manikin.scene.obstacle import Box, Obstacle
 from manikin.verification import check_contact_plan, load_contact_plan, parse_contact_plan
 from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest
+from manikin.verification.solids import Solid
+from manikin.verification.touching import ContactRows, Rules
 
 DATA = Path(__file__).parent / "data"
 
@@ -260,6 +263,22 @@ def test_feet_that_no_posture_reaches_are_refused():
     broken = check_contact_plan(*parse_contact_plan(content, "split.json")).requirements.first_broken
     assert broken.key == "max_reach_gap_m"
     assert "stages[2]" in broken.where
+
+
+def test_a_sole_may_bridge_a_gap_that_leaves_enough_of_it(rising):
+    """On two slabs 4 cm apart six sevenths of a sole touch; 14 cm apart half of it."""
+    foot = sole("left_foot", [0.0, 0.0, 0.0], length=0.28, width=0.12, friction=0.7)
+    for gap, held in ((0.04, True), (0.14, False)):
+        away = 0.15 + 0.5 * gap
+        slabs = [
+            Solid(Obstacle(name, Box([0.3, 0.3, 0.02]), translation=[x, 0.0, -0.01]))
+            for name, x in (("front", away), ("rear", -away))
+        ]  # fmt: skip
+        rows = ContactRows(rising[0].build_body(), slabs, Rules(0.7, 400.0))
+        rows.measure({"left_foot": foot}, "stages[0]")
+        found = {row.key: row for row in rows.rows if row is not None}
+        assert found["max_contact_distance_m"].held
+        assert found["min_sole_share"].held == held
 
 
 # --- balance ------------------------------------------------------------------------------------------------
