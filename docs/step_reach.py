@@ -12,7 +12,7 @@ import numpy as np
 from manikin.body import human
 from manikin.kinematics.step_reach import FILE, HEELS, RESTS, STATURE, StepReach
 
-ROUNDS = 400
+ROUNDS = 300
 """Rounds of sampling outwards."""
 
 
