@@ -1,8 +1,8 @@
 """Places of one foot relative to the other for which one posture of the body holds both.
 
 The set is sampled like a region of the centre of mass (:mod:`manikin.kinematics.reach_sampler`), the place of
-the second foot being one more unknown. Of humans it scales with the stature, and that of each sex is shipped:
-``docs/step_reach.py`` makes the file.
+the second foot being one more unknown. Of humans it scales with the stature, and that of each sex is shipped for a
+centre of mass anywhere: ``docs/step_reach.py`` makes the file.
 """
 
 from collections.abc import Sequence
@@ -73,9 +73,9 @@ class StepReach:
 
     @classmethod
     def sampled(
-        cls, body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere", rounds: int = 24
+        cls, body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere", rounds: int = 200
     ) -> "StepReach":
-        """Sample the set of a body; a few seconds.
+        """Sample the set of a body; a second.
 
         Args:
             heels: Which feet may stand on their toes.
@@ -89,7 +89,7 @@ class StepReach:
 
     @staticmethod
     def of(body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere") -> "StepReach":
-        """The set of a body, computed once; of a human of usual proportions from the shipped table.
+        """The set of a body, computed once; of a human of usual proportions, anywhere, from the shipped table.
 
         Args:
             heels: Which feet may stand on their toes: none, the standing one, or both.
@@ -125,11 +125,11 @@ class StepReach:
 
 @lru_cache(maxsize=64)
 def _step_reach_of(body: BodyModel, heels: Heels, rest: Rest) -> StepReach:
-    if body.stature is None or body.sex is None or body.lengths:
+    if body.stature is None or body.sex is None or body.lengths or rest != "anywhere":
         return StepReach.sampled(body, heels, rest)
     scale = body.stature / STATURE
     with np.load(FILE, allow_pickle=False) as table:
-        A, b = table[f"{body.sex}/{heels}/{rest}/A"], table[f"{body.sex}/{heels}/{rest}/b"]
+        A, b = table[f"{body.sex}/{heels}/A"], table[f"{body.sex}/{heels}/b"]
     # Lengths grow with the body and turns do not.
     return StepReach(
         frozen_array(A.astype(np.float64) * [1.0, 1.0, 1.0, scale], "A"),

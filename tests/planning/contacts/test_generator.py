@@ -61,7 +61,7 @@ def check(body, scene, answer, q, limb):
     tilt = np.arccos(min(turn[:, 2] @ contact.normal, 1.0))
     assert tilt < (2e-4 if contact.kind is ContactKind.SOLE else np.deg2rad(15.0) + 1e-6)
     if contact.kind is not ContactKind.GRASP:
-        assert scene.supporting_surface(contact).obstacle == answer.obstacle
+        assert scene.supporting_surface(contact).obstacles == answer.obstacles
     slots = limb_slots(body, limb)
     others = np.setdiff1d(np.arange(body.nq), slots)
     assert np.array_equal(answer.q[others], np.asarray(q)[others])
@@ -332,7 +332,7 @@ def test_candidates_are_all_samples_near_a_surface(person, person_samples):
     """The index and the filters together, against a test of every sample on every surface."""
     ramp = Obstacle("ramp", Box((0.6, 0.8, 0.1)), rotation_from_rpy(0.1, -0.4, 0.2), (0.4, 0.1, 0.9))
     corner = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0.5, 0.2, 0], [0, 1, 0]]) * 0.5 + [0.2, -0.2, 1.1]
-    bent = Surface("bent", corner, np.array([0.0, 0.0, 1.0]))
+    bent = Surface(("bent",), corner, np.array([0.0, 0.0, 1.0]))
     surfaces = (*Scene([ramp]).surfaces, bent)
     samples = person_samples["left_arm"]
     state = Configuration(person, person.standing_posture())

@@ -1,11 +1,14 @@
 """Postures of the trunk: between which walls and under which ceilings they are free."""
 
+from itertools import pairwise
+
 import coal
 import numpy as np
 import pytest
 
-from manikin.body import human
-from manikin.planning.contacts import TrunkClearance, TrunkPostures
+from manikin.body import human, with_further_contacts
+from manikin.contact import point
+from manikin.planning.contacts import PostureFinder, TrunkClearance, TrunkPosture, TrunkPostures
 from manikin.scene import Box, Cylinder, Obstacle, Scene
 from manikin.scene.collision import collision_parts, part_meter
 
@@ -82,3 +85,39 @@ def test_quick_test_agrees_with_measured_distances(postures: TrunkPostures) -> N
             assert answer == (nearest >= checker.margin)
     alone = TrunkClearance(postures, scene)
     assert np.array_equal(np.vstack([alone.free(row) for row in places]), free)
+
+
+def test_body_bends_before_a_bar_and_not_below_it(postures: TrunkPostures) -> None:
+    """Along a way under a bar, changes of posture are free, and the ends are upright."""
+    bar = Obstacle("bar", Box((0.2, 4.0, 0.2)), translation=(1.2, 0.0, 1.15))
+    clearance = TrunkClearance(postures, Scene([bar]))
+    places = np.array([[x, 0.0, 0.0, 0.0] for x in np.arange(0.0, 2.6, 0.15)])
+    way = clearance.along(places)
+    assert way is not None
+    assert clearance.free(places)[np.arange(len(places)), way].all()
+    assert postures[way[0]].name == postures[way[-1]].name == "upright"
+    free = clearance.free(places)
+    for number, (before, after) in enumerate(pairwise(way)):
+        low, high = sorted((postures[before].height, postures[after].height))
+        passed = [before, after] + [
+            row for row, item in enumerate(postures) if low + 0.02 < item.height < high - 0.02
+        ]
+        assert before == after or free[number, passed].all() or free[number + 1, passed].all()
+    wall = Obstacle("wall", Box((0.2, 9.0, 3.0)), translation=(1.2, 0.0, 1.5))
+    assert TrunkClearance(postures, Scene([wall])).along(places) is None
+
+
+def test_body_is_on_hands_and_knees_under_less_than_0_6_m() -> None:
+    """Knees carry on the flesh of thigh and shank; both may touch the floor, the rest keeps its distance."""
+    body = with_further_contacts(human(), ("knees",))
+    roof = Obstacle("roof", Box((3.0, 2.0, 0.3)), translation=(0.0, 0.0, 0.75))
+    places = {"left_knee": (-0.25, 0.1), "right_knee": (-0.25, -0.1), "left_hand": (0.5, 0.14),
+              "right_hand": (0.5, -0.14)}  # fmt: skip
+    held = {name: point(name, (*place, 0.0), friction=0.7) for name, place in places.items()}
+    bent = {"hip_flexion": 1.6, "knee_flexion": 1.7, "shoulder_flexion": 1.5, "ankle_dorsiflexion": -0.8}
+    q = body.posture({f"{side}_{name}": angle for side in ("left", "right") for name, angle in bent.items()})
+    q[:7] = (-0.25, 0.0, 0.45, 0.0, np.sin(0.7), 0.0, np.cos(0.7))
+    scene = Scene([roof])
+    posed = PostureFinder(body, scene).pose(held, held, q, q)
+    assert posed.q is not None, posed.reason
+    assert TrunkPosture.of("on hands and knees", body, posed.q, 1.0).height < 0.6

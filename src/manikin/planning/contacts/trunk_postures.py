@@ -16,7 +16,7 @@ Arms close and a turned trunk are our choice.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import coal
 import numpy as np
@@ -29,7 +29,7 @@ from manikin.contact import Contact, sole
 from manikin.errors import BodyError
 from manikin.kinematics import PostureProblem, SolverSettings, com_target, generate_posture, touching_pairs
 from manikin.kinematics.fold import FEET_APART
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw, turned_root
 from manikin.scene import Box, Obstacle, Proximity, Scene
 from manikin.scene.collision import CollisionPart, Meter, collision_parts, local_box, part_meter, shape_of
 from manikin.scene.covering import cover
@@ -90,6 +90,12 @@ class TrunkPosture:
     shapes: tuple[coal.CollisionGeometry, ...]
     rotations: FloatArray
     translations: FloatArray
+
+    def at(self, place: FloatArray) -> FloatArray:
+        """(nq,) the posture at a place (4,): x, y and height of the ground [m], heading of the feet [rad]."""
+        out = turned_root(self.q, float(place[3]))
+        out[:3] = rotation_from_yaw(float(place[3])) @ self.q[:3] + place[:3]
+        return out
 
     @classmethod
     def of(cls, name: str, body: BodyModel, q: FloatArray, cost: float) -> "TrunkPosture":
@@ -243,6 +249,12 @@ def _half_extent(shape: coal.CollisionGeometry, rotation: FloatArray) -> FloatAr
     return np.abs(rotation) @ (0.5 * (high - low))
 
 
+STANDING = 0.1
+"""Way that standing at a place counts as, at least [m]; our choice."""
+
+CHANGING = 0.3
+"""Way that costs as much as a change of posture in which the parts of the body move 1 m; our choice [m]."""
+
 BALLS = 4
 """Balls that cover each shape in the quick test."""
 
@@ -304,6 +316,50 @@ class TrunkClearance:
         """(k,) index of the cheapest free posture at each place, -1 where there is none."""
         free = self.free(places)
         return np.where(free.any(axis=1), np.argmax(free, axis=1), -1)
+
+    def along(self, places: FloatArray) -> NDArray[np.int64] | None:
+        """(k,) postures at places (k, 4) one after the other that cost least together; None where none pass.
+
+        The ends are in the cheapest one that is free there.  A posture costs what it does over the way to its
+        neighbours, a change a share of the way that the body's parts move in it.  A change is made at one of
+        its two places, where both postures and all of a height in between have to be free.
+        """
+        free, costs = self.free(places), self.postures.costs - 1.0
+        ways = np.maximum(np.linalg.norm(np.diff(places[:, :3], axis=0), axis=1), STANDING)
+        share = np.append(ways, STANDING) + np.insert(ways, 0, STANDING)
+        ends = self.cheapest(places[[0, -1]])
+        total = np.where(np.arange(len(costs)) == ends[0], 0.0, np.inf)
+        came_from: list[NDArray[np.int64]] = []
+        for number in range(1, len(places)):
+            after = free[number]
+            possible = self._changeable(free[number - 1]) | self._changeable(after)
+            through = np.where(possible, total[:, None] + CHANGING * self._changes, np.inf)
+            came_from.append(np.argmin(through, axis=0))
+            total = np.where(after, through.min(axis=0) + 0.5 * share[number] * costs, np.inf)
+        if min(ends) < 0 or not np.isfinite(total[ends[1]]):
+            return None
+        chosen = [int(ends[1])]
+        for back in reversed(came_from):
+            chosen.append(int(back[chosen[-1]]))
+        return np.array(chosen[::-1])
+
+    def _changeable(self, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(m, m) which postures change into which where (m,) of them are free; all into themselves."""
+        hindered = np.einsum("prb,b->pr", self._between, ~free)
+        return (free[:, None] & free[None, :] & ~hindered) | np.eye(len(free), dtype=bool)
+
+    @cached_property
+    def _between(self) -> NDArray[np.bool_]:
+        """(m, m, m) whether a height is between those of two postures."""
+        height = np.array([item.height for item in self.postures])
+        low, high = np.minimum(height[:, None], height), np.maximum(height[:, None], height)
+        return (height > low[..., None] + SKIN) & (height < high[..., None] - SKIN)
+
+    @cached_property
+    def _changes(self) -> FloatArray:
+        """(m, m) mean way of the parts of the body from one posture to another [m]."""
+        middles = np.array([item.translations for item in self.postures])
+        return np.linalg.norm(middles[:, None] - middles[None, :], axis=3).mean(axis=2)
 
     def _free(self, places: FloatArray) -> NDArray[np.bool_]:
         free = np.ones((len(places), len(self.postures)), dtype=bool)
