@@ -1,8 +1,8 @@
 """Places of one foot relative to the other for which one posture of the body holds both.
 
 The set is sampled like a region of the centre of mass (:mod:`manikin.kinematics.reach_sampler`), the place of
-the second foot being one more unknown. Of humans it scales with the stature, and that of each sex is shipped for a
-centre of mass anywhere: ``docs/step_reach.py`` makes the file.
+the second foot being one more unknown. Of humans it scales with the stature; the sets of both sexes with the
+centre of mass anywhere are shipped, and ``docs/step_reach.py`` makes the file.
 """
 
 from collections.abc import Sequence
@@ -89,7 +89,7 @@ class StepReach:
 
     @staticmethod
     def of(body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere") -> "StepReach":
-        """The set of a body, computed once; of a human of usual proportions, anywhere, from the shipped table.
+        """The set of a body, computed once; anywhere, a human of usual proportions has the shipped one.
 
         Args:
             heels: Which feet may stand on their toes: none, the standing one, or both.
