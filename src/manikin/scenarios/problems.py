@@ -293,10 +293,11 @@ def _regions(values: ScenarioValues, sequence: StanceSequence) -> tuple[ComRegio
     """Where the body's postures have the CoM in each phase, with the places that the file gives.
 
     At those, and on stances on which sampling finds no posture, the full search for key postures judges.
+    A largest distance from the supports that the file gives takes the place of all regions.
     """
-    body = build_body(values)
-    if body.is_point_mass:
+    if values.is_point_mass or values.max_support_distance is not None:
         return ()
+    body = build_body(values)
     reach, phases = ComReach.of(body), values.explicit_supports().phases
     near = [None if phase.com_near is None else np.array(phase.com_near) for phase in phases]
     known = [values.start_com, *near[1 : len(sequence)], values.goal_com]
