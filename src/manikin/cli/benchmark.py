@@ -6,7 +6,16 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from manikin.cli.console import DONE, JobsOption, JsonOption, OutOption, bars, directory_of, print_json
+from manikin.cli.console import (
+    DONE,
+    FAILED,
+    JobsOption,
+    JsonOption,
+    OutOption,
+    bars,
+    directory_of,
+    print_json,
+)
 from manikin.errors import InputError
 
 
@@ -32,12 +41,24 @@ def benchmark(
         Path | None, typer.Option(metavar="DIR", help="Only write the scenes as scenario files there.")
     ] = None,
     list_families: Annotated[bool, typer.Option("--list", help="Only list the families.")] = False,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="PLAN.json", help="Only check a contact plan, of whatever planner."),
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(metavar="[SCENARIO]", help="With --check: what the plan is for; default: its own."),
+    ] = None,
     json: JsonOption = False,
 ) -> int:
     """Plan families of random everyday scenes, and count what is found, planned and proved."""
     from manikin.pipeline import benchmark as tasks
     from manikin.scenarios.families import FAMILIES, chosen_families
 
+    if check is not None:
+        return _checked(check, scenario, json=json)
+    if scenario is not None:
+        raise InputError(f"SCENARIO {scenario!r} is given without --check; valid: --check PLAN.json SCENARIO")
     chosen = chosen_families(families)
     numbers = range(first_seed, first_seed + seeds)
     if stage not in tasks.STAGES:
@@ -64,12 +85,34 @@ def benchmark(
             chosen, numbers, stage=cast("tasks.StageName", stage), path=directory, jobs=jobs,
             time_limit=time_limit, fresh=fresh, report=report,
         )  # fmt: skip
-    from manikin.reports.benchmark_tables import failure_lines, text_table
+    from manikin.reports.benchmark_tables import failure_lines, text_table, write_benchmark_page
 
+    page = None if directory is None else write_benchmark_page(directory, result)
     if json:
         print_json(result)
         return DONE
     typer.echo(text_table(result))
     for line in failure_lines(result):
         typer.echo(line)
+    if page is not None:
+        typer.echo(f"report: {page}")
     return DONE
+
+
+def _checked(plan: Path, scenario: str | None, *, json: bool) -> int:
+    """Check one contact plan and print what was measured."""
+    from manikin.reports.summary_table import requirement_lines
+    from manikin.scenarios import load_scenario
+    from manikin.verification import check_contact_plan, load_contact_plan
+
+    result = check_contact_plan(
+        *load_contact_plan(plan, None if scenario is None else load_scenario(scenario))
+    )
+    report = result.to_dict()
+    if json:
+        print_json(report)
+    else:
+        typer.echo(result.verdict)
+        for line in requirement_lines(report["requirements"]):
+            typer.echo(line)
+    return DONE if result.held else FAILED

@@ -8,6 +8,7 @@ order of the tasks nor on the number of processes. Only times differ.
     DIR/benchmark.json         options, families with their counts, entries of all tasks
     DIR/tasks/FAMILY-SEED.json the entry of a task, written as soon as it is known
     DIR/scenes/FAMILY-SEED.yaml its scenario, for manikin run and for other planners, with its meshes
+    DIR/report.html            the counts, and every task with its body, times and reason
 """
 
 import hashlib
@@ -24,15 +25,17 @@ import numpy as np
 
 from manikin.errors import ManikinError, TimeLimitError
 from manikin.pipeline.batch import usable_cores
+from manikin.pipeline.run_directory import CONTACT_PLAN
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import Report, RunContext
 from manikin.pipeline.stages.contact_stage import plan_contacts
-from manikin.planning.contacts import ContactPlan
+from manikin.pipeline.stages.context import plan_in_world
 from manikin.runtime import __version__
 from manikin.runtime.files import ResultDirectory
 from manikin.runtime.parallel import processor_time_limit, side_by_side
 from manikin.scenarios import Scenario
 from manikin.scenarios.families import FAMILIES, Family, draw_scene
+from manikin.verification import PlannedContacts, check_contact_plan
 
 BENCHMARK = "benchmark.json"
 SCENES = "scenes"
@@ -142,17 +145,38 @@ def _contacts(scenario: Scenario, stages: _StageClock) -> dict[str, Any]:
     planned = plan_contacts(context, report)
     stages("check", 0.0)
     plan = None if planned is None else planned.plan
-    checked = None if plan is None else check_contacts(context, plan)
-    return report.close() | {"checked": checked}
+    given = None if plan is None else plan_in_world(plan, context.transform_task_to_world)
+    return report.close() | {"checked": None if given is None else checked_contacts(scenario, given)}
 
 
 def _whole(scenario: Scenario, stages: _StageClock) -> dict[str, Any]:
-    return run(scenario, progress=stages).summary
+    """Summary of a run, with the verdict of the check of its contacts."""
+    with tempfile.TemporaryDirectory() as temporary:
+        directory = Path(temporary) / "run"
+        summary = run(scenario, out=directory, progress=stages).summary
+        stages("check", 0.0)
+        file = directory / CONTACT_PLAN
+        return {**summary, "checked": checked_contacts(scenario, file) if file.is_file() else None}
 
 
-def check_contacts(_context: RunContext, _plan: ContactPlan) -> dict[str, Any] | None:
-    """Verdict of an independent check of a contact plan; None as long as there is none."""
-    return None
+def checked_contacts(scenario: Scenario, plan: PlannedContacts | Path) -> dict[str, Any]:
+    """Verdict of the independent check of a contact plan.
+
+    Args:
+        plan: In the world, or its file.
+
+    Returns:
+        ``certified``, ``verdict`` in one line, ``broken`` (keys of the requirements that do not hold) and
+        ``room_m`` of the centre of mass.
+    """
+    try:
+        result = check_contact_plan(scenario, plan)
+    except ManikinError as error:
+        return {"certified": False, "verdict": f"refused: {error}", "broken": [], "room_m": None}
+    return {
+        "certified": result.held, "verdict": result.verdict, "broken": sorted(result.requirements.broken),
+        "room_m": result.room,
+    }  # fmt: skip
 
 
 def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:

@@ -1,9 +1,14 @@
-"""Results of a benchmark in words: one row for each family, and every failure with its reason."""
+"""Results of a benchmark: one row for each family, every failure with its reason, and a page of both."""
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
+from manikin.pipeline.run_directory import REPORT
+from manikin.reports.pages import render
 from manikin.reports.summary_table import NOTHING, number
+from manikin.runtime.files import write_result
+from manikin.scenarios.families import FAMILIES
 
 HEADER = (
     "family", "tasks", "contacts", "certified", "planned", "proved", "contacts [s]: median", "95 %",
@@ -51,8 +56,22 @@ def text_table(result: Mapping[str, Any]) -> str:
 
 
 def failure_lines(result: Mapping[str, Any]) -> Iterator[str]:
-    """Every task that failed with its stage and reason."""
+    """Every task that failed with its stage and reason, and every one whose contacts the check refuses."""
     for entry in result["tasks"]:
+        if entry["checked"] is not None and not entry["checked"]["certified"]:
+            yield f"{entry['family']}-{entry['seed']} (check): {entry['checked']['verdict']}"
         if entry["failure"] is not None:
             failure = entry["failure"]
             yield f"{entry['family']}-{entry['seed']} ({failure['stage']}): {failure['reason']}"
+
+
+def write_benchmark_page(directory: Path, result: Mapping[str, Any]) -> Path:
+    """Write ``report.html`` of a benchmark beside its results, and return the file.
+
+    Raises:
+        MotionFileError: If it cannot be written.
+    """
+    descriptions = {name: family.description for name, family in FAMILIES.items()}
+    rows = family_rows(result)
+    page = render("benchmark", result=result, header=HEADER, rows=rows, descriptions=descriptions)
+    return write_result(directory / REPORT, page)

@@ -117,26 +117,26 @@ class BodyShapes:
     def to_itself(self, postures: FloatArray) -> FloatArray:
         """(p, c) clearance of each of the body's collision pairs in each posture [m]."""
         index = {name: number for number, name in enumerate(self.names)}
-        pairs = [(index[a], index[b]) for a, b in self.body.collision_pairs]
-        count, result = len(self.shapes), np.full((len(postures), len(pairs)), np.inf)
+        result = np.full((len(postures), len(self.body.collision_pairs)), np.inf)
         rounds, boxes = self.placed(postures)
-        row = np.zeros((len(postures), count), dtype=np.int64)
+        row = np.zeros((len(postures), len(self.shapes)), dtype=np.int64)
         for shapes in (rounds, boxes):
             row[shapes.posture, shapes.shape] = np.arange(len(shapes.shape))
-        for number, (a, b) in enumerate(pairs):
-            kinds = [self.shapes[k].kind is ShapeKind.BOX for k in (a, b)]
-            if kinds[0] and not kinds[1]:
-                a, b, kinds = b, a, kinds[::-1]
-            first = (boxes if kinds[0] else rounds).rows(row[:, a])
-            second = (boxes if kinds[1] else rounds).rows(row[:, b])
-            if kinds[0]:
-                result[:, number] = separation(first.corners, second.corners, _axes(first, second))
-            elif kinds[1]:
-                result[:, number] = _least_along(first, _distance_to_boxes(second)) - first.radius
-            else:
-                apart = segment_segment(*first.ends, *second.ends)
-                result[:, number] = apart - first.radius - second.radius
+        # By kind, with the box last where there is one: number of the pair, first and second shape.
+        pairs: dict[int, list[tuple[int, int, int]]] = {0: [], 1: [], 2: []}
+        for number, names in enumerate(self.body.collision_pairs):
+            ordered = sorted((index[name] for name in names), key=self._is_box)
+            pairs[sum(map(self._is_box, ordered))].append((number, ordered[0], ordered[1]))
+        for kind, numbers in pairs.items():
+            if numbers:
+                which, a, b = np.array(numbers).T
+                first = (boxes if kind == 2 else rounds).rows(row[:, a].ravel())
+                second = (boxes if kind else rounds).rows(row[:, b].ravel())
+                result[:, which] = _PAIRS[kind](first, second).reshape(len(postures), -1)
         return result
+
+    def _is_box(self, shape: int) -> bool:
+        return self.shapes[shape].kind is ShapeKind.BOX
 
 
 def _extent(shape: Shape) -> FloatArray:
@@ -270,6 +270,22 @@ def _axes(first: Placed, second: Placed) -> FloatArray:
     own, other = first.rotation.transpose(0, 2, 1), second.rotation.transpose(0, 2, 1)
     crossed = np.cross(own[:, :, None], other[:, None]).reshape(len(own), 9, 3)
     return np.concatenate([own, other, crossed], axis=1)
+
+
+def _two_rounds(first: Placed, second: Placed) -> FloatArray:
+    return segment_segment(*first.ends, *second.ends) - first.radius - second.radius
+
+
+def _round_and_box(first: Placed, second: Placed) -> FloatArray:
+    return _least_along(first, _distance_to_boxes(second)) - first.radius
+
+
+def _two_boxes(first: Placed, second: Placed) -> FloatArray:
+    return separation(first.corners, second.corners, _axes(first, second))
+
+
+_PAIRS = (_two_rounds, _round_and_box, _two_boxes)
+"""Clearances (n,) of pairs of shapes, by the number of boxes among them."""
 
 
 def worst(clearance: FloatArray, allowed: np.ndarray) -> tuple[float, tuple[int, ...]]:

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
+import pinocchio as pin
 from scipy.optimize import linprog
 from scipy.sparse import block_diag, csr_array, hstack, vstack
 
+from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind, default_normal_force_cap
 from manikin.numerics.spatial import GRAVITY, FloatArray
 
@@ -210,6 +212,46 @@ def _room(forces: Forces, weight: float, sides: FloatArray) -> float:
         bounds=bounds, method="highs",
     )  # fmt: skip
     return 0.0 if solved.x is None else float(solved.x[-1])
+
+
+def torque_share(
+    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], cap: float | None
+) -> float:  # fmt: skip
+    """Smallest share of the joints' torque limits with which a posture can be held at rest.
+
+    Args:
+        q: (nq,) posture that holds the contacts.
+        contacts: Those that carry.
+        cap: Largest sum of the normal forces of soles and points [N]; the body's default when None.
+
+    Returns:
+        The largest share of any joint, as small as the contact forces can make it; infinite where they cannot
+        hold the posture.
+    """
+    if not contacts:
+        return np.inf
+    model, data = body.pinocchio, body.pinocchio.createData()
+    gravity = np.array(pin.computeGeneralizedGravity(model, data, q))
+    pin.computeJointJacobians(model, data, q)
+    pin.updateFramePlacements(model, data)
+    columns, axes = [], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    for contact in contacts:
+        jacobian = pin.getFrameJacobian(model, data, body.effector_frame(contact.effector), axes)
+        columns.append(jacobian.T @ forces_of([contact], body.mass, cap, contact.position).wrench)
+    forces = forces_of(contacts, body.mass, cap, np.zeros(3))
+    held, count = np.concatenate(columns, axis=1), len(forces.lower)
+    # Joint torques are gravity less what the contact forces give: between the limits times the share.
+    above = np.column_stack([-held[6:], -body.torque_upper])
+    below = np.column_stack([held[6:], body.torque_lower])
+    shared = np.column_stack([forces.rows, np.zeros(len(forces.rows))])
+    solved = linprog(
+        np.append(np.zeros(count), 1.0), A_ub=np.vstack([above, below, shared]),
+        b_ub=np.concatenate([-gravity[6:], gravity[6:], forces.limits]),
+        A_eq=np.column_stack([held[:6], np.zeros(6)]), b_eq=gravity[:6],
+        bounds=np.column_stack([np.append(forces.lower, 0.0), np.append(forces.upper, np.inf)]),
+        method="highs",
+    )  # fmt: skip
+    return np.inf if solved.x is None else float(solved.x[-1])
 
 
 @dataclass(frozen=True, eq=False)

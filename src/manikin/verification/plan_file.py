@@ -14,13 +14,13 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import yaml
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from manikin.body import BodyModel
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, ContactKind
-from manikin.errors import InputError, ScenarioError
-from manikin.numerics.spatial import FloatArray, check_rotation, frozen_array
+from manikin.errors import ContactError, InputError, ScenarioError
+from manikin.numerics.spatial import FloatArray, check_rotation
 from manikin.runtime import __version__
 from manikin.runtime.files import read_json
 from manikin.scenarios import Scenario, ScenarioFile, load_scenario
@@ -50,15 +50,11 @@ Quaternion = tuple[Number, Number, Number, Number]
 
 
 class PlannedContactSection(ContactSection):
-    """A contact as in a scenario's supports, with its exact frame and the points that carry."""
+    """A contact as in a scenario's supports, with its exact frame."""
 
     rotation: Matrix3 | None = optional(
         "rows of the rotation from the contact's axes to the world's, instead of yaw_deg, normal and "
         "rpy_deg: x to the toes, z out of the scene into the body"
-    )
-    points: Annotated[list[Vector3], Field(min_length=1)] | None = optional(
-        "corners of the part that touches and carries force, in the contact's frame, in order [m] "
-        "(default: the whole sole, or the position itself)"
     )
 
     @model_validator(mode="after")
@@ -67,6 +63,17 @@ class PlannedContactSection(ContactSection):
         if self.rotation is not None and given:
             raise refuse(given[0], "is given beside rotation; valid: one of both")
         return self
+
+
+def _kept_or_given(value: Any) -> str:
+    return "same" if isinstance(value, str) else "contact"
+
+
+PlannedContactEntry = Annotated[
+    Annotated[Literal["same"], Tag("same")] | Annotated[PlannedContactSection, Tag("contact")],
+    Discriminator(_kept_or_given),
+]
+"""A contact, or the word ``same`` for the one of the stage before."""
 
 
 class PostureSection(Section):
@@ -80,7 +87,7 @@ class PostureSection(Section):
 class StageSection(Section):
     """The contacts of one stage and how it begins."""
 
-    contacts: dict[Text, Literal["same"] | PlannedContactSection] = required(
+    contacts: dict[Text, PlannedContactEntry] = required(
         "contacts by effector; 'same' for the one of the stage before"
     )
     posture: PostureSection | None = optional(
@@ -172,6 +179,9 @@ class PlannedContacts:
         goal: (nq,) posture with which the last one ends, or None.
         goal_com: (3,) centre of mass then [m]; None leaves it to the posture.
         planner: Who made it.
+
+    Raises:
+        ContactError: If a number is not finite.
     """
 
     stages: tuple[PlannedStage, ...]
@@ -180,10 +190,17 @@ class PlannedContacts:
     planner: str = f"manikin {__version__}"
 
     def __post_init__(self) -> None:
-        """Make contacts that are kept one value."""
+        """Make contacts that are kept one value, and refuse numbers that are none."""
         kept: dict[str, Contact] = {}
         stages = []
-        for stage in self.stages:
+        _check_finite(self.goal, "goal.posture")
+        _check_finite(self.goal_com, "goal.com")
+        for number, stage in enumerate(self.stages):
+            for key in ("posture", "com", "com_velocity", "via"):
+                _check_finite(getattr(stage, key), f"stages[{number}].{key}")
+            for name, contact in stage.contacts.items():
+                for values in (contact.position, contact.rotation_contact_to_world, contact.points):
+                    _check_finite(values, f"stages[{number}].contacts.{name}")
             contacts = {
                 name: kept[name] if name in kept and _is_kept(contact, kept[name]) else contact
                 for name, contact in stage.contacts.items()
@@ -208,6 +225,11 @@ class PlannedContacts:
             before = stage.contacts
         goal = {"posture": _posture_dict(body, self.goal), "com": _listed(self.goal_com)}
         return content | {"stages": stages, "goal": {k: v for k, v in goal.items() if v is not None}}
+
+
+def _check_finite(values: FloatArray | None, where: str) -> None:
+    if values is not None and not np.all(np.isfinite(values)):
+        raise ContactError(f"contact plan: {where} is {values.tolist()}; valid: finite numbers")
 
 
 def _is_kept(contact: Contact, before: Contact) -> bool:
@@ -296,8 +318,6 @@ def _contact(
             rotation = check_rotation(entry.rotation, "rotation")
             oriented = contact.kind is ContactKind.GRASP
             contact = replace(contact, rotation_contact_to_world=rotation, oriented=oriented)
-        if entry.points is not None:
-            contact = replace(contact, points=frozen_array(entry.points, "points [m]", (None, 3)))
     except InputError as error:
         raise ScenarioError(f"{where}.contacts.{effector}: {error}") from None
     return contact
@@ -375,10 +395,10 @@ def _contact_dict(contact: Contact) -> dict[str, Any]:
     limits = {
         "normal_force_cap_N": contact.normal_force_cap, "torsion_limit_Nm": contact.torsion_limit,
     }  # fmt: skip
-    return common | {
-        "points": contact.points.tolist(), "friction": contact.friction,
-        **{key: value for key, value in limits.items() if value is not None},
-    }  # fmt: skip
+    if contact.kind is ContactKind.SOLE:
+        common["polygon"] = contact.points[:, :2].tolist()
+    common["friction"] = contact.friction
+    return common | {key: value for key, value in limits.items() if value is not None}
 
 
 def _posture_dict(body: BodyModel, q: FloatArray | None) -> dict[str, Any] | None:

@@ -5,15 +5,17 @@ drawn in the ranges that the family states and are rounded to millimetres, as pe
 scenes are then moved: by up to 10 m along x and y, and turned by any yaw.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 
-from manikin.runtime.files import make_directory, writing
+from manikin.numerics.spatial import PlanarTransform
+from manikin.runtime.files import atomic_path, make_directory, writing
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.validation import validate
@@ -95,21 +97,45 @@ class Sketch:
         return 1.0 if self.coin() else -1.0
 
     def box(
-        self, name: str, x: Range, y: Range, z: Range, rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        **keys: Any,
+        self, name: str, x: Range, y: Range, z: Range, *, yaw_deg: float = 0.0,
+        about: tuple[float, float] | None = None, tilt_deg: tuple[float, float] = (0.0, 0.0), **keys: Any,
     ) -> None:  # fmt: skip
-        """Add a box by its extents before it is turned about its middle [m, deg]."""
-        size = [round(abs(high - low), 4) for low, high in (x, y, z)]
-        middle = [round(0.5 * (low + high), 4) for low, high in (x, y, z)]
-        self.add(name, box=size, position=middle, rpy_deg=rpy_deg, **keys)
+        """Add a box by its extents before it is turned [m, deg].
 
-    def add(self, name: str, **keys: Any) -> None:
-        """Add an obstacle by the keys of its section."""
-        turn = keys.pop("rpy_deg", (0.0, 0.0, 0.0))
-        entry = {"name": name, **keys}
-        if any(turn):
-            entry["rpy_deg"] = [float(angle) for angle in turn]
-        self._scene.append(entry)
+        Args:
+            yaw_deg: Turn about the vertical.
+            about: Where its axis stands; in the middle of the box when omitted.
+            tilt_deg: Roll and pitch about the middle before.
+        """
+        size = [round(abs(high - low), 4) for low, high in (x, y, z)]
+        middle = np.array([0.5 * (low + high) for low, high in (x, y, z)])
+        if about is not None:
+            turn = PlanarTransform(0.0, 0.0, yaw_deg)
+            middle[:2] = np.array(about) + turn.directions(middle[:2] - np.array(about))
+        self.add(name, box=size, position=middle, rpy_deg=(*tilt_deg, yaw_deg), **keys)
+
+    def rod(self, name: str, ends: tuple[ArrayLike, ArrayLike], radius: float) -> None:
+        """Add a cylinder between two points (3,) [m], level or upright or in the plane of x and z."""
+        low, high = (np.asarray(end, dtype=np.float64) for end in ends)
+        way = high - low
+        along = way / np.linalg.norm(way)
+        roll, pitch = (
+            (90.0, 0.0) if abs(along[1]) > 0.5 else (0.0, np.degrees(np.arctan2(along[0], along[2])))
+        )
+        shape = {"radius_m": radius, "length_m": round(float(np.linalg.norm(way)), 4)}
+        self.add(name, cylinder=shape, position=0.5 * (low + high), rpy_deg=(roll, round(pitch, 2), 0.0))
+
+    def add(self, name: str, *, position: ArrayLike, rpy_deg: Sequence[float] = (), **keys: Any) -> None:
+        """Add an obstacle by the keys of its section [m, deg]."""
+        place = [round(float(value), 4) + 0.0 for value in np.asarray(position)]
+        turn = {"rpy_deg": [round(float(angle), 2) + 0.0 for angle in rpy_deg]} if any(rpy_deg) else {}
+        self._scene.append({"name": name, **keys, "position": place, **turn})
+
+    def mesh(self, name: str, mesh: trimesh.Trimesh, ending: str, position: ArrayLike, **keys: Any) -> None:
+        """Add a mesh, which is written beside the scenario."""
+        file = f"{name}.{ending}"
+        self.meshes[file] = mesh
+        self.add(name, mesh=file, position=position, **keys)
 
     def start(self, x: float, y: float, heading_deg: float = 0.0, **keys: Any) -> None:
         """Set the start [m, deg]."""
@@ -119,19 +145,26 @@ class Sketch:
         """Set the goal [m, deg]."""
         self._ends["goal"] = self._end(x, y, heading_deg, keys)
 
+    def exchange(self) -> None:
+        """Let the way lead from goal to start, facing as before."""
+        self._ends = {"start": self._ends["goal"], "goal": self._ends["start"]}
+
     def turn_back(self) -> None:
         """Let the way lead from goal to start, facing the other way."""
-        ends = self._ends
-        self._ends = {"start": ends["goal"], "goal": ends["start"]}
+        self.exchange()
         for end in self._ends.values():
             end["heading_deg"] = _angle(end["heading_deg"] + 180.0)
 
     def data(self, name: str, description: str) -> dict[str, Any]:
         """Content of the scenario's file."""
         floor = {} if self.floor == 0.0 else {"floor_height_m": self.floor}
+        scene = [
+            {**entry, "mesh": f"{name}-{entry['mesh']}"} if "mesh" in entry else entry
+            for entry in self._scene
+        ]
         return {
-            "name": name, "description": description, "body": self.body, **floor, "scene": self._scene,
-            **self.keys, "task": self._ends,
+            "name": name, "description": description, "body": self.body, **floor, "scene": scene, **self.keys,
+            "task": self._ends,
         }  # fmt: skip
 
     @staticmethod
@@ -182,8 +215,8 @@ def draw_scene(family: Family, seed: int, folder: Path | None = None) -> Scenari
     if folder is not None and sketch.meshes:
         make_directory(folder)
         for file, mesh in sketch.meshes.items():
-            with writing(folder / file):
-                mesh.export(folder / file)
+            with writing(folder / name), atomic_path(folder / f"{name}-{file}") as temporary:
+                mesh.export(temporary, file_type=file.rpartition(".")[2])
     data = sketch.data(name, family.description)
     scenario = Scenario(validate(ScenarioFile, data, name), name, folder or Path(), {})
     if not sketch.coin():

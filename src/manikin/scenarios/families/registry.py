@@ -1,19 +1,21 @@
 """All families by name."""
 
 from manikin.errors import InputError
-from manikin.scenarios.families import levels, ways
+from manikin.scenarios.families import furniture, levels, ways
 from manikin.scenarios.families.family import Family
 
 FAMILIES: dict[str, Family] = {
-    draw.__name__: Family(draw.__name__, draw)
-    for draw in (
-        ways.flat,
-        ways.thresholds,
-        ways.bars,
-        levels.stairs,
-        levels.platforms,
+    family.name: family
+    for family in (
+        Family(draw.__name__.replace("_", "-"), draw)
+        for draw in (
+            ways.flat, ways.around, levels.stairs, ways.thresholds, ways.bars, ways.hatches, levels.platforms,
+            levels.stones, levels.ramps, ways.gaps, levels.rubble, furniture.chairs, levels.roofs,
+            levels.blocks, furniture.buildings, ways.tunnels, furniture.ladders, furniture.quadruped_stairs,
+            furniture.quadruped_rubble,
+        )
     )
-}
+}  # fmt: skip
 """Families in the order of tables."""
 
 ALL = "all"
