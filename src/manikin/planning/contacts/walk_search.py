@@ -38,8 +38,8 @@ COLUMN = (0.12, 0.5, 0.9)
 STRONG_TRIES = 8
 """Ways that are refused because a posture at rest asks for more than the strength.
 
-A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so after
-that many ways the later stages decide."""
+A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so
+after that many ways the later stages decide."""
 
 NEAR_TRIES = 12
 """Ways after which a pair without a posture closes all that are much like it."""
