@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration
-from manikin.contact import sole
-from manikin.errors import ScenarioError
+from manikin.contact import point, sole
+from manikin.errors import ContactError, ScenarioError
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.verification import check_contact_plan, load_contact_plan, parse_contact_plan
-from manikin.verification.equilibrium import CentreState, dynamic_shortfall, rest
+from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest
 
 DATA = Path(__file__).parent / "data"
 
@@ -187,6 +187,14 @@ def test_a_broken_plan_is_refused_with_the_true_cause(rising, spoil):
     assert broken.measured == pytest.approx(MEASURED.get(spoil, broken.measured), abs=1e-6)
 
 
+def test_numbers_that_are_none_are_refused(rising):
+    """A plan made in memory is held to finite numbers as a file is."""
+    contact = last_foot(rising[1])
+    broken = replace(contact, position=np.array([np.nan, 0.0, 0.0]))
+    with pytest.raises(ContactError, match=r"contacts.left_foot is \[nan, 0.0, 0.0\]; valid: finite"):
+        with_contact(rising[1], contact, broken)
+
+
 def test_a_file_read_back_is_the_same_plan(rising):
     """Contacts, postures and the scenario inside a file come back."""
     scenario, plan = rising
@@ -230,12 +238,28 @@ def test_bad_files_are_refused_in_one_line(path, value, said):
     assert "\n" not in message
 
 
-def test_the_example_of_the_documentation_is_certified_as_far_as_contacts_go():
-    """A step by hand, without postures."""
+def example():
+    """Plan of the documentation: one step, without postures."""
     page = (Path(__file__).parents[2] / "docs" / "contact-plan.md").read_text()
     (text,) = re.findall(r"<!-- example: contact plan -->\n```json\n(.*?)```", page, re.DOTALL)
-    result = check_contact_plan(*parse_contact_plan(json.loads(text), "example.json"))
+    return json.loads(text)
+
+
+def test_the_example_of_the_documentation_is_certified_as_far_as_contacts_go():
+    """A step by hand, without postures."""
+    result = check_contact_plan(*parse_contact_plan(example(), "example.json"))
     assert result.verdict.startswith("certified without postures")
+
+
+def test_feet_that_no_posture_reaches_are_refused():
+    """Feet 1.5 m apart are nearer than the legs are long, and yet no joint goes so far with flat soles."""
+    content = example()
+    content["stages"][2]["contacts"]["left_foot"]["position"][0] = 1.54
+    content["scenario"]["task"]["goal"]["at"] = [0.79, 0.0]
+    content["goal"]["com"][0] = 0.79
+    broken = check_contact_plan(*parse_contact_plan(content, "split.json")).requirements.first_broken
+    assert broken.key == "max_reach_gap_m"
+    assert "stages[2]" in broken.where
 
 
 # --- balance ------------------------------------------------------------------------------------------------
@@ -260,6 +284,21 @@ def test_room_on_one_flat_sole_is_half_its_width():
     assert rest(foot, 70.0, None, np.array([0.3, 0.2, 1.0])).room == pytest.approx(0.06, abs=1e-3)
     over = np.array([0.3, 0.2, 1.0]) + 0.1 * np.array([-np.sin(0.7), np.cos(0.7), 0.0])
     assert rest(foot, 70.0, None, over).shift == pytest.approx(0.04, abs=1e-3)
+
+
+def test_a_push_moves_the_place_of_rest():
+    """200 N at 1.2 m tip backwards by 240 N.m, 0.35 m of the weight; the sole ends 0.14 m behind."""
+    feet = [
+        sole(name, [0.0, y, 0.0], length=0.28, width=0.12, friction=0.7)
+        for name, y in (("left_foot", 0.1), ("right_foot", -0.1))
+    ]  # fmt: skip
+    hands = [point(f"{side}_hand", [0.6, y, 1.2], friction=1e-3, normal=[-1.0, 0.0, 0.0])
+             for side, y in (("left", 0.2), ("right", -0.2))]  # fmt: skip
+    push = HandForce(np.array([1.0, 0.0, 0.0]), 200.0)
+    com = np.array([0.0, 0.0, 1.0])
+    needed = 200.0 * 1.2 / (70.0 * 9.81) - 0.14
+    assert rest([*feet, *hands], 70.0, None, com).shift == 0.0
+    assert rest([*feet, *hands], 70.0, None, com, act=push).shift == pytest.approx(needed, abs=1e-3)
 
 
 def test_a_dynamic_stage_needs_the_accelerations_that_friction_allows():

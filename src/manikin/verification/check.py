@@ -19,10 +19,10 @@ from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.sequence import friction_of
-from manikin.verification.equilibrium import CentreState, dynamic_shortfall, rest, torque_share
+from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest, torque_share
 from manikin.verification.holding import HeldPosture, HoldingRows, Kinematics
 from manikin.verification.plan_file import PlannedContacts, PlannedStage, load_contact_plan
-from manikin.verification.reach import ReachBounds
+from manikin.verification.reach import REACHED, PostureSearch, ReachBounds
 from manikin.verification.solids import Solid
 from manikin.verification.task import task_rows
 from manikin.verification.touching import ContactRows, Rules
@@ -66,7 +66,9 @@ class ContactPlanCheck(Displayed):
         if broken is not None:
             return f"refused: {broken.reason}"
         return (
-            "certified" if self.complete else "certified without postures: contacts, balance and order alone"
+            "certified"
+            if self.complete
+            else "certified without postures: contacts, reach, balance and order alone"
         )
 
     def facts(self) -> dict[str, str]:
@@ -138,6 +140,11 @@ class _Check:
         self._kinematics = Kinematics(self._body)
         self._changes = list(self._at_changes())
         self._reach = ReachBounds(self._body)
+        act = scenario.act
+        self._act: HandForce | None = None
+        if act is not None:
+            direction = np.array(act.direction) / np.linalg.norm(act.direction)
+            self._act = HandForce(direction, act.force_N)
 
     def run(self) -> ContactPlanCheck:
         touching, postures = self._contacts(), list(self._postures())
@@ -146,7 +153,7 @@ class _Check:
         holding.measure(postures, {key: touching.touched(contact) for key, contact in contacts.items()})
         balance, room = self._balance()
         rows: list[Requirement | None] = [
-            *self._order(), *touching.rows, self._within_reach(), *holding.rows, *balance,
+            *self._order(), *touching.rows, self._within_reach(), *holding.rows, *balance, self._reached(),
             *task_rows(self._scenario, self._plan),
         ]  # fmt: skip
         complete = all(change.q is not None for change in self._changes)
@@ -220,14 +227,30 @@ class _Check:
             1.0, 1e-6,
         )  # fmt: skip
         for change in self._changes:
-            for first, second in combinations(change.held, 2):
-                if first.effector != second.effector:
-                    apart = float(np.linalg.norm(first.position - second.position))
-                    bound = self._reach.between(first.effector, second.effector)
-                    farthest.take(
-                        apart / max(bound, 1e-9), f"{first.effector} and {second.effector}, {change.where}"
-                    )
+            for share, pair in self._shares(change):
+                farthest.take(share, pair)
         return farthest.row
+
+    def _shares(self, change: _Change) -> Iterator[tuple[float, str]]:
+        for first, second in combinations(change.held, 2):
+            if first.effector != second.effector:
+                apart = float(np.linalg.norm(first.position - second.position))
+                bound = self._reach.between(first.effector, second.effector)
+                yield apart / max(bound, 1e-9), f"{first.effector} and {second.effector}, {change.where}"
+
+    def _within_lengths(self, change: _Change) -> bool:
+        return all(share <= 1.0 for share, _ in self._shares(change))
+
+    def _reached(self) -> Requirement | None:
+        """Where no posture is given, one is looked for; not where lengths say that there is none."""
+        missed = Worst("max_reach_gap_m", "miss of the nearest posture", "m", "<=", REACHED, 1e-9)
+        search = PostureSearch(self._body)
+        for change in self._changes:
+            if change.q is None and change.held and self._within_lengths(change):
+                same = {contact.effector: contact for contact in change.held}
+                if len(same) == len(change.held):
+                    missed.take(search.gap(change.held, change.com), change.where)
+        return missed.row
 
     def _balance(self) -> tuple[list[Requirement | None], float]:
         off = Worst(
@@ -247,7 +270,8 @@ class _Check:
                     number: self._reach.to_com(contact.effector) for number, contact in enumerate(contacts)
                 }
             guess = com if com is not None else _middle(change.held)
-            result = rest(contacts, self._mass, self._cap, guess, within)
+            act = self._act if change.after is None else None
+            result = rest(contacts, self._mass, self._cap, guess, within, act)
             shift = result.shift if com is not None or result.place is None else 0.0
             names = ", ".join(contact.effector for contact in contacts) or "no contact"
             off.take(shift, f"{change.where} on {names}")

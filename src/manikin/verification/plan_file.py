@@ -19,7 +19,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from manikin.body import BodyModel
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, ContactKind
-from manikin.errors import InputError, ScenarioError
+from manikin.errors import ContactError, InputError, ScenarioError
 from manikin.numerics.spatial import FloatArray, check_rotation
 from manikin.runtime import __version__
 from manikin.runtime.files import read_json
@@ -179,6 +179,9 @@ class PlannedContacts:
         goal: (nq,) posture with which the last one ends, or None.
         goal_com: (3,) centre of mass then [m]; None leaves it to the posture.
         planner: Who made it.
+
+    Raises:
+        ContactError: If a number is not finite.
     """
 
     stages: tuple[PlannedStage, ...]
@@ -187,10 +190,17 @@ class PlannedContacts:
     planner: str = f"manikin {__version__}"
 
     def __post_init__(self) -> None:
-        """Make contacts that are kept one value."""
+        """Make contacts that are kept one value, and refuse numbers that are none."""
         kept: dict[str, Contact] = {}
         stages = []
-        for stage in self.stages:
+        _check_finite(self.goal, "goal.posture")
+        _check_finite(self.goal_com, "goal.com")
+        for number, stage in enumerate(self.stages):
+            for key in ("posture", "com", "com_velocity", "via"):
+                _check_finite(getattr(stage, key), f"stages[{number}].{key}")
+            for name, contact in stage.contacts.items():
+                for values in (contact.position, contact.rotation_contact_to_world, contact.points):
+                    _check_finite(values, f"stages[{number}].contacts.{name}")
             contacts = {
                 name: kept[name] if name in kept and _is_kept(contact, kept[name]) else contact
                 for name, contact in stage.contacts.items()
@@ -215,6 +225,11 @@ class PlannedContacts:
             before = stage.contacts
         goal = {"posture": _posture_dict(body, self.goal), "com": _listed(self.goal_com)}
         return content | {"stages": stages, "goal": {k: v for k, v in goal.items() if v is not None}}
+
+
+def _check_finite(values: FloatArray | None, where: str) -> None:
+    if values is not None and not np.all(np.isfinite(values)):
+        raise ContactError(f"contact plan: {where} is {values.tolist()}; valid: finite numbers")
 
 
 def _is_kept(contact: Contact, before: Contact) -> bool:
