@@ -7,10 +7,12 @@ import trimesh
 
 from manikin.body import human
 from manikin.contact import sole
+from manikin.numerics.spatial import rotation_from_yaw
 from manikin.scene import (
     Box,
     Capsule,
     Cylinder,
+    FootingTable,
     Mesh,
     Obstacle,
     Proximity,
@@ -104,6 +106,39 @@ def test_prepare(benchmark, person, scene):
 def test_supporting_surface(benchmark, scene):
     foot = sole("left_foot", (1.0, 0.0, 0.2), length=0.28, width=0.12, friction=0.7)
     benchmark(scene.supporting_surface, foot)
+
+
+@pytest.fixture(scope="module")
+def rubble():
+    """Sixteen turned boxes in each other and fourteen steps, on the floor."""
+    rng = np.random.default_rng(1)
+    boxes = [
+        Obstacle(
+            f"box_{k}", Box(rng.uniform(0.1, 0.6, 3)), rotation_from_yaw(turn), (*rng.uniform(-1, 1, 2), 0.0)
+        )
+        for k, turn in enumerate(rng.uniform(0.0, 6.0, 16))
+    ]
+    steps = [
+        Obstacle(f"step_{k}", Box((0.25, 1.0, h)), translation=(1.5 + 0.25 * k, 0.0, h / 2))
+        for k, h in enumerate(0.15 * np.arange(1, 15))
+    ]
+    return [*boxes, *steps]
+
+
+def test_surfaces_of_thirty_boxes(benchmark, rubble):
+    benchmark(lambda: Scene(rubble).surfaces)
+
+
+def test_a_thousand_soles(benchmark, rubble):
+    """About half of them over an edge."""
+    surfaces = Scene(rubble).surfaces_facing((0.0, 0.0, 1.0), 0.1)
+    sole = np.array([[0.14, 0.05], [0.14, -0.05], [-0.14, -0.05], [-0.14, 0.05]])
+    table, rng = FootingTable(surfaces, sole), np.random.default_rng(2)
+    places = table.under(rng.uniform((-1.2, -1.2), (4.0, 1.2), (1000, 2)), rng.uniform(-3.0, 3.0, 1000))
+    chosen = (places.numbers[:1000], places.positions[:1000], places.rotations[:1000])
+    footing = table.place(*chosen)
+    benchmark.extra_info["over_an_edge"] = float(np.mean((footing.share > 0.0) & (footing.share < 1.0)))
+    benchmark(table.place, *chosen)
 
 
 def test_cover_a_mesh(benchmark):

@@ -11,7 +11,7 @@ import numpy as np
 from manikin.body import human
 from manikin.kinematics.step_reach import FILE, HEELS, STATURE, StepReach
 
-ROUNDS = 60
+ROUNDS = 300
 """Rounds of sampling outwards."""
 
 
@@ -21,7 +21,7 @@ def main(path: Path) -> None:
     for sex in ("male", "female"):
         body = human(STATURE, 22.0 * STATURE**2, sex)
         for heels in HEELS:
-            reach = StepReach.sampled(body, heels, ROUNDS)
+            reach = StepReach.sampled(body, heels, rounds=ROUNDS)
             table[f"{sex}/{heels}/A"] = reach.A.astype(np.float32)
             table[f"{sex}/{heels}/b"] = reach.b.astype(np.float32)
     np.savez_compressed(path, allow_pickle=False, **table)

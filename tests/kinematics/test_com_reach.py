@@ -109,8 +109,19 @@ def test_places_of_a_foot_grow_with_the_body_and_are_mirrored():
 def test_the_shipped_places_are_those_that_sampling_finds():
     """Few rounds of sampling reach no place beyond the table by more than 2 cm."""
     body = human(1.75, 70.0, "male")
-    sampled, shipped = StepReach.sampled(body, rounds=4), StepReach.of(body)
+    sampled, shipped = StepReach.sampled(body, rounds=8), StepReach.of(body)
     places = np.random.default_rng(3).uniform([-1.0, -0.8, -0.6, -1.0], [1.0, 0.0, 0.6, 1.0], (2000, 4))
     inside = sampled.contains(places)
     assert inside.sum() > 20
     assert shipped.room(places[inside]).min() > -0.02
+
+
+def test_a_high_step_down_needs_the_rear_heel():
+    """0.45 m down and half a metre ahead, the body resting on the lower foot: not with both soles flat.
+
+    A man of 1.75 m; people step down as far.
+    """
+    body, place = human(1.75, 75.0, "male"), np.array([[0.50, -0.15, -0.45, 0.0]])
+    flat, raised = (StepReach.sampled(body, heels, "moved", rounds=100) for heels in ("down", "standing up"))
+    assert flat.room(place)[0] < -0.1
+    assert raised.contains(place)[0]

@@ -11,6 +11,7 @@ from manikin.body.configuration import Configuration, random_configuration
 from manikin.kinematics.posture_terms import (
     ClearanceTerm,
     ComTerm,
+    EdgeTerm,
     LimitTerm,
     PositionTerm,
     ReferenceTerm,
@@ -29,6 +30,15 @@ TERMS = {
     "com height": ComTerm(np.array([np.nan, np.nan, 0.9])),
     "upright": UprightTerm("thorax"),
     "direction": UprightTerm("head", np.array([1.0, 0, 0]), np.array([0, 0.6, 0.8])),
+    "edge": EdgeTerm(
+        "left_foot",
+        np.array([0.06, 0.0, 0.0]),
+        np.array([0.1, 0.2, 0.3]),
+        rotation_from_rpy(0.1, -0.2, 0.5),
+        0.0,
+        0.9,
+        6 + BODY.joint_index("left_toe_extension"),
+    ),
     "reference": ReferenceTerm(BODY.standing_posture()[7:]),
     "limits": LimitTerm(BODY),
 }

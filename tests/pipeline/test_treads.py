@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from manikin.balance.motion_forces import _force_points
+from manikin.contact import sole
+from manikin.control.edge_forces import contact_geometry, points_along
 from manikin.errors import ScenarioError
+from manikin.numerics.polygon import signed_distance
 from manikin.numerics.spatial import GRAVITY
 from manikin.planning.com import plan_com
 from manikin.scenarios import Scenario, load_scenario
@@ -71,6 +75,25 @@ def test_what_planning_balances_on_is_inside_what_touches(scenario):
     assert np.allclose(shares, [0.22 / 0.28, 0.09 / 0.12])
     assert np.allclose(planned.centre, real.centre)
     assert np.array_equal(planned.position, real.position)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "segments"),
+    [(-0.095, 0.14, ["left_foot", "left_toes"]), (-0.14, 0.03, ["left_foot"]), (0.08, 0.13, ["left_toes"])],
+)
+def test_control_and_force_sharing_press_only_on_what_touches(scenario, low, high, segments):
+    """Points of a heel or toes over an edge carry nothing; the toes' part is that before their hinge."""
+    body = scenario.build_body()
+    ring = [(low, -0.06), (high, -0.06), (high, 0.06), (low, 0.06)]
+    contact = sole("left_foot", (0, 0, 0), length=0.28, width=0.12, friction=0.7, polygon=ring)
+    geometry = contact_geometry(body, contact, inset=0.01)
+    assert [segment for segment, _ in geometry.patches] == segments
+    along = points_along(body, geometry)
+    assert along.min() == pytest.approx(low + 0.01)
+    assert along.max() == pytest.approx(high - 0.01)
+    points = _force_points(body, contact)
+    assert signed_distance(points[:, :2], contact.outline).min() >= -1e-12
+    assert len(points) == 4 + 2 * (len(segments) == 2)
 
 
 def test_the_centre_of_mass_is_planned_over_what_touches(scenario):

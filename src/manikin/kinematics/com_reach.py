@@ -34,6 +34,10 @@ NORMALS = frozen_array(_template(), "normals")
 """(26, 3) normals of a region in the heading frame of its stance."""
 
 
+ROOM = 0.01
+"""Room that is left to the faces of a region around places that are known to be reached [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class ComRegion:
     """Convex region of the centre of mass over a stance, in the world.
@@ -64,9 +68,9 @@ class ComRegion:
         return self.missed > 0.0
 
     def including(self, points: ArrayLike) -> "ComRegion":
-        """The region with its faces moved out to points (..., 3) where a posture is known [m]."""
+        """The region with its faces moved out to :data:`ROOM` beyond points (..., 3) that are known [m]."""
         ends = np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)) @ self.normals.T
-        return replace(self, offsets=np.maximum(self.offsets, ends.max(axis=0, initial=-np.inf)))
+        return replace(self, offsets=np.maximum(self.offsets, ends.max(axis=0, initial=-np.inf) + ROOM))
 
     def violation(self, points: ArrayLike) -> FloatArray:
         """(...) largest distance of (..., 3) points beyond a face [m]; negative is room."""

@@ -9,15 +9,16 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
-from manikin.body.limbs import end_segments, hangs
+from manikin.body.limbs import end_segments, hanging_segment, hangs
 from manikin.body.model import BodyModel
 from manikin.body.natural_range import LearntJoint, learnt_joints
-from manikin.contact import Contact, ContactKind
+from manikin.contact import Contact, ContactKind, SolePart
 from manikin.errors import BodyError, InputError
 from manikin.kinematics.posture_terms import (
     UP,
     ClearanceTerm,
     ComTerm,
+    EdgeTerm,
     LimitTerm,
     Linearised,
     PositionTerm,
@@ -26,6 +27,7 @@ from manikin.kinematics.posture_terms import (
     Term,
     UprightTerm,
 )
+from manikin.kinematics.reach_sampler import HEEL_UP, TOES_UP
 from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, frozen_array
 from manikin.scene.distance import NOTHING, Ignored, Proximity
 from manikin.scene.spheres import SphereProximity
@@ -134,7 +136,8 @@ class PostureProblem:
     """Requirements and preferences of one posture.
 
     Attributes:
-        contacts: Contacts held: a sole's whole pose, a point's or grasp's position.
+        contacts: Contacts held: a sole's whole pose, a point's or grasp's position; a sole of which only heel
+            or toes touch pitches about them.
         placements: Further effectors that must be somewhere, by name.
         com: (3,) centre of mass [m]; NaN leaves an axis free; None leaves it wholly free.
         com_weight: None when it is required; otherwise it is only wished, with this weight [1/m^2].
@@ -193,6 +196,9 @@ class PostureProblem:
         """Terms that must be zero."""
         terms: list[Term] = []
         for contact in self.contacts:
+            if contact.part is not SolePart.FULL:
+                terms.append(self._edge(contact))
+                continue
             terms.append(PositionTerm(contact.effector, contact.position, "contact"))
             if contact.kind is ContactKind.SOLE:
                 terms.append(RotationTerm(contact.effector, contact.rotation_contact_to_world, "contact"))
@@ -206,6 +212,17 @@ class PostureProblem:
         if self.learnt_margin is not None:
             terms.append(LearntRangeTerm(self.body, self.learnt_margin))
         return tuple(terms)
+
+    def _edge(self, contact: Contact) -> EdgeTerm:
+        """A sole that pitches about the part that touches."""
+        on_toes = contact.part is SolePart.TOES
+        x = contact.points[:, 0].min() if on_toes else contact.points[:, 0].max()
+        toes = hanging_segment(self.body, self.body.effector(contact.effector).segment) if on_toes else None
+        return EdgeTerm(
+            contact.effector, np.array([float(x), 0.0, 0.0]), contact.position,
+            contact.rotation_contact_to_world, *((0.0, HEEL_UP) if on_toes else (-TOES_UP, 0.0)),
+            None if toes is None else 6 + self.body.joint_index(toes.hinges[0].name),
+        )  # fmt: skip
 
     def wishes(self) -> tuple[tuple[FloatArray, Term], ...]:
         """Terms that should be small, with the weight of each row."""

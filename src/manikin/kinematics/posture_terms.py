@@ -88,6 +88,63 @@ class RotationTerm:
 
 
 @dataclass(frozen=True, eq=False)
+class EdgeTerm:
+    """A sole that stands on one edge, the hinge of its toes or its heel, and may pitch about it.
+
+    The edge's middle is in its place [m]; the sole's y axis is that of the contact, the pitch is between its
+    bounds and the toes stay flat [rad].
+
+    Attributes:
+        effector: Name of the effector.
+        pivot: (3,) middle of the edge in the effector's frame [m].
+        position: (3,) origin of the sole lying flat [m].
+        rotation: (3, 3) its axes to the world's.
+        least: Smallest pitch, heel up when positive [rad].
+        most: Largest pitch [rad].
+        toes: Index of the toes' hinge in the velocity vector, or None where they do not carry.
+    """
+
+    effector: str
+    pivot: FloatArray
+    position: FloatArray
+    rotation: FloatArray
+    least: float
+    most: float
+    toes: int | None = None
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """See :class:`Term`."""
+        rotation, position = configuration.effector_placement(self.effector)
+        jacobian = configuration.effector_jacobian(self.effector)
+        linear, angular = jacobian[:3], jacobian[3:]
+        arm, own = rotation @ self.pivot, rotation[:, 1]
+        forward, up = self.rotation[:, 0], self.rotation[:, 2]
+        along = rotation[:, 0]
+        sine, cosine = -along @ up, along @ forward
+        pitch = float(np.arctan2(sine, cosine))
+        beyond = min(pitch - self.least, 0.0) + max(pitch - self.most, 0.0)
+        turn = -cosine * np.cross(along, up) - sine * np.cross(along, forward)
+        turning = turn @ angular / (sine**2 + cosine**2)
+        rows = [
+            linear - skew(arm) @ angular, np.cross(own, forward) @ angular, np.cross(own, up) @ angular,
+            turning if beyond else np.zeros_like(turning),
+        ]  # fmt: skip
+        place = position + arm - self.position - self.rotation @ self.pivot
+        residual = [*place, own @ forward, own @ up, beyond]
+        if self.toes is not None:
+            flat = -turning
+            flat[self.toes] += 1.0
+            rows.append(flat)
+            residual.append(float(configuration.q[self.toes + 1]) - pitch)
+        return Linearised(np.array(residual), np.vstack(rows))
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`Term`."""
+        gap, angle = np.linalg.norm(residual[:3]), np.rad2deg(np.linalg.norm(residual[3:]))
+        return f"edge of contact '{self.effector}' misses its place by {gap:.4f} m and {angle:.2f} deg"
+
+
+@dataclass(frozen=True, eq=False)
 class ComTerm:
     """The centre of mass at a position (3,), NaN for free axes: ``r = c - c*`` [m]."""
 

@@ -12,13 +12,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import REFLECTION, hinge_line
+from manikin.body.segments import Limb
 from manikin.contact import ContactKind, SolePart
 from manikin.errors import BodyError
 from manikin.kinematics.leg_kinematics import LegKinematics
-from manikin.kinematics.limb_kinematics import LimbKinematics, ReachVolume, reach_volume
+from manikin.kinematics.limb_kinematics import LimbKinematics, ReachVolume, reach_volume, rigid_reach
 from manikin.numerics.spatial import FloatArray, dot, matrix, rotations
 
 SAMPLES = 600
@@ -131,12 +133,18 @@ class ReachBody:
         """Reach of the limb of an effector, and the distance to keep inside it [m]."""
         if effector not in self._volumes:
             limb = next((limb for limb in self.body.limbs if limb.effector == effector), None)
-            if limb is None:
-                valid = ", ".join(limb.effector for limb in self.body.limbs)
-                raise BodyError(f"no limb has effector {effector!r}; valid: {valid}")
-            margin = VOLUME_MARGIN * self.scale if len(LimbKinematics(self.body, limb)) else 0.0
-            self._volumes[effector] = reach_volume(self.body, limb, np.random.default_rng(0)), margin
+            self._volumes[effector] = self._rigid(effector) if limb is None else self._sampled(limb)
         return self._volumes[effector]
+
+    def _sampled(self, limb: Limb) -> tuple[ReachVolume, float]:
+        margin = VOLUME_MARGIN * self.scale if len(LimbKinematics(self.body, limb)) else 0.0
+        return reach_volume(self.body, limb, np.random.default_rng(0)), margin
+
+    def _rigid(self, effector: str) -> tuple[ReachVolume, float]:
+        """What touches without a limb, as the buttocks on a seat, moves with its segment alone."""
+        own = self.body.effector(effector)
+        limb = Limb(effector, effector, (own.segment,), ContactKind.POINT)
+        return rigid_reach(limb, own.segment, own.translation, own.rotation), 0.0
 
     def trunk(
         self, place: FloatArray, root: FloatArray, spine: FloatArray
@@ -286,10 +294,11 @@ class ReachSampler:
             return Held(x[held], projections[held], float(violation.min()))
         x, projections = x[held], projections[held]
         for _ in range(self._outward):
-            fresh = np.clip(self._farther(x, projections), low, high)
+            outermost = np.argpartition(-projections, min(OUTERMOST, len(x)) - 1, axis=0)[:OUTERMOST].T
+            fresh = np.clip(self._farther(x, outermost), low, high)
             more, beyond = self._evaluate(fresh)
-            held = beyond <= 0.0
-            x, projections = np.vstack([x, fresh[held]]), np.vstack([projections, more[held]])
+            kept, held = np.unique(outermost), beyond <= 0.0
+            x, projections = np.vstack([x[kept], fresh[held]]), np.vstack([projections[kept], more[held]])
         return Held(x, projections)
 
     def _first(self, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -301,17 +310,11 @@ class ReachSampler:
         a, b = best.min(axis=0) - 0.15 * width, best.max(axis=0) + 0.15 * width
         return self._rng.uniform(np.maximum(a, low), np.minimum(b, high), (SAMPLES, len(low)))
 
-    def _farther(self, x: FloatArray, projections: FloatArray) -> FloatArray:
-        """New unknowns near those that are outermost along each normal: differential evolution."""
-        count = min(OUTERMOST, len(x))
-        outermost = np.argpartition(-projections, count - 1, axis=0)[:count].T
-        copies = -(-SAMPLES // len(outermost))
-        first, second, third = (
-            np.take_along_axis(
-                outermost, self._rng.integers(0, count, (len(outermost), copies)), axis=1
-            ).ravel()
-            for _ in range(3)
-        )
+    def _farther(self, x: FloatArray, outermost: NDArray[np.int64]) -> FloatArray:
+        """New unknowns near those (m, k) that are outermost along each direction: differential evolution."""
+        directions, count = outermost.shape
+        chosen = self._rng.integers(0, count, (3, directions, -(-SAMPLES // directions)))
+        first, second, third = (np.take_along_axis(outermost, each, axis=1).ravel() for each in chosen)
         step = x[second] - x[third]
         noise = 0.01 * self._rng.normal(size=step.shape)
         return x[first] + self._rng.uniform(0.3, 1.0, (len(first), 1)) * step + noise

@@ -1,8 +1,8 @@
 """Places of one foot relative to the other for which one posture of the body holds both.
 
 The set is sampled like a region of the centre of mass (:mod:`manikin.kinematics.reach_sampler`), the place of
-the second foot being one more unknown. Of humans it scales with the stature, and that of each sex is shipped:
-``docs/step_reach.py`` makes the file.
+the second foot being one more unknown. Of humans it scales with the stature; the sets of both sexes with the
+centre of mass anywhere are shipped, and ``docs/step_reach.py`` makes the file.
 """
 
 from collections.abc import Sequence
@@ -32,6 +32,15 @@ Heels = Literal["down", "standing up", "both up"]
 """Feet that may stand on their toes: none, the one that stays, or both."""
 
 HEELS: tuple[Heels, ...] = ("down", "standing up", "both up")
+
+Rest = Literal["anywhere", "standing", "moved"]
+"""Foot over which the centre of mass is, so that the body may rest on it alone while the other one lands or
+leaves; or anywhere."""
+
+RESTS: tuple[Rest, ...] = ("anywhere", "standing", "moved")
+
+REST_INSET = 0.035
+"""Distance of a resting centre of mass from the sole's edges [m], of a body of 1.75 m; our choice."""
 
 FILE = Path(__file__).with_name("step_reach.npz")
 """Shipped sets of a man and a woman of :data:`STATURE`."""
@@ -63,29 +72,34 @@ class StepReach:
     b: FloatArray
 
     @classmethod
-    def sampled(cls, body: BodyModel, heels: Heels = "down", rounds: int = 24) -> "StepReach":
-        """Sample the set of a body; a few seconds.
+    def sampled(
+        cls, body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere", rounds: int = 200
+    ) -> "StepReach":
+        """Sample the set of a body; a second.
 
         Args:
             heels: Which feet may stand on their toes.
+            rest: Over which foot the centre of mass is.
             rounds: Of sampling outwards.
 
         Raises:
             BodyError: If the body has no legs like those of a human.
         """
-        return cls(*_StepSampler(ReachBody(body), heels, rounds).polytope())
+        return cls(*_StepSampler(ReachBody(body), heels, rest, rounds).polytope())
 
     @staticmethod
-    def of(body: BodyModel, heels: Heels = "down") -> "StepReach":
-        """The set of a body, computed once; of a human of usual proportions from the shipped table.
+    def of(body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere") -> "StepReach":
+        """The set of a body, computed once; anywhere, a human of usual proportions has the shipped one.
 
         Args:
             heels: Which feet may stand on their toes: none, the standing one, or both.
+            rest: Over which foot the centre of mass is: ``"standing"`` for the moved foot to land or leave,
+                ``"moved"`` for the standing one to leave after it.
 
         Raises:
             BodyError: If the body has no legs like those of a human.
         """
-        return _step_reach_of(body, heels)
+        return _step_reach_of(body, heels, rest)
 
     def room(self, places: ArrayLike, foot: str = "right_foot") -> FloatArray:
         """(k,) least distance of places (k, 4) of a foot to the end of the set [m]; negative outside."""
@@ -109,16 +123,17 @@ class StepReach:
         return given * [1.0, -1.0, 1.0, -1.0] if foot == "left_foot" else given
 
 
-@lru_cache(maxsize=32)
-def _step_reach_of(body: BodyModel, heels: Heels) -> StepReach:
-    if body.stature is None or body.sex is None or body.lengths:
-        return StepReach.sampled(body, heels)
+@lru_cache(maxsize=64)
+def _step_reach_of(body: BodyModel, heels: Heels, rest: Rest) -> StepReach:
+    if body.stature is None or body.sex is None or body.lengths or rest != "anywhere":
+        return StepReach.sampled(body, heels, rest)
     scale = body.stature / STATURE
     with np.load(FILE, allow_pickle=False) as table:
-        A, b = table[f"{body.sex}/{heels}/A"].astype(np.float64), table[f"{body.sex}/{heels}/b"]
+        A, b = table[f"{body.sex}/{heels}/A"], table[f"{body.sex}/{heels}/b"]
     # Lengths grow with the body and turns do not.
     return StepReach(
-        frozen_array(A * [1.0, 1.0, 1.0, scale], "A"), frozen_array(scale * b.astype(np.float64), "b")
+        frozen_array(A.astype(np.float64) * [1.0, 1.0, 1.0, scale], "A"),
+        frozen_array(scale * b.astype(np.float64), "b"),
     )
 
 
@@ -128,7 +143,7 @@ class _StepSampler(ReachSampler):
     The last four unknowns are the place.
     """
 
-    def __init__(self, parts: ReachBody, heels: Heels, rounds: int) -> None:
+    def __init__(self, parts: ReachBody, heels: Heels, rest: Rest, rounds: int) -> None:
         body, scale = parts.body, parts.scale
         if parts.legs is None:
             raise BodyError(f"body {body.name!r} has no legs like those of a human; valid: a human")
@@ -142,6 +157,8 @@ class _StepSampler(ReachSampler):
         super().__init__(parts, [standing, self._moved], directions, rounds)
         self._width = body.sole_width or 0.12 * scale
         self._half = half - 0.5 * self._width
+        inset = REST_INSET * scale
+        self._rest, self._room = rest, np.array([half - inset, max(0.5 * self._width - inset, 0.0)])
 
     def polytope(self) -> tuple[FloatArray, FloatArray]:
         """Rows and offsets of the set of places."""
@@ -169,12 +186,24 @@ class _StepSampler(ReachSampler):
 
     def _evaluate(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How far the places are out (n, m), and the largest violation (n,) of unknowns (n, d)."""
-        _, violation = self._legs(x, x[:, :3], rotations(x[:, 3], x[:, 4], x[:, 5]))
+        root = rotations(x[:, 3], x[:, 4], x[:, 5])
+        legs, violation = self._legs(x, x[:, :3], root)
         place, rotation = self._placed(self._moved, x)
+        if self._rest != "anywhere":
+            com = self._coms(x[:, :3], root, legs)
+            if self._rest == "moved":
+                com = (com - place[:, None]) @ rotation
+            over = np.maximum(np.abs(com[..., :2]) - self._room, 0.0)
+            violation = np.maximum(violation, BEYOND * np.hypot(over[..., 0], over[..., 1]).min(axis=-1))
         along, here = self._half * rotation[..., 0], np.tile([self._half, 0.0, 0.0], (len(x), 1))
         apart = segment_distance(place - along, place + along, -here, here)
         violation = np.maximum(violation, BEYOND * (self._width - apart))
         return self._places(x) @ self._normals.T, violation
+
+    def _coms(self, place: FloatArray, root: FloatArray, legs: FloatArray) -> FloatArray:
+        """(n, k, 3) centres of mass of the bends of the spine [m]."""
+        upper = self._parts.masses.sum() * place[:, None] + self._parts.bends @ np.swapaxes(root, -1, -2)
+        return (upper + legs.sum(axis=0)[:, None]) / self._parts.body.mass
 
     def _placed(self, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         if contact is not self._moved:

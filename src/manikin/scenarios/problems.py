@@ -10,6 +10,7 @@ import numpy as np
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, ContactKind, ContactSchedule, StanceSequence
 from manikin.errors import InputError
+from manikin.kinematics.com_reach import ComReach, ComRegion
 from manikin.kinematics.fold import HEAD_CLEARANCE, fold_under, lowest_ceiling
 from manikin.motion.file import MotionFile, read_motions
 from manikin.motion.motion import phases_of
@@ -230,10 +231,11 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
     rest = np.zeros(3) if options.zero_end_accelerations else None
     velocity = (0.0, 0.0, 0.0) if seat is None else values.file.task.goal.velocity_m_s
     given: dict[str, Any] = {"degree": options.degree, "samples": options.samples}
+    sequence = _standing(values, planning=True)
     with values.refusing(("planning",)):
         return CentroidalProblem(
             values.moved_mass,
-            _standing(values, planning=True),
+            sequence,
             values.start_com,
             values.goal_com,
             goal_velocity=None if velocity is None else np.array(velocity),
@@ -242,6 +244,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
             margin_space=options.margin_space,
             required_margin=values.required_margin,
             support_distance=values.max_support_distance,
+            regions=_regions(values, sequence),
             geometric=_height_constraints(values),
             key_planes=_key_planes(values),
             max_duration=options.max_duration_s,
@@ -284,6 +287,26 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
         for axis, (middle, room) in enumerate(zip(phase.com_near, phase.com_within_m, strict=True)):
             planes += [KeyPlane(key, sign * np.eye(3)[axis], sign * middle + room) for sign in (1.0, -1.0)]
     return tuple(planes)
+
+
+def _regions(values: ScenarioValues, sequence: StanceSequence) -> tuple[ComRegion | None, ...]:
+    """Where the body's postures have the CoM in each phase, with the places that the file gives.
+
+    At those, and on stances on which sampling finds no posture, the full search for key postures judges.
+    A largest distance from the supports that the file gives takes the place of all regions.
+    """
+    if values.is_point_mass or values.max_support_distance is not None:
+        return ()
+    body = build_body(values)
+    reach, phases = ComReach.of(body), values.explicit_supports().phases
+    near = [None if phase.com_near is None else np.array(phase.com_near) for phase in phases]
+    known = [values.start_com, *near[1 : len(sequence)], values.goal_com]
+    regions: list[ComRegion | None] = []
+    for number, phase in enumerate(sequence):
+        region = reach.region(phase.stance.contacts)
+        places = [place for place in known[number : number + 2] if place is not None]
+        regions.append(None if region.empty else region.including(places))
+    return tuple(regions)
 
 
 def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array
 from manikin.scene.obstacle import Box, Capsule, Cylinder, Obstacle
@@ -23,6 +24,8 @@ FINGER_ROOM = 0.038
 """Free room that fingers need around a bar [m]."""
 HAND_BREADTH = 0.085
 """Length of a bar that a hand covers [m]; our choice."""
+STRIP_WIDTH = 0.06
+"""Width of the faces that stand for the sides of a round bar [m]; a palm over one is put onto its middle."""
 _SPACING = 0.02  # [m]; between places along a bar that are tested for room
 _SIDES = 8
 
@@ -57,11 +60,11 @@ class GraspLine:
         return self.start + np.clip(share, 0.0, 1.0)[..., None] * along
 
     def strips(self, axis: FloatArray) -> tuple[Surface, ...]:
-        """Narrow faces around a round bar of a direction (3,), on each of which a palm may lie."""
+        """Faces around a round bar of a direction (3,), in the middle of each of which a palm may lie."""
         reach = 0.5 * HAND_BREADTH * axis
         corners = np.array([self.start - reach, self.end + reach])
         sideways, upward, _ = axes_of_normal(axis).T
-        half = self.radius * np.tan(np.pi / _SIDES)
+        half = 0.5 * STRIP_WIDTH
         found: list[Surface] = []
         for angle in 2.0 * np.pi * np.arange(_SIDES) / _SIDES:
             normal = np.cos(angle) * sideways + np.sin(angle) * upward
@@ -99,6 +102,25 @@ def grasp_strips(lines: Sequence[GraspLine], obstacles: Sequence[Obstacle]) -> t
     """Faces around the round bars, for a palm; boxes have faces of their own."""
     axes = {item.name: item.rotation[:, 2] for item in obstacles}
     return tuple(strip for line in lines if line.round for strip in line.strips(axes[line.obstacle]))
+
+
+def palm_places(lines: Sequence[GraspLine], numbers: NDArray[np.int64], points: FloatArray) -> FloatArray:
+    """(n, 3) middles of palms' grips on the axes of round bars, nearest to points over their strips [m].
+
+    Args:
+        lines: Of the scene.
+        numbers: (n,) index of each strip among those of :func:`grasp_strips`.
+        points: (n, 3) in the planes of the strips.
+    """
+    bars = [line for line in lines if line.round]
+    start, end = (
+        np.array([getattr(bar, name) for bar in bars])[numbers // _SIDES] for name in ("start", "end")
+    )
+    axis = end - start
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-12)
+    length = np.linalg.norm(end - start, axis=1)
+    along = np.clip(np.einsum("ni,ni->n", points - start, axis), 0.0, length)
+    return start + along[:, None] * axis
 
 
 def _bar(obstacle: Obstacle) -> tuple[FloatArray, FloatArray, float, bool] | None:

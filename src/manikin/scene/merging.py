@@ -60,24 +60,31 @@ def _coplanar(faces: Sequence[Surface]) -> Iterator[list[int]]:
     if not faces:
         return
     normals = np.array([face.normal for face in faces])
-    corners = np.concatenate([face.polygon for face in faces])
-    first = np.cumsum([0, *(len(face.polygon) for face in faces)])[:-1]
+    corner = np.array([face.polygon[0] for face in faces])
     left = np.ones(len(faces), dtype=bool)
     for seed in np.argsort([-face.area for face in faces], kind="stable").tolist():
         if not left[seed]:
             continue
-        away = np.abs((corners - faces[seed].polygon[0]) @ normals[seed])
-        own = left & (normals @ normals[seed] >= PARALLEL) & (np.maximum.reduceat(away, first) <= COPLANAR)
-        own[seed] = True
-        left &= ~own
-        yield [seed, *(number for number in np.flatnonzero(own).tolist() if number != seed)]
+        normal, base = normals[seed], faces[seed].polygon[0]
+        near = left & (normals @ normal >= PARALLEL) & (np.abs((corner - base) @ normal) <= COPLANAR)
+        near[seed] = False
+        own = [
+            number
+            for number in np.flatnonzero(near).tolist()
+            if np.abs((faces[number].polygon - base) @ normal).max() <= COPLANAR
+        ]
+        left[[seed, *own]] = False
+        yield [seed, *own]
 
 
 def _joined(members: Sequence[Surface], solids: "Sequence[_Solid]") -> list[tuple[int, Surface]]:
     """Surfaces that coplanar faces make, each with the first of the faces that it is made of."""
     frame = _frame(members)
+    around = _around(frame, members, solids)
+    if len(members) == 1 and not around:
+        return [(0, members[0])]
     shapes = [frame.flat(face.polygon, face.holes) for face in members]
-    hidden = _hidden(frame, shapes, solids)
+    hidden = shapely.union_all([solid.slice(frame) for solid in around], grid_size=GRID)
     found: list[tuple[int, Surface]] = []
     for group in _touching(shapes):
         names = tuple(dict.fromkeys(members[number].obstacles[0] for number in sorted(group)))
@@ -133,16 +140,11 @@ def _union(shapes: Sequence[Geometry]) -> Geometry:
     return shapely.union_all([union, wider.buffer(-0.51 * COPLANAR, join_style="mitre")], grid_size=GRID)
 
 
-def _hidden(frame: PlaneFrame, shapes: Sequence[Geometry], solids: "Sequence[_Solid]") -> Geometry:
-    """What solids cover of a plane, of those near the shapes."""
-    low_x, low_y, high_x, high_y = np.asarray(shapely.total_bounds(shapes)).tolist()
-    slices = [
-        solid.slice(frame)
-        for solid in solids
-        if solid.meets(frame, np.array([low_x, low_y]), np.array([high_x, high_y]))
-    ]
-    some = [item for item in slices if not item.is_empty]
-    return shapely.union_all(some, grid_size=GRID) if len(some) != 1 else some[0]
+def _around(frame: PlaneFrame, members: Sequence[Surface], solids: "Sequence[_Solid]") -> "list[_Solid]":
+    """Solids that may cover something of faces of a plane."""
+    flat = np.concatenate([(face.polygon - frame.origin) @ frame.rotation[:, :2] for face in members])
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    return [solid for solid in solids if solid.meets(frame, low, high)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import coal
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from manikin.contact import Contact, ContactKind
 from manikin.errors import ContactError, SceneError
@@ -14,7 +14,7 @@ from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.collision import Meter, collision_parts, part_meter
 from manikin.scene.footing import FootingTable
-from manikin.scene.grasp_line import GraspLine, grasp_lines, grasp_strips
+from manikin.scene.grasp_line import GraspLine, grasp_lines, grasp_strips, palm_places
 from manikin.scene.merging import COPLANAR, merged_surfaces
 from manikin.scene.obstacle import HalfSpace, Obstacle
 from manikin.scene.surface import Surface
@@ -96,8 +96,19 @@ class Scene(Displayed):
 
     @cached_property
     def holds(self) -> tuple[Surface, ...]:
-        """The surfaces, and after them narrow faces around the round bars, on which only a palm can lie."""
+        """The surfaces, and after them faces around the round bars, on which only a palm can lie."""
         return (*self.surfaces, *grasp_strips(self.grasp_lines, self.obstacles))
+
+    def palms(self, numbers: NDArray[np.int64], points: FloatArray) -> FloatArray:
+        """(n, 3) places of palms over points (n, 3) of holds of (n,) indices: on bars in their middle [m]."""
+        placed, strip = np.array(points), numbers - len(self.surfaces)
+        rows = np.flatnonzero(strip >= 0)
+        if len(rows):
+            on_axis = palm_places(self.grasp_lines, strip[rows], placed[rows])
+            normals = np.array([self.holds[number].normal for number in numbers[rows]])
+            height = np.einsum("ni,ni->n", placed[rows] - on_axis, normals)
+            placed[rows] = on_axis + height[:, None] * normals
+        return placed
 
     def surfaces_facing(self, direction: Sequence[float], max_angle: float) -> tuple[Surface, ...]:
         """Surfaces whose normal is within ``max_angle`` [rad] of ``direction`` (3,)."""

@@ -109,11 +109,14 @@ def faces_of(obstacle: Obstacle) -> tuple[Surface, ...]:
 
 
 def _surface(obstacle: Obstacle, polygon: FloatArray, normal: FloatArray) -> Surface:
-    world_normal = obstacle.rotation @ normal
+    return _in_world(obstacle, obstacle.to_world(polygon), obstacle.rotation @ normal)
+
+
+def _in_world(obstacle: Obstacle, polygon: FloatArray, normal: FloatArray) -> Surface:
     return Surface(
         (obstacle.name,),
-        frozen_array(obstacle.to_world(polygon), "polygon", (None, 3)),
-        frozen_array(world_normal / np.linalg.norm(world_normal), "normal", (3,)),
+        frozen_array(polygon, "polygon", (None, 3)),
+        frozen_array(normal / np.linalg.norm(normal), "normal", (3,)),
     )
 
 
@@ -167,6 +170,9 @@ def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
             if whole.area_faces[group].sum() >= SMALLEST_AREA:
                 normal = np.einsum("i,ij->j", whole.area_faces[group], whole.face_normals[group])
                 triangles = whole.triangles[group]
+                if len(group) == 1:
+                    surfaces.append(_in_world(obstacle, triangles[0], normal))
+                    continue
                 frame = PlaneFrame.of(normal / np.linalg.norm(normal), triangles[0])
                 union = shapely.union_all([frame.flat(ring) for ring in triangles], grid_size=GRID)
                 surfaces += frame.surfaces(union, (obstacle.name,))

@@ -122,12 +122,14 @@ class ContactRows:
 
     def _lying(self, contact: Contact, hull: FloatArray, where: str) -> frozenset[str]:
         """A polygon on flat pieces of the scene, which may be several in one plane."""
-        samples = contact.position + polygon_samples(hull) @ contact.rotation_contact_to_world.T
+        local = polygon_samples(hull)
+        samples = contact.position + local @ contact.rotation_contact_to_world.T
+        corners = contact.points_in_world
         middle = contact.position + contact.centre @ contact.rotation_contact_to_world.T
-        best, nearest, off = np.full(len(samples), np.inf), np.inf, np.pi
+        best, nearest, off = np.full(len(samples) + len(corners), np.inf), np.inf, np.pi
         touched = set()
         for solid in self._solids:
-            distance, _ = solid.support(samples, contact.normal, _SEEN)
+            distance, _ = solid.support(np.vstack([samples, corners]), contact.normal, _SEEN)
             best = np.minimum(best, distance)
             if distance.min() <= ON_SURFACE:
                 touched.add(solid.name)
@@ -136,7 +138,13 @@ class ContactRows:
                 nearest, off = min(nearest, height), angle
         if nearest < 0.05:
             self._angle.take(float(np.rad2deg(off)), where)
-        self._distance.take(float(best.max()), where)
+        # The corners carry force; between them a sole may bridge a gap, which is no part of what touches.
+        self._distance.take(float(best[len(samples) :].max()), where)
+        weight = np.linalg.norm(local - hull.mean(axis=0), axis=1)
+        lying = float(weight @ (best[: len(samples)] <= ON_SURFACE) / weight.sum())
+        size = nominal_size(self._body, contact.effector)
+        if size is not None:
+            self._share.take(lying * area(hull) / (size[0] * size[1]), where)
         return frozenset(touched)
 
     def _at_points(self, contact: Contact, where: str) -> frozenset[str]:
@@ -187,7 +195,8 @@ class ContactRows:
             return
         half = 0.5 * np.array(size)
         self._beyond.take(float((np.abs(contact.points[:, :2]) - half).max()), where)
-        self._share.take(0.0 if hull is None else area(hull) / (size[0] * size[1]), where)
+        if hull is None:
+            self._share.take(0.0, where)
 
 
 def outline(points: FloatArray) -> FloatArray | None:

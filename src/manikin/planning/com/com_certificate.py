@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.balance import WrenchPolytope, least_zmp_distance
+from manikin.kinematics.com_reach import ComRegion
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
 from manikin.planning.com.feasibility import row_slopes
@@ -29,7 +30,7 @@ class Residual:
     """Largest violation of one requirement.
 
     Attributes:
-        requirement: ``"balance margin"``, ``"support distance"``, ``"phase duration"``,
+        requirement: ``"balance margin"``, ``"support distance"``, ``"reach"``, ``"phase duration"``,
             ``"total duration"``, ``"start position"``, ... or the name of a geometric constraint.
         value: Largest violation [``unit``]; negative is what is left to spare.
         phase: Where it happens, or None for the whole motion.
@@ -211,6 +212,12 @@ def position_excess(
             for p, phase in zip(positions, problem.sequence, strict=True)
         ]
         yield "support distance", excess
+    if problem.regions:
+        none = ComRegion.everywhere()
+        yield (
+            "reach",
+            [(region or none).violation(p) for p, region in zip(positions, problem.regions, strict=True)],
+        )
     for constraint in problem.geometric:
         yield constraint.name, [constraint.violation(p) for p in positions]
 

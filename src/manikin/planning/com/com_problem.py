@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.balance import pseudo_wrench
 from manikin.contact import ContactSchedule, StanceSequence
 from manikin.errors import InputError, SplineError
+from manikin.kinematics.com_reach import ComRegion
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.numerics.spline import BSpline
 from manikin.planning.com.com_constraints import GeometricConstraint, KeyPlane
@@ -252,6 +253,8 @@ class CentroidalProblem:
         margin_space: Whether the margin is a wrench [N.m] or a force at the CoM [N].
         required_margin: d_min must not be smaller (5.21) [N.m] or [N].
         support_distance: Largest distance of the CoM from every active contact (5.26) [m].
+        regions: Where the body's postures have the CoM in each phase, None where that is not known; empty
+            for none at all.
         key_planes: Planes behind which the CoM must be at single key instants, neither the first nor the
             last, where the CoM is given.
         max_duration: Longest duration of the whole motion [s].
@@ -272,6 +275,7 @@ class CentroidalProblem:
     margin_space: MarginSpace = "wrench"
     required_margin: float = 0.0
     support_distance: float | None = None
+    regions: tuple[ComRegion | None, ...] = ()
     geometric: tuple[GeometricConstraint, ...] = ()
     key_planes: tuple[KeyPlane, ...] = ()
     max_duration: float | None = None
@@ -287,6 +291,7 @@ class CentroidalProblem:
             "required_margin": finite_number(
                 self.required_margin, "centroidal required_margin", at_least=0.0
             ),
+            "regions": _checked_regions(self.regions, len(self.sequence)),
             "geometric": tuple(self.geometric),
             "key_planes": _inner_planes(self.key_planes, len(self.sequence)),
             "samples": _integer(self.samples, "samples", 2),
@@ -326,6 +331,12 @@ class CentroidalProblem:
     def max_durations(self) -> FloatArray:
         """(phases,) upper bounds of the durations [s], infinite where there is none."""
         return np.array([np.inf if p.max_duration is None else p.max_duration for p in self.sequence])
+
+
+def _checked_regions(regions: Sequence[ComRegion | None], phases: int) -> tuple[ComRegion | None, ...]:
+    if regions and len(regions) != phases:
+        raise InputError(f"centroidal regions are {len(regions)} for {phases} phases; valid: one per phase")
+    return tuple(regions)
 
 
 def _inner_planes(planes: Sequence[KeyPlane], phases: int) -> tuple[KeyPlane, ...]:

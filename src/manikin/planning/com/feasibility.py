@@ -137,7 +137,7 @@ class Failure:
 
     Attributes:
         requirement: Short name of what cannot be met: ``"durations"``, ``"weight"``, ``"intersection"``,
-            ``"start balance"``, ``"goal balance"``, ``"friction"``, ``"support distance"``,
+            ``"start balance"``, ``"goal balance"``, ``"friction"``, ``"support distance"``, ``"reach"``,
             ``"balance margin"`` or the name of a geometric constraint.
         reason: One sentence with the numbers.
         phase: Index of the phase, or None when it concerns the whole motion.
@@ -228,6 +228,7 @@ def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]
     failure = (
         _duration_failure(problem)
         or _reach_failure(problem)
+        or _apart_failure(problem)
         or misplaced(problem, problem.start_com, (0,), "start CoM")
         or misplaced(problem, problem.goal_com, (last,), "goal CoM")
         or _weight_failure(problem, polytopes)
@@ -288,6 +289,13 @@ def misplaced(
                     f"the limit is {limit:.3f} m",
                     phase, where=contact.effector,
                 )  # fmt: skip
+    for phase in phases if problem.regions else ():
+        region, stance = problem.regions[phase], problem.sequence[phase].stance
+        beyond = -np.inf if region is None else float(region.violation(com))
+        if beyond > tolerance:
+            where = ", ".join(stance.effectors)
+            reason = f"{what} is {beyond:.3f} m out of this body's reach on {where} in phase {phase}"
+            return Failure("reach", reason, phase, where=where)
     for constraint in problem.geometric:
         violation = float(constraint.violation(com))
         if violation > tolerance:
@@ -301,6 +309,25 @@ def _reach_failure(problem: CentroidalProblem) -> Failure | None:
         reason = out_of_reach(problem, index)
         if reason is not None:
             return Failure("support distance", reason, index, where=", ".join(phase.stance.effectors))
+    return None
+
+
+def _apart_failure(problem: CentroidalProblem) -> Failure | None:
+    """Failure of a change of contacts at which no CoM is in the regions of both phases, or None."""
+    for key, (before, after) in enumerate(itertools.pairwise(problem.regions), start=1):
+        if before is None or after is None:
+            continue
+        rows = np.vstack([before.normals, after.normals])
+        room = _largest_distance(Polytope(rows, np.append(before.offsets, after.offsets)), np.ones(len(rows)))
+        if room < -REACH_TOLERANCE:
+            stances = (problem.sequence[key - 1].stance, problem.sequence[key].stance)
+            where = ", ".join(dict.fromkeys(name for stance in stances for name in stance.effectors))
+            return Failure(
+                "reach",
+                f"no centre of mass is in this body's reach both before and after the change at T_{key}, on "
+                f"{where}: the two regions are {-2.0 * room:.2f} m apart",
+                key, where=where,
+            )  # fmt: skip
     return None
 
 

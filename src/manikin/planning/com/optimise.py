@@ -71,6 +71,35 @@ def with_violated(
     return tuple(grown)
 
 
+ReachRows = tuple[NDArray[np.int64], ...]
+"""Indices of the imposed faces of each phase's region."""
+
+
+def no_reach_rows(problem: CentroidalProblem) -> ReachRows:
+    """No face of any region."""
+    return tuple(np.zeros(0, dtype=np.int64) for _ in problem.regions)
+
+
+def with_broken_faces(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, chosen: ReachRows
+) -> ReachRows:
+    """Add to each phase the faces of its region that a trajectory breaks, or is about to break."""
+    if not problem.regions:
+        return chosen
+    grown: list[NDArray[np.int64]] = []
+    for region, rows, times in zip(problem.regions, chosen, phase_times(trajectory), strict=True):
+        if region is None or region.empty:
+            grown.append(rows)
+            continue
+        beyond = (trajectory.position(times) @ region.normals.T - region.offsets).max(axis=0)
+        broken = bool((beyond > TOLERANCE).any())
+        grown.append(np.union1d(rows, np.flatnonzero(beyond > -FACE_ROOM)) if broken else rows)
+    return tuple(grown)
+
+
+FACE_ROOM = 0.02
+"""Room that a face has left where it is imposed along with broken ones [m]."""
+
 SHORTFALL_WEIGHT = 20.0
 """Exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
 
@@ -104,12 +133,16 @@ class MarginTargets:
                 for phase, com in ends
                 for contact in phase.stance
             ]
+        if problem.regions:
+            outer = ((problem.regions[0], problem.start_com), (problem.regions[-1], problem.goal_com))
+            room += [-float(region.violation(com)) for region, com in outer if region is not None]
         position = min(cls.position, *(0.5 * max(slack, 0.0) for slack in room)) if room else cls.position
         return cls(problem.required_margin + 1e-3, position)
 
     def grown(self, problem: CentroidalProblem, certificate: Residuals) -> "MarginTargets":
         """Targets that make up for what the last solution broke between its samples."""
         names = ["support distance"] if problem.support_distance is not None else []
+        names += ["reach"] if problem.regions else []
         names += [constraint.name for constraint in problem.geometric]
         position = max((certificate[name].value for name in names), default=0.0)
         return replace(
@@ -141,7 +174,7 @@ class Attempt:
     converged: bool
 
 
-def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProgram:
+def build_programme(problem: CentroidalProblem, facets: FacetIndices, faces: ReachRows = ()) -> ComProgram:
     """The compiled optimisation of a problem, shared by all problems of the same structure."""
     return transcribe(
         ComStructure(
@@ -154,6 +187,7 @@ def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProg
             limited_distance=problem.support_distance is not None,
             key_planes=tuple(plane.key for plane in problem.key_planes),
             loaded=tuple(number for number, phase in enumerate(problem.sequence) if phase.load is not None),
+            reach=tuple(len(rows) for rows in faces),
         )
     )
 
@@ -165,6 +199,7 @@ def optimise(
     targets: MarginTargets,
     bezier: FloatArray,
     durations: FloatArray,
+    faces: ReachRows = (),
 ) -> Attempt:
     """Run the solver once from Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s].
 
@@ -175,8 +210,9 @@ def optimise(
         targets: Bounds used at the samples.
         bezier: Where to begin.
         durations: Where to begin.
+        faces: Indices of the faces of the regions imposed in each phase.
     """
-    programme = build_programme(problem, facets)
+    programme = build_programme(problem, facets, faces)
     lower, upper = _unknown_bounds(programme, problem)
     row_lower, row_upper = _row_bounds(programme, problem, targets)
     unknowns = programme.pack_unknowns(
@@ -184,7 +220,7 @@ def optimise(
     )
     solution = programme.solver(
         x0=np.clip(unknowns, lower, upper),
-        p=programme.pack_parameters(_parameters(problem, polytopes, facets)),
+        p=programme.pack_parameters(_parameters(problem, polytopes, facets, faces)),
         lbx=lower, ubx=upper, lbg=row_lower, ubg=row_upper,
     )  # fmt: skip
     local, durations, margin = programme.unpack_unknowns(np.asarray(solution["x"], dtype=np.float64).ravel())
@@ -198,7 +234,10 @@ def optimise(
 
 
 def _parameters(
-    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], facets: FacetIndices
+    problem: CentroidalProblem,
+    polytopes: Sequence[WrenchPolytope],
+    facets: FacetIndices,
+    faces: ReachRows = (),
 ) -> dict[str, object]:
     weights, reference = problem.weights, problem.reference
     values: dict[str, object] = {
@@ -219,6 +258,10 @@ def _parameters(
     for index, phase in enumerate(problem.sequence):
         if phase.load is not None:
             values[f"load{index}"] = (phase.load.mass, *phase.load.offset)
+    for index, (region, rows) in enumerate(zip(problem.regions, faces, strict=False)):
+        if region is not None and len(rows):
+            values[f"faces{index}"] = region.normals[rows]
+            values[f"ends{index}"] = region.offsets[rows] - region.normals[rows] @ reference
     for index, plane in enumerate(problem.key_planes):
         values[f"normal{index}"] = plane.normal
         values[f"offset{index}"] = plane.offset - plane.normal @ reference
@@ -248,6 +291,7 @@ def _row_bounds(
         "distance": (-np.inf, limit**2),
         "continuity": (0.0, 0.0),
         "key_plane": (-np.inf, 0.0),
+        "reach": (-np.inf, -targets.position),
         "total_duration": (0.0, 0.0),
         "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
     }

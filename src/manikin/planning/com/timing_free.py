@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 
@@ -33,8 +34,10 @@ from manikin.planning.com.optimise import (
     MarginTargets,
     facet_distances,
     nearest_facets,
+    no_reach_rows,
     optimise,
     trajectory_of,
+    with_broken_faces,
     with_violated,
 )
 from manikin.runtime.display import Displayed
@@ -299,20 +302,25 @@ def _rounds(
     bezier, durations = guess(problem, style, polytopes)
     trajectory = trajectory_of(problem, bezier, durations)
     facets = nearest_facets(facet_distances(problem, trajectory, polytopes))
-    targets = MarginTargets.of(problem)
+    targets, faces = MarginTargets.of(problem), no_reach_rows(problem)
     for _ in range(MAX_ROUNDS):
-        attempt = optimise(problem, polytopes, facets, targets, bezier, durations)
+        attempt = optimise(problem, polytopes, facets, targets, bezier, durations, faces)
         yield attempt
         distances = facet_distances(problem, attempt.trajectory, polytopes)
         kept = min(float(values[rows].min()) for values, rows in zip(distances, facets, strict=True))
         more_facets = with_violated(facets, distances, kept - NEGLIGIBLE * abs(kept))
-        enough = all(len(new) == len(old) for new, old in zip(more_facets, facets, strict=True))
+        more_faces = with_broken_faces(problem, attempt.trajectory, faces)
+        enough = _same(more_facets, facets) and _same(more_faces, faces)
         hopeless = not attempt.converged or attempt.margin < targets.margin - 1e-3
         if enough and (attempt.certificate.within() or hopeless):
             return  # a violation that is more than an effect of sampling stays
         if enough:
             targets = targets.grown(problem, attempt.certificate)
-        facets, bezier, durations = more_facets, attempt.bezier, attempt.durations
+        facets, faces, bezier, durations = more_facets, more_faces, attempt.bezier, attempt.durations
+
+
+def _same(new: Sequence[NDArray[np.int64]], old: Sequence[NDArray[np.int64]]) -> bool:
+    return all(len(rows) == len(before) for rows, before in zip(new, old, strict=True))
 
 
 def limiting_at(
@@ -350,9 +358,14 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
         at = certificate[barrier.name]
         return Failure(barrier.name, f"{barrier.impassable}; no way around it was found", at.phase, at.time)
     if worst.requirement != "balance margin":
-        return Failure(
-            worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
-        )
+        where = ", ".join(problem.sequence[worst.phase].stance.effectors) if worst.phase is not None else ""
+        what = f"{worst} in the best attempt"
+        if worst.requirement == "reach":
+            what = (
+                f"at {worst.time:.3f} s the centre of mass is {worst.value:.3f} m out of this body's reach "
+                f"on {where} in phase {worst.phase}, in the best attempt"
+            )
+        return Failure(worst.requirement, f"no trajectory found: {what}", worst.phase, worst.time, where)
     what = f"the largest margin found is {certificate.min_margin:.2f}"
     phase, instant = certificate.limiting_phase, certificate.limiting_time
     return missed_margin(problem, best.trajectory, polytopes, phase, instant, what)

@@ -43,6 +43,7 @@ class ComStructure:
         contacts: Number of contacts of each phase.
         key_planes: Key instant of each plane.
         loaded: Phases with a load.
+        reach: Number of faces of its region imposed in each phase.
     """
 
     degree: int
@@ -54,6 +55,7 @@ class ComStructure:
     limited_distance: bool
     key_planes: tuple[int, ...] = ()
     loaded: tuple[int, ...] = ()
+    reach: tuple[int, ...] = ()
 
     @property
     def phases(self) -> int:
@@ -183,6 +185,12 @@ def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
             offset = position - ca.repmat(centres[index, :], len(s), 1)
             builder.add("distance", ca.sum2(offset * offset))
     inner = slice(1 if phase == 0 else 0, len(s) - 1 if phase == structure.phases - 1 else len(s))
+    faces = structure.reach[phase] if structure.reach else 0
+    if faces:
+        normals = builder.parameter(f"faces{phase}", faces, 3)
+        offsets = builder.parameter(f"ends{phase}", faces)
+        beyond = position[inner, :] @ normals.T - ca.repmat(offsets.T, len(s[inner]), 1)
+        builder.add("reach", beyond)
     for index, function in enumerate(structure.geometric):
         within = position[inner, :]
         values = _symbolic(function, within + ca.repmat(builder.parameters["reference"], within.shape[0], 1))

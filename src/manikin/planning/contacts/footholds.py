@@ -37,10 +37,10 @@ ON_PLANE = 0.02
 """Height up to which a neighbouring surface is no hindrance to a foot [m]; the foot has a test of its own."""
 
 _REQUEST = coal.CollisionRequest()
-_SHIFTS = np.array([
-    [0.0, 0.0], [-1.0, 0.0], [-0.5, 0.0], [0.5, 0.0], [1.0, 0.0], [0.0, -0.5], [0.0, 0.5], [-0.5, -0.5],
-    [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5],
-])  # fmt: skip
+_SHIFTS = np.array(
+    [[x, 0.0] for x in (0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0)]
+    + [[x, y] for y in (-0.5, 0.5) for x in (0.0, 0.5, -0.5)]
+)
 _NEAR = np.arange(-12, 13) * 0.02, np.arange(-3, 4) * 0.02  # around a wanted place, along and across [m]
 _HEIGHT_WEIGHT = 0.7  # what a difference in height counts beside one along the ground
 
@@ -157,7 +157,7 @@ class Footholds:
             moved = self._moved(put, np.repeat(partly, len(_SHIFTS)), away.reshape(-1, 2))
             lies = np.where(self._blocked(moved), 0.0, self._shares(moved)).reshape(len(partly), -1)
             # A shift has to gain something.
-            pick = np.argmax(lies - 0.5 * SHIFT * np.linalg.norm(_SHIFTS, axis=1), axis=1)
+            pick = np.argmax(lies - 0.2 * SHIFT * np.linalg.norm(_SHIFTS, axis=1), axis=1)
             rows = np.arange(len(partly)) * len(_SHIFTS) + pick
             put.positions[partly] = moved.positions[rows]
             value[partly] = lies[np.arange(len(partly)), pick]

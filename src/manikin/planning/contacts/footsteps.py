@@ -299,7 +299,12 @@ class FootstepSearch:
         made &= (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
         cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
-        cost += 1.2 * rise + 8.0 * np.maximum(0.0, rise - 0.2 * size) + 0.25 * np.abs(turned) + (1.0 - shares)
+        cost += (
+            1.2 * rise
+            + 8.0 * np.maximum(0.0, rise - 0.2 * size)
+            + 0.25 * np.abs(turned)
+            + 3.0 * (1.0 - shares)
+        )
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
         cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
         return np.where(made, cost, np.inf)

@@ -153,7 +153,7 @@ class ContactGenerator:
         self.rules = rules or ContactRules()
         self._state = Configuration(body)
         self._table = SurfaceTable(scene.holds)
-        self._faces = len(scene.surfaces)
+        self._scene, self._faces = scene, len(scene.surfaces)
         self._tools = {
             name: _LimbTools(body, limb_named(body, name), scene, item) for name, item in samples.items()
         }
@@ -241,6 +241,9 @@ class ContactGenerator:
                 f"no sample of {limb} lies flat on a surface of {self._names(near)}, though these are near"
             )
             return _failure(limb, Hindrance.SURFACE, message)
+        if touch is ContactKind.GRASP:
+            palms = self._scene.palms(candidates.surfaces, candidates.points)
+            candidates = replace(candidates, points=palms)
         return _SamplesInContact(tools, situation, candidates, touch, sole)
 
     def _names(self, surfaces: NDArray[np.int64]) -> str:

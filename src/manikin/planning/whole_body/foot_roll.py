@@ -21,7 +21,14 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.swing_path import Pose
 
 PUSH_OFF_PITCH = float(np.deg2rad(24.0))
-"""Pitch at lift-off, heel up [rad]."""
+"""Pitch at lift-off on the level, heel up [rad]."""
+
+HIGHEST_PITCH = float(np.deg2rad(48.0))
+"""Pitch at lift-off of a foot that is left behind on a step of :data:`HIGH_STEP` [rad]: with the heel down no
+leg bends far enough for the body to be over the lower foot."""
+
+HIGH_STEP = 0.22
+"""Height of such a step over the stature."""
 
 HEEL_STRIKE_PITCH = float(np.deg2rad(10.0))
 """Pitch at landing, toes up [rad]."""
@@ -41,6 +48,7 @@ class FootRoll:
         end: Pose of the sole afterwards, lying flat.
         hinge: (3,) hinge of the toes in the sole's frame [m].
         heel: (3,) middle of the heel's edge in the sole's frame [m].
+        push_off: Pitch at lift-off, heel up [rad].
     """
 
     instants: FloatArray
@@ -48,6 +56,7 @@ class FootRoll:
     end: Pose
     hinge: FloatArray
     heel: FloatArray
+    push_off: float = PUSH_OFF_PITCH
 
     @property
     def pivots(self) -> tuple[Pose, Pose]:
@@ -99,7 +108,7 @@ class FootRoll:
     @property
     def _at_lift_off(self) -> list[float]:
         up, off, _, _ = self.instants
-        angle = PUSH_OFF_PITCH if off > up else 0.0
+        angle = self.push_off if off > up else 0.0
         # The pitch rate at lift-off is 1.2 times the mean since the heel rose.
         return [angle, 1.2 * angle / max(off - up, 1e-9), 0.0]
 
@@ -133,9 +142,11 @@ def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootR
     up = schedule.instants[swing.first_phase - 1] if start.part is SolePart.TOES else off
     flat = schedule.instants[swing.last_phase + 2] if end.part is SolePart.HEEL else land
     hinge = np.zeros(3) if toes is None else frame.rotation.T @ (toes.origin - frame.translation)
+    drop = float(start.position[2] - end.position[2]) / (HIGH_STEP * (body.stature or 1.75))
     return FootRoll(
         np.array([up, off, land, flat]), Pose.of(start), Pose.of(end), hinge,
         np.array([-0.5 * (body.sole_length or start.length), 0.0, 0.0]),
+        PUSH_OFF_PITCH + float(np.clip(drop, 0.0, 1.0)) * (HIGHEST_PITCH - PUSH_OFF_PITCH),
     )  # fmt: skip
 
 
