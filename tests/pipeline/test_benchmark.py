@@ -7,6 +7,7 @@ import pytest
 from manikin.cli.app import main
 from manikin.pipeline import benchmark
 from manikin.pipeline.benchmark import BenchmarkTask, run_benchmark, run_task
+from manikin.reports.benchmark_tables import family_rows, write_benchmark_page
 from manikin.scenarios.families import FAMILIES
 
 
@@ -47,7 +48,8 @@ def test_what_is_done_stays_done_until_the_scene_or_the_stage_changes(tmp_path, 
         scene = benchmark.digest(benchmark.draw_scene(FAMILIES[task.family], task.seed))
         return {
             "family": task.family, "seed": task.seed, "stage": task.stage, "scene": scene, "contacts": True,
-            "planned": False, "proved": False, "checked": None, "failure": None, "duration_s": None,
+            "outcome": "contacts", "body": {"model": "human"}, "planned": False, "proved": False,
+            "checked": None, "failure": None, "duration_s": None,
             "processor_s": {"contacts": 1.0 + task.seed, "total": 2.0},
         }  # fmt: skip
 
@@ -61,6 +63,8 @@ def test_what_is_done_stays_done_until_the_scene_or_the_stage_changes(tmp_path, 
     assert result["families"]["flat"]["contacts_s"]["median"] == pytest.approx(2.0)
     assert json.loads((tmp_path / "benchmark.json").read_text())["total"] == result["total"]
     assert (tmp_path / "scenes" / "bars-2.yaml").is_file()
+    assert family_rows(result)[-1][:4] == ("all", "6", "6", "-")
+    assert 'href="scenes/bars-2.yaml"' in write_benchmark_page(tmp_path, result).read_text()
     entry = tmp_path / "tasks" / "bars-2.json"
     entry.write_text(entry.read_text().replace('"stage": "contacts"', '"stage": "all"'))
     run_benchmark(families, range(3), path=tmp_path, jobs=1)

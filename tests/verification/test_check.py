@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration
-from manikin.contact import sole
+from manikin.contact import point, sole
 from manikin.errors import ContactError, ScenarioError
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.verification import check_contact_plan, load_contact_plan, parse_contact_plan
-from manikin.verification.equilibrium import CentreState, dynamic_shortfall, rest
+from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest
 
 DATA = Path(__file__).parent / "data"
 
@@ -284,6 +284,21 @@ def test_room_on_one_flat_sole_is_half_its_width():
     assert rest(foot, 70.0, None, np.array([0.3, 0.2, 1.0])).room == pytest.approx(0.06, abs=1e-3)
     over = np.array([0.3, 0.2, 1.0]) + 0.1 * np.array([-np.sin(0.7), np.cos(0.7), 0.0])
     assert rest(foot, 70.0, None, over).shift == pytest.approx(0.04, abs=1e-3)
+
+
+def test_a_push_moves_the_place_of_rest():
+    """200 N at 1.2 m tip backwards by 240 N.m, 0.35 m of the weight; the sole ends 0.14 m behind."""
+    feet = [
+        sole(name, [0.0, y, 0.0], length=0.28, width=0.12, friction=0.7)
+        for name, y in (("left_foot", 0.1), ("right_foot", -0.1))
+    ]  # fmt: skip
+    hands = [point(f"{side}_hand", [0.6, y, 1.2], friction=1e-3, normal=[-1.0, 0.0, 0.0])
+             for side, y in (("left", 0.2), ("right", -0.2))]  # fmt: skip
+    push = HandForce(np.array([1.0, 0.0, 0.0]), 200.0)
+    com = np.array([0.0, 0.0, 1.0])
+    needed = 200.0 * 1.2 / (70.0 * 9.81) - 0.14
+    assert rest([*feet, *hands], 70.0, None, com).shift == 0.0
+    assert rest([*feet, *hands], 70.0, None, com, act=push).shift == pytest.approx(needed, abs=1e-3)
 
 
 def test_a_dynamic_stage_needs_the_accelerations_that_friction_allows():

@@ -19,7 +19,7 @@ from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.sequence import friction_of
-from manikin.verification.equilibrium import CentreState, dynamic_shortfall, rest, torque_share
+from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest, torque_share
 from manikin.verification.holding import HeldPosture, HoldingRows, Kinematics
 from manikin.verification.plan_file import PlannedContacts, PlannedStage, load_contact_plan
 from manikin.verification.reach import REACHED, PostureSearch, ReachBounds
@@ -140,6 +140,11 @@ class _Check:
         self._kinematics = Kinematics(self._body)
         self._changes = list(self._at_changes())
         self._reach = ReachBounds(self._body)
+        act = scenario.act
+        self._act: HandForce | None = None
+        if act is not None:
+            direction = np.array(act.direction) / np.linalg.norm(act.direction)
+            self._act = HandForce(direction, act.force_N)
 
     def run(self) -> ContactPlanCheck:
         touching, postures = self._contacts(), list(self._postures())
@@ -265,7 +270,8 @@ class _Check:
                     number: self._reach.to_com(contact.effector) for number, contact in enumerate(contacts)
                 }
             guess = com if com is not None else _middle(change.held)
-            result = rest(contacts, self._mass, self._cap, guess, within)
+            act = self._act if change.after is None else None
+            result = rest(contacts, self._mass, self._cap, guess, within, act)
             shift = result.shift if com is not None or result.place is None else 0.0
             names = ", ".join(contact.effector for contact in contacts) or "no contact"
             off.take(shift, f"{change.where} on {names}")

@@ -53,6 +53,14 @@ class Forces:
     upper: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class HandForce:
+    """Force of both hands on what they touch: at least ``force`` [N] along a unit ``direction`` (3,)."""
+
+    direction: FloatArray
+    force: float
+
+
 def forces_of(contacts: Sequence[Contact], mass: float, cap: float | None, origin: FloatArray) -> Forces:
     """Forces that contacts can give.
 
@@ -76,6 +84,15 @@ def forces_of(contacts: Sequence[Contact], mass: float, cap: float | None, origi
         np.concatenate([block.lower for block in blocks]),
         np.concatenate([block.upper for block in blocks]),
     )
+
+
+def _acting(forces: Forces, contacts: Sequence[Contact], act: HandForce) -> Forces:
+    """Forces of which those of the hands are at least what an act takes: the object pushes back."""
+    sizes = [len(_block(contact, contact.position).lower) for contact in contacts]
+    hands = np.repeat(["hand" in contact.effector for contact in contacts], sizes)
+    row = np.where(hands, act.direction @ forces.wrench[:3], 0.0)
+    rows, limits = np.vstack([forces.rows, row]), np.append(forces.limits, -act.force)
+    return Forces(forces.wrench, rows, limits, forces.lower, forces.upper)
 
 
 def _block(contact: Contact, origin: FloatArray) -> Forces:
@@ -131,7 +148,7 @@ class Rest:
 
 def rest(
     contacts: Sequence[Contact], mass: float, cap: float | None, com: FloatArray,
-    within: Mapping[int, float] | None = None,
+    within: Mapping[int, float] | None = None, act: HandForce | None = None,
 ) -> Rest:  # fmt: skip
     """Equilibrium of a body at rest on contacts.
 
@@ -141,12 +158,15 @@ def rest(
         cap: Largest sum of the normal forces of soles and points [N]; the body's default when None.
         com: (3,) centre of mass, or where one is looked for first [m].
         within: Largest level distance of the centre of mass from single contacts, by their number [m].
+        act: What the hands do meanwhile.
     """
     if not contacts:
         return Rest(np.inf, 0.0, None)
     level = float(np.mean([contact.position[2] for contact in contacts]))
     origin = np.array([com[0], com[1], level])
     forces = forces_of(contacts, mass, cap, origin)
+    if act is not None:
+        forces = _acting(forces, contacts, act)
     weight = mass * GRAVITY
     count = len(forces.lower)
     # Variables: forces, level shift of the centre of mass (2), its size. Scaled by the weight.
@@ -177,7 +197,7 @@ def rest(
     if solved.x is None:
         return Rest(np.inf, 0.0, None)
     place = com[:2] + solved.x[count : count + 2]
-    shift = float(np.linalg.norm(solved.x[count : count + 2]))
+    shift = float(solved.x[-1])
     if shift > 1e-6:
         return Rest(shift, 0.0, place)
     return Rest(0.0, _room(forces, weight, sides[::2]), place)

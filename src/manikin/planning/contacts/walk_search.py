@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.balance.criteria import static_torque_share
 from manikin.body import BodyModel
-from manikin.contact import Contact
+from manikin.contact import Contact, Stance
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
@@ -32,6 +33,16 @@ FEET = ("left_foot", "right_foot")
 
 COLUMN = (0.12, 0.5, 0.9)
 """Radius, lowest and highest end above the ground of what has to be free, of a body of 1.75 m [m]."""
+
+
+STRONG_TRIES = 8
+"""Ways that are refused because a posture at rest asks for more than the strength.
+
+A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so
+after that many ways the later stages decide."""
+
+NEAR_TRIES = 12
+"""Ways after which a pair without a posture closes all that are much like it."""
 
 
 @dataclass(frozen=True)
@@ -239,7 +250,10 @@ class WalkSearch:
 
     def _refuse(self, stand: int, step: int, reason: str) -> None:
         self.reasons[reason] += 1
-        self.search.close(stand, step)
+        if self.replanned < NEAR_TRIES:
+            self.search.close(stand, step)
+        else:
+            self.search.refuse(stand, step)
 
     def _pair(self, first: str, numbers: Sequence[int]) -> tuple[Foothold, Foothold]:
         """Left and right of two footholds, the first of which is one foot's."""
@@ -260,5 +274,9 @@ class WalkSearch:
         if posed.q is None:
             start = np.concatenate([guide, q[len(guide) :]])
             posed = self.poser.pose(held, carrying, start, guide, restarts=True)
+        if posed.q is not None:
+            share = static_torque_share(self.poser.body, posed.q, Stance(list(carrying.values())))
+            if share > 1.0 and self.replanned < STRONG_TRIES:
+                posed = Posed(None, f"resting on {names[rests]} asks for {share:.2f} of the strength")
         self._postures[key] = posed
         return posed

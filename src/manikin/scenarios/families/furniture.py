@@ -33,7 +33,7 @@ def chairs(sketch: Sketch) -> None:
             sketch.box(f"{edge}_armrest", (rear, front - 0.06), (y, y + 0.05), (top - 0.03, top))
             sketch.box(f"{edge}_arm_post", (front - 0.12, front - 0.08), (y, y + 0.05), (0.0, top - 0.03))
     sketch.start(0.0, 0.0, posture="seated")
-    sketch.goal(front + sketch.between(0.15, 0.6), sketch.between(-0.1, 0.1), sketch.between(-20.0, 20.0, 1))
+    sketch.goal(front + sketch.between(0.2, 0.6), sketch.between(-0.1, 0.1), sketch.between(-20.0, 20.0, 1))
 
 
 LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
