@@ -137,6 +137,15 @@ def test_footing_is_the_overlap_of_sole_and_surface():
     assert kinds == {0, 1, 2, 3}
 
 
+def test_footing_with_a_corner_below_the_middle_of_the_sole():
+    """A quarter of the sole is on the box, the middle on its corner: it does not stand there."""
+    table = FootingTable(Scene([box("a", (0, 0, 0), (1, 1, 0.2))]).surfaces_facing(UP, 0.1)[1:], SOLE)
+    places = np.array([[0.0, 0.0, 0.2], [0.5, 0.0, 0.2], [0.0, 0.5, 0.2], [0.0, 1.0, 0.2]])
+    footing = table.place(np.zeros(4, dtype=int), places, np.tile(np.eye(3), (4, 1, 1)))
+    assert np.allclose(footing.share, [0.25, 0.5, 0.5, 0.25])
+    assert not footing.stands.any()
+
+
 def test_bars_that_a_hand_can_close_round_have_grasp_lines():
     """Rails of up to 51 mm, square ones of up to 40 mm; not beams, nor where a post or wall is in the way."""
     turn = rotation_from_rpy(0.0, np.pi / 2, 0.3)
