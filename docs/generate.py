@@ -5,6 +5,7 @@ Run ``python docs/generate.py`` after a change; a test compares the result with 
 printed, reduced to what the page shows.  Each report replaces the kept one of the same stature or seed,
 the one without either the main one.  Reports that do not say it are told:
 ``python docs/generate.py report.json --stature 1.65 small.json --seed 3 third.json``.
+What ``manikin benchmark --json`` printed, or its ``benchmark.json``, is taken over likewise.
 A page marks a generated table with ``<!-- generated: NAME -->`` ... ``<!-- end generated -->``.
 """
 
@@ -22,16 +23,21 @@ from manikin.body import human
 from manikin.body.human_parts import HUMAN_HINGES
 from manikin.body.strength import HUMAN_STRENGTH, DirectionStrength, LegStrength, hinge_strength
 from manikin.motion.file import DATASETS
+from manikin.reports import benchmark_tables
 from manikin.reports.summary_table import counts_line
 from manikin.scenarios import json_schema
+from manikin.scenarios.families import FAMILIES
 from manikin.scenarios.stance_file import StanceFile
+from manikin.verification import ContactPlanFile
 
 DOCS = Path(__file__).parent
 SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
     "scenario.schema.json": json_schema,
     "stance.schema.json": StanceFile.model_json_schema,
+    "contact-plan.schema.json": ContactPlanFile.model_json_schema,
 }
 RESULTS = DOCS / "results.json"
+BENCHMARK = DOCS / "benchmark.json"
 FAR = 1e5
 """Bounds beyond this only refuse nonsense and are not shown."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
@@ -192,11 +198,24 @@ def take_over_results(arguments: Sequence[str]) -> None:
             except ValueError:
                 raise SystemExit(f"{word} has no number after it; valid: {word} NUMBER REPORT.json") from None
             continue
-        report = {"stature_m": None, "seed": None, **json.loads(Path(word).read_text(encoding="utf-8"))}
+        given = json.loads(Path(word).read_text(encoding="utf-8"))
+        if "families" in given:
+            take_over_benchmark(given)
+            continue
+        report = {"stature_m": None, "seed": None, **given}
         kept, told = result_tables.filed(kept, report | told), {}
     if told:
         raise SystemExit(f"{told} has no report after it; valid: [--stature M] [--seed N] REPORT.json")
     RESULTS.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+
+
+def take_over_benchmark(report: dict[str, Any]) -> None:
+    """Keep the counts of a benchmark in place of the earlier one of its stage."""
+    kept = json.loads(BENCHMARK.read_text(encoding="utf-8")) if BENCHMARK.exists() else {}
+    kept[report["stage"]] = result_tables.rounded_values(
+        {key: value for key, value in report.items() if key not in ("tasks", "complete", "wall_s")}
+    )
+    BENCHMARK.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 
 OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
@@ -240,6 +259,31 @@ def seeds_table() -> str:
 
 
 NOT_YET = "No report has been taken over yet.\n"
+
+
+# --- benchmark ---------------------------------------------------------------------------------
+
+
+def families_table() -> str:
+    """Families of random scenes with what is drawn, and why a person can do it."""
+    rows = []
+    for name, family in FAMILIES.items():
+        first, _, rest = " ".join((family.draw.__doc__ or "").split()).partition(". ")
+        drawn, _, possible = rest.partition("Possible: ")
+        rows.append([f"`{name}`", first, drawn.strip() or "-", possible])
+    return result_tables.markdown_rows(["family", "task", "drawn as well", "possible because"], rows)
+
+
+def benchmark_table(stage: str) -> str:
+    """Counts of the kept benchmark of a stage."""
+    kept = json.loads(BENCHMARK.read_text(encoding="utf-8")) if BENCHMARK.exists() else {}
+    if stage not in kept:
+        return NOT_YET
+    report = kept[stage]
+    first, count = report["first_seed"], report["seeds"]
+    table = result_tables.markdown_rows(benchmark_tables.HEADER, benchmark_tables.family_rows(report))
+    limit = f"{report['time_limit_s']:g} s of processor time per task"
+    return f"{table}\nSeeds {first} to {first + count - 1}, {limit}, manikin {report['manikin']}.\n"
 
 
 # --- walls ---------------------------------------------------------------------------------------
@@ -394,6 +438,7 @@ def pushed_predictions() -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "scenario": lambda: schema_tables(json_schema()),
     "stance": lambda: schema_tables(StanceFile.model_json_schema()),
+    "contact-plan": lambda: schema_tables(ContactPlanFile.model_json_schema()),
     "segments": segment_table,
     "hinges": hinge_table,
     "strength": strength_table,
@@ -402,6 +447,9 @@ TABLES: dict[str, Callable[[], str]] = {
     "beams": beams_table,
     "statures": statures_table,
     "seeds": seeds_table,
+    "families": families_table,
+    "benchmark-contacts": lambda: benchmark_table("contacts"),
+    "benchmark-all": lambda: benchmark_table("all"),
     "walls-trials": walls_trials,
     "walls-spacing": walls_spacing,
     "heuristics": heuristics_table,

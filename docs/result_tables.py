@@ -229,6 +229,13 @@ def _reduced_run(run: Mapping[str, Any]) -> dict[str, Any]:
     return {**kept, "wall_s": _rounded(run["wall_s"])}
 
 
+def rounded_values(value: Any) -> Any:
+    """Plain values with four significant digits each."""
+    if isinstance(value, Mapping):
+        return {key: rounded_values(item) for key, item in value.items()}
+    return _rounded(value)
+
+
 def _rounded(value: Any) -> Any:
     """Four significant digits, so that what changes in a file has changed in the world."""
     if not isinstance(value, float) or not math.isfinite(value) or value == 0.0:

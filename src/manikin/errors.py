@@ -51,3 +51,7 @@ class SplineError(InputError):
 
 class SolverError(ManikinError):
     """A numerical solver failed for a reason that is not infeasibility."""
+
+
+class TimeLimitError(ManikinError):
+    """Work did not end within the time it was given."""

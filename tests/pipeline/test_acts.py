@@ -24,7 +24,9 @@ def test_a_way_ends_with_both_hands_on_the_object(rope):
     found.scenario.check_contacts(scene)
     last = found.plan.stages[-1]
     assert {"left_hand", "right_hand"} <= set(last.contacts)
-    assert all(scene.touched_obstacle(last.contacts[hand]) == "bar" for hand in ("left_hand", "right_hand"))
+    assert all(
+        scene.touched_obstacles(last.contacts[hand]) == ("bar",) for hand in ("left_hand", "right_hand")
+    )
     assert found.scenario.act.force_N == 200.0
 
 

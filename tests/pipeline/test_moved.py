@@ -76,7 +76,7 @@ def test_files_of_a_moved_run_are_in_the_world(both, name):
     scenario = load_scenario(there.directory / "scenario.yaml")
     scene = scenario.build_scene()
     for contact in (contact for phase in content.schedule.sequence for contact in phase.stance):
-        assert content.scene.touched_obstacle(contact, 0.005) == scene.touched_obstacle(contact, 0.005)
+        assert content.scene.touched_obstacles(contact, 0.005) == scene.touched_obstacles(contact, 0.005)
     kept = content.executed if content.planned is None else content.planned
     start = np.array(scenario.file.task.start.com or scenario.file.task.start.at)[:2]
     assert np.hypot(*(kept.com[0, :2] - start)) < 0.5

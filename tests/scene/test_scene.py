@@ -36,9 +36,9 @@ def test_obstacles_are_found_by_name():
 
 def test_a_foot_is_held_by_the_surface_under_it():
     scene = Scene([PLATFORM])
-    assert scene.supporting_surface(sole("left_foot", (0.5, 0.0, 0.2), **FOOT)).obstacle == "platform"
-    assert scene.supporting_surface(sole("left_foot", (-0.5, 0.0, 0.0), **FOOT)).obstacle == "floor"
-    assert scene.supporting_surface(sole("left_foot", (0.5, 0.0, 0.204), **FOOT)).obstacle == "platform"
+    assert scene.supporting_surface(sole("left_foot", (0.5, 0.0, 0.2), **FOOT)).obstacles == ("platform",)
+    assert scene.supporting_surface(sole("left_foot", (-0.5, 0.0, 0.0), **FOOT)).obstacles == ("floor",)
+    assert scene.supporting_surface(sole("left_foot", (0.5, 0.0, 0.204), **FOOT)).obstacles == ("platform",)
 
 
 @pytest.mark.parametrize(
@@ -66,9 +66,9 @@ def test_normals_must_agree():
     contact = point("left_hand", (0.5, 0.0, 0.2), friction=0.5, normal=tilted)
     with pytest.raises(ContactError, match="none faces its normal"):
         scene.supporting_surface(contact)
-    assert scene.supporting_surface(contact, max_angle=np.deg2rad(4.0)).obstacle == "platform"
+    assert scene.supporting_surface(contact, max_angle=np.deg2rad(4.0)).obstacles == ("platform",)
     side = point("left_hand", (1.1, 0.0, 0.1), friction=0.5, normal=(1.0, 0.0, 0.0))
-    assert scene.supporting_surface(side).obstacle == "platform"
+    assert scene.supporting_surface(side).obstacles == ("platform",)
 
 
 @given(
@@ -83,7 +83,7 @@ def test_support_is_found_on_a_box_of_any_orientation(roll, pitch, yaw, x, y):
     ramp = Obstacle("ramp", Box((1.0, 1.0, 0.1)), rotation, (0.0, 0.0, 1.0))
     position = ramp.to_world([x, y, 0.05])
     contact = sole("left_foot", position, rotation=rotation, **FOOT)
-    assert Scene([ramp]).supporting_surface(contact).obstacle == "ramp"
+    assert Scene([ramp]).supporting_surface(contact).obstacles == ("ramp",)
 
 
 def test_grasps_need_a_surface_near_their_point_and_round_bars_are_found_by_distance():
@@ -92,9 +92,9 @@ def test_grasps_need_a_surface_near_their_point_and_round_bars_are_found_by_dist
     hand = grasp("right_hand", (0.02, 0.0, 1.2), max_force=100.0)
     assert scene.nearest(hand.position)[0] == "bar"
     assert scene.nearest((0.12, 0.0, 1.2))[1] == pytest.approx(0.1)
-    assert scene.touched_obstacle(hand) == "bar"
-    assert scene.touched_obstacle(sole("left_foot", (0.5, 0.0, 0.2), **FOOT)) == "platform"
+    assert scene.touched_obstacles(hand) == ("bar",)
+    assert scene.touched_obstacles(sole("left_foot", (0.5, 0.0, 0.2), **FOOT)) == ("platform",)
     with pytest.raises(ContactError):
-        scene.touched_obstacle(sole("left_foot", (0.5, 0.0, 0.5), **FOOT))
+        scene.touched_obstacles(sole("left_foot", (0.5, 0.0, 0.5), **FOOT))
     with pytest.raises(SceneError, match="empty"):
         Scene([], None).nearest((0, 0, 0))

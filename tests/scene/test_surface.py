@@ -4,12 +4,12 @@ import trimesh
 
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, load_mesh
-from manikin.scene.surface import surfaces_of
+from manikin.scene.surface import faces_of
 
 
 def test_a_box_has_six_faces_pointing_out_with_the_right_areas():
     item = Obstacle("box", Box((1.0, 2.0, 3.0)), rotation_from_rpy(0.3, 0.5, -0.7), (1.0, 2.0, 3.0))
-    faces = surfaces_of(item)
+    faces = faces_of(item)
     assert sorted(round(face.area, 9) for face in faces) == [2, 2, 3, 3, 6, 6]
     for face in faces:
         assert (face.centre - item.translation) @ face.normal > 0
@@ -20,8 +20,8 @@ def test_a_box_has_six_faces_pointing_out_with_the_right_areas():
 def test_a_mesh_box_has_the_faces_of_the_box():
     box = Box((1.0, 2.0, 3.0))
     shape = trimesh.creation.box(box.size)
-    faces = surfaces_of(Obstacle("mesh", Mesh(shape.vertices, shape.faces)))
-    wanted = surfaces_of(Obstacle("box", box))
+    faces = faces_of(Obstacle("mesh", Mesh(shape.vertices, shape.faces)))
+    wanted = faces_of(Obstacle("box", box))
     assert len(faces) == 6
     for face in wanted:
         (same,) = [other for other in faces if np.allclose(other.normal, face.normal)]
@@ -42,17 +42,17 @@ def test_an_l_shaped_facet_keeps_its_notch():
 
 
 def test_cylinder_caps_planes_and_half_spaces_face_the_right_way():
-    top, bottom = surfaces_of(Obstacle("stool", Cylinder(0.2, 0.5), translation=(0, 0, 0.25)))
+    top, bottom = faces_of(Obstacle("stool", Cylinder(0.2, 0.5), translation=(0, 0, 0.25)))
     assert np.allclose(top.normal, (0, 0, 1))
     assert np.allclose(bottom.normal, (0, 0, -1))
     # A 32-gon has the circle's area up to a factor sin(2 pi / 32) / (2 pi / 32) = 0.9936.
     assert np.isclose(top.area, np.pi * 0.04 * 0.9936, rtol=1e-4)
     assert np.isclose(bottom.area, top.area)
-    assert len(surfaces_of(Obstacle("wall", HalfSpace((1, 0, 0), 2.0)))) == 1
-    front, back = surfaces_of(Obstacle("sheet", Plane((1, 0, 0), 2.0)))
+    assert len(faces_of(Obstacle("wall", HalfSpace((1, 0, 0), 2.0)))) == 1
+    front, back = faces_of(Obstacle("sheet", Plane((1, 0, 0), 2.0)))
     assert np.allclose(front.normal, -back.normal)
     assert np.allclose(front.polygon[:, 0], 2.0)
-    assert surfaces_of(Obstacle("bar", Capsule(0.02, 1.0))) == ()
+    assert faces_of(Obstacle("bar", Capsule(0.02, 1.0))) == ()
 
 
 def test_distance_in_space_combines_height_and_overhang():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from manikin.balance import BalanceReport, evaluate_balance
-from manikin.body import BodyModel, creature_from_urdf, insect
+from manikin.body import BodyModel, creature_from_urdf, insect, quadruped
 from manikin.body.human import human
 from manikin.contact import Contact, FrictionModel, Stance
 from manikin.contact import grasp as contact_grasp
@@ -178,18 +178,21 @@ def stance(
 def creature(
     source: str | Path = "insect", limbs: Mapping[str, Any] | None = None, **options: Any
 ) -> BodyModel:
-    """Body that is no person: the built-in insect, or a robot or animal from a URDF file.
+    """Body that is no person: the built-in insect or quadruped, or a robot or animal from a URDF file.
 
     Args:
-        source: ``"insect"``, or the file.
+        source: ``"insect"``, ``"quadruped"``, or the file.
         limbs: Limbs of the file's body by name, see :func:`manikin.body.creature_from_urdf`.
-        options: Of :func:`manikin.body.further_bodies` or :func:`manikin.body.creature_from_urdf`.
+        options: Of :func:`manikin.body.insect`, :func:`manikin.body.quadruped` or
+            :func:`manikin.body.creature_from_urdf`.
 
     Raises:
         BodyError: If the file or a limb is not usable.
     """
     if str(source) == "insect":
         return insect(**options)
+    if str(source) == "quadruped":
+        return quadruped(**options)
     if limbs is None:
         raise InputError(f"creature {str(source)!r} has no limbs; valid: limbs={{name: {{'tip': link}}}}")
     return creature_from_urdf(source, limbs, **options)

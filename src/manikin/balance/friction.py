@@ -13,6 +13,7 @@ import numpy as np
 from manikin.contact import Contact, ContactKind, FrictionModel
 from manikin.contact.contact import friction_model as checked
 from manikin.numerics.facet_enumeration import fan_of_generators
+from manikin.numerics.polygon import convex_polygon
 from manikin.numerics.polytope import facet_rows
 from manikin.numerics.spatial import FloatArray, cross
 
@@ -93,7 +94,9 @@ def _friction_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]
 
 
 def _pressure_rows(contact: Contact) -> list[Row]:
-    """CoP inside the rectangle ([Qiu2012]_ 4.14): x = -tau_y / f_z, y = tau_x / f_z."""
+    """CoP inside the rectangle ([Qiu2012]_ 4.14) or polygon: x = -tau_y / f_z, y = tau_x / f_z."""
+    if _is_polygon(contact):
+        return _polygon_rows(contact)
     half_length, half_width = contact.length / 2, contact.width / 2
     sides = {"left": ("outer", "inner"), "right": ("inner", "outer")}
     left, right = sides.get(contact.effector.split("_")[0], ("left", "right"))
@@ -113,6 +116,28 @@ def _pressure_rows(contact: Contact) -> list[Row]:
     ]
 
 
+def _is_polygon(contact: Contact) -> bool:
+    """Whether a sole touches with something other than a rectangle along its axes, or an edge."""
+    local = np.abs(contact.points - contact.centre)[:, :2]
+    return contact.kind is ContactKind.SOLE and bool(np.abs(local - local.max(axis=0)).max() > 1e-9)
+
+
+def _polygon_rows(contact: Contact) -> list[Row]:
+    """CoP inside the hull of the points, about their middle."""
+    corners = convex_polygon((contact.points - contact.centre)[:, :2])
+    edges = np.roll(corners, -1, axis=0) - corners
+    out = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
+    words = {(0, True): "front", (0, False): "rear", (1, True): "left", (1, False): "right"}
+    rows: list[Row] = []
+    for (x, y), corner in zip(out.tolist(), corners, strict=True):
+        axis = int(abs(y) > abs(x))
+        side = words[axis, (x, y)[axis] > 0.0]
+        room = float(corner @ [x, y])
+        phrase = f"tipping over the {side} edge of what of it touches"
+        rows.append(([0, 0, -room, y, -x, 0], 0.0, LimitKind.TIPPING, phrase))
+    return rows
+
+
 def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
     turn, mu = LimitKind.TURNING, pyramid_friction(contact, friction_model)
     signs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
@@ -123,10 +148,11 @@ def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
             for c in (1.0, -1.0)
             for a, b in signs
         ]
-    if friction_model == "cone":
+    if friction_model == "cone" or _is_polygon(contact):
+        centred = replace(contact, points=contact.points - contact.centre)
         return [
             (row.tolist(), 0.0, turn, words[float(np.sign(row[5]))])
-            for row in _yaw_facets(replace(contact, points=contact.points - contact.centre))
+            for row in _yaw_facets(centred, friction_model)
         ]
     x, y = contact.length / 2, contact.width / 2
     return [
@@ -136,13 +162,13 @@ def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
     ]
 
 
-def _yaw_facets(sole: Contact) -> FloatArray:
+def _yaw_facets(sole: Contact, friction_model: FrictionModel) -> FloatArray:
     """(k, 6) facets of the cone over the corner forces that bound the yaw moment.
 
     The other ones are those of friction and pressure: a sum of corner forces has any force in the
-    friction cone together with any centre of pressure in the rectangle.
+    friction cone together with any centre of pressure in the rectangle or polygon.
     """
-    edges = edge_wrenches(sole, "cone")
+    edges = edge_wrenches(sole, friction_model)
     size = np.hypot(sole.length, sole.width)
     edges[:, 3:] /= size
     fan = fan_of_generators(edges, np.ones((len(edges), 1)), np.ones(1, dtype=np.bool_))

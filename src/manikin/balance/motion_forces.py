@@ -23,6 +23,7 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Sta
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.dynamics import CarriedForces, FreeDynamics, centroidal_motion
+from manikin.numerics.polygon import chord
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_about
 from manikin.scene.distance import moves_by_joint
@@ -286,8 +287,11 @@ def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
     """(k, 3) points of the contact frame that carry force: corners, and the ends of the toes' hinge."""
     line = hinge_line(body, contact.effector)
     full = contact.kind is ContactKind.SOLE and contact.part is SolePart.FULL
-    if not full or line is None or abs(line) >= 0.5 * contact.length:
+    if not full or line is None or (abs(line) >= 0.5 * contact.length and not contact.hangs_over):
         return contact.points
+    if contact.hangs_over:
+        ends = chord(contact.outline, line)
+        return contact.points if ends is None else np.vstack([contact.points, [[line, y, 0.0] for y in ends]])
     half = 0.5 * contact.width
     return np.vstack([contact.points, [[line, half, 0.0], [line, -half, 0.0]]])
 

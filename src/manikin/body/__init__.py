@@ -17,12 +17,13 @@ from manikin.body.limbs import (
 from manikin.body.load import carrying
 from manikin.body.model import BodyModel
 from manikin.body.natural_range import NaturalRange, human_volumes
+from manikin.body.quadruped import quadruped
 from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
 
 __all__ = [
     "Anthropometry", "BodyModel", "Configuration", "Effector", "Hinge", "JointVolume", "Limb", "LimbSpec",
     "NaturalRange", "Segment", "Sex", "Shape", "ShapeKind", "are_mirrored", "body_from_signature", "carrying",
     "creature_from_urdf", "difference", "human", "human_volumes", "insect", "integrate", "interpolate",
-    "kudoh", "limb_named", "limb_placement", "point_mass", "random_configuration", "volume_of",
+    "kudoh", "limb_named", "limb_placement", "point_mass", "quadruped", "random_configuration", "volume_of",
     "with_further_contacts", "with_knees_and_elbows", "with_root",
 ]  # fmt: skip

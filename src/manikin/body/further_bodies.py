@@ -19,7 +19,7 @@ strengths are our own choice.
 where the contact schedule has them, see :func:`manikin.motion.motion.foot_positions`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -55,6 +55,7 @@ _TIP_FREE = 0.4
 _MASS_SHARES = {"femur": 0.025, "tibia": 0.015, "tarsus": 0.005}
 _TRUNK_RADIUS = 0.11
 _SPEED = 12.0
+HingeEntry = tuple[str, tuple[float, float, float], float, float, float]
 _HINGES = {
     # Segment: name, axis of the left leg, range [deg], strength in units of weight times length.
     "femur": (
@@ -96,7 +97,7 @@ def _insect_trunk(length: float, mass: float) -> Segment:
     radius = _TRUNK_RADIUS * length
     turn = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     shape = Shape("trunk", ShapeKind.CAPSULE, (radius, length - 2.0 * radius), rotation=turn)
-    inertia = _rod(share * mass, radius, length, axis=0)
+    inertia = rod_inertia(share * mass, radius, length, axis=0)
     return Segment("trunk", None, np.zeros(3), (), share * mass, np.zeros(3), inertia, (shape,))
 
 
@@ -109,8 +110,9 @@ def _insect_leg(name: str, pair: str, sign: float, length: float, mass: float) -
         part_mass, radius = _MASS_SHARES[part] * mass, _RADII[part] * length
         parts.append(
             Segment(
-                f"{name}_{part}", parent, origin, _insect_hinges(name, part, sign, 9.81 * mass * length),
-                part_mass, 0.5 * reach, _rod(part_mass, radius, share * length, axis=1),
+                f"{name}_{part}", parent, origin,
+                mirrored_hinges(name, sign, 9.81 * mass * length, _HINGES[part]), part_mass,
+                0.5 * reach, rod_inertia(part_mass, radius, share * length, axis=1),
                 (_rod_shape(part, radius, reach),),
             )
         )  # fmt: skip
@@ -118,15 +120,24 @@ def _insect_leg(name: str, pair: str, sign: float, length: float, mass: float) -
     return parts
 
 
-def _insect_hinges(name: str, part: str, sign: float, strength: float) -> tuple[Hinge, ...]:
-    """Hinges of one segment; those of the right side are the reflection of the left ones."""
+def mirrored_hinges(
+    name: str, sign: float, strength: float, entries: Sequence[HingeEntry]
+) -> tuple[Hinge, ...]:
+    """Hinges of one segment of a leg; those of the right side are the reflection of the left ones.
+
+    Args:
+        name: Of the leg, the first part of the hinges' names.
+        sign: 1 on the left, -1 on the right.
+        strength: Unit of the torques [N.m].
+        entries: Name, axis of the left leg, lower and upper limit [deg], torque in that unit.
+    """
     reflection = np.ones(3) if sign > 0.0 else np.array([-1.0, 1.0, -1.0])
     return tuple(
         Hinge(
             f"{name}_{joint}", reflection * np.array(axis), float(np.deg2rad(lower)),
             float(np.deg2rad(upper)), _SPEED, -torque * strength, torque * strength,
         )
-        for joint, axis, lower, upper, torque in _HINGES[part]
+        for joint, axis, lower, upper, torque in entries
     )  # fmt: skip
 
 
@@ -138,7 +149,7 @@ def _rod_shape(part: str, radius: float, reach: FloatArray) -> Shape:
     return Shape(part, ShapeKind.CAPSULE, (radius, span), centre, turn)
 
 
-def _rod(mass: float, radius: float, length: float, axis: int) -> FloatArray:
+def rod_inertia(mass: float, radius: float, length: float, axis: int) -> FloatArray:
     """Inertia (3, 3) of a solid cylinder along one axis about its centre."""
     moments = np.full(3, mass * (3.0 * radius**2 + length**2) / 12.0)
     moments[axis] = 0.5 * mass * radius**2

@@ -38,8 +38,14 @@ def hangs(body: BodyModel, effector: str) -> bool:
 
 
 def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
-    """Names of the segments with which an effector touches: its own and the one hanging on it."""
+    """Names of the segments with which an effector touches.
+
+    They are its own and the one hanging on it; of a knee or an elbow both that meet in the joint.
+    """
     own = body.effector(effector).segment
+    for limb in body.limbs:
+        if limb.effector == effector and len(limb.segments) > 1 and is_further(body, limb):
+            return own, limb.segments[-2]
     hanging = hanging_segment(body, own)
     return (own,) if hanging is None else (own, hanging.name)
 

@@ -14,6 +14,7 @@ import typer
 
 from manikin.cli.analyze import analyze
 from manikin.cli.balance import balance
+from manikin.cli.benchmark import benchmark
 from manikin.cli.compare import compare
 from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED, JsonOption, complain, print_json
 from manikin.cli.contact import contact
@@ -96,7 +97,8 @@ def scenarios(json: JsonOption = False) -> None:
 
 
 for _command in (
-    run, analyze, push, walk, words, ergonomics, statistics, compare, view, balance, contact, export,
+    run, benchmark, analyze, push, walk, words, ergonomics, statistics, compare, view, balance, contact,
+    export,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(library, name="library")

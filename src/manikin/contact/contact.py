@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.errors import ContactError
+from manikin.numerics.polygon import convex_polygon
 from manikin.numerics.spatial import (
     GRAVITY,
     FloatArray,
@@ -32,6 +33,9 @@ FrictionModel = Literal["outer", "inner", "cone"]
 
 FRICTION_MODELS: tuple[FrictionModel, ...] = get_args(FrictionModel)
 """Names of the friction models."""
+
+MOST_CORNERS = 8
+"""Most corners of what of a sole touches."""
 
 BODY_WEIGHTS_CAP = 3.0
 """Cap on the sum of normal forces of a stance where nothing else is given [body weights]."""
@@ -89,7 +93,7 @@ class ContactKind(StrEnum):
     """Kind of contact: the forces that it can give."""
 
     SOLE = "sole"
-    """Unilateral, frictional, over a rectangle: four corner points carrying forces."""
+    """Unilateral, frictional, over a rectangle or what of it touches: corner points carrying forces."""
     POINT = "point"
     """Unilateral, frictional, at one point."""
     GRASP = "grasp"
@@ -148,6 +152,19 @@ class Contact(Displayed):
     settle: float = 0.0
 
     @property
+    def hangs_over(self) -> bool:
+        """Whether it is a full sole of which only a part is on its surface: no rectangle about its frame."""
+        if self.kind is not ContactKind.SOLE or self.part is not SolePart.FULL:
+            return False
+        size = np.abs(self.points)
+        return len(size) != 4 or bool(np.abs(size - size[0]).max() > 1e-12)
+
+    @property
+    def outline(self) -> FloatArray:
+        """(k, 2) hull of the points in the contact frame, counter-clockwise [m]."""
+        return convex_polygon(self.points[:, :2])
+
+    @property
     def centre(self) -> FloatArray:
         """(3,) middle of the points in the contact frame [m]; the origin for a full sole."""
         return 0.5 * (self.points.min(axis=0) + self.points.max(axis=0))
@@ -189,8 +206,9 @@ def sole(
     effector: str, position: ArrayLike, yaw: float = 0.0, *, length: float, width: float, friction: float,
     normal: ArrayLike | None = None, rotation: ArrayLike | None = None,
     normal_force_cap: float | None = None, torsion_limit: float | None = None, settle: float = 0.0,
+    polygon: ArrayLike | None = None,
 ) -> Contact:  # fmt: skip
-    """Make a rectangular sole: four corner points with friction pyramids.
+    """Make a rectangular sole, or one that hangs over an edge: corner points with friction pyramids.
 
     Args:
         effector: Name of the effector, such as ``"left_foot"``.
@@ -204,6 +222,8 @@ def sole(
         normal_force_cap: Largest normal force on this sole [N].
         torsion_limit: Largest moment about the normal [N.m].
         settle: Time after the touch-down in which it may still slide to its place [s].
+        polygon: (k, 2) convex corners of what of the rectangle touches, in the contact frame [m];
+            all of it when omitted.
 
     Raises:
         ContactError: If a value is not finite or out of its range.
@@ -213,6 +233,10 @@ def sole(
     half_width = finite_number(width, f"{where} width", above=0.0, error=ContactError) / 2
     signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))
     corners = [[a * half_length, b * half_width, 0.0] for a, b in signs]
+    if polygon is not None:
+        part = _part_of_sole(polygon, np.array([half_length, half_width]), where)
+        whole = np.abs(part[:, :2]) >= np.array([half_length, half_width]) - 1e-9
+        corners = corners if len(part) == 4 and whole.all() else part
     made = _frictional(
         ContactKind.SOLE, effector, position, corners, yaw, friction, normal, rotation, normal_force_cap
     )
@@ -221,6 +245,23 @@ def sole(
         torsion_limit=_optional_limit(torsion_limit, f"{where} torsion_limit [N.m]"),
         settle=finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError),
     )
+
+
+def _part_of_sole(polygon: ArrayLike, half: FloatArray, where: str) -> FloatArray:
+    """(k, 3) corners of what of a sole touches, counter-clockwise, checked against its half sizes (2,)."""
+    given = frozen_array(polygon, f"{where} polygon [m]", (None, 2), ContactError)
+    hull = convex_polygon(given)
+    beyond = float((np.abs(given) - half).max(initial=0.0))
+    if beyond > 1e-6:
+        raise ContactError(
+            f"{where} polygon goes {beyond * 1000:.1f} mm beyond the sole; valid: corners in its rectangle"
+        )
+    if len(hull) != len(given) or not 3 <= len(hull) <= MOST_CORNERS:
+        raise ContactError(
+            f"{where} polygon has {len(given)} corners, {len(hull)} on its hull; "
+            f"valid: 3 to {MOST_CORNERS} corners of a convex polygon"
+        )
+    return np.column_stack([hull, np.zeros(len(hull))])
 
 
 def point(
@@ -286,13 +327,15 @@ def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
         hinge: Where the hinge of the toes crosses the sole's x axis [m].
 
     Raises:
-        ContactError: If the contact is no full sole or the hinge lies beyond it.
+        ContactError: If the contact is no whole sole or the hinge lies beyond it.
     """
     where = f"{part} of '{contact.effector}'"
     if contact.kind is not ContactKind.SOLE or contact.part is not SolePart.FULL:
         raise ContactError(f"{where} is taken from a {contact.part} {contact.kind}; valid: a full sole")
     if part is SolePart.FULL:
         return contact
+    if contact.hangs_over:
+        raise ContactError(f"{where} is taken from a sole that hangs over an edge; valid: a whole one")
     half_length, half_width = contact.length / 2, contact.width / 2
     line = finite_number(
         hinge, f"{where} hinge [m]", above=-half_length, at_most=half_length, error=ContactError

@@ -355,11 +355,14 @@ def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling)
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:
-    """Soles that ``other`` lacks; none when nothing else would be left to stand on."""
+    """Soles that ``other`` lacks; none when nothing else would be left to stand on.
+
+    One that hangs over an edge lands and leaves flat: its heel or its toes have nothing below them.
+    """
     changing = tuple(
         contact.effector
         for contact in stance
-        if contact.kind is ContactKind.SOLE and contact.effector not in other
+        if contact.kind is ContactKind.SOLE and contact.effector not in other and not contact.hangs_over
     )
     staying = [contact for contact in stance if contact.effector not in changing]
     return changing if any(contact.kind is ContactKind.SOLE for contact in staying) else ()

@@ -10,6 +10,7 @@ from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
 from manikin.control.dynamics import DynamicsState
+from manikin.numerics.polygon import chord, inset_polygon
 from manikin.numerics.spatial import FloatArray, skew
 
 
@@ -60,15 +61,33 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
         return ContactGeometry(contact.effector, ((effector.segment, on_segment(points)),))
     if contact.kind is not ContactKind.SOLE:
         return ContactGeometry(contact.effector, ((effector.segment, on_segment(contact.points)),))
+    line = 0.0 if toes is None else float((effector.rotation.T @ (toes.origin - effector.translation))[0])
+    if contact.hangs_over:
+        heel, tips = _parts(inset_polygon(contact.outline, inset), np.inf if toes is None else line)
+        patches = [(effector.segment, on_segment(heel))] if len(heel) else []
+        if toes is not None and len(tips):
+            patches.append((toes.name, on_segment(tips) - toes.origin))
+        return ContactGeometry(contact.effector, tuple(patches))
     half_length, half_width = 0.5 * contact.length - inset, 0.5 * contact.width - inset
     if toes is None:
         corners = _rectangle((-half_length, half_length), half_width)
         return ContactGeometry(contact.effector, ((effector.segment, on_segment(corners)),))
-    line = float((effector.rotation.T @ (toes.origin - effector.translation))[0])
     line = float(np.clip(line, -half_length + 0.01, half_length - 0.01))
     heel = on_segment(_rectangle((-half_length, line), half_width))
     tips = on_segment(_rectangle((half_length,), half_width)) - toes.origin
     return ContactGeometry(contact.effector, ((effector.segment, heel), (toes.name, tips)))
+
+
+def _parts(polygon: FloatArray, line: float) -> tuple[FloatArray, FloatArray]:
+    """Corners (k, 3) of what of a polygon (n, 2) is behind a line across the sole, and those before it.
+
+    The ends of the line are of the first, as long as anything is behind it.
+    """
+    behind, ahead = polygon[polygon[:, 0] <= line], polygon[polygon[:, 0] > line]
+    if len(behind) and len(ahead) and (ends := chord(polygon, line)) is not None:
+        behind = np.vstack([behind, [[line, y] for y in ends]])
+    heel, tips = (np.column_stack([part, np.zeros(len(part))]) for part in (behind, ahead))
+    return heel, tips
 
 
 def points_along(body: BodyModel, geometry: ContactGeometry) -> FloatArray:

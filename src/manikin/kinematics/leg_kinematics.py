@@ -67,13 +67,18 @@ class LegKinematics:
         self, pelvis: FloatArray, place: FloatArray, angles: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Rotations (2, n, 3, 3) and origins (2, n, 3) [m] of the feet in the world, see :meth:`angles`."""
+        thigh, shank = self.segments(pelvis, angles)
+        a = angles[:, self.slots].transpose(2, 1, 0)
+        foot = _reflect_right(_reflect_right(shank) @ _turn(-a[5], "y") @ _turn(-a[6], "x"))
+        ankle = self.hips(pelvis, place) - self.thigh * thigh[..., 2] - self.shank * shank[..., 2]
+        return foot, ankle
+
+    def segments(self, pelvis: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rotations (2, n, 3, 3) of thighs and shanks to the world, see :meth:`angles`."""
         a = angles[:, self.slots].transpose(2, 1, 0)
         thigh = _reflected(pelvis) @ _hip(a[0], a[1], a[2])
         shank = thigh @ _turn(a[3], "y") @ _turn(-a[4], "z")
-        foot = _reflect_right(shank @ _turn(-a[5], "y") @ _turn(-a[6], "x"))
-        thigh, shank = _reflect_right(thigh), _reflect_right(shank)
-        ankle = self.hips(pelvis, place) - self.thigh * thigh[..., 2] - self.shank * shank[..., 2]
-        return foot, ankle
+        return _reflect_right(thigh), _reflect_right(shank)
 
     def angles(
         self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, angles: FloatArray

@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
+from manikin.body.limbs import end_segments, hangs
 from manikin.body.model import BodyModel
 from manikin.body.natural_range import LearntJoint, learnt_joints
 from manikin.contact import Contact, ContactKind
@@ -255,12 +256,16 @@ def hinge_weights(body: BodyModel, preferences: Preferences) -> FloatArray:
 
 
 def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
-    """Pairs (segment, obstacle) of contacts (effector, obstacle): the effector's segment and its children."""
+    """Pairs (segment, obstacle) of contacts (effector, obstacle): with what an effector touches.
+
+    What hangs on the root may touch what the root sits on as well.
+    """
     pairs = set()
     for effector, obstacle in effector_obstacles:
-        segment = body.effector(effector).segment
-        pairs.add((segment, obstacle))
-        pairs.update((other.name, obstacle) for other in body.segments if other.parent == segment)
+        pairs.update((name, obstacle) for name in end_segments(body, effector))
+        if not hangs(body, effector):
+            root = body.effector(effector).segment
+            pairs.update((other.name, obstacle) for other in body.segments if other.parent == root)
     return frozenset(pairs)
 
 

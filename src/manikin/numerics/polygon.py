@@ -44,6 +44,36 @@ def polygon_of_halfplanes(A: ArrayLike, b: ArrayLike) -> FloatArray:
     return _without_twins(polygon)
 
 
+def fewer_corners(polygon: FloatArray, most: int) -> FloatArray:
+    """A convex polygon (k, 2) with at most so many corners, without those that cut off least."""
+    corners = polygon
+    while len(corners) > most:
+        before, after = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
+        cut = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+        corners = np.delete(corners, int(np.argmin(cut)), axis=0)
+    return corners
+
+
+def chord(polygon: FloatArray, x: float) -> tuple[float, float] | None:
+    """Lowest and highest y of a convex polygon (k, 2) at a given x, or None beside it."""
+    start, end = polygon, np.roll(polygon, -1, axis=0)
+    crosses = (np.minimum(start[:, 0], end[:, 0]) <= x) & (x <= np.maximum(start[:, 0], end[:, 0]))
+    if not crosses.any():
+        return None
+    start, way = start[crosses], (end - start)[crosses]
+    level = way[:, 0] == 0.0
+    share = (x - start[:, 0]) / np.where(level, 1.0, way[:, 0])
+    y = np.concatenate([start[:, 1] + np.where(level, 0.0, share) * way[:, 1], (start + way)[level, 1]])
+    return float(y.min()), float(y.max())
+
+
+def inset_polygon(polygon: FloatArray, distance: float) -> FloatArray:
+    """(k, 2) what of a convex polygon, counter-clockwise, is at least a distance inside its edges."""
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    out = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
+    return polygon_of_halfplanes(out, np.einsum("ei,ei->e", out, polygon) - distance)
+
+
 def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
     """(...) distance to the boundary of a convex polygon, positive inside, negative outside [m].
 

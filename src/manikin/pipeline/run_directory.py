@@ -4,6 +4,7 @@
 
     DIR/scenario.yaml      the scenario with every default and override, ready to run again
     DIR/stages/*.json      what each stage found, written as soon as it is known
+    DIR/contacts.json      contacts that were planned, with their postures (manikin.verification)
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
     DIR/motion-NAME.h5     planned motion of another walker
     DIR/summary.json       written when every stage is done
@@ -265,6 +266,7 @@ def _first_phases(sequence: StanceSequence, count: int) -> StanceSequence:
 
 
 SCENARIO = "scenario.yaml"
+CONTACT_PLAN = "contacts.json"
 MOTION = "motion.h5"
 BVH = "motion.bvh"
 OTHERS = "motion-*.h5"
@@ -301,7 +303,9 @@ class RunDirectory(ResultDirectory):
         """
         super().__init__(path)
         # The summary goes first: without it the directory is known to be incomplete.
-        self.remove(SUMMARY, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS)
+        self.remove(
+            SUMMARY, CONTACT_PLAN, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS
+        )
 
     def write_scenario(self, yaml_text: str) -> Path:
         """Keep the resolved scenario."""

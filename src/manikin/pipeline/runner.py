@@ -5,16 +5,20 @@ nothing already computed is lost.  A stage that finds nothing ends the run with 
 explanation; only misuse and broken input raise.
 """
 
+import re
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from manikin.contact import ContactSchedule
 from manikin.errors import ScenarioError
 from manikin.pipeline.stages import ExecutionRequirements, Progress, Report, RunContext, RunResult
-from manikin.pipeline.stages.contact_stage import plan_contacts
+from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_again
+from manikin.pipeline.stages.context import StageFailure
 from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, execute_motion
 from manikin.pipeline.stages.recovery_stage import recover_from_push
 from manikin.pipeline.stages.refinement_stage import KeyedContacts, refine_contacts
@@ -92,7 +96,15 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         return _refined(with_contacts, report, requirements)
     if context.scenario.is_point_mass:
         return _moved_point_mass(with_contacts, report)
-    return _followed(with_contacts, report, requirements)
+    result, schedule = _followed(with_contacts, report, requirements)
+    for _ in range(1, context.scenario.contacts.attempts):
+        phase = failed_phase(report.failure, schedule)
+        again = None if phase is None else plan_contacts_again(with_contacts, report, phase)
+        if again is None:
+            break
+        with_contacts = again
+        result, schedule = _followed(with_contacts, report, requirements)
+    return result()
 
 
 def _moved_point_mass(context: RunContext, report: Report) -> RunResult:
@@ -101,8 +113,14 @@ def _moved_point_mass(context: RunContext, report: Report) -> RunResult:
     return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
 
 
-def _followed(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
-    """The centre of mass first, then all joints along it, the act and the execution."""
+def _followed(
+    context: RunContext, report: Report, requirements: ExecutionRequirements
+) -> tuple[Callable[[], RunResult], ContactSchedule | None]:
+    """The centre of mass first, then all joints along it, the act and the execution.
+
+    Returns:
+        What makes the result, and the schedule of the contacts, as far as it came.
+    """
     centroidal = plan_centre_of_mass(context, report)
     plan = with_key_postures(context, report, centroidal)
     wholebody = follow_centre_of_mass(context, report, plan)
@@ -110,14 +128,26 @@ def _followed(context: RunContext, report: Report, requirements: ExecutionRequir
         other = with_stricter_key_postures(context, report, centroidal, plan)
         if other is not None:
             plan, wholebody = other, follow_centre_of_mass(context, report, other)
-    if plan.trajectory is None or wholebody is None or not wholebody.succeeded:
-        return RunResult.of(report, plan.centroidal, wholebody)
-    planned = append_act(context, report, PlannedMotion(plan.trajectory.schedule, wholebody.motion))
+    schedule = None if plan.trajectory is None else plan.trajectory.schedule
+    if schedule is None or wholebody is None or not wholebody.succeeded:
+        return partial(RunResult.of, report, plan.centroidal, wholebody), schedule
+    planned = append_act(context, report, PlannedMotion(schedule, wholebody.motion))
     wholebody = replace(wholebody, motion=planned.motion)
     if report.failure is not None or not context.scenario.execution_required:
-        return RunResult.of(report, plan.centroidal, wholebody)
+        return partial(RunResult.of, report, plan.centroidal, wholebody), schedule
     execution = execute_motion(context, report, planned, requirements)
-    return RunResult.of(report, plan.centroidal, wholebody, execution)
+    report.judge()
+    return partial(RunResult.of, report, plan.centroidal, wholebody, execution), schedule
+
+
+def failed_phase(failure: StageFailure | None, schedule: ContactSchedule | None) -> int | None:
+    """Index of the phase in which a stage failed, or None where that is not known."""
+    if failure is None:
+        return None
+    named = re.match(r"phase (\d+)", failure.where)
+    if named is not None:
+        return int(named[1])
+    return None if schedule is None else int(schedule.phase_at(failure.time_s))
 
 
 def _refined(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:

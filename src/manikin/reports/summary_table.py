@@ -87,6 +87,7 @@ def verdict_line(summary: Mapping[str, Any]) -> str:
 
 
 HEADINGS = {
+    "contacts": "planned contacts",
     "walk": "planned walk", "centroidal": "planned centre of mass", "wholebody": "planned whole body",
     "act": "planned act", "execution": "executed in the physics engine", "act execution": "executed act",
     "push": "executed in the physics engine",
@@ -101,7 +102,11 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[str]:
     """Verdict of a run in one line, then every requirement; broken ones are marked."""
     yield verdict_line(summary)
     yield about_line(summary)
-    rows: Sequence[Mapping[str, Any]] = summary["requirements"]
+    yield from requirement_lines(summary["requirements"])
+
+
+def requirement_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Every requirement in a line, those of a stage below its heading; broken ones are marked."""
     names = [f"{row['name']} ({row['where']})" if row["where"] else str(row["name"]) for row in rows]
     width = max(map(len, names), default=0)
     heading = ""

@@ -1,4 +1,4 @@
-"""Work in several processes on one machine, by joblib."""
+"""Work in several processes on one machine, by joblib, and a limit of its processor time."""
 
 import os
 import signal
@@ -8,13 +8,14 @@ import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any, TypeVar
 
 from joblib import Parallel, delayed
 from joblib.externals.loky.backend import resource_tracker
 from threadpoolctl import ThreadpoolController
 
-from manikin.errors import ManikinError
+from manikin.errors import ManikinError, TimeLimitError
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -67,6 +68,45 @@ def side_by_side(
             warnings.simplefilter("ignore")  # of results that nobody waits for
             if results is not None:
                 results.close()
+
+
+class _TimeIsUp(BaseException):
+    """Unwinds the work; no Exception, so that nobody takes it for a failure of their own."""
+
+
+@contextmanager
+def processor_time_limit(seconds: float) -> Iterator[None]:
+    """Context that ends when this process has computed for so long, however busy the machine is.
+
+    A native library that computes is left first. Outside of the main thread, and where the system has no
+    such timer, there is no limit.
+
+    Args:
+        seconds: Processor time [s].
+
+    Raises:
+        TimeLimitError: If the time is over.
+    """
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or not hasattr(signal, "ITIMER_PROF"):
+        yield
+        return
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        raise _TimeIsUp
+
+    before = signal.signal(signal.SIGPROF, stop)
+    try:
+        # Again every second: a native library may swallow the first.
+        signal.setitimer(signal.ITIMER_PROF, seconds, 1.0)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+    except _TimeIsUp:
+        raise TimeLimitError(f"did not end within {seconds:g} s of processor time") from None
+    finally:
+        signal.signal(signal.SIGPROF, before)
 
 
 @contextmanager

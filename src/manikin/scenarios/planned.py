@@ -16,7 +16,7 @@ from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.validation import validate
-from manikin.scenarios.values import ScenarioValues
+from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
 
 STATURE = 1.75
@@ -319,8 +319,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
             phase["com_within_m"] = list(stage.com_room)
         before = dict(stage.contacts)
         phases.append(phase)
-    feet = next(c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
-    long, wide = feet.length, feet.width
+    long, wide = _sole_size(scenario, plan)
     supports = {
         "friction": friction,
         "sole": {"length_m": long, "width_m": wide},
@@ -353,7 +352,19 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
         entry["normal"] = [float(x) for x in contact.normal]
     if contact.friction != friction:
         entry["friction"] = contact.friction
+    if contact.hangs_over:
+        entry["polygon"] = contact.points[:, :2].tolist()
     return entry
+
+
+def _sole_size(scenario: Scenario, plan: ContactPlan) -> tuple[float, float]:
+    """Length and width of a whole sole: one of the plan, or the body's where all hang over edges [m]."""
+    feet = (c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
+    for contact in feet:
+        if not contact.hangs_over:
+            return contact.length, contact.width
+    body = build_body(scenario)
+    return float(body.sole_length or 0.0), float(body.sole_width or 0.0)
 
 
 def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, Any]]:

@@ -251,7 +251,11 @@ class Scenario(Displayed, ScenarioValues):
                 obstacle["mesh"] = str((self.folder / obstacle["mesh"]).resolve())
         if "recording" in data["planning"]:
             data["planning"]["recording"] = str(self.find_file(data["planning"]["recording"]).resolve())
-        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None)
+        return _yaml(data)
+
+    def to_short_yaml(self) -> str:
+        """Return the scenario as people write it: without defaults, files by the names that were given."""
+        return _yaml(self.file.model_dump(mode="json", exclude_defaults=True))
 
     def _changed(self, **changes: Any) -> Scenario:
         data = self._data()
@@ -270,3 +274,7 @@ class Scenario(Displayed, ScenarioValues):
         if self.file.floor_height_m is None:
             data["floor_height_m"] = None
         return data
+
+
+def _yaml(data: Mapping[str, Any]) -> str:
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None)

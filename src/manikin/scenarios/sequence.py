@@ -76,6 +76,7 @@ def build_contact(
         math.radians(entry.yaw_deg),
         length=min(own.length_m, default_sole.length_m) if shrink else own.length_m,
         width=min(own.width_m, default_sole.width_m) if shrink else own.width_m,
+        polygon=entry.polygon,
         friction=friction,
         normal=entry.normal,
         normal_force_cap=force_cap,
@@ -202,7 +203,7 @@ def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> No
                 )
         for contact in stance:
             with values.refusing(("supports", "phases", number, contact.effector)):
-                scene.touched_obstacle(contact, tolerance)
+                scene.touched_obstacles(contact, tolerance)
 
 
 def _contact(values: ScenarioValues, effector: str, entry: ContactSection, planning: bool) -> Contact:
@@ -215,4 +216,11 @@ def _contact(values: ScenarioValues, effector: str, entry: ContactSection, plann
         stature = values.file.body.stature_m  # the rectangle of the buttocks that presses on a seat
         default_sole = SoleSection(length_m=SEAT_LENGTH * stature, width_m=SEAT_WIDTH * stature)
     cap = supports.contact_normal_force_cap_N
-    return build_contact(effector, entry, friction, default_sole, planning=planning, force_cap=cap)
+    if entry.polygon is None or not planning:
+        return build_contact(effector, entry, friction, default_sole, planning=planning, force_cap=cap)
+    # What touches of a sole over an edge is drawn together about its own middle, as a whole sole is.
+    real = entry.sole or (default_sole if effector == "buttocks" else supports.sole)
+    made = build_contact(effector, entry, friction, real, force_cap=cap)
+    shares = (min(1.0, default_sole.length_m / real.length_m), min(1.0, default_sole.width_m / real.width_m))
+    points = made.centre + np.array([*shares, 1.0]) * (made.points - made.centre)
+    return replace(made, points=frozen_array(points, "points of a sole [m]", (None, 3)))

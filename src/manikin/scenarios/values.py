@@ -18,6 +18,7 @@ from manikin.body import (
     insect,
     kudoh,
     point_mass,
+    quadruped,
     with_further_contacts,
 )
 from manikin.contact import ContactModel
@@ -348,7 +349,7 @@ def build_body(values: ScenarioValues) -> BodyModel:
     Raises:
         ScenarioError: If the body's data are out of range.
     """
-    if values.file.body.model in ("insect", "urdf"):
+    if values.file.body.model in ("insect", "quadruped", "urdf"):
         return _creature(values)
     load = values.file.body.load
     load = load if load is not None and load.lasts else None
@@ -371,11 +372,13 @@ def build_body(values: ScenarioValues) -> BodyModel:
 
 
 def _creature(values: ScenarioValues) -> BodyModel:
-    """An insect, or the creature of a robot description."""
+    """An insect, a quadruped, or the creature of a robot description."""
     data = values.file.body
     with values.refusing(("body",)):
         if data.model == "insect":
             return insect(data.length_m, data.mass_kg)
+        if data.model == "quadruped":
+            return quadruped(data.length_m, data.mass_kg)
         sole = data.sole
         return creature_from_urdf(
             values.folder / str(data.urdf),

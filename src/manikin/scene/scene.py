@@ -6,15 +6,18 @@ from functools import cached_property
 
 import coal
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from manikin.contact import Contact, ContactKind
 from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.collision import Meter, collision_parts, part_meter
+from manikin.scene.footing import FootingTable
+from manikin.scene.grasp_line import GraspLine, grasp_lines, grasp_strips, palm_places
+from manikin.scene.merging import COPLANAR, merged_surfaces
 from manikin.scene.obstacle import HalfSpace, Obstacle
-from manikin.scene.surface import Surface, surfaces_of
+from manikin.scene.surface import Surface
 
 FLOOR = "floor"
 """Name of the floor obstacle."""
@@ -80,8 +83,32 @@ class Scene(Displayed):
 
     @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
-        """Every flat face of every obstacle, in order."""
-        return tuple(surface for item in self.obstacles for surface in surfaces_of(item))
+        """Every flat place of the scene, coplanar faces that touch joined and what is hidden left out.
+
+        See :func:`manikin.scene.merging.merged_surfaces`; in the order of the obstacles.
+        """
+        return merged_surfaces(self.obstacles)
+
+    @cached_property
+    def grasp_lines(self) -> tuple[GraspLine, ...]:
+        """Pieces of rails, rungs and other bars that a hand can close round, in order."""
+        return grasp_lines(self.obstacles, self._distances)
+
+    @cached_property
+    def holds(self) -> tuple[Surface, ...]:
+        """The surfaces, and after them faces around the round bars, on which only a palm can lie."""
+        return (*self.surfaces, *grasp_strips(self.grasp_lines, self.obstacles))
+
+    def palms(self, numbers: NDArray[np.int64], points: FloatArray) -> FloatArray:
+        """(n, 3) places of palms over points (n, 3) of holds of (n,) indices: on bars in their middle [m]."""
+        placed, strip = np.array(points), numbers - len(self.surfaces)
+        rows = np.flatnonzero(strip >= 0)
+        if len(rows):
+            on_axis = palm_places(self.grasp_lines, strip[rows], placed[rows])
+            normals = np.array([self.holds[number].normal for number in numbers[rows]])
+            height = np.einsum("ni,ni->n", placed[rows] - on_axis, normals)
+            placed[rows] = on_axis + height[:, None] * normals
+        return placed
 
     def surfaces_facing(self, direction: Sequence[float], max_angle: float) -> tuple[Surface, ...]:
         """Surfaces whose normal is within ``max_angle`` [rad] of ``direction`` (3,)."""
@@ -109,6 +136,34 @@ class Scene(Displayed):
             return aligned[int(np.argmin(worst))]
         raise ContactError(self._off_surface(contact, aligned, tolerance))
 
+    def contact_polygon(self, contact: Contact, tolerance: float = 0.005) -> tuple[FloatArray, float]:
+        """What of a sole lies on the scene, and the share of its area that this is.
+
+        For many places use a :class:`~manikin.scene.footing.FootingTable`, which says the same.
+
+        Args:
+            contact: A sole; its points are what could touch.
+            tolerance: Largest height of its middle over the surface [m].
+
+        Returns:
+            (k, 2) corners in the contact frame [m] on the surface that has most of it, none where it cannot
+            stand there; the share.
+        """
+        surfaces = [
+            surface for surface in self._aligned(contact, _ALIGNED)
+            if abs(float(surface.height(contact.position[None])[0])) <= tolerance
+        ]  # fmt: skip
+        if not surfaces:
+            return np.zeros((0, 2)), 0.0
+        count = len(surfaces)
+        rotations = np.broadcast_to(contact.rotation_contact_to_world, (count, 3, 3))
+        footing = FootingTable(surfaces, contact.outline).place(
+            np.arange(count), np.broadcast_to(contact.position, (count, 3)), rotations
+        )
+        row = int(np.argmax(footing.share))
+        share = float(footing.share[row])
+        return (footing.polygon(row) if footing.stands[row] else np.zeros((0, 2))), share
+
     def nearest(self, point: ArrayLike) -> tuple[str, float]:
         """Name of the obstacle nearest to a (3,) world point, and its signed distance [m].
 
@@ -117,23 +172,20 @@ class Scene(Displayed):
         """
         if not self.obstacles:
             raise SceneError("scene is empty, so nothing is nearest; valid: at least one obstacle")
-        place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
-        distances = [
-            (min(meter(place, other)[0] for meter, other in meters), name)
-            for name, meters in self._point_meters.items()
-        ]
-        distance, name = min(distances, key=lambda item: item[0])
+        distance, name = self._distances(point)[0]
         return name, distance
 
-    def touched_obstacle(self, contact: Contact, tolerance: float = 0.005) -> str:
-        """Name of the obstacle that a contact touches; ContactError if there is none.
+    def touched_obstacles(self, contact: Contact, tolerance: float = 0.005) -> tuple[str, ...]:
+        """Names of the obstacles that a contact touches; ContactError if there is none.
 
-        A sole or point lies on a surface, see :meth:`supporting_surface`; a grasp has the fingers around
-        something within :data:`GRASP_REACH` of its position.
+        A sole or point lies on a surface, see :meth:`supporting_surface`, and touches all obstacles that the
+        surface belongs to: what is coplanar beside it is never in its way. A grasp has the fingers around
+        what is within :data:`GRASP_REACH` of its position, nearest to it, several where they meet there.
         """
         if contact.kind is not ContactKind.GRASP:
-            return self.supporting_surface(contact, tolerance).obstacle
-        name, distance = self.nearest(contact.position) if self.obstacles else ("", np.inf)
+            return self.supporting_surface(contact, tolerance).obstacles
+        near = self._distances(contact.position) if self.obstacles else [(np.inf, "")]
+        distance, name = near[0]
         if distance > GRASP_REACH:
             place = np.round(contact.position, 4).tolist()
             away = f"the nearest, {name!r}, is {distance * 1000:.1f} mm away"
@@ -142,7 +194,16 @@ class Scene(Displayed):
                 f"grasp '{contact.effector}' at {place} m holds on to nothing: {nearest}; "
                 f"valid: within {GRASP_REACH * 1000:g} mm of an obstacle"
             )
-        return name
+        return tuple(other for away, other in near if away <= distance + COPLANAR)
+
+    def _distances(self, point: ArrayLike) -> list[tuple[float, str]]:
+        """Signed distance [m] of a (3,) world point to each obstacle, and its name; the nearest first."""
+        place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
+        distances = [
+            (min(meter(place, other)[0] for meter, other in meters), name)
+            for name, meters in self._point_meters.items()
+        ]
+        return sorted(distances, key=lambda item: item[0])
 
     @cached_property
     def _point_meters(self) -> dict[str, list[tuple[Meter, coal.Transform3s]]]:
@@ -173,8 +234,13 @@ class Scene(Displayed):
         worst = float(height[np.argmax(np.abs(height))])
         side = "above" if worst >= 0 else "below"
         beside = f" and {over * 1000:.1f} mm beyond its edge" if over > tolerance else ""
+        names = " and ".join(nearest.obstacles)
+        if beside and abs(worst) <= tolerance and contact.kind is ContactKind.SOLE:
+            polygon, share = self.contact_polygon(contact, tolerance)
+            part = np.round(polygon, 4).tolist()
+            remedy += f", or, with the {100 * share:.0f} % of it that does, polygon: {part}" if part else ""
         return (
-            f"{where} lies on no surface: the nearest, of '{nearest.obstacle}', has a contact point "
+            f"{where} lies on no surface: the nearest, of '{names}', has a contact point "
             f"{abs(worst) * 1000:.1f} mm {side} it{beside}; {remedy}"
         )
 

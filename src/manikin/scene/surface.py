@@ -1,35 +1,42 @@
 """Planar faces of the scene that an effector can be put on."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import trimesh
+import shapely
+from numpy.typing import NDArray
+from shapely import Geometry
 
-from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array
+from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array, skew
 from manikin.scene.mesh import Mesh, as_trimesh
 from manikin.scene.obstacle import Box, Cylinder, HalfSpace, Obstacle, Plane
 
 ENDLESS_HALF_SIZE = 1000.0
 """Half the side of the square polygon of an endless plane [m]."""
-_CAP_CORNERS = 32
-_SMALLEST_AREA = 1e-4  # [m^2]; smaller mesh facets hold no contact
+CAP_CORNERS = 32
+"""Corners of the polygon that stands for a cylinder's cap."""
+SMALLEST_AREA = 1e-4
+"""Smaller polygons are no surface, because they hold no contact [m^2]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A flat polygon of an obstacle, seen from its free side.
+    """A flat polygon of one or more obstacles, seen from its free side.
 
     Attributes:
-        obstacle: Name of the obstacle.
+        obstacles: Names of the obstacles that it belongs to; coplanar ones that touch are one surface.
         polygon: (k, 3) corners in the world [m], counter-clockwise about the normal;
             not necessarily convex.
         normal: (3,) unit normal, out of the obstacle.
+        holes: (h, 3) corners of each hole [m], clockwise about the normal.
     """
 
-    obstacle: str
+    obstacles: tuple[str, ...]
     polygon: FloatArray
     normal: FloatArray
+    holes: tuple[FloatArray, ...] = ()
 
     @cached_property
     def rotation(self) -> FloatArray:
@@ -38,12 +45,17 @@ class Surface:
         rotation.setflags(write=False)
         return rotation
 
+    @cached_property
+    def edges(self) -> tuple[FloatArray, FloatArray]:
+        """(e, 3) starts and ends of the edges of the polygon and its holes [m], surface on their left."""
+        rings = (self.polygon, *self.holes)
+        return np.concatenate(rings), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+
     @property
     def area(self) -> float:
-        """[m^2]."""
-        flat = self._flat(self.polygon)
-        following = np.roll(flat, -1, axis=0)
-        return float(0.5 * np.sum(flat[:, 0] * following[:, 1] - following[:, 0] * flat[:, 1]))
+        """[m^2]; without the holes."""
+        start, end = (self._flat(points) for points in self.edges)
+        return float(0.5 * np.sum(start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]))
 
     @property
     def centre(self) -> FloatArray:
@@ -56,13 +68,13 @@ class Surface:
 
     def outside(self, points: FloatArray) -> FloatArray:
         """(k,) distance in the plane from each projected point to the polygon [m]; 0 inside."""
-        corners, flat = self._flat(self.polygon), self._flat(points)
-        edge = np.roll(corners, -1, axis=0) - corners
-        to_point = flat[:, None] - corners
+        start, end = (self._flat(corners) for corners in self.edges)
+        flat, edge = self._flat(points), end - start
+        to_point = flat[:, None] - start
         along = np.einsum("kei,ei->ke", to_point, edge) / np.einsum("ei,ei->e", edge, edge)
         nearest = to_point - np.clip(along, 0.0, 1.0)[..., None] * edge
         gap = np.sqrt(np.einsum("kei,kei->ke", nearest, nearest).min(axis=1))
-        return np.where(self._inside(flat, corners), 0.0, gap)
+        return np.where(inside_edges(flat, start, end), 0.0, gap)
 
     def distance(self, points: FloatArray) -> FloatArray:
         """(k,) distance of (k, 3) points to the polygon in space [m]."""
@@ -71,20 +83,19 @@ class Surface:
     def _flat(self, points: FloatArray) -> FloatArray:
         return (np.asarray(points) - self.polygon[0]) @ self.rotation[:, :2]
 
-    @staticmethod
-    def _inside(points: FloatArray, corners: FloatArray) -> np.ndarray:
-        """Even-odd rule."""
-        following = np.roll(corners, -1, axis=0)
-        x, y = points[:, :1], points[:, 1:]
-        straddles = (corners[:, 1] > y) != (following[:, 1] > y)
-        rise = following[:, 1] - corners[:, 1]
-        rise = np.where(rise == 0.0, 1.0, rise)
-        crossing = corners[:, 0] + (y - corners[:, 1]) / rise * (following[:, 0] - corners[:, 0])
-        return np.sum(straddles & (x < crossing), axis=1) % 2 == 1
+
+def inside_edges(points: FloatArray, start: FloatArray, end: FloatArray) -> NDArray[np.bool_]:
+    """(...,) whether points (..., 2) are inside closed rings of edges (..., e, 2), by the even-odd rule."""
+    x, y = points[..., None, 0], points[..., None, 1]
+    straddles = (start[..., 1] > y) != (end[..., 1] > y)
+    rise = end[..., 1] - start[..., 1]
+    rise = np.where(rise == 0.0, 1.0, rise)
+    crossing = start[..., 0] + (y - start[..., 1]) / rise * (end[..., 0] - start[..., 0])
+    return np.sum(straddles & (x < crossing), axis=-1) % 2 == 1
 
 
-def surfaces_of(obstacle: Obstacle) -> tuple[Surface, ...]:
-    """Flat faces of an obstacle: box faces, cylinder caps, planes, coplanar mesh facets."""
+def faces_of(obstacle: Obstacle) -> tuple[Surface, ...]:
+    """Flat faces of one obstacle: box faces, cylinder caps, planes, coplanar mesh facets."""
     shape = obstacle.shape
     if isinstance(shape, Box):
         return _box_faces(obstacle, shape)
@@ -98,11 +109,14 @@ def surfaces_of(obstacle: Obstacle) -> tuple[Surface, ...]:
 
 
 def _surface(obstacle: Obstacle, polygon: FloatArray, normal: FloatArray) -> Surface:
-    world_normal = obstacle.rotation @ normal
+    return _in_world(obstacle, obstacle.to_world(polygon), obstacle.rotation @ normal)
+
+
+def _in_world(obstacle: Obstacle, polygon: FloatArray, normal: FloatArray) -> Surface:
     return Surface(
-        obstacle.name,
-        frozen_array(obstacle.to_world(polygon), "polygon", (None, 3)),
-        frozen_array(world_normal / np.linalg.norm(world_normal), "normal", (3,)),
+        (obstacle.name,),
+        frozen_array(polygon, "polygon", (None, 3)),
+        frozen_array(normal / np.linalg.norm(normal), "normal", (3,)),
     )
 
 
@@ -119,8 +133,8 @@ def _box_faces(obstacle: Obstacle, box: Box) -> tuple[Surface, ...]:
 
 
 def _caps(obstacle: Obstacle, cylinder: Cylinder) -> tuple[Surface, ...]:
-    angle = np.arange(_CAP_CORNERS) * 2 * np.pi / _CAP_CORNERS
-    ring = cylinder.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_CAP_CORNERS)])
+    angle = np.arange(CAP_CORNERS) * 2 * np.pi / CAP_CORNERS
+    ring = cylinder.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(CAP_CORNERS)])
     up = np.array([0.0, 0.0, 1.0])
     top = _surface(obstacle, ring + up * cylinder.length / 2, up)
     bottom = _surface(obstacle, ring[::-1] - up * cylinder.length / 2, -up)
@@ -142,43 +156,68 @@ def _endless(obstacle: Obstacle, shape: Plane | HalfSpace) -> tuple[Surface, ...
 
 
 def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
-    """Coplanar triangles that touch, each group as the polygons of its outline.
+    """Coplanar triangles that touch, each group as one polygon or several, with its holes.
 
-    A facet with a hole gives its outer outline only; an outline that touches itself is
-    skipped. Open pieces are seen from the side their triangles turn to.
+    Open pieces are seen from the side their triangles turn to.
     """
-    surfaces = []
+    surfaces: list[Surface] = []
     for piece in mesh.pieces:
-        whole = as_trimesh(piece.vertices, piece.faces)
+        whole = as_trimesh(obstacle.to_world(piece.vertices), piece.faces)
         groups = [np.asarray(group) for group in whole.facets]
         grouped = np.concatenate(groups) if groups else np.zeros(0, dtype=np.int64)
         groups += [np.array([face]) for face in np.setdiff1d(np.arange(len(piece.faces)), grouped)]
         for group in groups:
-            if whole.area_faces[group].sum() >= _SMALLEST_AREA:
+            if whole.area_faces[group].sum() >= SMALLEST_AREA:
                 normal = np.einsum("i,ij->j", whole.area_faces[group], whole.face_normals[group])
-                outline = _outline(whole, group, normal / np.linalg.norm(normal))
-                if outline is not None:
-                    surfaces.append(_surface(obstacle, outline, normal / np.linalg.norm(normal)))
+                triangles = whole.triangles[group]
+                if len(group) == 1:
+                    surfaces.append(_in_world(obstacle, triangles[0], normal))
+                    continue
+                frame = PlaneFrame.of(normal / np.linalg.norm(normal), triangles[0])
+                union = shapely.union_all([frame.flat(ring) for ring in triangles], grid_size=GRID)
+                surfaces += frame.surfaces(union, (obstacle.name,))
     return tuple(surfaces)
 
 
-def _outline(mesh: trimesh.Trimesh, group: np.ndarray, normal: FloatArray) -> FloatArray | None:
-    """Corners of the longest boundary loop of a group of triangles."""
-    directed = mesh.faces[group][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    edges = {(int(a), int(b)) for a, b in directed}
-    following = {a: b for a, b in edges if (b, a) not in edges}
-    loops: list[list[int]] = []
-    while following:
-        loop = [min(following)]
-        while loop[-1] in following:
-            loop.append(following.pop(loop[-1]))
-        loops.append(loop[:-1])
-    polygons = [mesh.vertices[loop] for loop in loops if len(loop) >= 3]
-    if not polygons:
-        return None
-    return max(polygons, key=lambda polygon: _doubled_area(polygon, normal))
+GRID = 1e-9
+"""Corners of surfaces that are joined or cut are rounded to this, in the plane of the surface [m]."""
 
 
-def _doubled_area(polygon: FloatArray, normal: FloatArray) -> float:
-    centred = polygon - polygon[0]
-    return float(np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0) @ normal)
+@dataclass(frozen=True, eq=False)
+class PlaneFrame:
+    """A plane with coordinates, in which polygons are joined and cut.
+
+    Attributes:
+        origin: (3,) in the world [m].
+        rotation: (3, 3) plane-to-world rotation, z along the normal.
+    """
+
+    origin: FloatArray
+    rotation: FloatArray
+
+    @staticmethod
+    def of(normal: FloatArray, ring: FloatArray) -> "PlaneFrame":
+        """Plane through the first corner of a ring (k, 3) [m], with x along its first edge."""
+        along = ring[1] - ring[0]
+        along = along - (along @ normal) * normal
+        along = along / np.linalg.norm(along)
+        return PlaneFrame(ring[0], np.column_stack([along, skew(normal) @ along, normal]))
+
+    def flat(self, ring: FloatArray, holes: Sequence[FloatArray] = ()) -> shapely.Polygon:
+        """The shadow of a polygon (k, 3) and its holes [m] on the plane."""
+        rings = [(corners - self.origin) @ self.rotation[:, :2] for corners in (ring, *holes)]
+        return shapely.Polygon(rings[0], rings[1:])
+
+    def surfaces(self, shape: Geometry, obstacles: tuple[str, ...]) -> list[Surface]:
+        """Polygons of a flat shape as surfaces, without those too small to be touched."""
+        found: list[Surface] = []
+        for part in shapely.get_parts(shapely.orient_polygons(shape.simplify(GRID))):
+            if isinstance(part, shapely.Polygon) and part.area >= SMALLEST_AREA:
+                rings = [np.asarray(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)]
+                outer, *holes = (
+                    frozen_array(self.origin + ring @ self.rotation[:, :2].T, "polygon", (None, 3))
+                    for ring in rings
+                )
+                normal = frozen_array(self.rotation[:, 2], "normal", (3,))
+                found.append(Surface(obstacles, outer, normal, tuple(holes)))
+        return found

@@ -260,8 +260,10 @@ def _touched(
 
 
 def _beyond(contact: Contact, positions: FloatArray) -> FloatArray:
-    """(k,) how far points lie outside the rectangle of a sole, along its axes [m]."""
+    """(k,) how far points lie outside the rectangle of a sole, along its axes, or outside its polygon [m]."""
     local = (positions - contact.position) @ contact.rotation_contact_to_world - contact.centre
+    if contact.hangs_over:
+        return -signed_distance((local + contact.centre)[:, :2], contact.outline)
     return (np.abs(local[:, :2]) - 0.5 * np.array([contact.length, contact.width])).max(axis=1)
 
 

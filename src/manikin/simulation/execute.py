@@ -47,12 +47,12 @@ _AT_REST = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class _Hold:
-    """One planned support with the obstacle under it."""
+    """One planned support with the obstacles under it."""
 
     effector: str
     segments: tuple[str, ...]
     interval: SupportInterval
-    obstacle: str
+    obstacles: tuple[str, ...]
 
 
 def default_physics(body: BodyModel, schedule: ContactSchedule) -> PhysicsOptions:
@@ -180,7 +180,7 @@ class _Run:
         self.world.carry({} if load is None else load.masses)
         now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
         if now != self._planned_now:
-            planned = [(self.holds[i].segments, self.holds[i].obstacle) for i in now]
+            planned = [(self.holds[i].segments, name) for i in now for name in self.holds[i].obstacles]
             self.world.plan_touches(planned, self._leaning)
             self._planned_now = now
         grasps = [item.interval for item in self.holds if item.interval.contact.kind is ContactKind.GRASP]
@@ -208,7 +208,7 @@ class _Run:
             item = self.holds[number]
             grasp = item.interval.contact.kind is ContactKind.GRASP
             if not grasp and time < item.interval.end - 1e-9:
-                felt[item.effector] = self.world.touching(item.segments, item.obstacle)
+                felt[item.effector] = any(self.world.touching(item.segments, name) for name in item.obstacles)
         return felt
 
     def _failed(self, output: ControlOutput) -> bool:
@@ -293,7 +293,7 @@ def _substeps(period: float, timestep: float) -> int:
 
 def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_Hold, ...]:
     return tuple(
-        _Hold(effector, end_segments(body, effector), interval, scene.touched_obstacle(interval.contact))
+        _Hold(effector, end_segments(body, effector), interval, scene.touched_obstacles(interval.contact))
         for effector in schedule.sequence.effectors
         for interval in support_intervals(schedule, effector, SWITCHING)
     )

@@ -146,9 +146,8 @@ def test_every_contact_lies_on_the_scene(walk):
     found, supports = walk
     schedule = recorded_schedule(smoothed(found), supports)
     scene = scene_under(schedule, supports.surfaces[0] - 0.3)  # as if all of it were on a stage
-    assert {scene.touched_obstacle(c) for phase in schedule.sequence for c in phase.stance} <= set(
-        scene.names
-    )
+    contacts = [contact for phase in schedule.sequence for contact in phase.stance]
+    assert all(set(scene.touched_obstacles(contact)) <= set(scene.names) for contact in contacts)
     assert len(scene) == 1 + len(supports.supports)
 
 

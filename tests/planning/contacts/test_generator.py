@@ -36,7 +36,7 @@ from manikin.planning.contacts.single_contact import ContactQuestion, find_conta
 from manikin.scenarios import load_scenario
 from manikin.scenarios.sequence import contact_rules
 from manikin.scenarios.world import start_posture
-from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
+from manikin.scene import Box, Capsule, Cylinder, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
 from manikin.scene.collision import pair_meter
 
 UP = Task((0.0, 0.0, 1.0))
@@ -52,6 +52,24 @@ def at_wall(person, person_samples):
     return ContactGenerator(person, wall_scene(), person_samples)
 
 
+def test_a_hand_closes_round_a_rail_and_not_round_a_pipe(person, person_samples):
+    """The palm lies on the rail's surface, its normal through the axis; what is 10 cm thick is no hold."""
+    turn, at = rotation_from_rpy(0.0, np.pi / 2, 0.0), np.array([0.2, -0.35, 0.95])
+    samples = {"right_arm": person_samples["right_arm"]}
+    for radius in (0.02, 0.05):
+        scene = Scene([Obstacle("rail", Cylinder(radius, 2.0), turn, at)])
+        generator = ContactGenerator(person, scene, samples)
+        q = person.standing_posture()
+        answer = generator.request(q, "right_arm", Task((0.0, 0.0, 1.0)), kind=ContactKind.GRASP)
+        assert answer.found == (radius == 0.02)
+        if answer.found:
+            contact = answer.contact
+            assert answer.obstacles == scene.touched_obstacles(contact) == ("rail",)
+            out = (contact.position - at) * [0.0, 1.0, 1.0]
+            np.testing.assert_allclose(out, radius * contact.normal, atol=1e-9)
+        assert not generator.request(q, "right_arm", Task((0.0, 0.0, 1.0)), kind=ContactKind.POINT).found
+
+
 def check(body, scene, answer, q, limb):
     """A contact is exact, on its surface, free of collision and within the joint ranges."""
     state = Configuration(body, answer.q)
@@ -61,7 +79,7 @@ def check(body, scene, answer, q, limb):
     tilt = np.arccos(min(turn[:, 2] @ contact.normal, 1.0))
     assert tilt < (2e-4 if contact.kind is ContactKind.SOLE else np.deg2rad(15.0) + 1e-6)
     if contact.kind is not ContactKind.GRASP:
-        assert scene.supporting_surface(contact).obstacle == answer.obstacle
+        assert scene.supporting_surface(contact).obstacles == answer.obstacles
     slots = limb_slots(body, limb)
     others = np.setdiff1d(np.arange(body.nq), slots)
     assert np.array_equal(answer.q[others], np.asarray(q)[others])
@@ -332,7 +350,7 @@ def test_candidates_are_all_samples_near_a_surface(person, person_samples):
     """The index and the filters together, against a test of every sample on every surface."""
     ramp = Obstacle("ramp", Box((0.6, 0.8, 0.1)), rotation_from_rpy(0.1, -0.4, 0.2), (0.4, 0.1, 0.9))
     corner = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0.5, 0.2, 0], [0, 1, 0]]) * 0.5 + [0.2, -0.2, 1.1]
-    bent = Surface("bent", corner, np.array([0.0, 0.0, 1.0]))
+    bent = Surface(("bent",), corner, np.array([0.0, 0.0, 1.0]))
     surfaces = (*Scene([ramp]).surfaces, bent)
     samples = person_samples["left_arm"]
     state = Configuration(person, person.standing_posture())

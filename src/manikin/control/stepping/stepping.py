@@ -195,9 +195,8 @@ class StepCheck:
         return result.succeeded and self._clear(result.q, (stays,))
 
     def _clear(self, q: FloatArray, soles: tuple[Contact, ...]) -> bool:
-        grounds = [self._scene.supporting_surface(contact, LEVEL).obstacle for contact in soles]
-        touching = zip((contact.effector for contact in soles), grounds, strict=True)
-        ignored = touching_pairs(self._body, list(touching))
+        grounds = ((item.effector, self._scene.supporting_surface(item, LEVEL).obstacles) for item in soles)
+        ignored = touching_pairs(self._body, [(foot, name) for foot, names in grounds for name in names])
         return self._proximity.minimum(q, ignored).distance > 0.0
 
 

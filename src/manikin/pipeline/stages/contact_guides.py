@@ -82,6 +82,8 @@ class ContactSearch:
         summary: The ``contacts`` block of the run's summary.
         failure: None, or the reason in one line.
         where: Stage of the search that failed.
+        again: Searches on for a plan without the step of a phase, which failed for a reason; None where the
+            search cannot.
     """
 
     scenario: Scenario | None
@@ -90,6 +92,7 @@ class ContactSearch:
     summary: Mapping[str, Any]
     failure: str | None = None
     where: str = ""
+    again: "Callable[[int, str], ContactSearch] | None" = None
 
     def to_dict(self, transform_task_to_world: PlanarTransform) -> dict[str, Any]:
         """Guide and postures in plain values, in the world."""
@@ -142,7 +145,7 @@ class SearchTally:
             reason = extension.failure or ""
         return self.failed(reason, "contacts")
 
-    def found(self, plan: ContactPlan, guide: GuideLine) -> ContactSearch:
+    def found(self, plan: ContactPlan, guide: GuideLine | None = None) -> ContactSearch:
         """A search that found contacts."""
         self.summary.update(steps=plan.steps, phases=len(plan.stages))
         return ContactSearch(None, plan, guide, self._done())

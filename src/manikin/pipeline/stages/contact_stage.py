@@ -13,7 +13,6 @@ import numpy as np
 from manikin.body import BodyModel, Limb, limb_named
 from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
-from manikin.kinematics import reach_volume
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.contact_guides import ContactSearch, RootGuide, SearchTally, guide_root, stage_at
 from manikin.pipeline.stages.context import Report, RunContext
@@ -24,14 +23,13 @@ from manikin.planning.contacts import (
     Endpoints,
     ExtendSettings,
     Extension,
-    GuideLine,
-    LimbExtendSettings,
     LimbPlaces,
     PostureFinder,
     PostureFinderSettings,
     Stage,
+    WalkSearch,
+    WalkSettings,
     follow_guide,
-    follow_guide_with_limbs,
     heading_of,
     sample_limbs,
     starts_on_limbs,
@@ -52,21 +50,6 @@ from manikin.scenarios.planned import with_supports
 from manikin.scenarios.sequence import contact_rules
 from manikin.scenarios.world import CLIMBING, carried_to
 from manikin.scene import Scene
-
-LEGS = ("left_leg", "right_leg")
-
-AROUND = 1.2
-"""Room around start and goal in which the root is led [m]."""
-
-PITCH = (-0.2, 1.0)
-ROLL = (-0.1, 0.1)
-"""Ranges of the lean of the root [rad]; our choice for a body on its feet."""
-
-TURN = float(np.deg2rad(75.0))
-"""Largest turn of the root from the headings of start and goal, where these are that close [rad]."""
-
-SEARCHES_AGAIN = 60
-"""Postures that are looked for along every guide after the first, which the others are much like."""
 
 
 class _ContactSearch:
@@ -92,6 +75,7 @@ class _FootSearch(_ContactSearch):
         self._reference = posture_style_of(scenario.manner).posture(body)
         self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
+        self._walk: WalkSearch | None = None
 
     def run(self) -> ContactSearch:
         start = stage_at(self._places, self._scenario, "start")
@@ -100,31 +84,33 @@ class _FootSearch(_ContactSearch):
         goal = self._goal(start)
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
-        standing = self._places.risen(start) if "buttocks" in start.contacts else None
-        if standing is not None and standing.stage is None:
-            return self._tally.failed(standing.failure or "", "start")
-        first = start if standing is None or standing.stage is None else standing.stage
-        result = self._tally.along_guides(
-            self._scenario.contacts.attempts,
-            lambda: self._guide(first, goal),
-            lambda line, number: self._follow(line, start, goal, number),
-        )
-        if result.plan is None:
-            return result
-        return replace(result, scenario=with_supports(self._scenario, result.plan))
+        self._walk = self._search(start, goal)
+        return self._result(self._walk.run())
 
-    def _follow(self, line: GuideLine, start: Stage, goal: Stage, before: int) -> Extension:
-        """Contacts along a guide after others, with the hands on the object where there is an act."""
+    def _again(self, phase: int, reason: str) -> ContactSearch:
+        """Another plan, without the step of a phase of the last one."""
+        if self._walk is None or not self._walk.refuse(phase):
+            return self._tally.failed(reason, "contacts")
+        return self._result(self._walk.run())
+
+    def _result(self, found: Extension) -> ContactSearch:
+        self._tally.summary["attempts"] += 1
+        self._tally.summary["postures"] = found.searches
+        self._tally.summary["backtracks"] = found.backtracks
+        if found.plan is None:
+            return self._tally.failed(found.failure or "", "contacts")
+        plan = self._acting(found.plan)
+        return replace(
+            self._tally.found(plan), scenario=with_supports(self._scenario, plan), again=self._again
+        )
+
+    def _search(self, start: Stage, goal: Stage) -> WalkSearch:
         options = self._scenario.contacts
-        settings = ExtendSettings(stride=options.stride_m)
-        if before:
-            settings = replace(settings, searches=SEARCHES_AGAIN)
         asked = PostureFinderSettings(
             natural=self._natural, friction_model=self._scenario.contact_model.friction
         )
         poser = PostureFinder(self._body, self._scene, self._reference, asked)
-        found = follow_guide(poser, line, start, goal, settings, friction=options.friction)
-        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
+        return WalkSearch(poser, start, goal, options.friction, WalkSettings(stride=options.stride_m))
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""
@@ -147,34 +133,6 @@ class _FootSearch(_ContactSearch):
     def _acting(self, way: ContactPlan) -> ContactPlan:
         """The way, and the hands on the object where there is an act."""
         return way if self._brace is None else with_hands(self._body, way, self._brace)
-
-    def _guide(self, start: Stage, goal: Stage) -> RootGuide:
-        ends = np.array([start.q[:7], goal.q[:7]])
-        world = GuideWorld(self._scene, self._abstraction(), _region(ends), _condition())
-        return guide_root(world, ends, self._rng)
-
-    def _abstraction(self) -> Abstraction:
-        volumes = [
-            reach_volume(self._body, limb, np.random.default_rng(0), natural=self._natural)
-            for limb in self._body.limbs
-            if limb.name in LEGS
-        ]
-        return abstraction_of(self._body, volumes)
-
-
-def _region(ends: FloatArray) -> SamplingRegion:
-    """Box around start and goal; headings between theirs, and a little beyond."""
-    low, high = ends[:, :3].min(axis=0) - AROUND, ends[:, :3].max(axis=0) + AROUND
-    low[2], high[2] = ends[:, 2].min() - 0.7, ends[:, 2].max() + 0.1
-    headings = np.unwrap([heading_of(pose) for pose in ends])
-    yaw = (headings.min() - TURN, headings.max() + TURN) if np.ptp(headings) <= TURN else None
-    return SamplingRegion(low, high, yaw=yaw, pitch=PITCH, roll=ROLL)
-
-
-def _condition() -> Condition:
-    """Both legs reach something to stand on."""
-    ground = UsableSurface((0.0, 0.0, 1.0), float(np.deg2rad(35.0)))
-    return Condition((LimbRule(LEGS, len(LEGS)),), dict.fromkeys(LEGS, ground))
 
 
 STANDING_HEIGHT = 0.92
@@ -241,19 +199,19 @@ class _LimbSearch(_ContactSearch):
         return self._tally.along_guides(
             self._scenario.contacts.attempts,
             lead,
-            lambda line, _: follow_guide_with_limbs(self._poser, self._places, line, stages[-1], settings),
+            lambda line, _: follow_guide(self._poser, self._places, line, stages[-1], settings),
         )
 
     @property
     def _climbs(self) -> bool:
         return self._scenario.file.task.goal.posture == CLIMBING
 
-    def _settings(self) -> LimbExtendSettings:
+    def _settings(self) -> ExtendSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
-        options, plain = self._scenario.contacts, LimbExtendSettings()
+        options, plain = self._scenario.contacts, ExtendSettings()
         size, pace = self._size, float(np.sqrt(self._size))
         human = self._body.stature is not None
-        return LimbExtendSettings(
+        return ExtendSettings(
             stride=options.stride_m * size if human else STRIDE * self._places.reach,
             same_place=plain.same_place * size,
             lift=plain.lift * max(size, SMALLEST),
@@ -356,13 +314,39 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
         raise scenario.error(("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs")
     report.progress("contacts", 0.0)
     result = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
-    report.summary["contacts"] = dict(result.summary)
+    return _with_contacts(context, report, result)
+
+
+def plan_contacts_again(context: RunContext, report: Report, phase: int) -> RunContext | None:
+    """Plan the supports again without the step of a phase, for which a later stage failed.
+
+    Args:
+        context: With the supports that failed.
+        report: Takes the ``contacts`` block again, in which the refused step is told.
+        phase: Index of the phase.
+
+    Returns:
+        None where there is no other plan; the failure of the later stage stays then.
+    """
+    failure, again = report.failure, context.search_again
+    if failure is None or again is None or context.plan is None:
+        return None
+    result = again(phase, failure.reason)
+    if result.plan is None:
+        return None
+    report.try_again(phase)
+    return _with_contacts(context, report, result)
+
+
+def _with_contacts(context: RunContext, report: Report, result: ContactSearch) -> RunContext | None:
+    report.summary["contacts"] = {**result.summary, "refused": report.refused}
     report.keep("contacts", result.to_dict(report.transform))
     if result.plan is None:
         report.fail("contacts", result.failure or "", where=result.where)
         return None
-    planned = replace(context, plan=result.plan)
-    if not scenario.refines and result.scenario is not None:
+    report.keep_contact_plan(result.plan)
+    planned = replace(context, plan=result.plan, search_again=result.again)
+    if not context.scenario.refines and result.scenario is not None:
         planned = planned.with_supports(result.scenario)
         report.keep_scenario(result.scenario)
     report.progress("contacts", 1.0)

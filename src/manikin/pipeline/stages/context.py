@@ -19,7 +19,8 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.motion.passage import Passage, measure_passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
-from manikin.pipeline.run_directory import MOTION, RunDirectory
+from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, RunDirectory
+from manikin.pipeline.stages.contact_guides import ContactSearch
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings
@@ -28,6 +29,7 @@ from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
 from manikin.scene import Scene
 from manikin.simulation import Execution, Recovery
+from manikin.verification import PlannedContacts, PlannedStage
 
 _PLACE = re.compile(r"\[(-?\d[\d.e+-]*(?:, -?\d[\d.e+-]*){1,2})\]")
 """A position as the stages write it into their reasons: two or three numbers in brackets."""
@@ -93,6 +95,23 @@ def trajectory_in_world(
     )  # fmt: skip
 
 
+def plan_in_world(plan: ContactPlan, transform_task_to_world: PlanarTransform) -> PlannedContacts:
+    """A contact plan as other programs and the check read it, in the world."""
+    transform = transform_task_to_world
+    moved: dict[int, Contact] = {}
+    for contact in (contact for stage in plan.stages for contact in stage.contacts.values()):
+        moved.setdefault(id(contact), contact_in_world(contact, transform))
+    stages = [
+        PlannedStage(
+            {name: moved[id(contact)] for name, contact in stage.contacts.items()},
+            transform.poses(stage.q), transform.points(stage.com),
+            via=None if stage.via is None else transform.poses(stage.via), duration=stage.min_duration,
+        )
+        for stage in plan.stages
+    ]  # fmt: skip
+    return PlannedContacts(tuple(stages), transform.poses(plan.goal), transform.points(plan.goal_com))
+
+
 def reason_in_world(reason: str, transform_task_to_world: PlanarTransform) -> str:
     """A reason in one line with the positions in it in the world.
 
@@ -136,6 +155,7 @@ class RunContext:
     settings: WholeBodySettings
     problem: CentroidalProblem | KeyframeProblem | None = None
     plan: ContactPlan | None = None
+    search_again: Callable[[int, str], ContactSearch] | None = None
 
     @classmethod
     def of(cls, scenario: Scenario, settings: WholeBodySettings | None = None) -> "RunContext":
@@ -234,6 +254,7 @@ class Report:
         failure: Why the run is no success so far, or None.
         planned: Whether a plan keeps every requirement of its certificate; None for a run without a plan.
         proved: Whether the body moved in the physics engine and kept every requirement.
+        refused: Failures after which other contacts were tried: phase and failure of each.
     """
 
     def __init__(
@@ -254,6 +275,7 @@ class Report:
         self.failure: StageFailure | None = None
         self.planned: bool | None = False
         self.proved = False
+        self.refused: list[dict[str, Any]] = []
         self._tables: dict[str, RequirementTable] = {}
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
@@ -289,6 +311,19 @@ class Report:
         """
         self.failure = StageFailure(stage, reason_in_world(reason, self.transform), float(time), where)
 
+    def try_again(self, phase: int) -> None:
+        """Begin again with other contacts after a failure, which is kept among the refused ones.
+
+        Args:
+            phase: Index of the phase of the contacts that failed.
+        """
+        if self.failure is not None:
+            self.refused.append({"phase": phase, **self.failure.as_dict()})
+        self.failure, self.planned, self.proved = None, False, False
+        self._tables = {}
+        for stage in ("centroidal", "wholebody", "act", "execution"):
+            self.summary[stage] = None
+
     def require(self, stage: str, table: RequirementTable) -> None:
         """Take the requirements of a stage's result into the summary, in place of earlier ones.
 
@@ -312,6 +347,13 @@ class Report:
         if self._directory is not None:
             self._directory.write_scenario(scenario.from_task_frame(self.transform).to_yaml())
 
+    def keep_contact_plan(self, plan: ContactPlan) -> None:
+        """Keep a contact plan of the task frame as a contact-plan file, in the world."""
+        if self._directory is not None:
+            context = self._context
+            content = plan_in_world(plan, self.transform).to_dict(context.body, context.given)
+            self._directory.write(CONTACT_PLAN, content)
+
     def keep_motions(
         self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None,
         file: str = MOTION,
@@ -331,7 +373,7 @@ class Report:
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
-        self._judge()
+        self.judge()
         failure, required = self.failure, self._context.scenario.execution_required
         word = "failed" if failure is not None else "proved" if required else "planned"
         self.summary |= {
@@ -346,7 +388,7 @@ class Report:
             self._directory.write_summary(self.summary)
         return self.summary
 
-    def _judge(self) -> None:
+    def judge(self) -> None:
         """A run that broke a requirement, or did not come to what was asked for, has failed."""
         for stage, table in self._tables.items():
             if self.failure is None and (broken := table.first_broken) is not None:

@@ -20,10 +20,9 @@ from manikin.planning.contacts.efort import (
 from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
 from manikin.planning.contacts.follow_guide import (
     ExtendSettings,
-    LimbExtendSettings,
     follow_guide,
-    follow_guide_with_limbs,
 )
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import (
     ContactGenerator,
     GeneratedContact,
@@ -45,18 +44,22 @@ from manikin.planning.contacts.heuristics import (
     duration,
 )
 from manikin.planning.contacts.limb_collisions import LimbCollisions
-from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
+from manikin.planning.contacts.limb_places import LimbPlaces
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPosture, TrunkPostures
+from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
 __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
     "ContactPlan", "ContactRules", "Duration", "Efort", "Endpoint", "Endpoints", "ExtendSettings",
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "GuideLine", "Habit", "Heuristic",
-    "Hindrance", "LimbCollisions", "LimbExtendSettings", "LimbPlaces", "LimbSamples", "Manipulability",
+    "Hindrance", "LimbCollisions", "LimbPlaces", "LimbSamples", "Manipulability",
     "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage",
-    "StrongEfort", "SurfaceTable", "Task", "WeightedSum", "certify_plan", "duration", "efort",
-    "find_candidates", "follow_guide", "follow_guide_with_limbs", "force_ellipsoid",
+    "StrongEfort", "SurfaceTable", "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures", "WalkSearch",
+    "WalkSettings", "WeightedSum",
+    "certify_plan", "duration", "efort",
+    "find_candidates", "follow_guide", "force_ellipsoid",
     "force_transmission_ratio", "heading_of", "manipulability", "mirrored", "pulling_efort", "sample_limb",
     "sample_limbs", "starts_on_limbs", "velocity_ellipsoid",
 ]  # fmt: skip

@@ -305,7 +305,7 @@ def _measured(
         if contact.kind is ContactKind.SOLE:
             off = rotation.T @ contact.rotation_contact_to_world
             turn = max(turn, float(np.linalg.norm(pin.log3(off))))
-    touched = [(contact.effector, scene.touched_obstacle(contact)) for contact in item.held]
+    touched = [(contact.effector, name) for contact in item.held for name in scene.touched_obstacles(contact)]
     near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
     pair = f", {' and '.join(near.pairs[int(np.argmin(near.distance))])}" if len(near.distance) else ""
     beyond = np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)

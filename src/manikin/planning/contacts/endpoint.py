@@ -18,8 +18,9 @@ from manikin.contact import Contact, FrictionModel, sole
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.depth_first import PartialPlan, SearchLog
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import GeneratedContact
-from manikin.planning.contacts.limb_places import Footholds, LimbPlaces, stature_of
+from manikin.planning.contacts.limb_places import LimbPlaces, stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.scene import Scene, Surface
 
@@ -138,7 +139,9 @@ class Endpoints:
         q = self._body.posture({**self._body.standing_angles, **_SITTING})
         q[3:7] = _level_turn(heading)
         sitting = Configuration(self._body, q).effector_placement("buttocks")[1]
-        for floor in self._levels(at, None):
+        # Below the seat there may be no floor: it is looked for where the feet may be.
+        ahead = [at + distance * size * turn[:2, 0] for distance in FEET_BEFORE_SEAT[::5]]
+        for floor in sorted({level for place in ahead for level in self._levels(place, None)}):
             for seat in self._levels(at, height):
                 if not low <= seat - floor <= high:
                     continue
@@ -178,7 +181,7 @@ class Endpoints:
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""
         levels: set[float] = set()
-        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.settings.steepest):
+        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
             level = _height_at(surface, at)
             if level is not None and (height is None or abs(level - height) < 0.05):
                 levels.add(round(level, 6))

@@ -1,14 +1,13 @@
-"""Contacts along a guide of the root, on feet or on any limbs: algorithm 7 of [Tonneau2015]_ 7.2.
+"""Contacts of any limbs along a guide of the root: algorithm 7 of [Tonneau2015]_ 7.2.
 
 The guide is followed limb by limb.  The limb that is farthest behind is put to a new place, its
-contact broken and made; all others are maintained.  A change counts only when two postures exist,
-free of collision and at rest on the contacts that stay: one that still holds the old contact and
-one that already holds the new one.  Where there is none, a shorter step, another place or another
-limb is tried, and then the change before is taken back.
+contact broken and made; all others are maintained.  A change counts only when three postures exist,
+free of collision and at rest on the contacts that stay: one that still holds the old contact, one with the
+limb off the line between its contacts, and one that already holds the new one.  Where one is missing, a
+shorter step, another place or another limb is tried, and then the change before is taken back.  Limbs go to
+contacts of the :class:`~manikin.planning.contacts.ContactGenerator` until the root is at its goal.
 
-Feet step to footholds below the guide until they are at their places at the goal.  Any limbs go to contacts
-of the :class:`~manikin.planning.contacts.ContactGenerator` until the root is at its goal, and a limb in
-flight has a third posture, off the line between its contacts.
+A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,30 +19,20 @@ from scipy.spatial.transform import Rotation
 
 from manikin.contact import Contact, ContactKind
 from manikin.kinematics import Placement
-from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import (
     Extension,
     GuideLine,
     PartialPlan,
     SearchLog,
-    heading_of,
     search_depth_first,
 )
-from manikin.planning.contacts.endpoint import UP, stand_up
-from manikin.planning.contacts.limb_places import Footholds, LimbPlaces, stature_of
+from manikin.planning.contacts.endpoint import UP
+from manikin.planning.contacts.limb_places import LimbPlaces
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 
 Item = TypeVar("Item")
-
-NEARER = (0.7, 0.4)
-"""Shares of the way to its place with which a foot comes nearer when no stride is possible."""
-
-AT_GOAL = 0.06
-"""Distance of a foot from its place at the goal that is not worth a step [m]."""
-
-AT_GOAL_TURN = float(np.deg2rad(15.0))
-"""Angle between the headings of a foot and its place at the goal that is not worth a step [rad]."""
 
 
 @dataclass(frozen=True)
@@ -51,40 +40,28 @@ class ExtendSettings:
     """How contacts follow a guide; the values are our choice.
 
     Attributes:
-        stride: Way from a foot to the next one, for a body of 1.75 m [m].
+        stride: Way of the root while every limb moves once [m].
         shares: Shares of the stride that are tried, in order.
         searches: Most postures that are looked for.
-        lift: How far a limb in flight keeps from the line between its contacts [m]; 0 plans no posture there.
+        lift: How far a limb in flight keeps from the line between its contacts [m].
         swing_duration: Shortest flight of a limb [s].
         swing_speed: Its mean speed on longer ways [m/s].
         shift_duration: Shortest time between two flights [s].
         hinge_pace: Mean speed of the hinge that turns most [rad/s].
-    """
-
-    stride: float = 0.36
-    shares: tuple[float, ...] = (1.0, 0.75, 0.5, 0.3)
-    searches: int = 250
-    lift: float = 0.0
-    swing_duration: float = 0.7
-    swing_speed: float = 0.7
-    shift_duration: float = 0.35
-    hinge_pace: float = HINGE_PACE
-
-
-@dataclass(frozen=True)
-class LimbExtendSettings(ExtendSettings):
-    """How contacts of any limbs follow a guide; the stride is the root's way while every limb moves once.
-
-    Attributes:
         places: Places that are tried for each share of the stride.
         same_place: Distance between two contacts that is not worth a move [m].
         goal_distance: Distance of the root from its goal at which it is reached [m].
         goal_turn: Angle between the root's attitude and the goal's at which it is reached [rad].
     """
 
+    stride: float = 0.36
     shares: tuple[float, ...] = (1.0, 0.6, 0.3)
     searches: int = 600
     lift: float = 0.08
+    swing_duration: float = 0.7
+    swing_speed: float = 0.7
+    shift_duration: float = 0.35
+    hinge_pace: float = HINGE_PACE
     places: int = 4
     same_place: float = 0.12
     goal_distance: float = 0.08
@@ -93,39 +70,10 @@ class LimbExtendSettings(ExtendSettings):
 
 def follow_guide(
     poser: PostureFinder,
-    guide: GuideLine,
-    start: Stage,
-    goal: Stage,
-    settings: ExtendSettings | None = None,
-    *,
-    friction: float = 0.7,
-) -> Extension:
-    """Find the contacts with which a body on feet follows a guide.
-
-    Contacts of the start that are no feet, such as a seat, are left first.
-
-    Args:
-        poser: Finds postures of a body with soles in its scene.
-        guide: Way of the root, from where it is at the start.
-        start: Contacts and posture at the start.
-        goal: Contacts and posture at the goal, on feet.
-        friction: Coulomb coefficient of the soles.
-    """
-    settings = settings or ExtendSettings()
-    log = SearchLog(poser, settings.searches)
-    moves = _FootMoves(poser, guide, settings, log, goal, friction)
-    first = stand_up(poser, start, moves.feet, guide.at(0.0), log)
-    if first is None:
-        return log.failure(f"cannot leave {', '.join(set(start.contacts) - moves.feet)}", guide.length)
-    return search_depth_first(first, moves, log, guide.length)
-
-
-def follow_guide_with_limbs(
-    poser: PostureFinder,
     places: LimbPlaces,
     guide: GuideLine,
     start: Stage,
-    settings: LimbExtendSettings | None = None,
+    settings: ExtendSettings | None = None,
 ) -> Extension:
     """Find the contacts with which a body follows a guide on any of its limbs.
 
@@ -133,10 +81,10 @@ def follow_guide_with_limbs(
         guide: Way of the root, from where it is at the start.
         start: Contacts and posture at the start; limbs without a contact make one where they can.
     """
-    settings = settings or LimbExtendSettings()
+    settings = settings or ExtendSettings()
     log = SearchLog(poser, settings.searches)
     along = dict.fromkeys(places.limbs, -settings.stride) | dict.fromkeys(start.contacts, 0.0)
-    moves = _LimbMoves(poser, guide, settings, log, places)
+    moves = _Moves(poser, guide, settings, log, places)
     return search_depth_first(PartialPlan((start,), along), moves, log, guide.length)
 
 
@@ -162,192 +110,17 @@ class _Move:
 
 
 class _Moves:
-    """What the moves of feet and those of any limbs have in common."""
-
-    def __init__(
-        self, poser: PostureFinder, guide: GuideLine, settings: ExtendSettings, log: SearchLog
-    ) -> None:
-        self._poser, self._guide, self._pace, self._log = poser, guide, settings, log
-
-    def _lifted(self, partial: PartialPlan, name: str) -> Posed:
-        """Posture that holds all contacts and rests on all but one."""
-        held = partial.last.contacts
-        return self._pose(held, _without(name, held), partial.last.q, self._guide.at(partial.here))
-
-    def _landed(
-        self, partial: PartialPlan, move: _Move, contact: Contact, lifting: FloatArray
-    ) -> PartialPlan | None:
-        """The plan with a limb put to a place, or None where a posture is missing."""
-        name, staying = move.limb, _without(move.limb, partial.last.contacts)
-        landed = {**staying, name: contact}
-        start = lifting if move.start is None else move.start
-        landing = self._pose(landed, staying, start, self._guide.at(move.root_along))
-        if landing.q is None:
-            self._log.refuse(f"{name} cannot be put down: {landing.reason}")
-            return None
-        before = partial.last.contacts.get(name)
-        way = 0.0 if before is None else float(np.linalg.norm(contact.position - before.position))
-        flight = max(self._pace.swing_duration, way / self._pace.swing_speed)
-        stages, body = partial.stages, self._poser.body
-        if before is None:
-            # The limb is free already: it reaches its contact while the phase before lasts.
-            stages = (*stages[:-1], replace(stages[-1], min_duration=max(stages[-1].min_duration, flight)))
-        else:
-            via = self._between(staying, lifting, landing.q, before, contact) if self._pace.lift else None
-            if self._pace.lift and via is None:
-                self._log.refuse(f"{name} finds no way around")
-                return None
-            stages = (*stages, Stage.of(body, staying, lifting, flight, via=via))
-        stages = (*stages, Stage.of(body, landed, landing.q, self._pace.shift_duration))
-        return PartialPlan(stages, move.along)
-
-    def _between(
-        self,
-        staying: Mapping[str, Contact],
-        lifting: FloatArray,
-        landing: FloatArray,
-        before: Contact,
-        after: Contact,
-    ) -> FloatArray | None:
-        """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
-        lift = self._pace.lift
-        middle = 0.5 * (before.position + after.position)
-        root = np.concatenate([0.5 * (lifting[:3] + landing[:3]), landing[3:7]])
-        start = np.concatenate([root, 0.5 * (lifting + landing)[7:]])
-        inward = (root[:3] - middle) * [1.0, 1.0, 0.0]
-        inward /= max(float(np.linalg.norm(inward)), 1e-9)
-        # What stands out of a wall is passed on the body's side, the ground from above.
-        for share in (0.7, 0.0, 2.0):
-            out = 0.5 * (before.normal + after.normal) + share * inward
-            place = middle + lift * out / max(float(np.linalg.norm(out)), 1e-9)
-            wish = {before.effector: Placement(place, None, None, 0.5 / lift**2)}
-            posed = self._poser.pose(staying, staying, start, root, placements=wish)
-            if posed.q is not None:
-                return posed.q
-        return None
-
-    def _pose(
-        self,
-        held: Mapping[str, Contact],
-        carrying: Mapping[str, Contact],
-        start: FloatArray,
-        root: FloatArray,
-    ) -> Posed:
-        """A posture whose points stand upright on their surfaces, as far as they can."""
-        wish = {
-            name: Placement(None, contact.rotation_contact_to_world, 0.05)
-            for name, contact in held.items()
-            if contact.kind is ContactKind.POINT
-        }
-        return self._poser.pose(held, carrying, start, root, placements=wish)
-
-
-class _FootMoves(_Moves):
-    """Steps of feet, as :class:`~manikin.planning.contacts.depth_first.Moves`."""
-
-    def __init__(
-        self, poser: PostureFinder, guide: GuideLine, settings: ExtendSettings, log: SearchLog, goal: Stage,
-        friction: float,
-    ) -> None:  # fmt: skip
-        super().__init__(poser, guide, settings, log)
-        self._goal, self._friction = goal, friction
-        self._footholds = Footholds(poser.body, poser.scene)
-        self._stride = settings.stride * stature_of(poser.body) / 1.75
-        self._known: dict[tuple[int, str], tuple[Stage, Posed]] = {}  # by identity of the stage
-
-    @property
-    def feet(self) -> frozenset[str]:
-        """Effectors that step."""
-        return frozenset(self._footholds.below_root)
-
-    def finished(self, partial: PartialPlan) -> ContactPlan | None:
-        """The plan, when every foot is where it is at the goal."""
-        if not all(self._is_at_goal(partial, foot) for foot in self._footholds.below_root):
-            return None
-        contacts = partial.last.contacts
-        posed = self._poser.pose(contacts, contacts, self._goal.q, self._goal.q[:7], restarts=True)
-        if posed.q is None:
-            self._log.refuse(f"at the goal: {posed.reason}")
-            return None
-        return ContactPlan.of(self._poser.body, partial.stages, posed.q, self._pace.hinge_pace)
-
-    def proposals(self, partial: PartialPlan) -> Iterator[_Move]:
-        """Steps, the longest of the foot that is farthest behind first."""
-        for name in sorted(partial.along, key=lambda foot: partial.along[foot]):
-            if self._is_at_goal(partial, name):
-                continue
-            tried: list[FloatArray] = []
-            for way, contact in self._wanted(partial, name):
-                if any(np.linalg.norm(contact.position - other) < 0.03 for other in tried):
-                    continue
-                tried.append(contact.position)
-                along = {**partial.along, name: way}
-                yield _Move(name, contact, along, float(np.mean(list(along.values()))))
-
-    def accepted(self, partial: PartialPlan, change: _Move) -> PartialPlan | None:
-        """The plan with a step more, or None where a posture is missing."""
-        lifting = self._lifted(partial, change.limb)
-        if lifting.q is None:
-            self._log.refuse(f"{change.limb} cannot be lifted: {lifting.reason}")
-            return None
-        return None if change.contact is None else self._landed(partial, change, change.contact, lifting.q)
-
-    def _is_at_goal(self, partial: PartialPlan, foot: str) -> bool:
-        held, wanted = partial.last.contacts.get(foot), self._goal.contacts[foot]
-        if held is None:
-            return False
-        away = float(np.linalg.norm(held.position - wanted.position))
-        return away <= AT_GOAL and float(np.cos(held.yaw - wanted.yaw)) >= np.cos(AT_GOAL_TURN)
-
-    def _wanted(self, partial: PartialPlan, foot: str) -> Iterator[tuple[float, Contact]]:
-        """Contacts to which a foot may go, each with how far along the guide it is."""
-        own = partial.along[foot]
-        ahead = max(value for name, value in partial.along.items() if name != foot)
-        strides = [ahead + share * self._stride for share in self._pace.shares]
-        # Where no stride leads, the foot comes nearer first, as on a turn.
-        nearer = [own + share * (min(strides[0], self._guide.length) - own) for share in NEARER]
-        for along in (*strides, *nearer):
-            if along >= self._guide.length - 1e-6:
-                yield self._guide.length, self._goal.contacts[foot]
-            elif along > own:
-                yield from ((along, contact) for contact in self._places(foot, along))
-
-    def _places(self, foot: str, along: float) -> list[Contact]:
-        """Contacts of a foot near where it would be if the body stood below the guide's pose."""
-        pose = self._guide.at(along)
-        yaw = heading_of(pose)
-        wanted = pose[:3] + rotation_from_yaw(yaw) @ self._footholds.below_root[foot]
-        contacts = self._footholds.near(foot, wanted, yaw, self._friction)
-        if not contacts:
-            self._log.refuse(f"no foothold for {foot} near {np.round(wanted, 2).tolist()} m")
-        return contacts
-
-    def _lifted(self, partial: PartialPlan, name: str) -> Posed:
-        """Posture before a foot is lifted: the same wherever it goes, and looked for once.
-
-        It counts every time, so that a foot that cannot be lifted uses up the search.
-        """
-        key = id(partial.last), name
-        if key in self._known:
-            self._poser.searches += 1
-            return self._known[key][1]
-        posed = super()._lifted(partial, name)
-        self._known[key] = partial.last, posed
-        return posed
-
-
-class _LimbMoves(_Moves):
     """Moves of any limbs, as :class:`~manikin.planning.contacts.depth_first.Moves`."""
 
     def __init__(
         self,
         poser: PostureFinder,
         guide: GuideLine,
-        settings: LimbExtendSettings,
+        settings: ExtendSettings,
         log: SearchLog,
         places: LimbPlaces,
     ) -> None:
-        super().__init__(poser, guide, settings, log)
+        self._poser, self._guide, self._log = poser, guide, log
         self._settings, self._places = settings, places
 
     def finished(self, partial: PartialPlan) -> ContactPlan | None:
@@ -410,8 +183,78 @@ class _LimbMoves(_Moves):
                 yield along
 
     def _lifted(self, partial: PartialPlan, name: str) -> Posed:
-        """Posture without one contact; as it is where the limb has none."""
-        return super()._lifted(partial, name) if name in partial.last.contacts else Posed(partial.last.q)
+        """Posture that holds all contacts and rests on all but one; as it is where the limb has none."""
+        held = partial.last.contacts
+        if name not in held:
+            return Posed(partial.last.q)
+        return self._pose(held, _without(name, held), partial.last.q, self._guide.at(partial.here))
+
+    def _landed(
+        self, partial: PartialPlan, move: _Move, contact: Contact, lifting: FloatArray
+    ) -> PartialPlan | None:
+        """The plan with a limb put to a place, or None where a posture is missing."""
+        name, staying = move.limb, _without(move.limb, partial.last.contacts)
+        landed = {**staying, name: contact}
+        start = lifting if move.start is None else move.start
+        landing = self._pose(landed, staying, start, self._guide.at(move.root_along))
+        if landing.q is None:
+            self._log.refuse(f"{name} cannot be put down: {landing.reason}")
+            return None
+        before = partial.last.contacts.get(name)
+        way = 0.0 if before is None else float(np.linalg.norm(contact.position - before.position))
+        flight = max(self._settings.swing_duration, way / self._settings.swing_speed)
+        stages, body = partial.stages, self._poser.body
+        if before is None:
+            # The limb is free already: it reaches its contact while the phase before lasts.
+            stages = (*stages[:-1], replace(stages[-1], min_duration=max(stages[-1].min_duration, flight)))
+        else:
+            via = self._between(staying, lifting, landing.q, before, contact)
+            if via is None:
+                self._log.refuse(f"{name} finds no way around")
+                return None
+            stages = (*stages, Stage.of(body, staying, lifting, flight, via=via))
+        stages = (*stages, Stage.of(body, landed, landing.q, self._settings.shift_duration))
+        return PartialPlan(stages, move.along)
+
+    def _between(
+        self,
+        staying: Mapping[str, Contact],
+        lifting: FloatArray,
+        landing: FloatArray,
+        before: Contact,
+        after: Contact,
+    ) -> FloatArray | None:
+        """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
+        lift = self._settings.lift
+        middle = 0.5 * (before.position + after.position)
+        root = np.concatenate([0.5 * (lifting[:3] + landing[:3]), landing[3:7]])
+        start = np.concatenate([root, 0.5 * (lifting + landing)[7:]])
+        inward = (root[:3] - middle) * [1.0, 1.0, 0.0]
+        inward /= max(float(np.linalg.norm(inward)), 1e-9)
+        # What stands out of a wall is passed on the body's side, the ground from above.
+        for share in (0.7, 0.0, 2.0):
+            out = 0.5 * (before.normal + after.normal) + share * inward
+            place = middle + lift * out / max(float(np.linalg.norm(out)), 1e-9)
+            wish = {before.effector: Placement(place, None, None, 0.5 / lift**2)}
+            posed = self._poser.pose(staying, staying, start, root, placements=wish)
+            if posed.q is not None:
+                return posed.q
+        return None
+
+    def _pose(
+        self,
+        held: Mapping[str, Contact],
+        carrying: Mapping[str, Contact],
+        start: FloatArray,
+        root: FloatArray,
+    ) -> Posed:
+        """A posture whose points stand upright on their surfaces, as far as they can."""
+        wish = {
+            name: Placement(None, contact.rotation_contact_to_world, 0.05)
+            for name, contact in held.items()
+            if contact.kind is ContactKind.POINT
+        }
+        return self._poser.pose(held, carrying, start, root, placements=wish)
 
     def _ahead(self, partial: PartialPlan, name: str, lifting: FloatArray, along: float) -> Iterator[_Move]:
         """Places ahead to which one limb may move."""

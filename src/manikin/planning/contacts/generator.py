@@ -90,7 +90,7 @@ class GeneratedContact:
 
     Attributes:
         q: (nq,) the body with this limb in contact and all else as asked, or None.
-        obstacle: Name of the obstacle touched, or None.
+        obstacles: Names of the obstacles touched; coplanar ones that touch are one surface.
         score: Score of the candidate; minus infinity without one.
         candidates: Number of samples in contact (Table 8.2).
         tried: How many of them were tried, or, without a contact, were found impossible.
@@ -104,7 +104,7 @@ class GeneratedContact:
     limb: str
     contact: Contact | None
     q: FloatArray | None
-    obstacle: str | None
+    obstacles: tuple[str, ...]
     score: float
     candidates: int
     tried: int
@@ -117,6 +117,11 @@ class GeneratedContact:
     def found(self) -> bool:
         """Whether there is a contact."""
         return self.contact is not None
+
+    @property
+    def obstacle(self) -> str | None:
+        """The obstacles in words, or None."""
+        return " and ".join(self.obstacles) or None
 
 
 class ContactGenerator:
@@ -147,7 +152,8 @@ class ContactGenerator:
         self.settings = settings or GeneratorSettings()
         self.rules = rules or ContactRules()
         self._state = Configuration(body)
-        self._table = SurfaceTable(scene.surfaces)
+        self._table = SurfaceTable(scene.holds)
+        self._scene, self._faces = scene, len(scene.surfaces)
         self._tools = {
             name: _LimbTools(body, limb_named(body, name), scene, item) for name, item in samples.items()
         }
@@ -218,14 +224,15 @@ class ContactGenerator:
         if limb not in self._tools:
             raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
         tools = self._tools[limb]
+        touch = kind or tools.limb.kind
         situation = Situation.of(self._state.update(q), tools.limb, _NO_DIRECTION)
         near = self._table.within_reach(situation, tools.samples, self.settings.tolerance)
+        if touch is not ContactKind.GRASP:
+            near = near[near < self._faces]  # on what is round only a palm can lie
         if not len(near):
             return _failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")
-        touch = kind or tools.limb.kind
-        return _WithinReach(
-            tools, situation, near, touch, footprint(self.body, tools.limb, touch, self.rules)
-        )
+        sole = footprint(self.body, tools.limb, touch, self.rules)
+        return _WithinReach(tools, situation, near, touch, sole)
 
     def _answers(
         self, reached: "_WithinReach", task: Task, heuristic: Heuristic, usable: UsableEfort | None,
@@ -238,6 +245,8 @@ class ContactGenerator:
             most_efort = tools.samples.largest_ratio * (self._table.normals[numbers] @ situation.reaction)
             numbers = numbers[usable.signed(most_efort) >= usable.least]
         candidates = self._samples_in_contact(reached, numbers)
+        if not len(candidates):
+            return [self._none_lies(reached, situation, usable)]
         if usable is None:
             scores, rows = heuristic.score(situation, candidates), np.arange(len(candidates))
         else:
@@ -251,10 +260,14 @@ class ContactGenerator:
 
     def _samples_in_contact(self, reached: "_WithinReach", numbers: NDArray[np.int64]) -> Candidates:
         """Step 2: samples on some of the surfaces within reach."""
-        return find_candidates(
+        candidates = find_candidates(
             self._table, numbers, reached.situation, reached.tools.samples,
             tolerance=self.settings.tolerance, max_tilt=self.settings.max_tilt, footprint=reached.footprint,
         )  # fmt: skip
+        if reached.kind is ContactKind.GRASP and len(candidates):
+            palms = self._scene.palms(candidates.surfaces, candidates.points)
+            candidates = replace(candidates, points=palms)
+        return candidates
 
     def _none_lies(
         self, reached: "_WithinReach", situation: Situation, usable: UsableEfort | None
@@ -277,7 +290,8 @@ class ContactGenerator:
 
     def _names(self, surfaces: NDArray[np.int64]) -> str:
         """Names of the obstacles of some surfaces."""
-        return ", ".join(sorted({self._table.surfaces[number].obstacle for number in np.unique(surfaces)}))
+        near = (self._table.surfaces[number] for number in np.unique(surfaces))
+        return ", ".join(sorted({name for surface in near for name in surface.obstacles}))
 
     def _choose(
         self, reached: "_WithinReach", situation: Situation, candidates: Candidates, scores: FloatArray,
@@ -311,7 +325,7 @@ class ContactGenerator:
                 continue
             q[tools.chain.slots] = aligned.angles
             surface = int(candidates.surfaces[row])
-            hit = tools.collisions.first(q, self._table.surfaces[surface].obstacle)
+            hit = tools.collisions.first(q, self._table.surfaces[surface].obstacles)
             if hit is not None:
                 faults[hit] += 1
                 continue
@@ -327,7 +341,7 @@ class ContactGenerator:
                 self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
             )
             answers.append(GeneratedContact(
-                tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacle,
+                tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacles,
                 float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
                 efort=alpha,
             ))  # fmt: skip
@@ -429,7 +443,7 @@ def _order(scores: FloatArray) -> NDArray[np.int64]:
 def _failure(
     limb: str, kind: Hindrance, message: str, candidates: int = 0, tried: int = 0
 ) -> GeneratedContact:
-    return GeneratedContact(limb, None, None, None, -np.inf, candidates, tried, kind, message)
+    return GeneratedContact(limb, None, None, (), -np.inf, candidates, tried, kind, message)
 
 
 def _none_fits(

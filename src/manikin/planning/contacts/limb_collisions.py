@@ -75,7 +75,7 @@ class LimbCollisions:
             if segment_of(shape) in self.soft:
                 self._yielding.setdefault(obstacle, []).append(number)
         self._names += [(names[a], names[b]) for a, b in inner]
-        self._touched: str | None = None
+        self._touched: tuple[str, ...] = ()
         self._far = FarPairs(body, limb, parts, self._shapes, self._placed, outer + inner)
         self.active: NDArray[np.bool_] = np.ones(len(self._names), dtype=bool)
         self.pairs = np.array(outer + inner, dtype=np.int64).reshape(-1, 2)
@@ -106,12 +106,12 @@ class LimbCollisions:
         """What the shapes of a pair are called: that of the body, and the obstacle or other shape."""
         return self._names[number]
 
-    def first(self, q: FloatArray, touched: str | None = None) -> tuple[str, str] | None:
+    def first(self, q: FloatArray, touched: tuple[str, ...] = ()) -> tuple[str, str] | None:
         """Shape of the body, and obstacle or other shape, of the first pair that collides, or None.
 
         Args:
             q: (nq,) configuration; all but the limb as in the situation that was begun, if one was.
-            touched: Name of the obstacle on which the limb has its contact.
+            touched: Names of the obstacles on which the limb has its contact.
         """
         if touched != self._touched:
             self._set_margin(self._touched, TOUCH)
@@ -121,8 +121,8 @@ class LimbCollisions:
             return None
         return next(names for names, result in self._tested if result.isCollision())
 
-    def _set_margin(self, obstacle: str | None, depth: float) -> None:
-        for number in self._yielding.get(obstacle or "", ()):
+    def _set_margin(self, obstacles: tuple[str, ...], depth: float) -> None:
+        for number in (pair for name in obstacles for pair in self._yielding.get(name, ())):
             self._placed.collisionRequests[number].security_margin = -depth
 
 

@@ -1,17 +1,16 @@
 """Places for one limb near where it should be: footholds of soles, and offers of the contact generator."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.body.limbs import is_further
-from manikin.contact import Contact, ContactKind, sole
-from manikin.errors import BodyError, ContactError
+from manikin.contact import ContactKind
+from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.candidates import Candidates, Situation
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
@@ -26,128 +25,6 @@ from manikin.planning.contacts.generator import (
 from manikin.planning.contacts.heuristics import Efort, Heuristic
 from manikin.planning.contacts.samples import LimbSamples, sample_limbs
 from manikin.scene import Scene, Surface
-from manikin.scene.collision import collision_parts
-
-_REQUEST = coal.CollisionRequest()
-
-
-@dataclass(frozen=True)
-class FootholdSettings:
-    """Settings of the search for footholds; the values are our choice.
-
-    Attributes:
-        reach: Farthest from the wanted place, along the heading and across it [m].
-        spacing: Between places that are tried [m].
-        edge: Distance of the sole to the edges of its surface [m].
-        clearance: Distance of the foot to other obstacles [m].
-        foot_height: Height of the foot above its sole that has to be free [m].
-        steepest: Largest slope of a surface to stand on [rad].
-        height_weight: What a difference in height counts beside one along the ground.
-        apart: Distance between two places of one surface that are both offered [m].
-        offered: Most places of one surface that are offered.
-    """
-
-    reach: tuple[float, float] = (0.24, 0.06)
-    spacing: float = 0.02
-    edge: float = 0.005
-    clearance: float = 0.015
-    foot_height: float = 0.10
-    steepest: float = float(np.deg2rad(30.0))
-    height_weight: float = 0.7
-    apart: float = 0.08
-    offered: int = 2
-
-
-class Footholds:
-    """Looks for footholds in one scene.
-
-    A foothold is where the whole sole lies on a surface and nothing else of the scene is in the way of
-    the foot. One instance works on buffers of its own: use one per thread.
-
-    Attributes:
-        below_root: (3,) place of each foot's sole relative to the root, level, in the standing posture [m].
-    """
-
-    def __init__(self, body: BodyModel, scene: Scene, settings: FootholdSettings | None = None) -> None:
-        """Prepare a scene.
-
-        Raises:
-            ContactError: If the body has no soles.
-        """
-        if body.sole_length is None or body.sole_width is None:
-            raise ContactError(f"body {body.name!r} has no soles; valid: a body that stands on feet")
-        self._size = np.array([body.sole_length, body.sole_width])
-        self.settings = settings or FootholdSettings()
-        self._surfaces = scene.surfaces_facing((0.0, 0.0, 1.0), self.settings.steepest)
-        self._parts = [(item.name, part) for item in scene for part in collision_parts(item)]
-        gap = 2.0 * self.settings.clearance
-        self._foot = coal.Box(*(self._size + gap), self.settings.foot_height)
-        q = np.array(body.standing_posture())
-        state = Configuration(body, q)
-        self.below_root = {
-            limb.effector: state.effector_placement(limb.effector)[1] - q[:3]
-            for limb in body.limbs
-            if limb.effector.endswith("foot")
-        }
-
-    def near(self, foot: str, wanted: FloatArray, yaw: float, friction: float) -> list[Contact]:
-        """Contacts of a foot around a place (3,) of its sole's middle [m], the nearest first.
-
-        The toes head to ``yaw`` [rad]; the friction is a Coulomb coefficient.
-        """
-        places = [place for surface in self._surfaces for place in self._on(surface, wanted, yaw)]
-        length, width = self._size
-        return [
-            sole(foot, position, length=length, width=width, friction=friction, rotation=rotation)
-            for _, position, rotation in sorted(places, key=lambda place: place[0])
-        ]
-
-    def _on(
-        self, surface: Surface, wanted: FloatArray, yaw: float
-    ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        """Weighted distance to the wanted place [m], position (3,) [m] and rotation (3, 3) of soles."""
-        rotation = onto_normal(rotation_from_yaw(yaw), surface.normal)
-        places = self._places(surface, wanted, rotation)
-        lifted = np.abs(places[:, 2] - wanted[2]) * self.settings.height_weight
-        cost = np.hypot(np.linalg.norm(places[:, :2] - wanted[:2], axis=1), lifted)
-        taken: list[FloatArray] = []
-        for row in np.argsort(cost, kind="stable"):
-            place = places[row]
-            if any(np.linalg.norm(place - other) < self.settings.apart for other in taken):
-                continue
-            if self._is_free(place, rotation, surface):
-                taken.append(place)
-                yield float(cost[row]), place, rotation
-                if len(taken) == self.settings.offered:
-                    return
-
-    def _places(self, surface: Surface, wanted: FloatArray, rotation: FloatArray) -> FloatArray:
-        """(n, 3) places of a grid around the wanted one where the whole sole lies on the surface."""
-        counts = (int(reach / self.settings.spacing) for reach in self.settings.reach)
-        steps = [self.settings.spacing * np.arange(-n, n + 1) for n in counts]
-        along, across = (axis.ravel() for axis in np.meshgrid(*steps, indexing="ij"))
-        heading = rotation[:2, 0] / np.linalg.norm(rotation[:2, 0])
-        side = np.array([-heading[1], heading[0]])
-        places = np.empty((len(along), 3))
-        places[:, :2] = wanted[:2] + along[:, None] * heading + across[:, None] * side
-        base = surface.polygon[0]
-        places[:, 2] = base[2] - (places[:, :2] - base[:2]) @ surface.normal[:2] / surface.normal[2]
-        half = 0.5 * self._size + self.settings.edge
-        corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * half @ rotation[:, :2].T
-        outside = surface.outside((places[:, None] + corners).reshape(-1, 3)).reshape(-1, 4)
-        return places[(outside <= 1e-9).all(axis=1)]
-
-    def _is_free(self, place: FloatArray, rotation: FloatArray, surface: Surface) -> bool:
-        """Whether nothing but the surface's own obstacle is in the foot's way, nor that one above it."""
-        lift = 0.5 * self.settings.foot_height + 2e-3
-        pose = coal.Transform3s(rotation, place + lift * surface.normal)
-        for _, part in self._parts:
-            result = coal.CollisionResult()
-            where = coal.Transform3s(part.rotation, part.translation)
-            coal.collide(self._foot, pose, part.geometry, where, _REQUEST, result)
-            if result.isCollision():
-                return False
-        return True
 
 
 def stature_of(body: BodyModel) -> float:
@@ -274,7 +151,7 @@ class LimbPlaces:
         }  # fmt: skip
         self._body, self._rules = body, rules
         self._level = scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
-        self._edges = Edges(tuple(surface.polygon for surface in scene.surfaces), FINGERS)
+        self._edges = Edges(tuple(surface.polygon for surface in scene.holds), FINGERS)
         state = Configuration(body, reference)
         root = pin.XYZQUATToSE3(reference[:7])
         self._wanted = {
@@ -344,7 +221,7 @@ class LimbPlaces:
                     continue
                 contact = make_contact(self._body, limb, kind, spot, rotation, self._rules)
                 score = -float(np.linalg.norm(spot - wanted)) / (ROOM * self.reach)
-                item = GeneratedContact(limb.name, contact, q, surface.obstacle, score, 0, 0)
+                item = GeneratedContact(limb.name, contact, q, surface.obstacles, score, 0, 0)
                 offers.append((-score + (0.1 if turn else 0.0), item))
         return [item for cost, item in sorted(offers, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
 

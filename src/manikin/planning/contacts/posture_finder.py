@@ -20,6 +20,9 @@ from manikin.kinematics import (
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Proximity, Scene
 
+ROOT = 7
+"""Numbers of a posture that are the pose of its root."""
+
 LEARNT_MARGIN = 0.01
 """Angle that such postures keep to the surface of a learnt volume [rad]; our choice."""
 
@@ -104,7 +107,7 @@ class PostureFinder:
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
-        self._touched: dict[Contact, str] = {}
+        self._touched: dict[Contact, tuple[str, ...]] = {}
 
     def pose(
         self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
@@ -118,7 +121,7 @@ class PostureFinder:
             held: Contacts that are held.
             carrying: Those that carry the body.
             start: (nq,) where to begin.
-            guide: (7,) pose of the root to be near; none when omitted.
+            guide: (7,) pose of the root to be near, or (nq,) posture to be like; none when omitted.
             place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
             inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
             restarts: Whether to try again from crouched postures.
@@ -126,20 +129,21 @@ class PostureFinder:
             preferences: Weights of what is not required; the default ones when omitted.
         """
         if place is None:
-            if guide is None:
-                near = np.asarray(Configuration(self.body, start).com[:2])
+            if guide is None or len(guide) > ROOT:
+                near = np.asarray(Configuration(self.body, start if guide is None else guide).com[:2])
             else:  # over the root of a person, and over what a creature has ahead of its root
                 near = guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
             place = self._region(carrying).nearest(near, self.settings.inset if inset is None else inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1
-        settings, led = self.settings, {} if guide is None else self.led(guide)
+        settings, led = self.settings, {} if guide is None else self.led(guide[:ROOT])
+        whole = guide is not None and len(guide) > ROOT
         problem = PostureProblem(
             self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
             proximity=self._proximity, clearance=settings.clearance, self_clearance=settings.clearance,
             ignore=self._touching(held), range_margin=settings.range_margin,
-            learnt_margin=settings.learnt_margin, reference=self._reference,
+            learnt_margin=settings.learnt_margin, reference=guide if whole else self._reference,
             preferences=preferences or Preferences(),
         )  # fmt: skip
         once = SolverSettings(
@@ -147,7 +151,8 @@ class PostureFinder:
         )
         if guide is not None:
             # The guide's trunk is free, so that from there no obstacle is passed on its wrong side.
-            result = generate_posture(problem, np.concatenate([guide, start[7:]]), settings=once)
+            there = guide if whole else np.concatenate([guide, start[ROOT:]])
+            result = generate_posture(problem, there, settings=once)
             if result.succeeded:
                 return Posed(result.q)
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
@@ -162,8 +167,9 @@ class PostureFinder:
     def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
         for contact in held.values():
             if contact not in self._touched:
-                self._touched[contact] = self.scene.touched_obstacle(contact)
-        return touching_pairs(self.body, [(name, self._touched[item]) for name, item in held.items()])
+                self._touched[contact] = self.scene.touched_obstacles(contact)
+        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
+        return touching_pairs(self.body, touched)
 
     def _region(self, carrying: Mapping[str, Contact]) -> StaticRegion:
         """Where the body may rest; asked again and again for the same contacts."""

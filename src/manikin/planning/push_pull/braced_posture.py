@@ -156,7 +156,7 @@ class _BraceSearch:
         faces = [
             face
             for face in self._scene.surfaces
-            if face.obstacle == self._act.obstacle and float(face.normal @ self._act.facing) < -0.7
+            if self._act.obstacle in face.obstacles and float(face.normal @ self._act.facing) < -0.7
         ]
         if not faces:
             reason = f"{self._act.obstacle} has no face against {self._act.kind}ing hands"
@@ -245,7 +245,7 @@ class _BraceSearch:
             if answer.contact is None or answer.q is None:
                 self._reasons[_HANDS][answer.message] += 1
                 return q, None
-            if answer.obstacle != self._act.obstacle:
+            if self._act.obstacle not in answer.obstacles:
                 self._reasons[_HANDS][f"{arm} prefers {answer.obstacle}"] += 1
                 return q, None
             q = answer.q

@@ -190,7 +190,7 @@ class VariableChoice:
         """Distance of a contact from the nearest obstacle; 0 where it lies on one [m]."""
         if contact not in self._off:
             try:
-                self._scene.touched_obstacle(contact, TOUCHING)
+                self._scene.touched_obstacles(contact, TOUCHING)
                 self._off[contact] = 0.0
             except ContactError:
                 near = abs(self._scene.nearest(contact.position)[1]) if self._scene.obstacles else np.inf

@@ -9,6 +9,7 @@ wrong side.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -330,5 +331,5 @@ def leaning_pairs(body: BodyModel, padded: Sequence[str]) -> frozenset[tuple[str
 
 def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
     """Pairs of end segment and obstacle that a contact brings together."""
-    obstacle = scene.touched_obstacle(contact, tolerance=0.02)
-    return frozenset((segment, obstacle) for segment in end_segments(body, contact.effector))
+    touched = scene.touched_obstacles(contact, tolerance=0.02)
+    return frozenset(product(end_segments(body, contact.effector), touched))

@@ -79,7 +79,7 @@ class ContactsSection(Section):
 
     friction: Positive = preset(0.7, "Coulomb coefficient of the soles")
     sole: SoleSection = preset(SoleSection(length_m=0.28, width_m=0.12), "size of the soles")
-    stride_m: Positive = preset(0.36, "length of a step [m] of a body of 1.75 m, scaled to the actual one")
+    stride_m: Positive = preset(0.4, "length of a step [m] of a body of 1.75 m, scaled to the actual one")
     limbs: list[Text] | None = optional(
         "names of the limbs that make contacts, hands as grasps (default: a human's feet, in "
         "steps on surfaces that carry the whole sole; all limbs of other bodies)"
@@ -94,7 +94,7 @@ class ContactsSection(Section):
         "volumes learnt from recorded motion as well",
     )
     attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = preset(
-        3, "guides that are tried before giving up"
+        3, "contact plans, or guides of a body on any limbs, that are tried before giving up"
     )
 
 
@@ -127,6 +127,7 @@ _KEYS = {
     "point_mass": ("mass_kg",),
     "kudoh": ("load",),
     "insect": ("length_m", "mass_kg"),
+    "quadruped": ("length_m", "mass_kg"),
     "urdf": ("urdf", "limbs", "standing_deg", "sole"),
 }
 """What each kind of body may be given."""
@@ -136,11 +137,13 @@ WORDS = {
     "point_mass": "a point mass",
     "kudoh": "the body of Kudoh, who has his own size",
     "insect": "an insect",
+    "quadruped": "a quadruped",
     "urdf": "a creature from URDF",
 }
 """Kinds of bodies in words."""
 
-_INSECT_KG = 2.0
+_OWN_SIZES = {"insect": {"mass_kg": 2.0}, "quadruped": {"length_m": 0.8, "mass_kg": 32.0}}
+"""Sizes of creatures where the file gives none."""
 
 
 class LimbSection(Section):
@@ -177,14 +180,16 @@ class LoadSection(Section):
 class BodySection(Section):
     """Whose motion it is."""
 
-    model: Literal["human", "kudoh", "point_mass", "insect", "urdf"] = preset(
+    model: Literal["human", "kudoh", "point_mass", "insect", "quadruped", "urdf"] = preset(
         "human",
         "built-in body: a person; kudoh, the 15 segments of Kudoh (2002), 1.72 m and 70 kg; "
-        "a point mass on massless feet, planned but not executed; an insect; or urdf, which goes without "
-        "saying beside that key, for a creature from a file",
+        "a point mass on massless feet, planned but not executed; an insect; a quadruped; or urdf, which "
+        "goes without saying beside that key, for a creature from a file",
     )
     stature_m: Positive = preset(1.75, "standing height [m], of a human only")
-    mass_kg: Positive = preset(79.0, "body mass [kg] (an insect's default: 2); a creature has its file's own")
+    mass_kg: Positive = preset(
+        79.0, "body mass [kg] (defaults: insect 2, quadruped 32); a creature from a file has its own"
+    )
     sex: Literal["male", "female"] = preset("male", "which anthropometric table, of a human only")
     age: Annotated[Number, Field(ge=AGE_RANGE[0], le=AGE_RANGE[1])] = preset(
         DEFAULT_AGE, "age [years], of a human only; its strength depends on it, nothing else"
@@ -197,7 +202,9 @@ class BodySection(Section):
         "what of a human may touch beside hands and feet, as limbs left_knee, right_knee, "
         "left_elbow, right_elbow, pelvis"
     )
-    length_m: Positive = preset(0.4, "length of the trunk [m], of an insect only")
+    length_m: Positive = preset(
+        0.4, "length of the trunk [m], of an insect or a quadruped only (default of a quadruped: 0.8)"
+    )
     urdf: Text | None = optional("robot description of a creature, relative to this file's folder")
     limbs: dict[str, LimbSection] | None = optional("limbs of a creature, by name")
     standing_deg: dict[str, Number] | None = optional("joint angles of a creature's standing posture [deg]")
@@ -206,12 +213,12 @@ class BodySection(Section):
     @model_validator(mode="before")
     @classmethod
     def _implied(cls, data: Any) -> Any:
-        """A file of a creature says which model it is; an insect does not weigh what a person does."""
+        """A file of a creature says which model it is; creatures do not weigh what a person does."""
         if not isinstance(data, Mapping):
             return data
         if "urdf" in data and "model" not in data:
             return {**data, "model": "urdf"}
-        return {"mass_kg": _INSECT_KG, **data} if data.get("model") == "insect" else data
+        return {**_OWN_SIZES.get(str(data.get("model")), {}), **data}
 
     @model_validator(mode="after")
     def _only_what_applies(self) -> Self:

@@ -20,7 +20,7 @@ from manikin.scenarios.validation import (
 )
 
 _KIND_KEYS: dict[str, tuple[str, ...]] = {
-    "sole": ("normal", "sole", "friction", "normal_force_cap_N", "torsion_limit_Nm", "settle_s"),
+    "sole": ("normal", "sole", "polygon", "friction", "normal_force_cap_N", "torsion_limit_Nm", "settle_s"),
     "point": ("normal", "friction", "normal_force_cap_N"),
     "grasp": ("max_force_N", "planning_max_force_N", "max_moment_Nm", "rpy_deg"),
 }
@@ -51,6 +51,10 @@ class ContactSection(Section):
         "orientation of a grasping hand [deg]"
     )
     sole: SoleSection | None = optional("size of this sole")
+    polygon: Annotated[list[tuple[Number, Number]], Field(min_length=3, max_length=8)] | None = optional(
+        "corners (x, y) of what of the sole touches where it hangs over an edge, convex, from its centre "
+        "along the toes' direction and to the left [m] (default: all of it)"
+    )
     friction: Positive | None = optional("Coulomb coefficient")
     normal_force_cap_N: Positive | None = optional("largest normal force of this contact [N]")
     torsion_limit_Nm: Positive | None = optional("largest moment about the normal [N.m]")

@@ -1,0 +1,118 @@
+"""``manikin benchmark``: how many random everyday scenes are planned and proved, and how fast."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from manikin.cli.console import (
+    DONE,
+    FAILED,
+    JobsOption,
+    JsonOption,
+    OutOption,
+    bars,
+    directory_of,
+    print_json,
+)
+from manikin.errors import InputError
+
+
+def benchmark(
+    context: typer.Context,
+    families: Annotated[
+        str, typer.Option(metavar="all|A,B", help="Families of scenes; --list shows them.")
+    ] = "all",
+    seeds: Annotated[int, typer.Option(metavar="N", min=1, max=100_000, help="Scenes of each.")] = 5,
+    first_seed: Annotated[int, typer.Option(metavar="N", min=0, help="Number of the first scene.")] = 0,
+    stage: Annotated[
+        str, typer.Option(metavar="contacts|all", help="Contacts alone, or whole runs.")
+    ] = "contacts",
+    jobs: JobsOption = None,
+    time_limit: Annotated[
+        float, typer.Option(metavar="S", min=1.0, help="Processor time after which a task is ended [s].")
+    ] = 600.0,
+    out: OutOption = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Do tasks again that the directory has already.")
+    ] = False,
+    write_scenes: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Only write the scenes as scenario files there.")
+    ] = None,
+    list_families: Annotated[bool, typer.Option("--list", help="Only list the families.")] = False,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="PLAN.json", help="Only check a contact plan, of whatever planner."),
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(metavar="[SCENARIO]", help="With --check: what the plan is for; default: its own."),
+    ] = None,
+    json: JsonOption = False,
+) -> int:
+    """Plan families of random everyday scenes, and count what is found, planned and proved."""
+    from manikin.pipeline import benchmark as tasks
+    from manikin.scenarios.families import FAMILIES, chosen_families
+
+    if check is not None:
+        return _checked(check, scenario, json=json)
+    if scenario is not None:
+        raise InputError(f"SCENARIO {scenario!r} is given without --check; valid: --check PLAN.json SCENARIO")
+    chosen = chosen_families(families)
+    numbers = range(first_seed, first_seed + seeds)
+    if stage not in tasks.STAGES:
+        raise InputError(f"--stage is {stage!r}; valid: {', '.join(tasks.STAGES)}")
+    if list_families:
+        descriptions = {name: family.description for name, family in FAMILIES.items()}
+        if json:
+            print_json({"families": descriptions})
+        else:
+            width = max(map(len, descriptions))
+            typer.echo("\n".join(f"{name:{width}}  {text}" for name, text in descriptions.items()))
+        return DONE
+    if write_scenes is not None:
+        tasks.write_scenes(chosen, numbers, write_scenes)
+        typer.echo(f"{len(chosen) * seeds} scenes in {write_scenes}", err=True)
+        return DONE
+    directory = directory_of(out, "benchmark", json=json)
+    with bars(context.obj) as progress:
+
+        def report(entry: Mapping[str, Any], done: int, count: int) -> None:
+            progress("benchmark", done / count, f"{done} of {count}, {entry['family']}-{entry['seed']}")
+
+        result = tasks.run_benchmark(
+            chosen, numbers, stage=cast("tasks.StageName", stage), path=directory, jobs=jobs,
+            time_limit=time_limit, fresh=fresh, report=report,
+        )  # fmt: skip
+    from manikin.reports.benchmark_tables import failure_lines, text_table, write_benchmark_page
+
+    page = None if directory is None else write_benchmark_page(directory, result)
+    if json:
+        print_json(result)
+        return DONE
+    typer.echo(text_table(result))
+    for line in failure_lines(result):
+        typer.echo(line)
+    if page is not None:
+        typer.echo(f"report: {page}")
+    return DONE
+
+
+def _checked(plan: Path, scenario: str | None, *, json: bool) -> int:
+    """Check one contact plan and print what was measured."""
+    from manikin.reports.summary_table import requirement_lines
+    from manikin.scenarios import load_scenario
+    from manikin.verification import check_contact_plan, load_contact_plan
+
+    result = check_contact_plan(
+        *load_contact_plan(plan, None if scenario is None else load_scenario(scenario))
+    )
+    report = result.to_dict()
+    if json:
+        print_json(report)
+    else:
+        typer.echo(result.verdict)
+        for line in requirement_lines(report["requirements"]):
+            typer.echo(line)
+    return DONE if result.held else FAILED

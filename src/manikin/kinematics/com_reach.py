@@ -1,0 +1,161 @@
+"""Reach of the centre of mass over given contacts, from the body's own kinematics.
+
+A stance leaves the centre of mass a region: each leg ends at its hip, hips and shoulders are where pelvis and
+trunk put them, and every joint has its range.  The region is a convex polytope with given normals, linear in
+a plan of the centre of mass; how far it reaches along each of them is sampled, see
+:mod:`manikin.kinematics.reach_sampler`.
+
+No obstacle and no balance is looked at.  Tonneau et al., "2PAC", ACM Trans. Graph. 37(5), 2018, have such
+regions for each contact of a robot alone; the common sampling of all contacts, which couples them by heading
+and lean of one trunk, is our own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.body import BodyModel, Configuration
+from manikin.contact import Contact, ContactKind
+from manikin.kinematics.reach_sampler import LocalContact, ReachBody, ReachSampler
+from manikin.numerics.spatial import FloatArray, frozen_array, rotations
+
+
+def _template() -> FloatArray:
+    """(26, 3) unit vectors towards the faces, edges and corners of a cube."""
+    grid = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    vectors = grid[np.abs(grid).sum(axis=1) > 0.0]
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
+
+NORMALS = frozen_array(_template(), "normals")
+"""(26, 3) normals of a region in the heading frame of its stance."""
+
+
+@dataclass(frozen=True, eq=False)
+class ComRegion:
+    """Convex region of the centre of mass over a stance, in the world.
+
+    Attributes:
+        normals: (m, 3) unit outward normals.
+        offsets: (m,) the region is ``normals @ p <= offsets`` [m].
+        heading: (2,) least and largest heading of the root found there [rad], from that of the stance.
+        lean: (2,) least and largest pitch of the trunk found there [rad].
+        missed: Least violation found where no posture holds the contacts [rad, or 3 rad a metre]; 0 where
+            there is one. An empty region has no rows.
+    """
+
+    normals: FloatArray
+    offsets: FloatArray
+    heading: FloatArray
+    lean: FloatArray
+    missed: float = 0.0
+
+    @classmethod
+    def everywhere(cls) -> "ComRegion":
+        """The region without a face."""
+        return cls(np.zeros((0, 3)), np.zeros(0), np.zeros(2), np.zeros(2))
+
+    @property
+    def empty(self) -> bool:
+        """Whether no posture was found that holds the contacts."""
+        return self.missed > 0.0
+
+    def including(self, points: ArrayLike) -> "ComRegion":
+        """The region with its faces moved out to points (..., 3) where a posture is known [m]."""
+        ends = np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)) @ self.normals.T
+        return replace(self, offsets=np.maximum(self.offsets, ends.max(axis=0, initial=-np.inf)))
+
+    def violation(self, points: ArrayLike) -> FloatArray:
+        """(...) largest distance of (..., 3) points beyond a face [m]; negative is room."""
+        places = np.asarray(points, dtype=np.float64)
+        if self.empty:
+            return np.full(places.shape[:-1], np.inf)
+        return np.max(places @ self.normals.T - self.offsets, axis=-1, initial=-np.inf)
+
+    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
+        """(...) whether (..., 3) points are inside or at most ``tolerance`` [m] beyond a face."""
+        return self.violation(points) <= tolerance
+
+
+class ComReach:
+    """Regions of the centre of mass of one body over any of its stances.
+
+    Use :meth:`of`, which keeps what was computed for a body.
+    """
+
+    def __init__(self, body: BodyModel) -> None:
+        """Prepare a body."""
+        self.parts = ReachBody(body)
+        self._regions: dict[tuple[object, ...], ComRegion] = {}
+        standing = Configuration(body)
+        self._standing = {
+            name: np.array(standing.effector_placement(name)[1] - standing.q[:3]) for name in body.effectors
+        }
+
+    @staticmethod
+    def of(body: BodyModel) -> "ComReach":
+        """The regions of a body, prepared once."""
+        return _reach_of(body)
+
+    def region(self, contacts: Sequence[Contact]) -> ComRegion:
+        """Region of the centre of mass with all contacts held.
+
+        Postures keep a little from the ends of the joint ranges; feet that stand on their toes or heels may
+        pitch about them. Equal stances are computed once, wherever they stand.
+
+        Args:
+            contacts: Of one stance, one for each effector.
+        """
+        if not contacts:
+            return ComRegion.everywhere()
+        frame, origin = self._heading_frame(contacts)
+        local = [_in_frame(contact, frame, origin) for contact in contacts]
+        key = tuple(
+            (c.effector, str(c.part), *np.round(c.position, 4), *np.round(c.rotation.ravel(), 4))
+            for c in local
+        )
+        if key not in self._regions:
+            self._regions[key] = self._sampled(local)
+        found = self._regions[key]
+        normals = found.normals @ frame.T
+        return replace(found, normals=normals, offsets=found.offsets + normals @ origin)
+
+    def _sampled(self, contacts: Sequence[LocalContact]) -> ComRegion:
+        held = ReachSampler(self.parts, contacts, NORMALS).held()
+        if held.missed > 0.0:
+            nothing = np.zeros(2)
+            return ComRegion(np.zeros((0, 3)), np.zeros(0), nothing, nothing, held.missed)
+        yaw, lean = held.unknowns[:, 3], held.unknowns[:, 4]
+        return ComRegion(
+            NORMALS, held.projections.max(axis=0), np.array([yaw.min(), yaw.max()]),
+            np.array([lean.min(), lean.max()]),
+        )  # fmt: skip
+
+    def _heading_frame(self, contacts: Sequence[Contact]) -> tuple[FloatArray, FloatArray]:
+        """Axes and origin of the stance: the middle of its contacts, heading as standing fits them best."""
+        places = np.array([contact.position for contact in contacts])
+        own = np.array([self._standing[contact.effector] for contact in contacts])
+        origin = places.mean(axis=0)
+        apart, own_apart = places - origin, own - own.mean(axis=0)
+        turn = np.sum((apart @ [1.0, 1j, 0.0]) * np.conj(own_apart @ [1.0, 1j, 0.0]))
+        for contact in contacts:
+            if contact.kind is ContactKind.SOLE:
+                turn += 0.3 * self.parts.scale**2 * np.exp(1j * contact.yaw)
+        if abs(turn) < 1e-9:
+            turn = np.exp(1j * contacts[0].yaw)
+        yaw = float(np.angle(turn))
+        return rotations(np.array(yaw), np.array(0.0), np.array(0.0)), origin
+
+
+@lru_cache(maxsize=16)
+def _reach_of(body: BodyModel) -> ComReach:
+    return ComReach(body)
+
+
+def _in_frame(contact: Contact, frame: FloatArray, origin: FloatArray) -> LocalContact:
+    position = (contact.position - origin) @ frame
+    rotation = frame.T @ contact.rotation_contact_to_world
+    return LocalContact(contact.effector, contact.kind, contact.part, position, rotation, contact.length / 2)

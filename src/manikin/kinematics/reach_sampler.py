@@ -1,0 +1,461 @@
+"""Sampling of the postures of a body that hold given contacts, far out along given directions.
+
+The unknowns are the pose of the root, the bend of the spine where a contact hangs on it, and the pitches of
+rolling feet. What each contact asks of its limb is known in closed form (legs of a human) or from the limb's
+sampled volume (all others). Samples move towards those that violate least, so that long strides and single
+places are found as well, and then outwards by differential evolution. What holds nothing, the spine of a body
+on its feet and legs that hang free, bends as is best for each direction.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import REFLECTION, hinge_line
+from manikin.contact import ContactKind, SolePart
+from manikin.errors import BodyError
+from manikin.kinematics.leg_kinematics import LegKinematics
+from manikin.kinematics.limb_kinematics import LimbKinematics, ReachVolume, reach_volume
+from manikin.numerics.spatial import FloatArray, dot, matrix, rotations
+
+SAMPLES = 600
+"""Postures of one round of sampling."""
+
+ROUNDS = 10
+"""Rounds of sampling towards the contacts at most."""
+
+ENOUGH = 150
+"""Postures that are enough to begin the search outwards."""
+
+ELITE = 60
+"""Postures that violate least, from whose neighbourhood the next round is sampled."""
+
+OUTWARD = 12
+"""Rounds of sampling outwards."""
+
+OUTERMOST = 10
+"""Outermost postures along each direction, whose differences are the steps of the next round."""
+
+RANGE_MARGIN = 0.05
+"""Angle that joints keep from the ends of their ranges [rad], as the postures of contact plans do."""
+
+VOLUME_MARGIN = 0.02
+"""Distance that effectors keep inside their limbs' volumes [m], of a body of 1.75 m."""
+
+LEGS_APART = 0.10
+"""Least distance of the shanks' middle lines [m], of a body of 1.75 m; our choice, a slim shank's breadth."""
+
+HEEL_UP = 0.9
+"""Largest pitch of a foot that stands on its toes [rad]."""
+
+TOES_UP = 0.45
+"""Largest pitch of a foot that stands on its heel [rad]."""
+
+BEYOND = 3.0
+"""Violation of a contact that is missed by a metre [rad]."""
+
+_TURN_LOWER, _TURN_UPPER = np.array([-1.2, -0.4, -0.5]), np.array([1.2, 1.4, 0.5])
+"""Yaw from the stance's heading, pitch and roll of the root [rad]."""
+
+_SPINE_LOWER, _SPINE_UPPER = np.array([-0.38, -0.38, -0.5]), np.array([0.99, 0.38, 0.5])
+"""Flexion, side bend and twist of the spine [rad]."""
+
+_THORAX_SHARE = 0.5
+"""Flexion and side bend of the thorax over those of the lumbar spine."""
+
+_LUMBAR_TWIST = 0.3
+"""Twist of the lumbar spine over that of the thorax."""
+
+_BENDS = np.array([[f, s, 0.0] for f in (-0.38, 0.0, 0.5, 0.99) for s in (-0.38, 0.0, 0.38)])
+"""(12, 3) bends of a free spine [rad]."""
+
+_SWINGS = np.deg2rad([
+    [-20.0, 0.0, 5.0], [-5.0, 0.0, 90.0], [35.0, 0.0, 20.0], [95.0, 0.0, 100.0], [5.0, 35.0, 10.0],
+    [5.0, -15.0, 10.0],
+])  # fmt: skip
+"""(6, 3) flexion and abduction of the hip and flexion of the knee of a leg that hangs free."""
+
+_SIDES = ("left", "right")
+_SPINE = ("pelvis", "lumbar", "thorax")
+_SPINE_COLUMNS = slice(6, 9)
+_PITCHES = 9
+
+
+@dataclass(frozen=True, eq=False)
+class LocalContact:
+    """A contact in the heading frame of its stance, see :class:`~manikin.contact.Contact`."""
+
+    effector: str
+    kind: ContactKind
+    part: SolePart
+    position: FloatArray
+    rotation: FloatArray
+    half_length: float
+
+
+class ReachBody:
+    """What the sampling needs to know of a body: masses, legs, volumes of the other limbs.
+
+    Attributes:
+        body: The body.
+        legs: Closed form of a human's legs, or None.
+        spine: Whether pelvis, lumbar spine and thorax move against each other; otherwise all is one part.
+        scale: Size over that of a person of 1.75 m.
+    """
+
+    def __init__(self, body: BodyModel) -> None:
+        """Add up the masses of the parts."""
+        self.body = body
+        try:
+            self.legs: LegKinematics | None = LegKinematics(body)
+        except BodyError:
+            self.legs = None
+        self.spine = set(_SPINE) <= {segment.name for segment in body.segments}
+        state = Configuration(body, body.standing_posture())
+        far = max(
+            (float(np.linalg.norm(state.effector_placement(e)[1] - state.q[:3])) for e in body.effectors),
+            default=1.0,
+        )
+        self.scale = far if body.stature is None else body.stature / 1.75
+        frames = _SPINE if self.spine else (body.segments[0].name,)
+        self.masses, self.coms, self.origins = _trunk_masses(body, state, frames, self.legs is not None)
+        self.leg_masses, self.leg_coms = np.zeros(2), np.zeros((2, 3))
+        if self.legs is not None:
+            self.leg_masses, self.leg_coms = _leg_masses(body)
+        self._volumes: dict[str, tuple[ReachVolume, float]] = {}
+
+    def volume(self, effector: str) -> tuple[ReachVolume, float]:
+        """Reach of the limb of an effector, and the distance to keep inside it [m]."""
+        if effector not in self._volumes:
+            limb = next((limb for limb in self.body.limbs if limb.effector == effector), None)
+            if limb is None:
+                valid = ", ".join(limb.effector for limb in self.body.limbs)
+                raise BodyError(f"no limb has effector {effector!r}; valid: {valid}")
+            margin = VOLUME_MARGIN * self.scale if len(LimbKinematics(self.body, limb)) else 0.0
+            self._volumes[effector] = reach_volume(self.body, limb, np.random.default_rng(0)), margin
+        return self._volumes[effector]
+
+    def trunk(
+        self, place: FloatArray, root: FloatArray, spine: FloatArray
+    ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
+        """Axes and origins of the trunk's parts, and mass times centre of mass (n, 3) of all but the legs.
+
+        Args:
+            place: (n, 3) of the root [m].
+            root: (n, 3, 3) its axes.
+            spine: (n, 3) flexion, side bend and twist [rad].
+        """
+        frames, places = [root], [place]
+        for number in range(1, len(self.masses)):
+            share = _THORAX_SHARE if number == 2 else 1.0
+            twist = (1.0 if number == 2 else _LUMBAR_TWIST) * spine[:, 2]
+            places.append(places[-1] + frames[-1] @ self.origins[number])
+            frames.append(frames[-1] @ _bend(share * spine[:, 0], share * spine[:, 1], twist))
+        parts = zip(self.masses, frames, places, self.coms, strict=True)
+        com = sum(mass * (origin + frame @ com) for mass, frame, origin, com in parts)
+        return frames, places, np.asarray(com)
+
+    def legs_com(self, hips: FloatArray, thigh: FloatArray, shank: FloatArray) -> FloatArray:
+        """(2, n, 3) mass times centre of mass of left and right legs, from their axes (2, n, 3, 3)."""
+        assert self.legs is not None
+        sides = np.array([np.ones(3), REFLECTION])[:, None]
+        knee = hips - self.legs.thigh * thigh[..., 2]
+        upper, lower = (
+            _applied(turn, com * sides) for turn, com in zip((thigh, shank), self.leg_coms, strict=True)
+        )
+        return self.leg_masses[0] * (hips + upper) + self.leg_masses[1] * (knee + lower)
+
+    @cached_property
+    def bends(self) -> FloatArray:
+        """(k, 3) mass times centre of mass of all but the legs, of bends of a free spine, in the root."""
+        if not self.spine:
+            return self.trunk(np.zeros((1, 3)), np.eye(3)[None], np.zeros((1, 3)))[2]
+        count = len(_BENDS)
+        return self.trunk(np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)), _BENDS)[2]
+
+    @cached_property
+    def swings(self) -> FloatArray:
+        """(2, k, 3) mass times centre of mass of a left and a right leg that hangs free, in the pelvis."""
+        assert self.legs is not None
+        count = len(_SWINGS)
+        angles = np.zeros((count, len(self.body.joint_names)))
+        for slots in self.legs.slots:
+            angles[:, slots[[0, 1, 3]]] = _SWINGS
+        pelvis = np.tile(np.eye(3), (count, 1, 1))
+        return self.legs_com(
+            self.legs.hips(pelvis, np.zeros((count, 3))), *self.legs.segments(pelvis, angles)
+        )
+
+
+def _trunk_masses(
+    body: BodyModel, state: Configuration, frames: Sequence[str], legs: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Masses (k,) [kg], centres of mass (k, 3) and origins (k, 3) [m] of the trunk's parts.
+
+    Everything that hangs on a part, but for legs in closed form, belongs to it as in standing.
+    """
+    part: dict[str, str] = {}
+    for segment in body.segments:
+        if segment.name in frames:
+            part[segment.name] = segment.name
+        elif legs and segment.name.endswith(("thigh", "leg", "foot", "toes")):
+            part[segment.name] = "leg"
+        else:
+            part[segment.name] = part[str(segment.parent)]
+    masses, coms, origins = [], [], []
+    for frame in frames:
+        members = [segment for segment in body.segments if part[segment.name] == frame]
+        mass = sum(segment.mass for segment in members)
+        place = sum((s.mass * state.point(s.name, s.com) for s in members), np.zeros(3)) / mass
+        rotation, origin = state.segment_placement(frame)
+        masses.append(mass)
+        coms.append(rotation.T @ (place - origin))
+        origins.append(body.segment(frame).origin)
+    return np.array(masses), np.array(coms), np.array(origins)
+
+
+def _leg_masses(body: BodyModel) -> tuple[FloatArray, FloatArray]:
+    """Masses of a left thigh, and of shank with foot and toes [kg], and their centres (2, 3) [m]."""
+    thigh, shank, foot, toes = (body.segment(f"left_{n}") for n in ("thigh", "leg", "foot", "toes"))
+    lower = shank.mass * shank.com + foot.mass * (foot.origin + foot.com)
+    lower = lower + toes.mass * (foot.origin + toes.origin + toes.com)
+    mass = shank.mass + foot.mass + toes.mass
+    return np.array([thigh.mass, mass]), np.array([thigh.com, lower / mass])
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Postures that hold the contacts.
+
+    Attributes:
+        unknowns: (n, d) pose of the root, bend of the spine, pitches of the feet.
+        projections: (n, m) how far each is out along each direction.
+        missed: Least violation where there is none [rad, or :data:`BEYOND` a metre]; 0 where there is one.
+    """
+
+    unknowns: FloatArray
+    projections: FloatArray
+    missed: float = 0.0
+
+
+class ReachSampler:
+    """The sampling of one stance in its heading frame."""
+
+    def __init__(
+        self, parts: ReachBody, contacts: Sequence[LocalContact], normals: FloatArray, outward: int = OUTWARD
+    ) -> None:
+        """Pose it.
+
+        Args:
+            parts: Of the body.
+            contacts: One for each effector.
+            normals: (m, 3) directions along which the centre of mass is sought far out.
+            outward: Rounds of sampling outwards.
+        """
+        self._parts, self._contacts, self._normals, self._outward = parts, contacts, normals, outward
+        self._rng = np.random.default_rng(0)
+        self._feet: list[LocalContact | None] = [None, None]
+        self._others: list[LocalContact] = []
+        for contact in contacts:
+            side = contact.effector.removesuffix("_foot")
+            if parts.legs is not None and contact.effector.endswith("_foot") and side in _SIDES:
+                self._feet[_SIDES.index(side)] = contact
+            else:
+                self._others.append(contact)
+
+    def held(self) -> Held:
+        """Sample towards the contacts, then outwards."""
+        low, high = self._bounds()
+        if np.any(low > high):
+            nothing = np.zeros((0, len(low)))
+            return Held(nothing, np.zeros((0, len(self._normals))), float(BEYOND * (low - high).max()))
+        x = self._first(low, high)
+        projections, violation = self._evaluate(x)
+        for _ in range(ROUNDS):
+            if np.count_nonzero(violation <= 0.0) >= ENOUGH:
+                break
+            fresh = self._nearer(x[np.argsort(violation, kind="stable")[:ELITE]], low, high)
+            more, beyond = self._evaluate(fresh)
+            x, projections = np.vstack([x, fresh]), np.vstack([projections, more])
+            violation = np.concatenate([violation, beyond])
+        held = violation <= 0.0
+        if not np.any(held):
+            return Held(x[held], projections[held], float(violation.min()))
+        x, projections = x[held], projections[held]
+        for _ in range(self._outward):
+            fresh = np.clip(self._farther(x, projections), low, high)
+            more, beyond = self._evaluate(fresh)
+            held = beyond <= 0.0
+            x, projections = np.vstack([x, fresh[held]]), np.vstack([projections, more[held]])
+        return Held(x, projections)
+
+    def _first(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        return self._rng.uniform(low, high, (2 * SAMPLES, len(low)))
+
+    def _nearer(self, best: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+        """New unknowns in the box of the best ones, made a little wider."""
+        width = best.max(axis=0) - best.min(axis=0)
+        a, b = best.min(axis=0) - 0.15 * width, best.max(axis=0) + 0.15 * width
+        return self._rng.uniform(np.maximum(a, low), np.minimum(b, high), (SAMPLES, len(low)))
+
+    def _farther(self, x: FloatArray, projections: FloatArray) -> FloatArray:
+        """New unknowns near those that are outermost along each normal: differential evolution."""
+        count = min(OUTERMOST, len(x))
+        outermost = np.argpartition(-projections, count - 1, axis=0)[:count].T
+        copies = -(-SAMPLES // len(outermost))
+        first, second, third = (
+            np.take_along_axis(
+                outermost, self._rng.integers(0, count, (len(outermost), copies)), axis=1
+            ).ravel()
+            for _ in range(3)
+        )
+        step = x[second] - x[third]
+        noise = 0.01 * self._rng.normal(size=step.shape)
+        return x[first] + self._rng.uniform(0.3, 1.0, (len(first), 1)) * step + noise
+
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Box of the unknowns: place and turns of the root, bend of the spine, pitch of each foot."""
+        low, high = np.full(3, -np.inf), np.full(3, np.inf)
+        for contact in self._contacts:
+            radius = self._radius(contact)
+            low = np.maximum(low, contact.position - radius)
+            high = np.minimum(high, contact.position + radius)
+            if contact in self._feet and contact.rotation[2, 2] > 0.7:
+                low[2] = max(low[2], contact.position[2] + 0.25 * radius)
+        bends = self._parts.spine and bool(self._others)
+        spine = (_SPINE_LOWER, _SPINE_UPPER) if bends else (np.zeros(3), np.zeros(3))
+        tilts = {SolePart.TOES: (0.0, HEEL_UP), SolePart.HEEL: (-TOES_UP, 0.0)}
+        pitches = [(0.0, 0.0) if foot is None else tilts.get(foot.part, (0.0, 0.0)) for foot in self._feet]
+        lower, upper = zip(*pitches, strict=True)
+        return (
+            np.concatenate([low, _TURN_LOWER, spine[0], lower]),
+            np.concatenate([high, _TURN_UPPER, spine[1], upper]),
+        )
+
+    def _radius(self, contact: LocalContact) -> float:
+        """Largest distance of the root from a contact [m]."""
+        legs = self._parts.legs
+        if contact in self._feet and legs is not None:
+            foot = self._parts.body.effector(contact.effector).translation
+            return legs.length + float(np.linalg.norm(legs.hip[0])) + float(np.linalg.norm(foot))
+        volume, _ = self._parts.volume(contact.effector)
+        far = float(np.linalg.norm(volume.vertices, axis=1).max())
+        return far + float(np.linalg.norm(self._parts.origins[1:], axis=1).sum())
+
+    def _evaluate(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far the centre of mass is out (n, m) [m], and the largest violation (n,) of unknowns (n, d)."""
+        parts, place, root = self._parts, x[:, :3], rotations(x[:, 3], x[:, 4], x[:, 5])
+        turned = self._normals @ root
+        violation = np.zeros(len(x))
+        if self._others:
+            frames, places, com = parts.trunk(place, root, x[:, _SPINE_COLUMNS])
+            far = com @ self._normals.T
+            violation = self._of_limbs(frames, places)
+        else:
+            far = parts.masses.sum() * (place @ self._normals.T) + (turned @ parts.bends.T).max(axis=-1)
+        if parts.legs is not None:
+            legs, beyond = self._legs(x, place, root)
+            violation = np.maximum(violation, beyond)
+            for side, foot in enumerate(self._feet):
+                if foot is None:
+                    far += parts.leg_masses.sum() * (place @ self._normals.T)
+                    far += (turned @ parts.swings[side].T).max(axis=-1)
+                else:
+                    far += legs[side] @ self._normals.T
+        return far / parts.body.mass, violation
+
+    def _of_limbs(self, frames: Sequence[FloatArray], places: Sequence[FloatArray]) -> FloatArray:
+        """(n,) violation of the limbs that are no legs in closed form."""
+        violation = np.zeros(len(places[0]))
+        for contact in self._others:
+            volume, margin = self._parts.volume(contact.effector)
+            part = _SPINE.index(volume.segment) if self._parts.spine and volume.segment in _SPINE else 0
+            local = ((contact.position - places[part])[:, None] @ frames[part])[:, 0]
+            violation = np.maximum(violation, BEYOND * (margin - volume.residual(local)))
+        return violation
+
+    def _legs(self, x: FloatArray, place: FloatArray, pelvis: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mass times centre of mass (2, n, 3) of the legs, and their violation (n,) [rad]."""
+        legs, n = self._parts.legs, len(x)
+        assert legs is not None
+        hips = legs.hips(pelvis, place)
+        foot, ankle = np.empty((2, n, 3, 3)), np.empty((2, n, 3))
+        for side, contact in enumerate(self._feet):
+            if contact is None:
+                foot[side], ankle[side] = pelvis, hips[side] - 0.5 * legs.length * pelvis[..., 2]
+            else:
+                foot[side], ankle[side] = self._foot(side, contact, x)
+        angles = legs.angles(pelvis, place, foot, ankle, np.zeros((n, len(self._parts.body.joint_names))))
+        size = np.linalg.norm(ankle - hips, axis=-1)
+        violation = np.zeros(n)
+        for side, contact in enumerate(self._feet):
+            if contact is not None:
+                beyond = self._beyond(angles[:, legs.slots[side]], legs.slots[side])
+                violation = np.maximum(violation, np.maximum(beyond, BEYOND * (size[side] - legs.length)))
+        thigh, shank = legs.segments(pelvis, angles)
+        if all(contact is not None for contact in self._feet):
+            knee = hips - legs.thigh * thigh[..., 2]
+            end = knee - legs.shank * shank[..., 2]
+            apart = segment_distance(knee[0], end[0], knee[1], end[1])
+            violation = np.maximum(violation, BEYOND * (LEGS_APART * self._parts.scale - apart))
+        return self._parts.legs_com(hips, thigh, shank), violation
+
+    def _beyond(self, angles: FloatArray, slots: np.ndarray) -> FloatArray:
+        """(n,) largest angle beyond a range of a leg's hinges (n, 7); the knee's rotation is not used."""
+        lower = self._parts.body.lower[slots] + RANGE_MARGIN
+        upper = self._parts.body.upper[slots] - RANGE_MARGIN
+        lower[3], lower[4], upper[4] = 0.0, -1.0, 1.0
+        return np.maximum(lower - angles, angles - upper).max(axis=1)
+
+    def _foot(self, side: int, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Axes (n, 3, 3) and origin (n, 3) of a foot in contact, pitched about its toes or its heel."""
+        own = self._parts.body.effector(contact.effector)
+        position, rotation = self._placed(contact, x)
+        if contact.part is SolePart.FULL:
+            axes = rotation @ own.rotation.T
+            return axes, position - axes @ own.translation
+        zero = np.zeros(len(x))
+        turn = rotations(zero, x[:, _PITCHES + side], zero)
+        pivot = -contact.half_length
+        if contact.part is SolePart.TOES:
+            pivot = hinge_line(self._parts.body, contact.effector) or 0.0
+        about = np.array([pivot, 0.0, 0.0])
+        centre = position + (rotation @ (about - turn @ about)[..., None])[..., 0]
+        axes = rotation @ turn @ own.rotation.T
+        return axes, centre - axes @ own.translation
+
+    def _placed(self, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        """Place and axes of a contact, the same for all unknowns or (n, ...)."""
+        return contact.position, contact.rotation
+
+
+def _applied(turns: FloatArray, vectors: FloatArray) -> FloatArray:
+    """(2, n, 3) vectors (2, 1, 3) turned by (2, n, 3, 3)."""
+    return (turns @ vectors[..., None])[..., 0]
+
+
+def _bend(flexion: FloatArray, side_bend: FloatArray, twist: FloatArray) -> FloatArray:
+    """(n, 3, 3) turns about y, then x, then z, as the hinges of the spine are."""
+    cy, sy = np.cos(flexion), np.sin(flexion)
+    cx, sx = np.cos(side_bend), np.sin(side_bend)
+    cz, sz = np.cos(twist), np.sin(twist)
+    return matrix([
+        [cy * cz + sy * sx * sz, -cy * sz + sy * sx * cz, sy * cx],
+        [cx * sz, cx * cz, -sx],
+        [-sy * cz + cy * sx * sz, sy * sz + cy * sx * cz, cy * cx],
+    ])  # fmt: skip
+
+
+def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """(n,) distance of the segments from a to b and from c to d, (n, 3) each [m]."""
+    u, v, w = b - a, d - c, a - c
+    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
+    determinant = np.maximum(uu * vv - uv * uv, 1e-12)
+    s = np.clip((uv * vw - vv * uw) / determinant, 0.0, 1.0)
+    t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
+    s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
+    gap = w + s[:, None] * u - t[:, None] * v
+    return np.sqrt(dot(gap, gap))

@@ -1,0 +1,243 @@
+"""Places on which a sole can lie: candidates of a footstep search, snapped to the surfaces of a scene.
+
+A candidate is a place and a heading seen from above.  It is put onto every surface below it; where a part
+of the sole would hang over an edge, or something stands in its way, it is shifted by up to :data:`SHIFT` to
+where more of it lies.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel, Configuration
+from manikin.contact import Contact, sole
+from manikin.errors import ContactError
+from manikin.numerics.spatial import FloatArray
+from manikin.scene import Scene
+from manikin.scene.collision import collision_parts
+from manikin.scene.footing import WHOLE, FootingTable, Places
+
+SHIFT = 0.08
+"""Longest shift of a candidate along the sole [m]; half of it across; our choice."""
+
+STEEPEST = math.radians(30.0)
+"""Largest slope of a surface to stand on [rad]; our choice."""
+
+FOOT_HEIGHT = 0.10
+"""Height above a sole that has to be free for the foot [m]; our choice."""
+
+FOOT_CLEARANCE = 0.015
+"""Distance of the foot to what stands beside it [m]; our choice."""
+
+ON_PLANE = 0.02
+"""Height up to which a neighbouring surface is no hindrance to a foot [m]; the foot has a test of its own."""
+
+_REQUEST = coal.CollisionRequest()
+_SHIFTS = np.array([
+    [0.0, 0.0], [-1.0, 0.0], [-0.5, 0.0], [0.5, 0.0], [1.0, 0.0], [0.0, -0.5], [0.0, 0.5], [-0.5, -0.5],
+    [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5],
+])  # fmt: skip
+_NEAR = np.arange(-12, 13) * 0.02, np.arange(-3, 4) * 0.02  # around a wanted place, along and across [m]
+_HEIGHT_WEIGHT = 0.7  # what a difference in height counts beside one along the ground
+
+
+@dataclass(frozen=True, eq=False)
+class Foothold:
+    """Place of a sole.
+
+    Attributes:
+        position: (3,) of the sole's middle in the world [m].
+        yaw: Heading of the toes [rad].
+        rotation: (3, 3) sole-to-world; z along the surface's normal.
+        polygon: (k, 2) what of the sole touches, in its own frame [m].
+        share: Share of its area that lies on the surface.
+        surface: Number of the surface; -1 for one that was given.
+    """
+
+    position: FloatArray
+    yaw: float
+    rotation: FloatArray
+    polygon: FloatArray
+    share: float = 1.0
+    surface: int = -1
+
+    @classmethod
+    def of(cls, contact: Contact) -> "Foothold":
+        """Foothold of a contact that is given."""
+        return cls(contact.position, contact.yaw, contact.rotation_contact_to_world, contact.points[:, :2])
+
+
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """Footholds as arrays: positions (k, 3) [m], yaws (k,) [rad], shares (k,) and surfaces (k,)."""
+
+    positions: FloatArray
+    yaws: FloatArray
+    rotations: FloatArray
+    shares: FloatArray
+    surfaces: NDArray[np.int64]
+
+
+class Footholds:
+    """Finds places of soles in one scene; one instance works on buffers of its own.
+
+    Attributes:
+        size: Length and width of the sole [m].
+        steepest: Largest slope of a surface to stand on [rad].
+        below_root: (3,) place of each foot's sole relative to the root, level, in the standing posture [m].
+    """
+
+    def __init__(
+        self, body: BodyModel, scene: Scene, size: tuple[float, float] | None = None,
+        steepest: float = STEEPEST,
+    ) -> None:  # fmt: skip
+        """Prepare a scene.
+
+        Args:
+            size: Length and width of the soles [m]; the body's when omitted.
+            steepest: Largest slope of a surface to stand on [rad].
+
+        Raises:
+            ContactError: If the body has no soles.
+        """
+        if body.sole_length is None or body.sole_width is None:
+            raise ContactError(f"body {body.name!r} has no soles; valid: a body that stands on feet")
+        self.size, self.steepest = size or (body.sole_length, body.sole_width), steepest
+        half = 0.5 * np.array(self.size)
+        self._table = FootingTable(
+            scene.surfaces_facing((0.0, 0.0, 1.0), steepest), half * [[1, 1], [1, -1], [-1, -1], [-1, 1]]
+        )
+        self._parts = [
+            (part.geometry, coal.Transform3s(part.rotation, part.translation))
+            for item in scene
+            for part in collision_parts(item)
+        ]
+        gap = 2.0 * FOOT_CLEARANCE
+        self._foot = coal.Box(self.size[0] + gap, self.size[1] + gap, FOOT_HEIGHT)
+        self._point = FootingTable(
+            self._table.surfaces, 1e-6 * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
+        )
+        q = np.array(body.standing_posture())
+        state = Configuration(body, q)
+        self.below_root = {
+            limb.effector: state.effector_placement(limb.effector)[1] - q[:3]
+            for limb in body.limbs
+            if limb.effector.endswith("foot")
+        }
+
+    def levels(self, places: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+        """Rows (m,) of places (k, 2) [m] that have a surface below or above, and its height there [m]."""
+        put = self._point.under(places, np.zeros(len(places)))
+        on = self._point.place(put.numbers, put.positions, put.rotations).share > 0.5
+        return put.rows[on], put.positions[on, 2]
+
+    def lay(self, places: FloatArray, yaws: FloatArray, level: float, rise: float) -> Laid:
+        """Footholds at or near candidates.
+
+        Args:
+            places: (k, 2) middles of soles seen from above [m].
+            yaws: (k,) headings of the toes [rad].
+            level: Height from which the foot comes [m].
+            rise: Largest difference in height to there [m].
+        """
+        put = self._put(places, yaws, level, rise)
+        shares = self._shares(put)
+        blocked = self._blocked(put)
+        value = np.where(blocked, 0.0, shares)
+        partly = np.flatnonzero((shares < WHOLE) | blocked)
+        if len(partly):
+            turn = put.rotations[partly, :2, 0]
+            turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+            side = np.stack([-turn[:, 1], turn[:, 0]], axis=-1)
+            away = SHIFT * (_SHIFTS[:, :1] * turn[:, None] + _SHIFTS[:, 1:] * side[:, None])
+            moved = self._moved(put, np.repeat(partly, len(_SHIFTS)), away.reshape(-1, 2))
+            lies = np.where(self._blocked(moved), 0.0, self._shares(moved)).reshape(len(partly), -1)
+            # A shift has to gain something.
+            pick = np.argmax(lies - 0.5 * SHIFT * np.linalg.norm(_SHIFTS, axis=1), axis=1)
+            rows = np.arange(len(partly)) * len(_SHIFTS) + pick
+            put.positions[partly] = moved.positions[rows]
+            value[partly] = lies[np.arange(len(partly)), pick]
+        chosen = np.flatnonzero(value > 0.0)
+        return Laid(
+            put.positions[chosen], yaws[put.rows[chosen]], put.rotations[chosen], value[chosen],
+            put.numbers[chosen],
+        )  # fmt: skip
+
+    def hold(self, laid: Laid, row: int) -> Foothold:
+        """One of several footholds."""
+        position, rotation = laid.positions[row], laid.rotations[row]
+        number = laid.surfaces[row : row + 1]
+        polygon = self._table.place(number, position[None], rotation[None]).polygon(0)
+        return Foothold(
+            position, float(laid.yaws[row]), rotation, polygon, float(laid.shares[row]), int(number[0])
+        )
+
+    def is_free(self, hold: Foothold) -> bool:
+        """Whether nothing of the scene stands where the foot would be."""
+        lift = 0.5 * FOOT_HEIGHT + 2e-3
+        pose = coal.Transform3s(hold.rotation, hold.position + lift * hold.rotation[:, 2])
+        for geometry, place in self._parts:
+            result = coal.CollisionResult()
+            coal.collide(self._foot, pose, geometry, place, _REQUEST, result)
+            if result.isCollision():
+                return False
+        return True
+
+    def near(self, foot: str, wanted: FloatArray, yaw: float, friction: float) -> Iterator[Contact]:
+        """Contacts of a foot around a place (3,) of its sole's middle [m], the nearest first.
+
+        The toes head to ``yaw`` [rad]; the friction is a Coulomb coefficient.
+        """
+        c, s = math.cos(yaw), math.sin(yaw)
+        grid = np.stack(np.meshgrid(_NEAR[0], _NEAR[1], indexing="ij"), axis=-1).reshape(-1, 2)
+        places = wanted[:2] + grid @ np.array([[c, s], [-s, c]])
+        laid = self.lay(places, np.full(len(places), yaw), float(wanted[2]), np.inf)
+        away = (laid.positions - wanted) * [1.0, 1.0, _HEIGHT_WEIGHT]
+        cost = np.linalg.norm(away, axis=1) + 0.1 * (1.0 - laid.shares)
+        for row in np.argsort(cost, kind="stable"):
+            hold = self.hold(laid, int(row))
+            if self.is_free(hold):
+                yield self.contact(foot, hold, friction)
+
+    def contact(self, foot: str, hold: Foothold, friction: float) -> Contact:
+        """Contact of a foot on a foothold, with a Coulomb coefficient."""
+        length, width = self.size
+        return sole(
+            foot, hold.position, length=length, width=width, friction=friction, rotation=hold.rotation,
+            polygon=None if hold.share >= WHOLE else hold.polygon,
+        )  # fmt: skip
+
+    def _put(self, places: FloatArray, yaws: FloatArray, level: float, rise: float) -> Places:
+        """Candidates on the surfaces within a rise."""
+        put = self._table.under(places, yaws)
+        rows = np.flatnonzero(np.abs(put.positions[:, 2] - level) <= rise)
+        return Places(put.rows[rows], put.numbers[rows], put.positions[rows], put.rotations[rows])
+
+    def _shares(self, put: Places) -> FloatArray:
+        """(k,) share of each sole on its surface; 0 where it cannot stand."""
+        found = self._table.place(put.numbers, put.positions, put.rotations)
+        return np.where(found.stands, found.share, 0.0)
+
+    def _blocked(self, put: Places) -> NDArray[np.bool_]:
+        """(k,) whether another surface rises in the way of each foot, seen from above."""
+        blocked = np.zeros(len(put.rows), dtype=bool)
+        yaws = np.arctan2(put.rotations[:, 1, 0], put.rotations[:, 0, 0])
+        over = self._table.under(put.positions[:, :2], yaws)
+        above = over.positions[:, 2] - put.positions[over.rows, 2]
+        pairs = np.flatnonzero((above > ON_PLANE) & (above < 2.0 * FOOT_HEIGHT))
+        if len(pairs):
+            met = self._table.place(over.numbers[pairs], over.positions[pairs], over.rotations[pairs])
+            blocked[over.rows[pairs[met.share > 1e-6]]] = True
+        return blocked
+
+    def _moved(self, put: Places, rows: NDArray[np.int64], away: FloatArray) -> Places:
+        """Some places moved by (k, 2) seen from above [m], on their surfaces."""
+        rotations = put.rotations[rows]
+        normals = rotations[:, :, 2]
+        rise = -np.einsum("ki,ki->k", normals[:, :2], away) / normals[:, 2]
+        positions = put.positions[rows] + np.column_stack([away, rise])
+        return Places(put.rows[rows], put.numbers[rows], positions, rotations)

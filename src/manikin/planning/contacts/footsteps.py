@@ -1,0 +1,466 @@
+"""Footsteps from start to goal: a best-first search over single footholds.
+
+A node is a foothold that carries while the other foot moves; an edge is a pair of footholds in which the
+body passes from one to the other.  What a step costs is about the time that a person takes for it.  The
+estimate of the cost that is left is the length of the shortest way over the ground for a thin column, so that
+ways round obstacles, over steps and across gaps are known from the start.
+
+Tests of the foot and the trunk come when a step is about to be taken (lazily).  Whether a pair of footholds
+has postures is tested by the caller; a pair without is closed with :meth:`FootstepSearch.close`, and the next
+best way is found.
+"""
+
+import heapq
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import coal
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
+
+from manikin.kinematics.step_reach import StepReach
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.scene import Scene
+from manikin.scene.collision import collision_parts
+
+STEP = 0.7
+"""Time of a short step [s]; our choice, as the next ones."""
+
+EASY = 3.0**0.25
+"""Way at which a step costs twice as much as a short one, over that of the cheapest gait: of a quartic."""
+
+REACH_MARGIN = 0.02
+"""Distance that steps keep to the end of what the body reaches [m]; our choice."""
+
+HIGHEST = 0.48
+"""Largest difference in height of two soles, of a body of 1.75 m [m]."""
+
+NARROWEST = 0.115
+"""Least distance of the middles of two soles across, of a body of 1.75 m [m]."""
+
+ALONG = (-0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
+ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
+TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
+"""Steps that are tried from a foot: ahead and to its side [m], and turned outwards [rad]."""
+
+CELL = 0.1
+"""Width of the cells of the ground on which the estimate is computed [m]."""
+
+GAP = 0.7
+"""Longest way over no ground that the estimate takes [m]."""
+
+MERGED = 0.06
+MERGED_TURN = math.radians(15.0)
+"""Places [m] and headings [rad] this close together count as one foothold."""
+
+GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
+"""Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.
+
+A way costs at most the factor more than the cheapest one.
+"""
+
+ALIKE = 0.08
+"""Distance of footholds up to which a step is much like one that was refused [m]; our choice."""
+
+TURN_COST = 0.9
+"""Cost of a turn [s/rad]: two steps turn a body by a right angle."""
+
+TURN_WAY = 0.6
+"""Way on which going backwards costs as much as a turn by two radians [m]."""
+
+LOOK = 5
+"""Cells of the way that tell where it leads."""
+
+_REQUEST = coal.CollisionRequest()
+
+
+@dataclass(frozen=True)
+class _Node:
+    """A foot on a foothold, ``side`` +1 for the left one; ``ends`` where the other one is at its goal."""
+
+    hold: int
+    side: int
+    ends: bool = False
+
+
+PairCost = Callable[[Foothold, Foothold], float]
+"""Cost of a body between two footholds, left and right [s]; infinite where it has no room."""
+
+
+@dataclass
+class FootstepSearch:
+    """Search for footsteps of one body in one scene.
+
+    Attributes:
+        scene: What is around.
+        footholds: Finds footholds.
+        start: Left and right foothold at the start.
+        goal: At the goal.
+        scale: Size of the body relative to one of 1.75 m.
+        reach: Places of one foot relative to the other that the body reaches.
+        pair_cost: Cost of the body between two footholds.
+        column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
+        stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
+    """
+
+    scene: Scene
+    footholds: Footholds
+    start: tuple[Foothold, Foothold]
+    goal: tuple[Foothold, Foothold]
+    scale: float
+    reach: StepReach
+    pair_cost: PairCost
+    column: tuple[float, float, float]
+    stride: float = 0.4
+    expanded: int = field(init=False, default=0)
+
+    def __post_init__(self) -> None:
+        self._holds = [*self.start, *self.goal]
+        self._keys: dict[tuple[int, ...], int] = {}
+        self._free: dict[int, bool] = dict.fromkeys(range(4), True)
+        self._pairs: dict[tuple[int, int], float] = {}
+        self._next: dict[tuple[int, int], list[tuple[int, float]]] = {}
+        self._closed: set[tuple[int, int]] = set()
+        self._refused: list[tuple[FloatArray, FloatArray]] = []
+        self._offsets = _offsets(self.scale)
+        self._field = _Field(
+            self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale
+        )
+        places = np.array([hold.position for hold in self._holds])
+        self._ahead: list[float] = self._field.costs(
+            places, np.array([hold.yaw for hold in self._holds])
+        ).tolist()
+
+    def close(self, stand: int, step: int) -> None:
+        """Close a pair of footholds, which has no posture."""
+        self._closed.add((stand, step))
+
+    def refuse(self, stand: int, step: int) -> None:
+        """Close all steps that are much like one, with which a later stage failed."""
+        self._refused.append((self._holds[stand].position, self._holds[step].position))
+        self._pairs = {pair: cost for pair, cost in self._pairs.items() if not self._is_refused(*pair)}
+
+    def hold(self, number: int) -> Foothold:
+        """Foothold of a number."""
+        return self._holds[number]
+
+    def best(self) -> list[int] | None:
+        """Numbers of the footholds of the best way, from both of the start to both of the goal; None without.
+
+        Consecutive ones are of different feet; the first two and the last two are those of start and goal.
+        """
+        for greed, most in GREED:
+            way, exhausted = self._search(greed, most)
+            if way is not None or exhausted:
+                return way
+        return None
+
+    def _search(self, greed: float, most: int) -> tuple[list[int] | None, bool]:
+        """A way with one factor on the estimate, or None and whether there is none at all."""
+        open_: list[tuple[float, int, float, _Node, _Node | None, bool]] = []
+        parents: dict[_Node, _Node | None] = {}
+        for number, side in ((0, 1), (1, -1)):
+            node = _Node(number, side)
+            open_.append((greed * self._ahead[number], number, 0.0, node, None, True))
+        heapq.heapify(open_)
+        count, expanded = len(open_), 0
+        while open_:
+            _, _, cost, node, parent, tested = heapq.heappop(open_)
+            if node in parents:
+                continue
+            if not tested and parent is not None:
+                total = cost + self._tested(parent, node)
+                if math.isfinite(total):
+                    count += 1
+                    rank = total + greed * self._ahead[node.hold]
+                    heapq.heappush(open_, (rank, count, total, node, parent, True))
+                continue
+            parents[node] = parent
+            if node.ends and self._at_goal(node):
+                return self._way(node, parents), False
+            if expanded == most:
+                return None, False
+            expanded += 1
+            self.expanded += 1
+            ends = self._at_goal(node)
+            for number, step_cost in self._steps(node):
+                after = _Node(number, -node.side, ends)
+                closed = after in parents or (node.hold, number) in self._closed
+                if closed or not math.isfinite(self._ahead[number]):
+                    continue
+                count += 1
+                total = cost + step_cost
+                rank = total + greed * self._ahead[number]
+                heapq.heappush(open_, (rank, count, total, after, node, False))
+        return None, True
+
+    def farthest(self) -> tuple[float, Foothold]:
+        """Least cost that was left at a foothold which was reached [s], and that foothold."""
+        return min(((self._ahead[n], self._holds[n]) for n, _ in self._next), key=lambda item: item[0])
+
+    def walled_off(self) -> str | None:
+        """Why no way over the ground leads from the start to the goal; None where one does."""
+        return (
+            None if math.isfinite(min(self._ahead[:2])) else self._field.walled_off(self._holds[0].position)
+        )
+
+    def _at_goal(self, node: _Node) -> bool:
+        return node.hold == (2 if node.side > 0 else 3)
+
+    def _way(self, node: _Node, parents: "dict[_Node, _Node | None]") -> list[int]:
+        way: list[int] = []
+        at: _Node | None = node
+        while at is not None:
+            way.append(at.hold)
+            at = parents[at]
+        # The foot that is not the first to stand is where it is at the start.
+        return [1 - way[-1], *way[::-1]]
+
+    def _tested(self, parent: _Node, node: _Node) -> float:
+        """Cost of the body's room at a step; infinite where the foot or the body has none."""
+        pair = parent.hold, node.hold
+        if pair in self._closed or self._is_refused(*pair):
+            return math.inf
+        if pair not in self._pairs:
+            if node.hold not in self._free:
+                self._free[node.hold] = self.footholds.is_free(self._holds[node.hold])
+            if not self._free[node.hold]:
+                self._pairs[pair] = math.inf
+            else:
+                stand, step = self._holds[parent.hold], self._holds[node.hold]
+                left, right = (stand, step) if parent.side > 0 else (step, stand)
+                self._pairs[pair] = self.pair_cost(left, right)
+        return self._pairs[pair]
+
+    def _is_refused(self, stand: int, step: int) -> bool:
+        first, last = self._holds[stand].position, self._holds[step].position
+        return any(
+            np.linalg.norm(first - a) < ALIKE and np.linalg.norm(last - b) < ALIKE for a, b in self._refused
+        )
+
+    def _steps(self, node: _Node) -> list[tuple[int, float]]:
+        """Footholds to which the other foot may go, with the cost of the step alone."""
+        key = node.hold, node.side
+        if key in self._next:
+            return self._next[key]
+        stand = self._holds[node.hold]
+        out = -node.side  # the other foot is to the right of a left one
+        ahead, across, turns = self._offsets
+        turn = np.array([math.cos(stand.yaw), math.sin(stand.yaw)])
+        side = np.array([-turn[1], turn[0]]) * out
+        places = stand.position[:2] + ahead[:, None] * turn + across[:, None] * side
+        yaws = stand.yaw + out * turns
+        goal = 3 if node.side > 0 else 2
+        found = self.footholds.lay(places, yaws, float(stand.position[2]), HIGHEST * self.scale)
+        ends = self._holds[goal]
+        costs = self._step_costs(
+            stand, out,
+            np.vstack([ends.position, found.positions]), np.append(ends.yaw, found.yaws),
+            np.append(ends.share, found.shares),
+        )  # fmt: skip
+        rows = np.flatnonzero(np.isfinite(costs))
+        steps: dict[int, float] = {}
+        if len(rows) and rows[0] == 0:
+            steps[goal] = float(costs[0])
+            rows = rows[1:]
+        rows -= 1
+        keys = np.column_stack([
+            np.rint(found.positions[rows, :2] / MERGED),
+            np.rint(found.yaws[rows] % (2.0 * math.pi) / MERGED_TURN), found.surfaces[rows],
+        ]).astype(np.int64)  # fmt: skip
+        fresh: list[int] = []
+        for row, label in zip(rows.tolist(), map(tuple, keys.tolist()), strict=True):
+            number = self._keys.setdefault(label, len(self._holds))
+            if number == len(self._holds):
+                self._holds.append(self.footholds.hold(found, row))
+                fresh.append(row)
+            # A place close by stands for the one that was asked for.
+            steps[number] = min(steps.get(number, math.inf), float(costs[1 + row]))
+        self._ahead.extend(self._field.costs(found.positions[fresh], found.yaws[fresh]).tolist())
+        self._next[key] = list(steps.items())
+        return self._next[key]
+
+    def _step_costs(
+        self, stand: Foothold, out: int, positions: FloatArray, yaws: FloatArray, shares: FloatArray
+    ) -> FloatArray:
+        """(k,) costs of steps [s]; infinite where no body makes them."""
+        away = positions - stand.position
+        c, s = math.cos(stand.yaw), math.sin(stand.yaw)
+        ahead, aside = c * away[:, 0] + s * away[:, 1], out * (c * away[:, 1] - s * away[:, 0])
+        turned = out * (np.mod(yaws - stand.yaw + math.pi, 2.0 * math.pi) - math.pi)
+        rise, size = np.abs(away[:, 2]), self.scale
+        way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
+        apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
+        made = self.reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
+        made &= (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
+        made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
+        cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
+        cost += 1.2 * rise + 8.0 * np.maximum(0.0, rise - 0.2 * size) + 0.25 * np.abs(turned) + (1.0 - shares)
+        cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
+        cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
+        return np.where(made, cost, np.inf)
+
+
+def _offsets(scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(k,) ways ahead and across [m] and turns [rad] of steps; the farther one goes, the less one turns."""
+    rows = [
+        (ahead, across, turn)
+        for ahead in ALONG
+        for across in ACROSS
+        for turn in TURNS
+        if (abs(turn) < 0.3 or ahead <= 0.3)
+        and (across < 0.3 or (abs(ahead) <= 0.15 and abs(turn) < 0.3))
+        and (across > 0.16 or turn >= 0.0)
+        and (ahead >= 0.0 or abs(turn) < 0.3)
+    ]
+    ahead, across, turns = np.array(rows).T
+    return scale * ahead, scale * across, turns
+
+
+class _Field:
+    """Cost to the goal over cells of the ground, for a thin column in place of the body."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        footholds: Footholds,
+        start: tuple[Foothold, Foothold],
+        goal: tuple[Foothold, Foothold],
+        column: tuple[float, float, float],
+        stride: float,
+    ) -> None:
+        ends = np.array([hold.position for hold in (*start, *goal)])
+        room = 1.5 + 0.25 * float(np.linalg.norm(ends[0] - ends[2]))
+        low, high = ends[:, :2].min(axis=0) - room, ends[:, :2].max(axis=0) + room
+        counts = np.ceil((high - low) / CELL).astype(int) + 1
+        axes = [low[axis] + CELL * np.arange(counts[axis]) for axis in range(2)]
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        rows, height = footholds.levels(grid)
+        # What lies close under something else on which a foot can stand is not reached.
+        order = np.lexsort((height, rows))
+        rows, height = rows[order], height[order]
+        covered = np.zeros(len(rows), dtype=bool)
+        same = rows[1:] == rows[:-1]
+        covered[:-1] = same & (height[1:] - height[:-1] < 0.45)
+        keep = ~covered
+        rows, height = rows[keep], height[keep]
+        self._points = np.column_stack([grid[rows], height])
+        radius, low_end, high_end = column
+        self._points = self._points[_column_is_free(scene, self._points, column)]
+        slow = np.ones(len(self._points))
+        for share, more in ((1.35, 0.8), (1.8, 0.5)):
+            taller = radius, low_end, share * high_end
+            slow[~_column_is_free(scene, self._points, taller)] += more
+        self._tree = cKDTree(self._points)
+        flat = cKDTree(self._points[:, :2])
+        near = flat.query_pairs(1.6 * CELL, output_type="ndarray")
+        # Over gaps: cells at the edge of the ground reach farther.
+        degree = np.bincount(near.ravel(), minlength=len(self._points))
+        edge = np.flatnonzero(degree < 8)
+        if len(edge):
+            far = cKDTree(self._points[edge, :2]).query_pairs(GAP, output_type="ndarray")
+            near = np.vstack([near, edge[far]])
+        away = self._points[near[:, 0]] - self._points[near[:, 1]]
+        rise = np.abs(away[:, 2])
+        pace = STEP * (1.0 + 1.0 / 3.0) / stride
+        slower = 0.5 * (slow[near[:, 0]] + slow[near[:, 1]])
+        length = pace * slower * np.linalg.norm(away[:, :2], axis=1) + 1.2 * rise
+        size = len(self._points)
+        self._near, self._rise = near, rise
+        passable = rise <= HIGHEST
+        near, length = near[passable], length[passable]
+        graph = csr_array((length + 1e-9, (near[:, 0], near[:, 1])), shape=(size, size))
+        middle = 0.5 * (goal[0].position + goal[1].position)
+        self._root = int(self._tree.query(middle)[1])
+        self._cost, before = dijkstra(graph, directed=False, indices=self._root, return_predecessors=True)
+        self._pace = pace
+        self._yaw = _middle_yaw(goal[0].yaw, goal[1].yaw)
+        # Where the way leads from each cell, and how far it is.
+        ahead = np.arange(size)
+        for _ in range(LOOK):
+            ahead = np.where(before[ahead] >= 0, before[ahead], ahead)
+        way = self._points[ahead, :2] - self._points[:, :2]
+        self._heading = np.arctan2(way[:, 1], way[:, 0])
+        self._way = np.linalg.norm(self._points[:, :2] - middle[:2], axis=1)
+
+    def walled_off(self, place: FloatArray) -> str:
+        """Why no way leads from a place (3,) to the goal: a step that is too high, or no room."""
+        size = len(self._points)
+        graph = csr_array((self._rise + 1e-6, (self._near[:, 0], self._near[:, 1])), shape=(size, size))
+        way = minimum_spanning_tree(graph)
+        costs, before = dijkstra(way, directed=False, indices=self._root, return_predecessors=True)
+        row = int(self._tree.query(place)[1])
+        if not math.isfinite(costs[row]):
+            return "no way over the ground has room for the body"
+        # The way with the lowest highest step is in a minimum spanning tree.
+        highest = 0.0
+        while before[row] >= 0:
+            highest = max(highest, abs(float(self._points[row, 2] - self._points[before[row], 2])))
+            row = int(before[row])
+        return f"every way over the ground has a step of {highest:.2f} m; feet make at most {HIGHEST:.2f} m"
+
+    def costs(self, places: FloatArray, yaws: FloatArray) -> FloatArray:
+        """(k,) estimates of the costs from places (k, 3) [m] with headings (k,) [rad] to the goal [s]."""
+        if not len(places):
+            return np.zeros(0)
+        gap, rows = self._tree.query(places, k=4)
+        costs = self._cost[rows] + self._pace * gap
+        pick = np.argmin(costs, axis=1)
+        row = rows[np.arange(len(places)), pick]
+        there, here = self._heading[row], np.asarray(yaws)
+        # To turn to where the way leads and back, or to go as one stands: aside or backwards is slower.
+        straight = _angle(here - there) + _angle(there - self._yaw)
+        across = _angle(here - self._yaw) + self._way[row] / TURN_WAY * (1.0 - np.cos(here - there))
+        return costs[np.arange(len(places)), pick] + TURN_COST * np.minimum(straight, across)
+
+
+def _angle(difference: FloatArray) -> FloatArray:
+    """Size of angles [rad], at most half a turn."""
+    return np.abs(np.mod(difference + math.pi, 2.0 * math.pi) - math.pi)
+
+
+def _middle_yaw(first: float, second: float) -> float:
+    """Heading between two [rad]."""
+    return math.atan2(math.sin(first) + math.sin(second), math.cos(first) + math.cos(second))
+
+
+def _column_is_free(scene: Scene, places: FloatArray, column: tuple[float, float, float]) -> np.ndarray:
+    """(k,) whether a vertical capsule above each place meets nothing."""
+    radius, low, high = column
+    shape = coal.Capsule(radius, max(high - low - 2.0 * radius, 1e-3))
+    free = np.ones(len(places), dtype=bool)
+    turn = np.eye(3)
+    lift = np.array([0.0, 0.0, 0.5 * (low + high)])
+    for item in scene:
+        for part in collision_parts(item):
+            there = coal.Transform3s(part.rotation, part.translation)
+            box = _bounds(part.geometry, there)
+            near = np.ones(len(places), dtype=bool)
+            if box is not None:
+                near = (places[:, :2] >= box[0][:2] - radius).all(axis=1)
+                near &= (places[:, :2] <= box[1][:2] + radius).all(axis=1)
+                near &= (places[:, 2] + low <= box[1][2]) & (places[:, 2] + high >= box[0][2])
+            for row in np.flatnonzero(near & free):
+                result = coal.CollisionResult()
+                coal.collide(
+                    shape, coal.Transform3s(turn, places[row] + lift), part.geometry, there, _REQUEST, result
+                )
+                free[row] = not result.isCollision()
+    return free
+
+
+def _bounds(
+    geometry: coal.CollisionGeometry, place: coal.Transform3s
+) -> tuple[FloatArray, FloatArray] | None:
+    """Corners of the box about a placed geometry along the axes; None where it is endless."""
+    geometry.computeLocalAABB()
+    low, high = np.asarray(geometry.aabb_local.min_), np.asarray(geometry.aabb_local.max_)
+    if not (np.isfinite(low).all() and np.isfinite(high).all()) or np.abs([low, high]).max() > 1e6:
+        return None
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    turned = corners @ place.getRotation().T + place.getTranslation()
+    return turned.min(axis=0), turned.max(axis=0)

@@ -1,0 +1,302 @@
+"""Independent check of a contact plan: contacts, reach, collisions, balance, order, start and goal.
+
+Nothing of the planner takes part: solids, triangles and distances, friction cones and linear programs are
+this room's own; the body gives its plain sizes, and Pinocchio the forward kinematics.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.contact import Contact
+from manikin.numerics.spatial import FloatArray
+from manikin.runtime.display import Displayed
+from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
+from manikin.scenarios import Scenario
+from manikin.scenarios.sequence import friction_of
+from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest, torque_share
+from manikin.verification.holding import HeldPosture, HoldingRows, Kinematics
+from manikin.verification.plan_file import PlannedContacts, PlannedStage, load_contact_plan
+from manikin.verification.reach import REACHED, PostureSearch, ReachBounds
+from manikin.verification.solids import Solid
+from manikin.verification.task import task_rows
+from manikin.verification.touching import ContactRows, Rules
+from manikin.verification.worst import Worst
+
+BALANCE = 1e-3
+"""Distance of the centre of mass from where it could rest up to which a body counts as balanced [m]."""
+
+SHORTFALL = 1e-4
+"""Share of the weight that may be missing on the way of a dynamic stage."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPlanCheck(Displayed):
+    """Outcome of a check.
+
+    Attributes:
+        requirements: What was measured, with limits and where; :attr:`stages` and the like count.
+        stages: Number of stages.
+        postures: Number of postures that were given and measured.
+        complete: Whether every change and the goal have a posture, so that reach and collisions are certified
+            and not only bounded.
+        room: Least distance that the centre of mass may move any way along the level at a change [m].
+    """
+
+    requirements: RequirementTable
+    stages: int
+    postures: int
+    complete: bool
+    room: float
+
+    @property
+    def held(self) -> bool:
+        """Whether the plan keeps every requirement."""
+        return self.requirements.held
+
+    @property
+    def verdict(self) -> str:
+        """In one line: ``"certified"``, ``"certified without postures"``, or the first broken requirement."""
+        broken = self.requirements.first_broken
+        if broken is not None:
+            return f"refused: {broken.reason}"
+        return (
+            "certified"
+            if self.complete
+            else "certified without postures: contacts, reach, balance and order alone"
+        )
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {"stages": str(self.stages), "postures": str(self.postures), "verdict": self.verdict}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "held": self.held, "verdict": self.verdict, "stages": self.stages, "postures": self.postures,
+            "complete": self.complete, "room_m": self.room,
+            "requirements": [row.as_dict("contacts") for row in self.requirements],
+        }  # fmt: skip
+
+
+def check_contact_plan(scenario: Scenario, plan: PlannedContacts | str | Path) -> ContactPlanCheck:
+    """Certify a contact plan for a scenario, or say what is wrong with it.
+
+    Args:
+        scenario: Body, scene and task.
+        plan: In the world, or the path of a contact-plan file.
+
+    Raises:
+        ScenarioError: If the file is malformed, or the scenario cannot be built.
+    """
+    if not isinstance(plan, PlannedContacts):
+        _, plan = load_contact_plan(plan, scenario)
+    return _Check(scenario, plan).run()
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """Two stages and what is between them; the first stage has none before, the goal none after."""
+
+    before: PlannedStage | None
+    after: PlannedStage | None
+    q: FloatArray | None
+    com: FloatArray | None
+    where: str
+
+    @property
+    def held(self) -> tuple[Contact, ...]:
+        """Contacts on both sides, which the posture has to hold."""
+        stages = [stage for stage in (self.before, self.after) if stage is not None]
+        return tuple({id(c): c for stage in stages for c in stage.contacts.values()}.values())
+
+    @property
+    def carrying(self) -> tuple[Contact, ...]:
+        """Contacts that stay, which alone may carry."""
+        if self.before is None or self.after is None:
+            return self.held
+        return tuple(c for name, c in self.after.contacts.items() if self.before.contacts.get(name) is c)
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether a stage beside it is dynamic, so that there need not be rest."""
+        return any(stage is not None and stage.dynamic for stage in (self.before, self.after))
+
+
+class _Check:
+    """One check."""
+
+    def __init__(self, scenario: Scenario, plan: PlannedContacts) -> None:
+        self._scenario, self._plan = scenario, plan
+        self._body: BodyModel = scenario.build_body()
+        self._mass = self._body.mass
+        self._cap = scenario.contact_model.normal_force_cap
+        self._solids = [Solid(item, item.name in scenario.padded) for item in scenario.build_scene()]
+        self._kinematics = Kinematics(self._body)
+        self._changes = list(self._at_changes())
+        self._reach = ReachBounds(self._body)
+        act = scenario.act
+        self._act: HandForce | None = None
+        if act is not None:
+            direction = np.array(act.direction) / np.linalg.norm(act.direction)
+            self._act = HandForce(direction, act.force_N)
+
+    def run(self) -> ContactPlanCheck:
+        touching, postures = self._contacts(), list(self._postures())
+        holding = HoldingRows(self._body, self._solids, self._kinematics)
+        contacts = {id(c): c for change in self._changes for c in change.held}
+        holding.measure(postures, {key: touching.touched(contact) for key, contact in contacts.items()})
+        balance, room = self._balance()
+        rows: list[Requirement | None] = [
+            *self._order(), *touching.rows, self._within_reach(), *holding.rows, *balance, self._reached(),
+            *task_rows(self._scenario, self._plan),
+        ]  # fmt: skip
+        complete = all(change.q is not None for change in self._changes)
+        return ContactPlanCheck(
+            requirement_table(rows), len(self._plan.stages), len(postures), complete, room
+        )
+
+    def _at_changes(self) -> Iterator[_Change]:
+        stages, plan = self._plan.stages, self._plan
+        for number, stage in enumerate(stages):
+            before = stages[number - 1] if number else None
+            yield _Change(
+                before, stage, stage.posture, self._com(stage.posture, stage.com), f"stages[{number}]"
+            )
+        yield _Change(stages[-1], None, plan.goal, self._com(plan.goal, plan.goal_com), "goal")
+
+    def _com(self, q: FloatArray | None, given: FloatArray | None) -> FloatArray | None:
+        return given if q is None else self._kinematics.com(q)
+
+    def _contacts(self) -> ContactRows:
+        values = self._scenario.contacts
+        rules = Rules(friction_of(self._scenario), values.grasp_force_N, values.forefoot_m is not None)
+        rows = ContactRows(self._body, self._solids, rules)
+        for number, stage in enumerate(self._plan.stages):
+            rows.measure(stage.contacts, f"stages[{number}]")
+        return rows
+
+    def _postures(self) -> Iterator[HeldPosture]:
+        for change in self._changes:
+            if change.q is not None:
+                yield HeldPosture(change.q, change.held, change.where)
+            if change.after is not None and change.after.via is not None:
+                own = tuple(change.after.contacts.values())
+                yield HeldPosture(change.after.via, own, f"{change.where}.via")
+
+    def _order(self) -> list[Requirement | None]:
+        """One contact is made or broken at each change, both hands at once for an act; one is there."""
+        most = Worst("max_changes", "contacts made and broken at one change", "", "<=", 1.0)
+        least = Worst("min_contacts", "contacts of a stage", "", ">=", 1.0)
+        said = Worst(
+            "max_com_difference_m",
+            "difference between the centre of mass given and the posture's",
+            "m",
+            "<=",
+            1e-3,
+        )
+        for number, (before, after) in enumerate(pairwise(self._plan.stages), start=1):
+            kept = sum(before.contacts.get(name) is c for name, c in after.contacts.items())
+            changed = len(before.contacts) + len(after.contacts) - 2 * kept
+            names = sorted(
+                {n for n, c in after.contacts.items() if before.contacts.get(n) is not c}
+                | {n for n, c in before.contacts.items() if after.contacts.get(n) is not c}
+            )
+            if self._scenario.file.task.act is not None and all("hand" in name for name in names):
+                changed = min(changed, 1)
+            most.take(changed, f"{' and '.join(names)}, stages[{number}]" if names else f"stages[{number}]")
+        given = [(stage.posture, stage.com) for stage in self._plan.stages] + [
+            (self._plan.goal, self._plan.goal_com)
+        ]
+        for (q, com), change in zip(given, self._changes, strict=True):
+            if q is not None and com is not None:
+                said.take(float(np.linalg.norm(self._kinematics.com(q) - com)), change.where)
+        for number, stage in enumerate(self._plan.stages):
+            least.take(len(stage.contacts), f"stages[{number}]")
+        return [least.row, most.row, said.row]
+
+    def _within_reach(self) -> Requirement | None:
+        """Contacts that are held at once are no farther apart than the body's segments are long."""
+        farthest = Worst(
+            "max_reach_share", "distance of two contacts over the longest way through the body", "", "<=",
+            1.0, 1e-6,
+        )  # fmt: skip
+        for change in self._changes:
+            for share, pair in self._shares(change):
+                farthest.take(share, pair)
+        return farthest.row
+
+    def _shares(self, change: _Change) -> Iterator[tuple[float, str]]:
+        for first, second in combinations(change.held, 2):
+            if first.effector != second.effector:
+                apart = float(np.linalg.norm(first.position - second.position))
+                bound = self._reach.between(first.effector, second.effector)
+                yield apart / max(bound, 1e-9), f"{first.effector} and {second.effector}, {change.where}"
+
+    def _within_lengths(self, change: _Change) -> bool:
+        return all(share <= 1.0 for share, _ in self._shares(change))
+
+    def _reached(self) -> Requirement | None:
+        """Where no posture is given, one is looked for; not where lengths say that there is none."""
+        missed = Worst("max_reach_gap_m", "miss of the nearest posture", "m", "<=", REACHED, 1e-9)
+        search = PostureSearch(self._body)
+        for change in self._changes:
+            if change.q is None and change.held and self._within_lengths(change):
+                same = {contact.effector: contact for contact in change.held}
+                if len(same) == len(change.held):
+                    missed.take(search.gap(change.held, change.com), change.where)
+        return missed.row
+
+    def _balance(self) -> tuple[list[Requirement | None], float]:
+        off = Worst(
+            "max_balance_shift_m", "distance of the centre of mass from a place of rest", "m", "<=", BALANCE
+        )
+        lacking = Worst(
+            "max_dynamic_shortfall", "share of the weight missing on the way", "", "<=", SHORTFALL
+        )
+        effort = Worst("max_torque_share", "share of the strength that rest takes", "", "<=", 1.0, 1e-6)
+        room = np.inf
+        for change in self._changes:
+            if change.dynamic:
+                continue
+            contacts, com, within = change.carrying, change.com, None
+            if com is None:
+                within = {
+                    number: self._reach.to_com(contact.effector) for number, contact in enumerate(contacts)
+                }
+            guess = com if com is not None else _middle(change.held)
+            act = self._act if change.after is None else None
+            result = rest(contacts, self._mass, self._cap, guess, within, act)
+            shift = result.shift if com is not None or result.place is None else 0.0
+            names = ", ".join(contact.effector for contact in contacts) or "no contact"
+            off.take(shift, f"{change.where} on {names}")
+            if com is not None:
+                room = min(room, result.room)
+            if change.q is not None and result.shift <= BALANCE:
+                share = torque_share(self._body, change.q, contacts, self._cap)
+                effort.take(share, f"{change.where} on {names}")
+        for number, stage in enumerate(self._plan.stages):
+            if stage.dynamic:
+                lacking.take(self._shortfall(number, stage), f"stages[{number}]")
+        return [off.row, lacking.row, effort.row], room
+
+    def _shortfall(self, number: int, stage: PlannedStage) -> float:
+        """Of one dynamic stage; a whole weight where an end of it is not given."""
+        start, end = self._changes[number], self._changes[number + 1]
+        if start.com is None or end.com is None or stage.duration is None:
+            return 1.0
+        after = end.after
+        leaving = np.zeros(3) if after is None else after.com_velocity
+        return dynamic_shortfall(
+            tuple(stage.contacts.values()), self._mass, self._cap, CentreState(start.com, stage.com_velocity),
+            CentreState(end.com, leaving), stage.duration,
+        )  # fmt: skip
+
+
+def _middle(contacts: Sequence[Contact]) -> FloatArray:
+    return np.mean([contact.position for contact in contacts], axis=0) if contacts else np.zeros(3)
