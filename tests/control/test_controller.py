@@ -199,3 +199,23 @@ def test_a_tilted_seat_carries_on_its_low_side_and_turns_the_pelvis(body, contac
     assert len(raised) == 2
     assert max(raised) < 1e-9
     assert max(force for _, force in forces) > 1.0
+
+
+def test_feet_that_are_points_turn_and_leave_the_body_free(on_points):
+    """An insect beside its plan moves back over six points that stay where they are, to 1 % of the CoM.
+
+    Held against turning as well, they would hold the body, and the program would move the points instead.
+    """
+    body, schedule, still = on_points
+    controller = Controller(body, still, schedule)
+    q = still.q[0].copy()
+    q[0] -= 0.01
+    output = controller.step(0.0, q, np.zeros(body.nv))
+    moved = output.state.centroidal_map[:3] @ output.acceleration / output.state.mass
+    tips = [
+        frame.jacobian[:3] @ output.acceleration
+        for name, frame in output.state.frames.items()
+        if name in schedule.sequence.effectors
+    ]
+    assert moved[0] > 0.9 * controller.settings.impedances.com.stiffness * 0.01
+    assert np.abs(tips).max() < 0.01 * moved[0]

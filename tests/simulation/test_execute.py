@@ -5,13 +5,13 @@ import pinocchio as pin
 import pytest
 
 from manikin.balance.motion_margin import motion_margin
-from manikin.body import carrying, human
-from manikin.contact import Stance
+from manikin.body import Configuration, carrying, human
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control import ControlSettings
 from manikin.errors import ContactError, InputError
 from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR
 from manikin.scene import Box, Obstacle, Scene
-from manikin.simulation import PhysicsOptions, Push, execute
+from manikin.simulation import PhysicsOptions, Push, compile_model, default_physics, execute
 
 
 def smooth(share):
@@ -144,6 +144,24 @@ def test_slippery_floor_is_seen_as_slip(body, stand):
     assert firm.max_slip_m < 1e-3
     assert icy.max_slip_m > 5e-3
     assert icy.max_foot_error_m > 4e-3
+
+
+def test_feet_do_not_slip_because_a_seat_is_smooth(body, stand):
+    """Each segment has the friction of its own contacts: the engine takes the larger of two geometries."""
+    schedule = stand(0.2).schedule
+    feet = [replace(contact, friction=0.7) for contact in schedule.sequence[0].stance]
+    place = Configuration(body, body.standing_posture()).effector_placement("buttocks")[1]
+    seat = sole("buttocks", place, length=0.2, width=0.3, friction=0.3)
+    phases = [Phase(Stance([*feet, seat])), Phase(Stance(feet))]
+    physics = default_physics(body, ContactSchedule(StanceSequence(phases), [0.0, 0.1, 0.2]))
+    model = compile_model(body, Scene(), physics).mujoco
+    owners = [model.body(number).name for number in model.geom_bodyid]
+    friction = {name: model.geom_friction[row, 0] for row, name in enumerate(owners)}
+    for side in ("left", "right"):
+        assert max(friction[f"{side}_foot"], friction["world"]) == 0.7
+        assert max(friction[f"{side}_toes"], friction["world"]) == 0.7
+    pelvis = body.effector("buttocks").segment
+    assert max(friction[pelvis], friction["world"]) == 0.3
 
 
 def test_push_is_withstood_and_too_strong_a_push_fells(body, stand):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
+from manikin.contact import ContactKind
 from manikin.control.dynamics import DynamicsState, FrameState
 from manikin.control.reference import EffectorReference, ReferenceSample
 from manikin.control.settings import Impedance
@@ -163,8 +164,14 @@ def stance_task(
     The velocity is damped to zero. Of the placement only the tilt of the sole against the
     surface is fed back: a foot that landed a little beside its planned place or heading
     cannot be moved there while it carries load.
+
+    What touches in a point carries no moment and turns about it as its limb moves: only the point is held.
+    Held against turning as well, six feet of an insect hold its whole body.
     """
     wanted = -gains.damping * frame.twist
+    if support.contact is not None and support.contact.kind is ContactKind.POINT:
+        place = frame.jacobian[:3]
+        return AccelerationTask(name, place, (wanted - frame.drift)[:3], np.full(3, weight))
     if support.contact is not None:
         tilt = skew(frame.rotation[:, 2]) @ support.contact.normal
         wanted[3:] += gains.stiffness * tilt

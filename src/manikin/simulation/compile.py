@@ -39,6 +39,7 @@ class PhysicsOptions:
     Attributes:
         timestep: [s]; 1 ms as in [Qiu2012]_ 6.1.
         friction: Coulomb coefficient between the body and the scene and of the body with itself.
+        contact_friction: Pairs of a segment and a larger coefficient between it and the scene.
         segment_friction: Pairs of a segment and the coefficient between it and whatever it touches; such a
             segment is soft, see ``soft_time_constant``.
         cone: Shape of the friction cones.
@@ -56,6 +57,7 @@ class PhysicsOptions:
 
     timestep: float = 1e-3
     friction: float = 0.7
+    contact_friction: tuple[tuple[str, float], ...] = ()
     segment_friction: tuple[tuple[str, float], ...] = ()
     cone: Literal["elliptic", "pyramidal"] = "elliptic"
     impratio: float = 10.0
@@ -71,13 +73,16 @@ class PhysicsOptions:
         for name in ("timestep", "friction", "impratio", "contact_time_constant", "soft_time_constant",
                      "contact_damping_ratio"):  # fmt: skip
             finite_number(getattr(self, name), f"physics {name}", above=0.0)
-        for segment, value in self.segment_friction:
+        for segment, value in (*self.contact_friction, *self.segment_friction):
             finite_number(value, f"physics friction of {segment}", above=0.0)
         for name in ("joint_damping", "armature"):
             finite_number(getattr(self, name), f"physics {name}", at_least=0.0)
         if self.cone not in ("elliptic", "pyramidal"):
             raise InputError(f"physics cone is {self.cone!r}; valid: elliptic, pyramidal")
 
+
+_TURNING_FRICTION = (0.005, 0.0001)
+"""The engine's own torsional and rolling friction, of no effect at contacts of three dimensions [m]."""
 
 PREFIX = "scene/"
 """Geometries of obstacles are named ``scene/<obstacle>`` or ``scene/<obstacle>/<number>``."""
@@ -299,7 +304,7 @@ def _set_options(spec: Any, options: PhysicsOptions) -> None:
 def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:
     """Contact settings of a geometry; bits let body and scene touch, and body and body if wanted."""
     return {
-        "friction": [options.friction, 0.005, 0.0001],
+        "friction": [options.friction, *_TURNING_FRICTION],
         "condim": 3,
         "solref": [options.contact_time_constant, options.contact_damping_ratio],
         "contype": 2 if scenery else 1,
@@ -319,8 +324,12 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
             item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
         for hinge in segment.hinges:
             _add_hinge(spec, item, hinge, options)
-        friction = dict(options.segment_friction).get(segment.name)
-        special = {} if friction is None else _soft_contact(friction, options)
+        friction, soft = (
+            dict(pairs).get(segment.name) for pairs in (options.contact_friction, options.segment_friction)
+        )
+        # Of two geometries the engine takes the larger friction.
+        special = {} if friction is None else {"friction": [friction, *_TURNING_FRICTION]}
+        special |= {} if soft is None else _soft_contact(soft, options)
         for shape in segment.shapes:
             _add_shape(item, segment, shape, {**contact, **special})
     for effector in body.effectors.values():
@@ -337,7 +346,7 @@ under load, so that a body slides on a cushion instead of bouncing along it."""
 def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
     """Contact settings of soft flesh, which count before those of what it touches."""
     return {
-        "friction": [friction, 0.005, 0.0001],
+        "friction": [friction, *_TURNING_FRICTION],
         "solref": [options.soft_time_constant, options.contact_damping_ratio],
         "priority": 1,
         "solimp": [*SOFT_IMPEDANCE, 0.5, 2.0],

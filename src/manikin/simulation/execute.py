@@ -56,17 +56,27 @@ class _Hold:
 
 
 def default_physics(body: BodyModel, schedule: ContactSchedule) -> PhysicsOptions:
-    """Physics of an execution: the schedule's least friction, stiff contacts, passive damping.
+    """Physics of an execution: stiff contacts, passive damping, and the friction of the planned contacts.
 
-    A segment that slides to its place on a seat has the friction of that contact alone.
+    Each segment that makes contact has the least friction of its own contacts, everything else the least
+    of all: feet do not slip on the floor because a seat is smooth. A segment that slides to its place on a
+    seat has the friction of that contact alone.
     """
     every = (contact for phase in schedule.sequence for contact in phase.stance)
     contacts = [contact for contact in every if contact.kind is not ContactKind.GRASP]
     options = PhysicsOptions(joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME)
     sliding = {body.effector(c.effector).segment: c.friction for c in contacts if c.settle > 0.0}
-    firm = [contact.friction for contact in contacts if contact.settle == 0.0]
     options = replace(options, segment_friction=tuple(sorted(sliding.items())))
-    return replace(options, friction=min(firm)) if firm else options
+    firm: dict[str, float] = {}
+    for contact in contacts:
+        if contact.settle == 0.0:
+            for segment in end_segments(body, contact.effector):
+                firm[segment] = min(firm.get(segment, np.inf), contact.friction)
+    if not firm:
+        return options
+    least = min(firm.values())
+    rougher = tuple(sorted((name, value) for name, value in firm.items() if value > least))
+    return replace(options, friction=least, contact_friction=rougher)
 
 
 def execute(

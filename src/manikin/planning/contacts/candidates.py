@@ -13,6 +13,8 @@ from manikin.scene import Surface
 
 IntArray = NDArray[np.int64]
 
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Situation:
@@ -74,9 +76,6 @@ class SurfaceTable:
         offsets: (m,) of their planes along the normals [m].
         group: (m,) number of the direction that a surface has for its normal.
         frames: (g, 3, 3) of each direction the normal and two axes in its planes.
-        lines: (l, 3) the axes of all frames, those along one line once; upright boxes have three together.
-        line: (g, 3) number of the line of each axis.
-        sign: (g, 3) +1 where the axis is along the line's direction, -1 where it is against it.
         side_low: (m, 2) smallest coordinates of the polygons along these axes [m].
         side_high: (m, 2) largest ones.
         filled: (m,) whether a polygon is all of the rectangle between them, as the faces of boxes are.
@@ -100,7 +99,6 @@ class SurfaceTable:
         self.group: IntArray = group.ravel()
         sides = np.array([self.surfaces[number].rotation[:, :2].T for number in first]).reshape(-1, 2, 3)
         self.frames = np.concatenate([self.normals[first][:, None], sides], axis=1)
-        self.lines, self.line, self.sign = _lines(self.frames)
         shadows = [
             item.polygon @ sides[number].T for item, number in zip(self.surfaces, self.group, strict=True)
         ]
@@ -118,11 +116,13 @@ class SurfaceTable:
         hull, radius = samples.hull
         away = np.clip(situation.origin, self._low, self._high) - situation.origin
         near = np.flatnonzero(np.einsum("mi,mi->m", away, away) <= (radius + tolerance) ** 2)
-        # Extents of the hull along the normals and sides of all directions, from the limb's origin.
-        extents = self.frames @ (situation.rotation @ hull.T)
-        low, high = extents.min(axis=2) - tolerance, extents.max(axis=2) + tolerance
-        offset = self.frames @ situation.origin
-        group = self.group[near]
+        # Extents of the hull along the normals and sides of their directions, from the limb's origin.
+        used, group = np.unique(self.group[near], return_inverse=True)
+        frames = self.frames[used]
+        extents = (frames.reshape(-1, 3) @ situation.rotation) @ hull.T
+        low = extents.min(axis=1).reshape(-1, 3) - tolerance
+        high = extents.max(axis=1).reshape(-1, 3) + tolerance
+        offset = frames @ situation.origin
         heights = self.offsets[near] - offset[group, 0]
         meets = (heights >= low[group, 0]) & (heights <= high[group, 0])
         sides = offset[group, 1:]
@@ -186,14 +186,17 @@ def find_candidates(
             tilted more cannot be aligned by small moves of the joints.
         footprint: (c, 3) points of the effector's frame that must lie over the polygon [m].
     """
-    rows, owner, gap = _near_planes(table, numbers, situation, samples, tolerance, float(np.cos(max_tilt)))
+    rows, owner, gap = _near_planes(table, numbers, situation, samples, tolerance, max_tilt)
     order = np.argsort(rows * len(numbers) + owner)  # no two are the same
     rows, owner, gap = rows.take(order), owner.take(order), gap.take(order)
     normals = (table.normals[numbers] @ situation.rotation).take(owner, axis=0)
     normals *= gap[:, None]
     points = situation.to_world(samples.positions.take(rows, axis=0) - normals)
-    if not table.filled[numbers].all():
-        inside = table.over(points, numbers[owner]).nonzero()[0]
+    loose = (~table.filled[numbers]).take(owner).nonzero()[0]
+    if len(loose):
+        kept = np.ones(len(owner), dtype=bool)
+        kept[loose] = table.over(points.take(loose, axis=0), numbers[owner[loose]])
+        inside = kept.nonzero()[0]
         rows, owner, points = rows.take(inside), owner.take(inside), points.take(inside, axis=0)
     if len(footprint) > 1:
         turns = situation.rotation @ samples.rotations.take(rows, axis=0)
@@ -207,54 +210,35 @@ def find_candidates(
 
 
 def _near_planes(
-    table: SurfaceTable,
-    numbers: IntArray,
-    situation: Situation,
-    samples: LimbSamples,
-    tolerance: float,
-    least: float,
-) -> tuple[IntArray, IntArray, FloatArray]:
-    """Samples upright over planes, within the bounds of their polygons; one direction of planes at a time.
+    table: SurfaceTable, numbers: IntArray, situation: Situation, samples: LimbSamples, tolerance: float,
+    max_tilt: float,
+) -> tuple[IntArray, IntArray, FloatArray]:  # fmt: skip
+    """Samples upright over planes, within the bounds of their polygons; whole leaves of samples first.
 
     Returns:
         Rows of the samples, positions of their surfaces in ``numbers``, heights over the planes [m].
     """
-    lines = table.lines @ situation.rotation
-    upward, places = lines @ samples.upward.T, lines @ samples.positions.T
-    shift = (table.lines @ situation.origin).tolist()
-    own_group = table.group[numbers]
-    selected: list[tuple[IntArray, IntArray, FloatArray]] = []
-    for group in set(own_group.tolist()):
-        own = (own_group == group).nonzero()[0]
-        surfaces = numbers[own]
-        (along, *sides), (sign, *signs) = table.line[group].tolist(), table.sign[group].tolist()
-        planes = sign * table.offsets[surfaces] - shift[along]
-        low, high = planes - tolerance, planes + tolerance
-        rows = (upward[along] >= least if sign > 0.0 else upward[along] <= -least).nonzero()[0]
-        height = places[along].take(rows)
-        level = ((height >= low.min()) & (height <= high.max())).nonzero()[0]
-        rows, height = rows.take(level), height.take(level)
-        inside = (height >= low[:, None]) & (height <= high[:, None])
-        ends = table.side_low[surfaces], table.side_high[surfaces]
-        for axis, (line, side) in enumerate(zip(sides, signs, strict=True)):
-            place = side * (places[line].take(rows) + shift[line])
-            inside &= place >= ends[0][:, axis, None]
-            inside &= place <= ends[1][:, axis, None]
-        which, near = np.divmod(inside.ravel().nonzero()[0], len(rows) or 1)
-        selected.append((rows.take(near), own.take(which), sign * (height.take(near) - planes.take(which))))
-    rows, owner, gap = (np.concatenate(parts) for parts in zip(*selected, strict=True))
-    return rows, owner, gap
-
-
-def _lines(frames: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Lines (l, 3) along which the axes of frames (g, 3, 3) are; of each its line and its sign (g, 3)."""
-    axes = frames.reshape(-1, 3)
-    rounded = np.round(axes, 9)
-    leading = np.take_along_axis(rounded, np.argmax(rounded != 0.0, axis=1)[:, None], axis=1)
-    sign = np.where(leading < 0.0, -1.0, 1.0)
-    _, first, line = np.unique(sign * rounded + 0.0, axis=0, return_index=True, return_inverse=True)
-    shape = frames.shape[:2]
-    return (sign * axes)[first].reshape(-1, 3), line.reshape(shape), sign.reshape(shape)
+    leaves, frames = samples.leaves, table.frames[table.group[numbers]]
+    shift = frames @ situation.origin
+    axes = frames @ situation.rotation  # (m, 3, 3): the normal and two sides, in the limb's frame
+    planes = table.offsets[numbers]
+    low = np.column_stack([planes - tolerance, table.side_low[numbers]]) - shift
+    high = np.column_stack([planes + tolerance, table.side_high[numbers]]) - shift
+    slopes = axes[:, 0] @ leaves.axes.T
+    near = slopes >= np.cos(np.minimum(max_tilt + leaves.spreads + _ROUNDING, np.pi))
+    for axis in range(3):
+        at = axes[:, axis] @ leaves.centres.T
+        near &= at >= low[:, axis, None] - leaves.radii
+        near &= at <= high[:, axis, None] + leaves.radii
+    owner, leaf = near.nonzero()
+    upright = np.einsum("pki,pi->pk", leaves.upward[leaf], axes[owner, 0]) >= np.cos(max_tilt)
+    pair, place = upright.nonzero()
+    owner, leaf = owner[pair], leaf[pair]
+    at = np.einsum("pai,pi->pa", axes[owner], leaves.positions[leaf, place])
+    inside = ((at >= low[owner]) & (at <= high[owner])).all(axis=1).nonzero()[0]
+    owner = owner[inside]
+    height = at[inside, 0] + shift[owner, 0] - planes[owner]
+    return leaves.rows[leaf[inside], place[inside]], owner, height
 
 
 def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:

@@ -67,8 +67,11 @@ def force_transmission_ratio(products: FloatArray, direction: ArrayLike) -> Floa
     From (n, 3, 3) ``J J^T`` [m^2] and a vector ``v`` (3,) in the same frame, of which the direction counts;
     (n,), infinite where the limb carries it without torque.
     """
-    v = unit_direction(direction)
-    squares = np.maximum((products.reshape(-1, 9) @ np.outer(v, v).ravel()), 0.0)
+    return _ratio(products, unit_direction(direction))
+
+
+def _ratio(products: FloatArray, v: FloatArray) -> FloatArray:
+    squares = np.maximum(products.reshape(-1, 9) @ (v[:, None] * v).ravel(), 0.0)
     with np.errstate(divide="ignore"):
         return 1.0 / np.sqrt(squares)
 
@@ -89,8 +92,8 @@ def efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> Fl
     Returns:
         (n,) finite, negative where the surface would have to pull.
     """
-    ratio = np.minimum(force_transmission_ratio(products, direction), MOST_RATIO)
-    return ratio * (normals @ unit_direction(direction))
+    v = unit_direction(direction)
+    return np.minimum(_ratio(products, v), MOST_RATIO) * (normals @ v)
 
 
 def pulling_efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:

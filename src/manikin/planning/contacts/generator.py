@@ -188,14 +188,14 @@ class ContactGenerator:
     ) -> list[GeneratedContact]:  # fmt: skip
         """Answers of one limb to tasks in the order of preference, up to the first that has a contact.
 
-        The samples in contact are looked up once. Other arguments and errors are those of :meth:`request`.
+        The surfaces within reach are looked up once. Other arguments and errors are those of :meth:`request`.
         """
-        near = self._samples_in_contact(q, limb, kind)
-        if isinstance(near, GeneratedContact):
-            return [near]
+        reached = self._within_reach(q, limb, kind)
+        if isinstance(reached, GeneratedContact):
+            return [reached]
         answers: list[GeneratedContact] = []
         for task in tasks:
-            answers += self._choose(near, task, heuristic or Efort(), usable)
+            answers += self._answers(reached, task, heuristic or Efort(), usable)
             if answers[-1].found:
                 break
         return answers
@@ -212,15 +212,15 @@ class ContactGenerator:
             most: Largest number of contacts.
             apart: Distance between two of them [m].
         """
-        near = self._samples_in_contact(q, limb, kind)
-        if isinstance(near, GeneratedContact):
-            return [near]
-        return self._choose(near, task, heuristic or Efort(), None, most, apart)
+        reached = self._within_reach(q, limb, kind)
+        if isinstance(reached, GeneratedContact):
+            return [reached]
+        return self._answers(reached, task, heuristic or Efort(), None, most, apart)
 
-    def _samples_in_contact(
+    def _within_reach(
         self, q: ArrayLike, limb: str, kind: ContactKind | None
-    ) -> "_SamplesInContact | GeneratedContact":
-        """Steps 1 and 2: the limb's samples on surfaces, whatever the task, or why there are none."""
+    ) -> "_WithinReach | GeneratedContact":
+        """Step 1: the surfaces within reach of a limb, whatever the task, or that there are none."""
         if limb not in self._tools:
             raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
         tools = self._tools[limb]
@@ -232,19 +232,61 @@ class ContactGenerator:
         if not len(near):
             return _failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")
         sole = footprint(self.body, tools.limb, touch, self.rules)
-        candidates = find_candidates(
-            self._table, near, situation, tools.samples, tolerance=self.settings.tolerance,
-            max_tilt=self.settings.max_tilt, footprint=sole,
-        )  # fmt: skip
+        return _WithinReach(tools, situation, near, touch, sole)
+
+    def _answers(
+        self, reached: "_WithinReach", task: Task, heuristic: Heuristic, usable: UsableEfort | None,
+        most: int = 1, apart: float = 0.0,
+    ) -> list[GeneratedContact]:  # fmt: skip
+        """Steps 2 to 4 for one task; surfaces that face another way are not looked at."""
+        tools, numbers = reached.tools, reached.surfaces
+        situation = replace(reached.situation, reaction=task.reaction_on(tools.limb.name))
+        if usable is not None:
+            most_efort = tools.samples.largest_ratio * (self._table.normals[numbers] @ situation.reaction)
+            numbers = numbers[usable.signed(most_efort) >= usable.least]
+        candidates = self._samples_in_contact(reached, numbers)
         if not len(candidates):
+            return [self._none_lies(reached, situation, usable)]
+        if usable is None:
+            scores, rows = heuristic.score(situation, candidates), np.arange(len(candidates))
+        else:
+            order = Efort(usable.pulling)
+            values = order.score(situation, candidates)
+            rows = np.flatnonzero(values >= usable.least)
+            scores = values if heuristic == order else heuristic.score(situation, candidates)
+        if not len(rows):
+            return [self._none_lies(reached, situation, usable)]
+        return self._choose(reached, situation, candidates, scores, rows, usable, most, apart)
+
+    def _samples_in_contact(self, reached: "_WithinReach", numbers: NDArray[np.int64]) -> Candidates:
+        """Step 2: samples on some of the surfaces within reach."""
+        candidates = find_candidates(
+            self._table, numbers, reached.situation, reached.tools.samples,
+            tolerance=self.settings.tolerance, max_tilt=self.settings.max_tilt, footprint=reached.footprint,
+        )  # fmt: skip
+        if reached.kind is ContactKind.GRASP and len(candidates):
+            palms = self._scene.palms(candidates.surfaces, candidates.points)
+            candidates = replace(candidates, points=palms)
+        return candidates
+
+    def _none_lies(
+        self, reached: "_WithinReach", situation: Situation, usable: UsableEfort | None
+    ) -> GeneratedContact:
+        """Failure of a limb of which no sample lies on a surface, or on none that pushes it the asked way."""
+        limb, near = reached.tools.limb.name, reached.surfaces
+        candidates = self._samples_in_contact(reached, near)
+        if usable is None or not len(candidates):
             message = (
                 f"no sample of {limb} lies flat on a surface of {self._names(near)}, though these are near"
             )
             return _failure(limb, Hindrance.SURFACE, message)
-        if touch is ContactKind.GRASP:
-            palms = self._scene.palms(candidates.surfaces, candidates.points)
-            candidates = replace(candidates, points=palms)
-        return _SamplesInContact(tools, situation, candidates, touch, sole)
+        best = float(Efort(usable.pulling).score(situation, candidates).max())
+        does = "holds" if usable.pulling else "pushes"
+        message = (
+            f"no surface in reach of {limb} ({self._names(candidates.surfaces)}) {does} it that way: "
+            f"the best EFORT is {best:.2g} N per N.m, usable {usable.least:.2g}"
+        )
+        return _failure(limb, Hindrance.DIRECTION, message, len(candidates))
 
     def _names(self, surfaces: NDArray[np.int64]) -> str:
         """Names of the obstacles of some surfaces."""
@@ -252,19 +294,11 @@ class ContactGenerator:
         return ", ".join(sorted({name for surface in near for name in surface.obstacles}))
 
     def _choose(
-        self, near: "_SamplesInContact", task: Task, heuristic: Heuristic, usable: UsableEfort | None,
-        most: int = 1, apart: float = 0.0,
+        self, reached: "_WithinReach", situation: Situation, candidates: Candidates, scores: FloatArray,
+        rows: NDArray[np.int64], usable: UsableEfort | None, most: int, apart: float,
     ) -> list[GeneratedContact]:  # fmt: skip
-        """Steps 3 and 4: best first, the first that can be aligned, are usable and free."""
-        tools, candidates, kind = near.tools, near.candidates, near.kind
-        situation = replace(near.situation, reaction=task.reaction_on(tools.limb.name))
-        rows = np.arange(len(candidates))
-        if usable is not None:
-            values = Efort(usable.pulling).score(situation, candidates)
-            rows = np.flatnonzero(values >= usable.least)
-            if not len(rows):
-                return [self._wrong_direction(near, float(values.max()), usable)]
-        scores = heuristic.score(situation, candidates)
+        """Steps 3 and 4: of some rows best first, the first that can be aligned, are usable and free."""
+        tools, kind = reached.tools, reached.kind
         answers: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()
         flat = kind is ContactKind.SOLE
@@ -296,7 +330,7 @@ class ContactGenerator:
                 faults[hit] += 1
                 continue
             turn = situation.rotation @ aligned.rotation
-            if flat and not self._table.carries_one(point + near.footprint @ turn.T, surface):
+            if flat and not self._table.carries_one(point + reached.footprint @ turn.T, surface):
                 faults[_TILTED] += 1
                 continue
             alpha = float(efort(aligned.product[None], direction, goal[2][None])[0])
@@ -314,18 +348,6 @@ class ContactGenerator:
             if len(answers) == most:
                 break
         return answers or [_none_fits(tools.limb.name, faults, len(candidates), usable)]
-
-    def _wrong_direction(
-        self, near: "_SamplesInContact", best: float, usable: UsableEfort
-    ) -> GeneratedContact:
-        """Failure of a limb that reaches surfaces of which none pushes it, or holds it, the asked way."""
-        does = "holds" if usable.pulling else "pushes"
-        limb, candidates = near.tools.limb.name, near.candidates
-        message = (
-            f"no surface in reach of {limb} ({self._names(candidates.surfaces)}) {does} it that way: "
-            f"the best EFORT is {best:.2g} N per N.m, usable {usable.least:.2g}"
-        )
-        return _failure(limb, Hindrance.DIRECTION, message, len(candidates))
 
     def _worth_trying(
         self,
@@ -355,12 +377,12 @@ class ContactGenerator:
 
 
 @dataclass(frozen=True, eq=False)
-class _SamplesInContact:
-    """Samples of a limb on surfaces, before a task orders them; the situation has no direction yet."""
+class _WithinReach:
+    """Surfaces within reach of a limb, by their numbers; the situation has no direction yet."""
 
     tools: "_LimbTools"
     situation: Situation
-    candidates: Candidates
+    surfaces: NDArray[np.int64]
     kind: ContactKind
     footprint: FloatArray
 
@@ -376,7 +398,12 @@ class _LimbTools:
         self.collisions = LimbCollisions(body, limb, scene)
         self.deep = DeepSamples(body, self.chain, samples, self.collisions)
         self._range = NaturalRange(body, limb) if samples.natural else None
-        _ = samples.upward, samples.manipulability, samples.hull  # made now, not during a request
+        _ = (
+            samples.leaves,
+            samples.manipulability,
+            samples.hull,
+            samples.largest_ratio,
+        )  # made now, not during a request
 
     def allowed(self, settings: GeneratorSettings, *, flat: bool) -> tuple[float, float]:
         """Distance [m] and tilt [rad] that the alignment may leave; what no joint moves is taken as it is."""

@@ -1,5 +1,6 @@
 """Sampled configurations of a limb, made once and asked often ([Tonneau2015]_ 5.1.4, 5.3.1)."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,6 +14,7 @@ from manikin.errors import BodyError
 from manikin.kinematics import LimbKinematics, ReachVolume
 from manikin.kinematics.limb_kinematics import hull_of, rigid_reach
 from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.planning.contacts.efort import MOST_RATIO
 
 THRESHOLD = 0.05
 """Smallest manipulability, as a share of the largest one seen; our choice, the thesis leaves it open."""
@@ -62,6 +64,12 @@ class LimbSamples:
         return np.ascontiguousarray(self.rotations[:, :, 2])
 
     @cached_property
+    def largest_ratio(self) -> float:
+        """Largest force transmission ratio of a sample in any direction (5.11) [N per N.m]."""
+        least = float(np.linalg.eigvalsh(self.products)[:, 0].min())
+        return min(1.0 / math.sqrt(least), MOST_RATIO) if least > 0.0 else MOST_RATIO
+
+    @cached_property
     def leaves(self) -> "SampleLeaves":
         """The samples in small groups that are near each other, for the look-up of those at a surface."""
         return SampleLeaves.of(self.positions, self.upward)
@@ -80,6 +88,7 @@ class LimbSamples:
         return hull_of(self.limb, self.segment, self.positions + self.origin)
 
 
+_ROUNDING = 1e-9
 _LEAF = 16
 """Largest number of samples in a leaf."""
 
@@ -89,9 +98,9 @@ class SampleLeaves:
     """Samples in l groups of k that are alike in position and direction, the ends of a k-d tree.
 
     Attributes:
-        rows: (l, k) rows of the samples; -1 where a group has fewer.
-        positions: (l, k, 3) of the effector [m]; NaN where there is none.
-        upward: (l, k, 3) its z axes.
+        rows: (l, k) rows of the samples.
+        positions: (l, k, 3) of the effector [m].
+        upward: (l, k, 3) its z axes; NaN for what only fills a group up.
         centres: (l, 3) middle of the box about the positions [m].
         radii: (l,) of a ball about it that holds them [m].
         axes: (l, 3) unit direction in the middle of the z axes.
@@ -112,27 +121,24 @@ class SampleLeaves:
         radius = 0.5 * float(np.ptp(positions, axis=0).max(initial=0.0))
         features = np.concatenate([positions, radius * upward], axis=1)
         levels = max(0, int(np.ceil(np.log2(len(positions) / _LEAF))))
-        size = int(np.ceil(len(positions) / 2**levels)) * 2**levels
-        rows = np.full(size, -1, dtype=np.int64)
-        rows[: len(positions)] = np.arange(len(positions))
-        rows = rows[None]
+        whole = int(np.ceil(len(positions) / 2**levels)) * 2**levels
+        rows = np.arange(whole)[None]  # what is beyond the samples stands for one of them and is no sample
         for _ in range(levels):
-            values = np.where(rows[..., None] >= 0, features[rows], np.nan)
-            widest = np.argmax(np.nanmax(values, axis=1) - np.nanmin(values, axis=1), axis=1)
+            values = features[rows % len(positions)]
+            widest = np.argmax(np.ptp(values, axis=1), axis=1)
             along = np.take_along_axis(values, widest[:, None, None], axis=2)[..., 0]
-            order = np.argsort(along, axis=1, kind="stable")  # what is missing comes last
+            order = np.argsort(along, axis=1, kind="stable")
             rows = np.take_along_axis(rows, order, axis=1).reshape(2 * len(rows), -1)
-        missing = (rows < 0)[..., None]
-        places = np.where(missing, np.nan, positions[rows])
-        directions = np.where(missing, np.nan, upward[rows])
-        centres = 0.5 * (np.nanmin(places, axis=1) + np.nanmax(places, axis=1))
-        radii = np.sqrt(np.nanmax(((places - centres[:, None]) ** 2).sum(axis=2), axis=1))
-        axes = np.nanmean(directions, axis=1)
+        real, rows = rows < len(positions), rows % len(positions)
+        places, directions = positions[rows], upward[rows]
+        centres = 0.5 * (places.min(axis=1) + places.max(axis=1))
+        radii = np.sqrt(((places - centres[:, None]) ** 2).sum(axis=2).max(axis=1)) + _ROUNDING
+        axes = directions.mean(axis=1)
         axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-12)
-        cosines = np.nanmin(np.einsum("lki,li->lk", directions, axes), axis=1)
-        return SampleLeaves(
-            rows, places, directions, centres, radii, axes, np.arccos(np.clip(cosines, -1.0, 1.0))
-        )
+        cosines = np.einsum("lki,li->lk", directions, axes).min(axis=1)
+        spreads = np.arccos(np.clip(cosines, -1.0, 1.0))
+        directions[~real] = np.nan
+        return SampleLeaves(rows, places, directions, centres, radii, axes, spreads)
 
 
 def manipulability(products: FloatArray) -> FloatArray:

@@ -197,7 +197,8 @@ class _Asked:
             return roles[len(answers) - 1], result, self.usable.signed(result.efort)
         farthest = max(range(len(answers)), key=lambda row: _progress(answers[row]))
         causes = [f"{role.infinitive}, {item.message}" for role, item in zip(roles, answers, strict=False)]
-        message = "; ".join(causes) if len(answers) > 1 else result.message
+        same = len({item.message for item in answers}) == 1
+        message = result.message if same else "; ".join(causes)
         return roles[farthest], replace(answers[farthest], message=message), None
 
 
