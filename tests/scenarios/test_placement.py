@@ -20,7 +20,7 @@ PLACES = st.tuples(
 OF_THE_BODY_OR_SHAPE = {
     ("LimbSection", "position"), ("LimbSection", "normal"), ("ObstacleSection", "box"),
     ("ObstacleSection", "plane"), ("ObstacleSection", "half_space"), ("PushSection", "direction_deg"),
-    ("BodySection", "standing_deg"), ("PhaseSection", "com_within_m"),
+    ("BodySection", "standing_deg"), ("PhaseSection", "com_within_m"), ("ContactSection", "polygon"),
     ("WeightsSection", "velocity"), ("WeightsSection", "acceleration"), ("WeightsSection", "jerk"),
 }  # fmt: skip
 """Vectors and angles of a file that are not measured in the world."""

@@ -21,9 +21,9 @@ def chairs(sketch: Sketch) -> None:
     arms, padded = sketch.coin(), sketch.coin()
     side = 0.5 * (sketch.between(0.50, 0.56) if arms else sketch.between(0.42, 0.50))
     rear = front - deep
-    pads = {"padded": True} if padded else {}
-    sketch.box("seat", (rear, front), (-side, side), (seat - thick, seat), **pads)
-    sketch.box("back", (rear - 0.04, rear), (-side, side), (seat, seat + sketch.between(0.35, 0.5)), **pads)
+    sketch.box("seat", (rear, front), (-side, side), (seat - thick, seat), padded=padded)
+    top = seat + sketch.between(0.35, 0.5)
+    sketch.box("back", (rear - 0.04, rear), (-side, side), (seat, top), padded=padded)
     for name, x in (("front", front - 0.07), ("rear", rear)):
         for edge, y in (("left", side - 0.04), ("right", -side)):
             sketch.box(f"{name}_{edge}_leg", (x, x + 0.04), (y, y + 0.04), (0.0, seat - thick))
@@ -108,7 +108,9 @@ def buildings(sketch: Sketch) -> None:
         solids.append(solid.apply_translation(0.5 * scale * (low + high)))
     ending = "stl" if sketch.coin() else "obj"
     keys = {} if unit == "m" else {"unit": unit}
-    sketch.mesh("building", trimesh.util.concatenate(solids), ending, corner, **keys)
+    whole = trimesh.util.concatenate(solids)
+    assert isinstance(whole, trimesh.Trimesh)
+    sketch.mesh("building", whole, ending, corner, **keys)
     sketch.start(0.0, sketch.between(-0.2, 0.2))
     last = first + 0.3 * (steps - 1)
     sketch.goal(0.5 * (last + end), sketch.between(-0.4, 0.4), sketch.between(-90.0, 90.0, 1))
