@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +30,8 @@ _STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
 _FEW, _SOME, _BLOCK = 4, 16, 64  # candidates looked at together: first, later, and where many collide
 _NO_DIRECTION = np.zeros(3)
 _LOOKED_AT = 8  # candidates for each that may be tried
+Alpha = TypeVar("Alpha", float, FloatArray)
+
 _TILTED, _UNNATURAL, _WEAK = ("", "tilted"), ("", "unnatural"), ("", "weak")
 NATURAL_SLACK = 0.1
 """Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
@@ -61,7 +64,7 @@ class UsableEfort:
     least: float
     pulling: bool = False
 
-    def signed(self, alpha: float) -> float:
+    def signed(self, alpha: Alpha) -> Alpha:
         """EFORT of what the limb does, from that of a limb that presses."""
         return -alpha if self.pulling else alpha
 
