@@ -60,7 +60,7 @@ MERGED_TURN = math.radians(15.0)
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.
 
-A way costs at most the factor more than the cheapest one.
+No bound on the cost of a way follows: the estimate counts turns, and may be more than the least cost.
 """
 
 ALIKE = 0.08
