@@ -25,7 +25,7 @@ from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
-from manikin.scene.collision import collision_parts
+from manikin.scene.collision import collision_parts, local_box
 
 STEP = 0.7
 """Time of a short step [s]; our choice, as the next ones."""
@@ -462,8 +462,7 @@ def _bounds(
     geometry: coal.CollisionGeometry, place: coal.Transform3s
 ) -> tuple[FloatArray, FloatArray] | None:
     """Corners of the box about a placed geometry along the axes; None where it is endless."""
-    geometry.computeLocalAABB()
-    low, high = np.asarray(geometry.aabb_local.min_), np.asarray(geometry.aabb_local.max_)
+    low, high = (np.asarray(corner) for corner in local_box(geometry))
     if not (np.isfinite(low).all() and np.isfinite(high).all()) or np.abs([low, high]).max() > 1e6:
         return None
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T

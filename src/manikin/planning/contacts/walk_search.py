@@ -21,15 +21,13 @@ from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import Extension, SearchLog
-from manikin.planning.contacts.endpoint import stand_up
+from manikin.planning.contacts.endpoint import FEET, stand_up
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.planning.contacts.footsteps import STEP, FootstepSearch
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.scene import Scene
-
-FEET = ("left_foot", "right_foot")
 
 COLUMN = (0.12, 0.5, 0.9)
 """Radius, lowest and highest end above the ground of what has to be free, of a body of 1.75 m [m]."""
