@@ -16,8 +16,9 @@ import pinocchio as pin
 
 from manikin.balance import MotionMargin, WrenchPolytope, motion_margin
 from manikin.body import BodyModel
-from manikin.body.limbs import end_segments, hanging_segment
+from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -364,7 +365,7 @@ def deepest_penetration(
     for swing in schedule.sequence.swings():
         start, end = schedule.swing_interval(swing)
         rows = np.flatnonzero((motion.time >= start) & (motion.time < end))
-        ends = frozenset(end_segments(body, swing.effector))
+        ends = frozenset(segment for segment, _ in touching_pairs(body, [(swing.effector, "")]))
         obstacles = _supports(body, ends, [ignored[row] for row in rows.tolist()])
         if not obstacles:
             continue
