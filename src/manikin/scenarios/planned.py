@@ -373,6 +373,8 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
         entry["normal"] = [float(x) for x in contact.normal]
     if contact.friction != friction:
         entry["friction"] = contact.friction
+    if contact.rolls:
+        entry["edge_radius_m"] = contact.edge_radius
     if contact.hangs_over:
         entry["polygon"] = contact.points[:, :2].tolist()
     return entry

@@ -65,6 +65,7 @@ class _ContactSearch:
         return Endpoints(
             self._body, self._scene, self._scenario.contacts.friction, reference,
             natural=self._natural, friction_model=self._scenario.contact_model.friction,
+            rolls=not self._scenario.refines,
         )  # fmt: skip
 
 

@@ -311,10 +311,14 @@ def _measured(
     error = turn = 0.0
     for contact in item.held:
         rotation, position = state.effector_placement(contact.effector)
-        error = max(error, float(np.linalg.norm(position - contact.position)))
-        if contact.kind is ContactKind.SOLE:
+        moved = float(np.linalg.norm(position - contact.position))
+        if contact.rolls:
+            moved, turned = contact.rolled_away(rotation, position)
+            turn = max(turn, turned)
+        elif contact.kind is ContactKind.SOLE:
             off = rotation.T @ contact.rotation_contact_to_world
             turn = max(turn, float(np.linalg.norm(pin.log3(off))))
+        error = max(error, moved)
     touched = [(contact.effector, name) for contact in item.held for name in scene.touched_obstacles(contact)]
     near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
     pair = f", {' and '.join(near.pairs[int(np.argmin(near.distance))])}" if len(near.distance) else ""

@@ -65,7 +65,7 @@ class Endpoints:
 
     def __init__(
         self, body: BodyModel, scene: Scene, friction: float, reference: FloatArray | None = None, *,
-        natural: bool = False, friction_model: FrictionModel = "outer",
+        natural: bool = False, friction_model: FrictionModel = "outer", rolls: bool = False,
     ) -> None:  # fmt: skip
         """Prepare a scene.
 
@@ -75,8 +75,9 @@ class Endpoints:
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
             natural: Whether hips and shoulders keep to their learnt ranges.
             friction_model: Friction model of the stances.
+            rolls: Whether a seated pelvis may roll forward on the front of the buttocks.
         """
-        self._body, self._scene, self._friction = body, scene, friction
+        self._body, self._scene, self._friction, self._rolls = body, scene, friction, rolls
         self._stature = stature_of(body)
         settings = PostureFinderSettings(natural=natural, friction_model=friction_model)
         self._poser = PostureFinder(body, scene, reference, settings)
@@ -133,7 +134,7 @@ class Endpoints:
         The buttocks are on the lowest seat there on which it can, at the place or before it.
         """
         low, high = (share * self._stature for share in SEAT_HEIGHTS)
-        sitter = Sitter(self._body, self._footholds, self._friction)
+        sitter = Sitter(self._body, self._footholds, self._friction, rolls=self._rolls)
         reasons: list[str] = []
         # Below the seat there may be no floor: it is looked for where the feet may be.
         forward = self._stature * rotation_from_yaw(heading)[:2, 0]

@@ -16,8 +16,8 @@ import numpy as np
 from manikin.balance.criteria import static_torque_share
 from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import ANKLE_FROM_HEEL
-from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.contact import Contact, Stance, point, sole
+from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
+from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
@@ -67,10 +67,13 @@ TRIED = 6
 """Sittings that are tried with the whole body."""
 
 LEAN = {
-    "hip_flexion": 1.5, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1, "lumbar_flexion": 0.95,
-    "thorax_flexion": 0.6, "neck_flexion": -0.4,
+    "hip_flexion": 1.5, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1, "lumbar_flexion": 0.8,
+    "thorax_flexion": 0.5, "neck_flexion": -0.4,
 }  # fmt: skip
-"""Angles of a body that leans far forward on a seat [rad]."""
+"""Angles of a body that leans far forward on a seat, its pelvis flat [rad]."""
+
+LEAN_PITCH = 0.5
+"""Pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +94,17 @@ class Sitting:
 class Sitter:
     """Compares ways to sit of one human body."""
 
-    def __init__(self, body: BodyModel, footholds: Footholds, friction: float) -> None:
+    def __init__(self, body: BodyModel, footholds: Footholds, friction: float, *, rolls: bool = True) -> None:
         """Take the lengths of the body; the friction is that of the soles.
+
+        Args:
+            rolls: Whether the pelvis may roll forward on the front of the buttocks; it lies flat otherwise.
 
         Raises:
             BodyError: If its legs are not a human's.
         """
         self._body, self._footholds, self._friction = body, footholds, friction
+        self._rolls = rolls
         self.stature = stature_of(body)
         legs = LegKinematics(body)
         self._thigh, self._shank = legs.thigh, legs.shank
@@ -108,9 +115,19 @@ class Sitter:
             float(body.segment(f"left_{name}").shapes[0].size[0]) for name in ("thigh", "leg")
         )
         self._heel = ANKLE_FROM_HEEL * float(body.sole_length or 0.0)
-        q = body.posture(_of_both_sides(body, LEAN))
-        state = Configuration(body, q)
-        self._lean = float((state.com - state.effector_placement("buttocks")[1])[0])
+        self._lean = self._farthest_lean()
+
+    def _farthest_lean(self) -> float:
+        """Way of the centre of mass before the middle of the buttocks' place where the body leans far [m]."""
+        pitch = LEAN_PITCH * self._rolls
+        q = self._body.posture(
+            _of_both_sides(self._body, {**LEAN, "hip_flexion": LEAN["hip_flexion"] + pitch})
+        )
+        q[3:7] = [0.0, np.sin(0.5 * pitch), 0.0, np.cos(0.5 * pitch)]
+        state = Configuration(self._body, q)
+        turn, place = state.effector_placement("buttocks")
+        edge = self.stature * np.array([0.5 * SEAT_LENGTH, 0.0, BUTTOCK_RADIUS])
+        return float((state.com - place - turn @ edge + edge)[0]) + self.stature * BUTTOCK_RADIUS * pitch
 
     def sittings(self, at: FloatArray, heading: float, seat: Surface, floor: float) -> Iterator[Sitting]:
         """Ways to sit near a place, the best first.
@@ -138,6 +155,8 @@ class Sitter:
                     "buttocks", at + forward * turn[:, 0], heading, length=SEAT_LENGTH * size,
                     width=SEAT_WIDTH * size, friction=SEAT_FRICTION,
                 )  # fmt: skip
+                if self._rolls:
+                    buttocks = rolling_front(buttocks, BUTTOCK_RADIUS * size)
                 tried.append((forward, ahead))
                 yield Sitting({"buttocks": buttocks, **feet[row]}, self._guess(buttocks, heading), cost)
 

@@ -312,8 +312,12 @@ def support_errors(
         pin.forwardKinematics(model, data, q)
         pin.updateFramePlacements(model, data)
         for contact in schedule.sequence[int(phases[k])].stance:
-            measure = _placement_error if contact.part is SolePart.FULL else _part_error
-            moved, turned = measure(body, data, contact)
+            if contact.rolls:
+                here = data.oMf[body.effector_frame(contact.effector)]
+                moved, turned = contact.rolled_away(here.rotation, here.translation)
+            else:
+                measure = _placement_error if contact.part is SolePart.FULL else _part_error
+                moved, turned = measure(body, data, contact)
             if settling[contact.effector][k]:
                 place = data.oMf[body.effector_frame(contact.effector)].translation
                 moved, turned = -float(contact.normal @ (place - contact.position)), 0.0
