@@ -167,7 +167,7 @@ class Contact(Displayed):
         return np.array([float(self.points[:, 0].max()), 0.0, self.edge_radius])
 
     def rolled_away(self, rotation: FloatArray, position: FloatArray) -> tuple[float, float]:
-        """Distance of the pivot of an effector from where it has rolled [m], and the tilt sideways [rad].
+        """Distance of the pivot of an effector from where it has rolled [m], and its wrong tilt [rad].
 
         Args:
             rotation: (3, 3) effector to world.
@@ -178,7 +178,7 @@ class Contact(Displayed):
         rolled = self.position + frame @ self.pivot + self.edge_radius * pitch * frame[:, 0]
         off = position + rotation @ self.pivot - rolled
         side = float(np.clip(rotation[:, 1] @ frame[:, 1], -1.0, 1.0))
-        return float(np.linalg.norm(off)), float(np.arccos(side))
+        return float(np.linalg.norm(off)), float(np.hypot(np.arccos(side), min(pitch, 0.0)))
 
     @property
     def hangs_over(self) -> bool:

@@ -32,8 +32,8 @@ from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, 
 from manikin.scene.distance import NOTHING, Ignored, Proximity
 from manikin.scene.spheres import SphereProximity
 
-LEANT = 0.8
-"""Largest pitch of what rolls on its front edge [rad]."""
+LEANT = (0.08, 0.8)
+"""Pitches of what rolls on its front edge [rad]; with less, what is behind the edge would carry too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +221,7 @@ class PostureProblem:
         if contact.rolls:
             return EdgeTerm(
                 contact.effector, contact.pivot, contact.position, contact.rotation_contact_to_world,
-                0.0, LEANT, radius=contact.edge_radius,
+                *LEANT, radius=contact.edge_radius,
             )  # fmt: skip
         on_toes = contact.part is SolePart.TOES
         x = contact.points[:, 0].min() if on_toes else contact.points[:, 0].max()

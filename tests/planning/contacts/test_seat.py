@@ -111,8 +111,8 @@ def test_no_speed_is_asked_for_over_the_feet():
 
 
 def test_hands_push_where_legs_are_too_weak():
-    """Half the strength of an adult: with armrests hands carry until the weight is over the feet."""
-    body = human(1.75, 75.0, "male", strength=0.5)
+    """A third of the strength of an adult: with armrests hands carry until the weight is over the feet."""
+    body = human(1.75, 75.0, "male", strength=0.35)
     seat = Obstacle("seat", Box((0.42, 0.46, 0.06)), translation=(0.02, 0.0, 0.40))
     arms = [
         Obstacle(f"{side}_armrest", Box((0.32, 0.05, 0.04)), translation=(0.05, sign * 0.27, 0.64))

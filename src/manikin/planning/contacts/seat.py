@@ -230,8 +230,9 @@ LEANING = (0.25, 0.5, 0.75, 0.92)
 LEANING_TIMES = (1.3, 0.9)
 """Time of that way, to where the body comes to rest over its feet and to where it goes on in motion [s]."""
 
-SEAT_OFF_INSET = 0.015
-"""Distance of the centre of mass to the edge of where it may rest on the feet when a seat is left [m]."""
+SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
+"""Distances of the centre of mass to the edge of where it may rest on the feet when a seat is left, tried in
+order [m]; the first is inside the smaller soles on which it is planned."""
 
 BEHIND = (0.0, 0.02, 0.04)
 """How far behind where it could rest the centre of mass is when a seat is left, tried in order [m]."""
@@ -310,10 +311,15 @@ def _leans(
     """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
     body = poser.body
     rest = Configuration(body, risen).com
-    over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSET)
+    over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSETS[-1])
     if over is None:
         yield _Lean(None, failure=f"{', '.join(held)} cannot carry the body at rest")
         return
+    for inset in SEAT_OFF_INSETS[:-1]:
+        farther = poser.resting_place(held, start.com[:2], inset)
+        posed = poser.pose(start.contacts, held, start.q, place=farther, inset=inset)
+        if posed.q is not None:
+            yield _lean(poser, posed.q, held, rest, moving=False)
     back = start.com[:2] - rest[:2]
     back /= max(float(np.linalg.norm(back)), 1e-9)
     reason, q = "", start.q
@@ -356,7 +362,7 @@ def _pushed_up(
 ) -> Leaving:  # fmt: skip
     """Leave a seat with hands that push, until the weight is over the feet."""
     # The arms push until they are long: what is left to rise alone is as little as they let.
-    free = poser.pose(pushing, held, start.q, risen[:7], inset=SEAT_OFF_INSET, restarts=True)
+    free = poser.pose(pushing, held, start.q, risen[:7], inset=SEAT_OFF_INSETS[-1], restarts=True)
     if free.q is None:
         return Leaving((start,), f"hands cannot be let go: {free.reason}")
     over_feet = Configuration(poser.body, free.q).com[:2]
