@@ -277,6 +277,9 @@ ABOVE = 0.01
 LOWEST = 0.1
 """Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
 
+DIP = 0.001
+"""Depth that the CoM of a rising body may be below those of its postures [m]; our choice."""
+
 HIGHEST = 10.0
 """Height above the lowest posture that no centre of mass reaches [m]."""
 
@@ -400,7 +403,7 @@ def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, An
         given.append({"height_band": _below_postures(plan)})
     elif "buttocks" in plan.stages[0].contacts and "height_band" not in keys:
         # Who has left a seat does not go down again: the pelvis would meet it.
-        lowest = min(float(stage.com[2]) - stage.com_room[2] for stage in plan.stages)
+        lowest = min(float(stage.com[2]) for stage in plan.stages) - DIP
         given.append({"height_band": {"lower": f"{lowest:.4f}", "upper": f"{lowest + HIGHEST:.4f}"}})
     return given
 

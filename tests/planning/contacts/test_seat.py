@@ -54,6 +54,20 @@ def test_a_small_woman_rises_from_a_chair():
     assert plan_com(found.scenario.build_centroidal_problem()).succeeded
 
 
+def test_the_pelvis_rolls_so_that_the_spine_need_not_bend():
+    """The weight is 4.5 cm inside the feet with less than half of the bend that lumbar and thorax have."""
+    found = planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
+    body, off = human(1.75, 75.0, "male"), next(s for s in found.plan.stages if "buttocks" not in s.contacts)
+    assert static_room(off.stance, body.mass, off.com) > 0.044
+    bend = {name: angle for name, angle in zip(body.joint_names, off.q[7:], strict=True) if "flexion" in name}
+    assert bend["lumbar_flexion"] < 0.5
+    assert bend["thorax_flexion"] < 0.35
+    turn, place = Configuration(body, off.q).effector_placement("buttocks")
+    assert np.arctan2(-turn[2, 0], turn[0, 0]) > 0.3
+    moved, tilt = found.plan.stages[0].contacts["buttocks"].rolled_away(turn, place)
+    assert max(moved, tilt) < 1e-3
+
+
 def test_a_person_sits_down():
     """The last change makes the contact of the buttocks, on the seat, and feet stay where they are."""
     task = {"start": {"at": [0.7, 0.1]}, "goal": {"at": [0.0, 0.0], "posture": "seated"}}

@@ -362,17 +362,22 @@ def _pushed_up(
 ) -> Leaving:  # fmt: skip
     """Leave a seat with hands that push, until the weight is over the feet."""
     # The arms push until they are long: what is left to rise alone is as little as they let.
-    free = poser.pose(pushing, held, start.q, risen[:7], inset=SEAT_OFF_INSETS[-1], restarts=True)
-    if free.q is None:
-        return Leaving((start,), f"hands cannot be let go: {free.reason}")
-    over_feet = Configuration(poser.body, free.q).com[:2]
-    off = poser.pose(start.contacts, pushing, start.q, place=over_feet, com_weight=LEAN_WEIGHT)
-    if off.q is None:
-        return Leaving((start,), off.reason)
-    weak = _too_weak(poser, off.q, pushing) or _too_weak(poser, free.q, held)
-    if weak:
-        return Leaving((start,), weak)
-    return _rising(poser, start, [(pushing, off.q, None), (held, free.q, None)], risen)
+    failure = None
+    for inset in SEAT_OFF_INSETS:
+        free = poser.pose(pushing, held, start.q, risen[:7], inset=inset, restarts=True)
+        if free.q is None:
+            failure = failure or f"hands cannot be let go: {free.reason}"
+            continue
+        over_feet = Configuration(poser.body, free.q).com[:2]
+        off = poser.pose(start.contacts, pushing, start.q, place=over_feet, com_weight=LEAN_WEIGHT)
+        if off.q is None:
+            failure = failure or off.reason
+            continue
+        weak = _too_weak(poser, off.q, pushing) or _too_weak(poser, free.q, held)
+        if weak is None:
+            return _rising(poser, start, [(pushing, off.q, None), (held, free.q, None)], risen)
+        failure = weak
+    return Leaving((start,), failure)
 
 
 def _too_weak(

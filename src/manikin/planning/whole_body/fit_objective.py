@@ -307,7 +307,8 @@ def _effector_rows(
     moved = by_joints[:, :3]
     if rolls.any():
         arm = (place[:, :3, :3] @ target.pivot[:, :, None])[:, :, 0]
-        pitched = frame[:, None, :, 1] @ by_joints[:, 3:]
+        cosine, sine, by_turn = _pitch(target, place)
+        pitched = (by_turn / (cosine**2 + sine**2)[:, None])[:, None] @ by_joints[:, 3:]
         moved = moved - skew(arm) @ by_joints[:, 3:]
         moved = moved - (target.pivot[:, 2, None] * frame[:, :, 0])[:, :, None] * pitched
     jacobian[:, :3] = along @ moved
@@ -327,15 +328,22 @@ def _effector_rows(
     return jacobian, residual
 
 
+def _pitch(target: EffectorTarget, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n,) cosine and sine of the pitch against a target and (n, 3) its derivative by a turn, all scaled."""
+    along, forward, up = place[:, :3, 0], target.rotation[:, :, 0], target.rotation[:, :, 2]
+    cosine, sine = np.sum(along * forward, axis=1), -np.sum(along * up, axis=1)
+    turn = -cosine[:, None] * np.cross(along, up) - sine[:, None] * np.cross(along, forward)
+    return cosine, sine, turn
+
+
 def _missed(target: EffectorTarget, place: FloatArray) -> FloatArray:
     """(n, 3) way of an effector at places (n, 4, 4) from its target; of what rolls, that of its pivot [m]."""
     error = place[:, :3, 3] - target.position
     if not target.pivot.any():
         return error
     frame, pivot = target.rotation, target.pivot
-    along = place[:, :3, 0]
-    pitch = np.arctan2(-np.sum(along * frame[:, :, 2], axis=1), np.sum(along * frame[:, :, 0], axis=1))
-    rolled = pivot + pitch[:, None] * pivot[:, 2:] * [1.0, 0.0, 0.0]
+    cosine, sine, _ = _pitch(target, place)
+    rolled = pivot + np.arctan2(sine, cosine)[:, None] * pivot[:, 2:] * [1.0, 0.0, 0.0]
     return error + (place[:, :3, :3] @ pivot[:, :, None] - frame @ rolled[:, :, None])[:, :, 0]
 
 
