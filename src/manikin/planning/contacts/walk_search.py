@@ -19,7 +19,7 @@ from manikin.body import BodyModel
 from manikin.contact import Contact, Stance
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Stage
 from manikin.planning.contacts.depth_first import Extension, SearchLog
 from manikin.planning.contacts.endpoint import FEET, stand_up
 from manikin.planning.contacts.footholds import Foothold, Footholds
@@ -38,6 +38,11 @@ STRONG_TRIES = 8
 
 A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so
 after that many ways the later stages decide."""
+
+EASIER = (0.4, 0.2, 0.55)
+"""Places of the centre of mass over the sole that carries, from its middle ahead, as shares of half its
+length, at which a posture is tried that asks for less strength: a thigh that is more upright turns less under
+the pelvis, and a knee has less before it."""
 
 NEAR_TRIES = 12
 """Ways after which a pair without a posture closes all that are much like it."""
@@ -61,7 +66,7 @@ class WalkSettings:
     swing_duration: float = 0.7
     swing_speed: float = 0.7
     shift_duration: float = 0.35
-    hinge_pace: float = HINGE_PACE
+    hinge_pace: float = 2.0
 
 
 @dataclass
@@ -104,6 +109,11 @@ class BodyRoom:
         posture = self._postures[number]
         q = posture.at(self._place(left, right))
         return q[:7] if posture.cost <= 1.0 else q
+
+    def stooped(self, number: int) -> list[int]:
+        """A posture and up to three in which the trunk is bent more, the cheapest first."""
+        heights = [item.height for item in self._postures]
+        return [number, *(n for n, high in enumerate(heights) if high < 0.97 * heights[number])][:4]
 
     def _place(self, left: Foothold, right: Foothold) -> FloatArray:
         """(4,) x, y and height of the ground [m] and heading [rad] between two feet."""
@@ -273,8 +283,31 @@ class WalkSearch:
             start = np.concatenate([guide, q[len(guide) :]])
             posed = self.poser.pose(held, carrying, start, guide, restarts=True)
         if posed.q is not None:
-            share = static_torque_share(self.poser.body, posed.q, Stance(list(carrying.values())))
-            if share > 1.0 and self.replanned < STRONG_TRIES:
-                posed = Posed(None, f"resting on {names[rests]} asks for {share:.2f} of the strength")
+            posed = self._easier(posed, held, held[names[rests]], self._pair(names[0], way), trunk)
         self._postures[key] = posed
         return posed
+
+    def _easier(
+        self, posed: Posed, held: Mapping[str, Contact], carrying: Contact, pair: tuple[Foothold, Foothold],
+        trunk: int,
+    ) -> Posed:  # fmt: skip
+        """A posture on one foot that the joints can hold at rest: the given one, or one that leans ahead."""
+        body, stance, name = self.poser.body, Stance([carrying]), carrying.effector
+
+        def share_of(item: Posed) -> float:
+            return math.inf if item.q is None else static_torque_share(body, item.q, stance)
+
+        best, least = posed, share_of(posed)
+        turn = carrying.rotation_contact_to_world
+        middle, ahead = carrying.position + turn @ carrying.centre, 0.5 * carrying.length * turn[:, 0]
+        for number, part in ((n, part) for n in self._room.stooped(trunk) for part in EASIER):
+            if least <= 1.0 or best.q is None:
+                break
+            place, guide = (middle + part * ahead)[:2], self._room.guide(number, *pair)
+            other = self.poser.pose(held, {name: carrying}, best.q, guide, place=place)
+            share = share_of(other)
+            if share < least:
+                best, least = other, share
+        if least > 1.0 and self.replanned < STRONG_TRIES:
+            return Posed(None, f"resting on {name} asks for {least:.2f} of the strength")
+        return best
