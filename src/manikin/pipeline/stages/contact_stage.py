@@ -33,6 +33,7 @@ from manikin.planning.contacts import (
     heading_of,
     sample_limbs,
     starts_on_limbs,
+    take_seat,
 )
 from manikin.planning.guide import (
     Abstraction,
@@ -64,6 +65,7 @@ class _ContactSearch:
         return Endpoints(
             self._body, self._scene, self._scenario.contacts.friction, reference,
             natural=self._natural, friction_model=self._scenario.contact_model.friction,
+            rolls=not self._scenario.refines,
         )  # fmt: skip
 
 
@@ -75,6 +77,7 @@ class _FootSearch(_ContactSearch):
         self._reference = posture_style_of(scenario.manner).posture(body)
         self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
+        self._seat: Stage | None = None
         self._walk: WalkSearch | None = None
 
     def run(self) -> ContactSearch:
@@ -84,6 +87,11 @@ class _FootSearch(_ContactSearch):
         goal = self._goal(start)
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
+        if "buttocks" in goal.contacts:
+            self._seat, before = goal, self._places.risen(goal)
+            if before.stage is None:
+                return self._tally.failed(f"the goal: {before.failure}", "goal")
+            goal = before.stage
         self._walk = self._search(start, goal)
         return self._result(self._walk.run())
 
@@ -99,7 +107,9 @@ class _FootSearch(_ContactSearch):
         self._tally.summary["backtracks"] = found.backtracks
         if found.plan is None:
             return self._tally.failed(found.failure or "", "contacts")
-        plan = self._acting(found.plan)
+        plan = self._acting(found.plan) if self._seat is None else self._sitting(found.plan, self._seat)
+        if isinstance(plan, str):
+            return self._tally.failed(plan, "goal")
         return replace(
             self._tally.found(plan), scenario=with_supports(self._scenario, plan), again=self._again
         )
@@ -111,6 +121,13 @@ class _FootSearch(_ContactSearch):
         )
         poser = PostureFinder(self._body, self._scene, self._reference, asked)
         return WalkSearch(poser, start, goal, options.friction, WalkSettings(stride=options.stride_m))
+
+    def _sitting(self, way: ContactPlan, seat: Stage) -> ContactPlan | str:
+        """The way, and the body sits down at its end; or why it cannot."""
+        asked = PostureFinderSettings(
+            natural=self._natural, friction_model=self._scenario.contact_model.friction
+        )
+        return take_seat(PostureFinder(self._body, self._scene, self._reference, asked), way, seat)
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""

@@ -47,6 +47,7 @@ from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import LimbPlaces
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.planning.contacts.seat import leave_seat, take_seat
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPosture, TrunkPostures
 from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
@@ -60,6 +61,6 @@ __all__ = [
     "WalkSettings", "WeightedSum",
     "certify_plan", "duration", "efort",
     "find_candidates", "follow_guide", "force_ellipsoid",
-    "force_transmission_ratio", "heading_of", "manipulability", "mirrored", "pulling_efort", "sample_limb",
-    "sample_limbs", "starts_on_limbs", "velocity_ellipsoid",
+    "force_transmission_ratio", "heading_of", "leave_seat", "manipulability", "mirrored", "pulling_efort",
+    "sample_limb", "sample_limbs", "starts_on_limbs", "take_seat", "velocity_ellipsoid",
 ]  # fmt: skip
