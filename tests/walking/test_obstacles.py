@@ -182,12 +182,9 @@ def test_bad_obstacles_are_refused_in_one_line(make, message):
 def test_a_path_around_obstacles_does_not_depend_on_where_the_scene_stands():
     """Ways are sought on a grid: with other axes they, and the local optimum they lead to, would differ."""
     transform = PlanarTransform(10.0, -7.0, 37.0)
-    walls = [
-        [[1.5, 0.3], [1.6, 0.3], [1.6, 3.0], [1.5, 3.0]],
-        [[1.5, -3.0], [1.6, -3.0], [1.6, -0.1], [1.5, -0.1]],
-    ]
+    wall = WalkObstacle("wall", [[1.5, 0.0], [1.6, 0.0], [1.6, 3.0], [1.5, 3.0]])
     talking = WalkObstacle.moving_disc("talking", (0.0, 3.0), [(2.5, 1.0), (2.5, 0.2)], 0.2)
-    obstacles = [*(WalkObstacle(f"wall {number}", corners) for number, corners in enumerate(walls)), talking]
+    obstacles = [wall, talking]
     moved = [one.moved(transform, 12) for one in obstacles]
     ends = [
         np.append(transform.points(x[:2]), x[2] + transform.yaw) for x in (START, np.array([3.0, 0.5, 0.4]))
