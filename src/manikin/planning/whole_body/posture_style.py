@@ -91,7 +91,8 @@ def plan_guide(
     found: list[FloatArray] = []
     failures: list[GuideFailure] = []
     touched: dict[str, FloatArray] = {}
-    settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False)
+    # The fit has the last word: where a posture is not found from the one before, its best attempt will do.
+    settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False, restarts=False)
     for k, instant in enumerate(time):
         contacts, placements = _requirements(schedule, float(instant), effectors, k)
         placements.update(_settling(body, schedule, float(instant), q, touched))
