@@ -17,7 +17,6 @@ from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, FrictionModel, sole
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
-from manikin.planning.contacts.depth_first import PartialPlan, SearchLog
 from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import GeneratedContact
 from manikin.planning.contacts.limb_places import LimbPlaces, stature_of
@@ -283,28 +282,25 @@ SEATED_ROOM = (0.01, 0.01, 0.006)
 
 
 def stand_up(
-    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray, log: SearchLog
-) -> PartialPlan | None:
+    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray
+) -> tuple[Stage, ...] | str:
     """The start on feet; its other contacts are left first, all at once.
 
     Args:
         start: Contacts and posture at the start.
         feet: Effectors to stand on.
         upright: (7,) pose of the root that has risen.
-        log: Where a missing posture is noted.
 
     Returns:
-        The stages up to standing on feet alone; None where a posture is missing.
+        The stages up to standing on feet alone, or why a posture is missing.
     """
     body = poser.body
     held = {name: contact for name, contact in start.contacts.items() if name in feet}
-    along = dict.fromkeys(held, 0.0)
     if len(held) == len(start.contacts):
-        return PartialPlan((start,), along)
+        return (start,)
     leaving = poser.pose(start.contacts, held, start.q, inset=SEAT_OFF_INSET, restarts=True)
     if leaving.q is None:
-        log.refuse(leaving.reason)
-        return None
+        return leaving.reason
     over_feet = Configuration(body, leaving.q).com[:2]
     stages = [start]
     for share in LEANING:
@@ -315,7 +311,6 @@ def stand_up(
     stages.append(Stage.of(body, held, leaving.q, RISING_TIME, SEATED_ROOM))
     risen = poser.pose(held, held, leaving.q, upright, restarts=True)
     if risen.q is None:
-        log.refuse(risen.reason)
-        return None
+        return risen.reason
     stages.append(Stage.of(body, held, risen.q, SETTLING_TIME))
-    return PartialPlan(tuple(stages), along)
+    return tuple(stages)
