@@ -138,7 +138,7 @@ class SearchLog:
         most = self._reasons.most_common(1)
         why = f"; most often: {most[0][0]}" if most else ""
         text = f"{what} beyond {100.0 * reached:.0f} % of it ({farthest:.2f} m){why}"
-        return Extension(None, self.searches, backtracks, text)
+        return Extension(None, self.searches, backtracks, text, reached)
 
 
 def search_depth_first(first: PartialPlan, moves: Moves[Change], log: SearchLog, length: float) -> Extension:
