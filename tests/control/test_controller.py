@@ -25,7 +25,7 @@ def force_per_point(problem, solution, controller):
         basis = loaded.basis
         edges = solution[start : start + basis.normal.size].reshape(-1, 4)
         start += basis.normal.size
-        geometry = controller._geometry[basis.contact.effector, basis.contact.part]
+        geometry = controller.geometry(basis.contact)
         number = 0
         for segment, points in geometry.patches:
             frame = problem.state.frames[f"segment/{segment}"]
@@ -219,3 +219,26 @@ def test_feet_that_are_points_turn_and_leave_the_body_free(on_points):
     ]
     assert moved[0] > 0.9 * controller.settings.impedances.com.stiffness * 0.01
     assert np.abs(tips).max() < 0.01 * moved[0]
+
+
+def test_a_foot_carries_on_what_touches_where_it_stands(body, contacts, still):
+    """A whole sole first, then one whose front hangs over an edge: no force acts beyond that edge."""
+    left, right = contacts
+    edge = [[0.02, 0.05], [-0.12, 0.05], [-0.12, -0.05], [0.02, -0.05]]
+    over = sole(
+        "left_foot", left.position, length=left.length, width=left.width, friction=0.7, polygon=edge
+    )  # fmt: skip
+    phases = [Phase(Stance(stance)) for stance in ([left, right], [right], [over, right])]
+    controller = Controller(body, still, ContactSchedule(StanceSequence(phases), [0.0, 0.2, 0.4, 1.0]))
+    q, v = body.standing_posture(), np.zeros(body.nv)
+    farthest = {}
+    for time in (0.1, 0.6):
+        output, x = solve(controller, q, v, time)
+        along = [
+            point[0] - left.position[0]
+            for _, point, _, contact in force_per_point(output.problem, x, controller)
+            if contact.effector == "left_foot"
+        ]
+        farthest[time] = max(along)
+    assert farthest[0.1] > 0.1
+    assert farthest[0.6] <= 0.02

@@ -39,6 +39,15 @@ TERMS = {
         0.9,
         6 + BODY.joint_index("left_toe_extension"),
     ),
+    "rolling edge": EdgeTerm(
+        "buttocks",
+        np.array([0.07, 0.0, 0.05]),
+        np.array([0.1, 0.2, 0.3]),
+        rotation_from_rpy(0.1, -0.2, 0.5),
+        0.0,
+        0.5,
+        radius=0.05,
+    ),
     "reference": ReferenceTerm(BODY.standing_posture()[7:]),
     "limits": LimitTerm(BODY),
 }

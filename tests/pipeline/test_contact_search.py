@@ -84,7 +84,6 @@ def test_a_seed_that_is_given_changes_no_options_of_the_planner():
     ("name", "where", "reason"),
     [
         ("crouch@walled-off", "contacts", "walled off"),
-        ("stand-up-chair@slippery", "contacts", "cannot leave buttocks"),
         ("stand-up-sofa@deep", "start", "no surface at the height of a seat"),
     ],
 )

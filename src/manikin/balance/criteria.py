@@ -199,7 +199,9 @@ def _onto(polygon: FloatArray, point: FloatArray) -> FloatArray:
     return points[int(np.argmin(np.linalg.norm(points - point, axis=1)))]
 
 
-def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 8) -> float:
+def static_room(
+    stance: Stance, mass: float, com: FloatArray, directions: int = 8, acceleration: FloatArray | None = None
+) -> float:
     """Distance that the centre of mass may move in any horizontal direction while held at rest [m].
 
     One linear program for each direction; the room is exact in these directions.
@@ -209,6 +211,7 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
         mass: Of the body [kg].
         com: (3,) centre of mass [m].
         directions: Number of directions.
+        acceleration: (3,) of the centre of mass, held in that motion then [m/s^2]; none when omitted.
 
     Returns:
         Distance [m]; minus infinity where the contacts cannot hold the body as it is.
@@ -218,12 +221,12 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
     generators, cap = ContactGenerators.of(stance), _cap(stance, mass)
     bounds = [(0.0, limit) for limit in generators.upper]
     about_origin = generators.about(np.zeros(3))
-    weight = mass * GRAVITY
+    force = mass * (np.array([0.0, 0.0, GRAVITY]) + (0.0 if acceleration is None else acceleration))
     room = np.inf
     for angle in 2.0 * np.pi * np.arange(directions) / directions:
         step = np.array([np.cos(angle), np.sin(angle), 0.0])
-        column = np.concatenate([np.zeros(3), -np.cross(step, [0.0, 0.0, weight])])
-        wanted = np.concatenate([[0.0, 0.0, weight], np.cross(com, [0.0, 0.0, weight])])
+        column = np.concatenate([np.zeros(3), -np.cross(step, force)])
+        wanted = np.concatenate([force, np.cross(com, force)])
         solution = linprog(
             np.append(np.zeros(len(bounds)), -1.0),
             A_ub=np.append(generators.normal, 0.0)[None], b_ub=[cap],
@@ -236,7 +239,9 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
     return room
 
 
-def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float:
+def static_torque_share(
+    body: BodyModel, q: FloatArray, stance: Stance, acceleration: FloatArray | None = None
+) -> float:
     """Smallest share of the joints' torque limits with which a posture is held at rest.
 
     Minimises the largest share of a torque limit over the contact forces, with
@@ -245,6 +250,7 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     Args:
         q: (nq,) posture that holds the contacts.
         stance: The contacts that carry it, with a cap as in :func:`static_room`.
+        acceleration: (3,) of the whole body, which moves as one [m/s^2]; none when omitted.
 
     Returns:
         The share; infinite where the contacts cannot hold the posture.
@@ -255,7 +261,10 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     origins = np.array([contact.position for contact in stance])[generators.contact]
     wrenches = generators.about(origins).T
     model = body.pinocchio
-    gravity = pin.computeGeneralizedGravity(model, model.createData(), np.asarray(q))
+    moving = np.zeros(model.nv)
+    if acceleration is not None:
+        moving[:3] = pin.XYZQUATToSE3(np.asarray(q)[:7]).rotation.T @ acceleration
+    gravity = pin.rnea(model, model.createData(), np.asarray(q), np.zeros(model.nv), moving)
     jacobians = [state.effector_jacobian(contact.effector) for contact in stance]
     columns = np.column_stack(
         [jacobians[number].T @ wrench for number, wrench in zip(generators.contact, wrenches, strict=True)]

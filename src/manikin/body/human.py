@@ -52,6 +52,9 @@ SEAT_DEPTH = 0.07
 SEAT_LENGTH = 0.08
 """Length, back to front, of the patch that presses on a seat, as a share of the stature."""
 
+BUTTOCK_RADIUS = 0.027
+"""Radius of the buttocks' lines and of their ends, on which a leaning body rolls, likewise; our choice."""
+
 SEAT_WIDTH = 0.14
 """Distance between the two lines that press on a seat, as a share of the stature."""
 
@@ -246,7 +249,7 @@ class _HumanBuilder:
 
     def _buttocks(self) -> tuple[Shape, Shape]:
         """Two short capsules from back to front; their lowest lines are what a seat carries."""
-        radius, half = 0.027 * self.stature, 0.5 * SEAT_LENGTH * self.stature
+        radius, half = BUTTOCK_RADIUS * self.stature, 0.5 * SEAT_LENGTH * self.stature
         height, aside = radius - SEAT_DEPTH * self.stature, 0.5 * SEAT_WIDTH * self.stature
         left, right = (
             Shape(

@@ -11,6 +11,7 @@ from manikin.contact.contact import (
     default_normal_force_cap,
     grasp,
     point,
+    rolling_front,
     sole,
     sole_part,
     soles_overlap,
@@ -29,5 +30,6 @@ from manikin.contact.stance import (
 __all__ = [
     "BODY_WEIGHTS_CAP", "FRICTION_MODELS", "CarriedLoad", "Contact", "ContactKind", "ContactModel",
     "ContactSchedule", "FrictionModel", "Phase", "Rolling", "SolePart", "Stance", "StanceSequence", "Swing",
-    "default_normal_force_cap", "grasp", "point", "roll_feet", "sole", "sole_part", "soles_overlap",
+    "default_normal_force_cap", "grasp", "point", "roll_feet", "rolling_front", "sole",
+    "sole_part", "soles_overlap",
 ]  # fmt: skip

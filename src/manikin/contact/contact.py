@@ -109,6 +109,8 @@ class SolePart(StrEnum):
     """Its rear edge, about which the foot tilts after it has landed."""
     TOES = "toes"
     """The part before the hinge of the toes, about which the foot tilts before it leaves."""
+    FRONT = "front"
+    """Its round front edge, on which it rolls: buttocks under a trunk that leans."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,6 +137,8 @@ class Contact(Displayed):
         oriented: Whether a grasping hand should have the rotation (a sole always does).
         settle: Time after the touch-down in which the effector may still slide along the
             surface to its place, as a body that sits down does [s].
+        edge_radius: Radius of the round front edge on which the effector rolls about its y axis [m];
+            0 where the part that touches is flat.
     """
 
     effector: str
@@ -150,6 +154,31 @@ class Contact(Displayed):
     part: SolePart = SolePart.FULL
     oriented: bool = False
     settle: float = 0.0
+    edge_radius: float = 0.0
+
+    @property
+    def rolls(self) -> bool:
+        """Whether the effector may turn about the contact's y axis as much as it likes."""
+        return self.part is SolePart.FRONT
+
+    @property
+    def pivot(self) -> FloatArray:
+        """(3,) middle of the line about which it turns then, in the effector's frame [m]."""
+        return np.array([float(self.points[:, 0].max()), 0.0, self.edge_radius])
+
+    def rolled_away(self, rotation: FloatArray, position: FloatArray) -> tuple[float, float]:
+        """Distance of the pivot of an effector from where it has rolled [m], and its wrong tilt [rad].
+
+        Args:
+            rotation: (3, 3) effector to world.
+            position: (3,) of its frame [m].
+        """
+        frame, along = self.rotation_contact_to_world, rotation[:, 0]
+        pitch = np.arctan2(-along @ frame[:, 2], along @ frame[:, 0])
+        rolled = self.position + frame @ self.pivot + self.edge_radius * pitch * frame[:, 0]
+        off = position + rotation @ self.pivot - rolled
+        side = float(np.clip(rotation[:, 1] @ frame[:, 1], -1.0, 1.0))
+        return float(np.linalg.norm(off)), float(np.hypot(np.arccos(side), min(pitch, 0.0)))
 
     @property
     def hangs_over(self) -> bool:
@@ -313,6 +342,25 @@ def grasp(
         max_moment=finite_number(max_moment, f"{where} max_moment [N.m]", at_least=0.0, error=ContactError),
         oriented=rotation is not None,
     )
+
+
+def rolling_front(contact: Contact, radius: float) -> Contact:
+    """The round front edge of a full sole, on which it rolls without sliding.
+
+    Args:
+        radius: Of the edge [m].
+
+    Raises:
+        ContactError: If the contact is no whole sole or the radius is not positive.
+    """
+    if contact.kind is not ContactKind.SOLE or contact.part is not SolePart.FULL or contact.hangs_over:
+        raise ContactError(f"front of '{contact.effector}' is taken from what is no whole sole")
+    radius = finite_number(
+        radius, f"sole '{contact.effector}' edge radius [m]", above=0.0, error=ContactError
+    )
+    front = contact.points[contact.points[:, 0] > 0.0]
+    points = frozen_array(front, "points of a front [m]", (2, 3))
+    return replace(contact, points=points, part=SolePart.FRONT, torsion_limit=None, edge_radius=radius)
 
 
 def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:

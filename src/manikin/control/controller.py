@@ -203,6 +203,10 @@ class Controller:
             force_weight=settings.weights.force, sum_cap=self.schedule.stance_at(time).normal_force_cap,
         )  # fmt: skip
 
+    def geometry(self, contact: Contact) -> ContactGeometry:
+        """Points of the body that carry the forces of a contact of the schedule."""
+        return self._geometry[_touching_points(contact)]
+
     def tasks(
         self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState],
         deviation: Deviation | None = None,
@@ -274,7 +278,7 @@ class Controller:
         return weight
 
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
-        geometry = self._geometry[support.effector, contact.part]
+        geometry = self.geometry(contact)
         basis = contact_force_basis(
             contact, geometry, state, sliding=support.settling,
             friction_share=self.settings.supports.friction_share, friction_model=self._friction_model,
@@ -313,7 +317,7 @@ class Controller:
 
     def _point_shares(self, support: SupportState, contact: Contact, edges: int) -> FloatArray:
         """(e k,) body weights that each point's variables may carry while the touching part changes."""
-        along = self._along[contact.effector, contact.part]
+        along = self._along[_touching_points(contact)]
         shares = np.full(len(along), np.inf)
         for part, share in support.fades:
             if part is not SolePart.FULL:  # a heel is what lies behind the middle of its sole
@@ -337,15 +341,17 @@ class Controller:
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
 
 
+def _touching_points(contact: Contact) -> tuple[str, SolePart, bytes]:
+    """What tells the points of contacts apart: a sole may hang over an edge at one place alone."""
+    return contact.effector, contact.part, contact.points.tobytes()
+
+
 def _geometries(
     body: BodyModel, schedule: ContactSchedule, inset: float
-) -> dict[tuple[str, SolePart], ContactGeometry]:
-    """Force-carrying points of each part of an effector that touches, as it first does."""
-    result: dict[tuple[str, SolePart], ContactGeometry] = {}
-    for contact in (contact for phase in schedule.sequence for contact in phase.stance):
-        if (contact.effector, contact.part) not in result:
-            result[contact.effector, contact.part] = contact_geometry(body, contact, inset)
-    return result
+) -> dict[tuple[str, SolePart, bytes], ContactGeometry]:
+    """Force-carrying points of every part of an effector that touches somewhere."""
+    contacts = {_touching_points(item): item for phase in schedule.sequence for item in phase.stance}
+    return {key: contact_geometry(body, item, inset) for key, item in contacts.items()}
 
 
 def _hanging_joints(body: BodyModel, effector: str) -> list[int]:

@@ -54,6 +54,7 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
     if contact.part is not SolePart.FULL:
         points = contact.points.copy()
         points[:, 1] -= inset * np.sign(points[:, 1])
+        points[:, 2] += contact.edge_radius  # the force on a round edge goes through its axis
         if contact.part is SolePart.TOES:
             points[points[:, 0] >= points[:, 0].max(), 0] -= inset
         if contact.part is SolePart.TOES and toes is not None:

@@ -32,6 +32,9 @@ from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, 
 from manikin.scene.distance import NOTHING, Ignored, Proximity
 from manikin.scene.spheres import SphereProximity
 
+LEANT = (0.08, 0.8)
+"""Pitches of what rolls on its front edge [rad]; with less, what is behind the edge would carry too."""
+
 
 @dataclass(frozen=True, eq=False)
 class LearntRangeTerm:
@@ -215,6 +218,11 @@ class PostureProblem:
 
     def _edge(self, contact: Contact) -> EdgeTerm:
         """A sole that pitches about the part that touches."""
+        if contact.rolls:
+            return EdgeTerm(
+                contact.effector, contact.pivot, contact.position, contact.rotation_contact_to_world,
+                *LEANT, radius=contact.edge_radius,
+            )  # fmt: skip
         on_toes = contact.part is SolePart.TOES
         x = contact.points[:, 0].min() if on_toes else contact.points[:, 0].max()
         toes = hanging_segment(self.body, self.body.effector(contact.effector).segment) if on_toes else None

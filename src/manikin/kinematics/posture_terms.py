@@ -102,6 +102,7 @@ class EdgeTerm:
         least: Smallest pitch, heel up when positive [rad].
         most: Largest pitch [rad].
         toes: Index of the toes' hinge in the velocity vector, or None where they do not carry.
+        radius: By which the edge moves forward per pitch: it is round, and rolls [m/rad].
     """
 
     effector: str
@@ -111,6 +112,7 @@ class EdgeTerm:
     least: float
     most: float
     toes: int | None = None
+    radius: float = 0.0
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """See :class:`Term`."""
@@ -126,10 +128,11 @@ class EdgeTerm:
         turn = -cosine * np.cross(along, up) - sine * np.cross(along, forward)
         turning = turn @ angular / (sine**2 + cosine**2)
         rows = [
-            linear - skew(arm) @ angular, np.cross(own, forward) @ angular, np.cross(own, up) @ angular,
+            linear - skew(arm) @ angular - self.radius * np.outer(forward, turning),
+            np.cross(own, forward) @ angular, np.cross(own, up) @ angular,
             turning if beyond else np.zeros_like(turning),
         ]  # fmt: skip
-        place = position + arm - self.position - self.rotation @ self.pivot
+        place = position + arm - self.position - self.rotation @ self.pivot - self.radius * pitch * forward
         residual = [*place, own @ forward, own @ up, beyond]
         if self.toes is not None:
             flat = -turning

@@ -277,6 +277,12 @@ ABOVE = 0.01
 LOWEST = 0.1
 """Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
 
+DIP = 0.001
+"""Depth that the CoM of a rising body may be below those of its postures [m]; our choice."""
+
+HIGHEST = 10.0
+"""Height above the lowest posture that no centre of mass reaches [m]."""
+
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
 
@@ -287,8 +293,17 @@ PLANNING = {
 }
 """Options of the planner of a body on its feet, where the file keeps the defaults; our choice.
 
-A body that leaves a seat keeps the defaults: its trunk cannot follow a path that is planned for ease alone.
+A body that sits down keeps the defaults.
 """
+
+PLANNING_RISING = {
+    "degree": 5,
+    "weights": {"margin": 0.2, "smoothness": 10.0, "duration": 5.0, "acceleration": [1.0, 1.0, 1.0]},
+}
+"""Options of the planner of a body that leaves a seat, likewise: a seated trunk cannot follow any path."""
+
+SEATED_LONGER = 1.5
+"""Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
 
 
 def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
@@ -303,7 +318,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     """
     friction = scenario.contacts.friction
     # Rising legs are soon at full length: there is less room above such postures than below them.
-    rises = "buttocks" in plan.stages[0].contacts
+    rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -312,6 +327,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
             for name, contact in stage.contacts.items()
         }
         phase["min_duration_s"] = stage.min_duration
+        if rises and "buttocks" in stage.contacts:
+            phase["max_duration_s"] = SEATED_LONGER * stage.min_duration
         if number:
             x, y, z = (float(value) for value in stage.com)
             drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
@@ -326,15 +343,20 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         "planning_sole": {"length_m": PLANNING_SHARE[0] * long, "width_m": PLANNING_SHARE[1] * wide},
         "phases": phases,
     }
-    task = {
+    # The centre of mass is planned up to where a seat is touched.
+    touch = next((stage for stage in plan.stages if "buttocks" in stage.contacts), None) if sits else None
+    task: dict[str, Any] = {
         "start": {"com": [float(x) for x in plan.stages[0].com]},
-        "goal": {"com": [float(x) for x in plan.goal_com]},
+        "goal": {"com": [float(x) for x in (plan.goal_com if touch is None else touch.com)]},
     }
+    if touch is not None:
+        speed = np.zeros(3) if touch.momentum is None else touch.momentum.velocity
+        task["goal"]["velocity_m_s"] = [float(x) for x in speed]
     if scenario.act is not None:
         task["act"] = scenario.act.model_dump(mode="json")
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.planning == type(scenario.planning)() and not rises:
-        planning = PLANNING
+    if scenario.planning == type(scenario.planning)() and not sits:
+        planning = PLANNING_RISING if rises else PLANNING
     constraints = _constraints(scenario, plan)
     return scenario.replaced(
         supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning
@@ -356,6 +378,8 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
         entry["normal"] = [float(x) for x in contact.normal]
     if contact.friction != friction:
         entry["friction"] = contact.friction
+    if contact.rolls:
+        entry["edge_radius_m"] = contact.edge_radius
     if contact.hangs_over:
         entry["polygon"] = contact.points[:, :2].tolist()
     return entry
@@ -379,6 +403,10 @@ def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, An
         given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
     if values.act is not None and "height_band" not in keys:
         given.append({"height_band": _below_postures(plan)})
+    elif "buttocks" in plan.stages[0].contacts and "height_band" not in keys:
+        # Who has left a seat does not go down again: the pelvis would meet it.
+        lowest = min(float(stage.com[2]) for stage in plan.stages) - DIP
+        given.append({"height_band": {"lower": f"{lowest:.4f}", "upper": f"{lowest + HIGHEST:.4f}"}})
     return given
 
 

@@ -301,8 +301,8 @@ class ScenarioFile(Section):
                 raise refuse(
                     f"task.{end}.posture", "is climbing; valid: beside contacts.limbs, the limbs that hold on"
                 )
-        if self.task.goal.posture == "seated":
-            raise refuse("task.goal.posture", "is seated; valid: standing or crouched, or explicit supports")
+        if self.task.goal.posture == "seated" and self.wholebody.method == "refine":
+            raise refuse("task.goal.posture", "is seated; valid: standing or crouched for a refined motion")
 
     def _check_body(self) -> None:
         if self.body.model == "human":

@@ -19,6 +19,7 @@ from manikin.contact import (
     grasp,
     point,
     roll_feet,
+    rolling_front,
     sole,
     soles_overlap,
 )
@@ -70,7 +71,7 @@ def build_contact(
         )  # fmt: skip
     own = entry.sole or default_sole
     shrink = planning and entry.sole is not None
-    return sole(
+    made = sole(
         effector,
         entry.position,
         math.radians(entry.yaw_deg),
@@ -83,6 +84,7 @@ def build_contact(
         torsion_limit=entry.torsion_limit_Nm,
         settle=entry.settle_s or 0.0,
     )
+    return made if entry.edge_radius_m is None else rolling_front(made, entry.edge_radius_m)
 
 
 PATCH_WIDTH = 0.7

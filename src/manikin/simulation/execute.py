@@ -12,6 +12,7 @@ from manikin.contact import ContactKind, ContactSchedule
 from manikin.control import Controller, ControlOutput, ControlSettings, ForceWish
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.errors import InputError
+from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
 from manikin.numerics.spatial import finite_number
 from manikin.scene import Scene
@@ -47,10 +48,11 @@ _AT_REST = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class _Hold:
-    """One planned support with the obstacles under it."""
+    """One planned support with the obstacles under it, and the segments that may lie on them."""
 
     effector: str
     segments: tuple[str, ...]
+    lying: tuple[str, ...]
     interval: SupportInterval
     obstacles: tuple[str, ...]
 
@@ -180,7 +182,7 @@ class _Run:
         self.world.carry({} if load is None else load.masses)
         now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
         if now != self._planned_now:
-            planned = [(self.holds[i].segments, name) for i in now for name in self.holds[i].obstacles]
+            planned = [(self.holds[i].lying, name) for i in now for name in self.holds[i].obstacles]
             self.world.plan_touches(planned, self._leaning)
             self._planned_now = now
         grasps = [item.interval for item in self.holds if item.interval.contact.kind is ContactKind.GRASP]
@@ -293,7 +295,13 @@ def _substeps(period: float, timestep: float) -> int:
 
 def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_Hold, ...]:
     return tuple(
-        _Hold(effector, end_segments(body, effector), interval, scene.touched_obstacles(interval.contact))
+        _Hold(
+            effector,
+            end_segments(body, effector),
+            tuple(sorted({segment for segment, _ in touching_pairs(body, [(effector, "")])})),
+            interval,
+            scene.touched_obstacles(interval.contact),
+        )
         for effector in schedule.sequence.effectors
         for interval in support_intervals(schedule, effector, SWITCHING)
     )

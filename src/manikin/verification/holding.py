@@ -117,9 +117,15 @@ class HoldingRows:
         places = self._kinematics.placements(item.q, [contact.effector for contact in item.held])
         for contact in item.held:
             place, where = places[contact.effector], f"{contact.effector}, {item.where}"
-            self._error.take(float(np.linalg.norm(place.translation - contact.position)), where)
+            frame = contact.rotation_contact_to_world
+            missed, turn = place.translation - contact.position, place.rotation.T @ frame
+            if contact.rolls:  # the axis of its edge goes forward with the pitch, which is free
+                pitch = float(np.arctan2(-turn[0, 2], turn[0, 0]))
+                turn = turn @ pin.utils.rotate("y", pitch)
+                missed = missed + (place.rotation - frame) @ contact.pivot
+                missed = missed - contact.edge_radius * pitch * frame[:, 0]
+            self._error.take(float(np.linalg.norm(missed)), where)
             if contact.kind is ContactKind.SOLE:
-                turn = place.rotation.T @ contact.rotation_contact_to_world
                 self._turn.take(float(np.rad2deg(np.linalg.norm(pin.log3(turn)))), where)
         angles = item.q[7:]
         beyond = np.maximum(self._body.lower - angles, angles - self._body.upper)

@@ -395,7 +395,9 @@ def _contact_dict(contact: Contact) -> dict[str, Any]:
     limits = {
         "normal_force_cap_N": contact.normal_force_cap, "torsion_limit_Nm": contact.torsion_limit,
     }  # fmt: skip
-    if contact.kind is ContactKind.SOLE:
+    if contact.rolls:
+        common["edge_radius_m"] = contact.edge_radius
+    elif contact.kind is ContactKind.SOLE:
         common["polygon"] = contact.points[:, :2].tolist()
     common["friction"] = contact.friction
     return common | {key: value for key, value in limits.items() if value is not None}

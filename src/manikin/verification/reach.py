@@ -116,12 +116,24 @@ class PostureSearch:
         for contact in contacts:
             frame = self._body.effector_frame(contact.effector)
             place, jacobian = data.oMf[frame], pin.getFrameJacobian(model, data, frame, _WORLD_AXES)
-            missed.append(contact.position - place.translation)
-            rows.append(jacobian[:3])
+            away, moves = contact.position - place.translation, jacobian[:3]
+            turn = pin.log3(contact.rotation_contact_to_world @ place.rotation.T)
+            turns = jacobian[3:]
+            if contact.rolls:
+                forward, across = contact.rotation_contact_to_world[:, :2].T
+                arm, pitch = place.rotation @ contact.pivot, -float(across @ turn)
+                rolled = contact.rotation_contact_to_world @ contact.pivot
+                away = away + rolled + contact.edge_radius * pitch * forward - arm
+                moves = (
+                    moves - pin.skew(arm) @ turns - contact.edge_radius * np.outer(forward, across @ turns)
+                )
+                level = np.eye(3) - np.outer(across, across)
+                turn, turns = level @ turn, level @ turns
+            missed.append(away)
+            rows.append(moves)
             if contact.kind is ContactKind.SOLE:
-                turn = pin.log3(contact.rotation_contact_to_world @ place.rotation.T)
                 missed.append(_SOLE_END * turn)
-                rows.append(_SOLE_END * jacobian[3:])
+                rows.append(_SOLE_END * turns)
         if com is not None:
             jacobian = pin.jacobianCenterOfMass(model, data, q, False)
             missed.append((com - data.com[0])[:2])

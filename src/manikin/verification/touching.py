@@ -195,7 +195,7 @@ class ContactRows:
             return
         half = 0.5 * np.array(size)
         self._beyond.take(float((np.abs(contact.points[:, :2]) - half).max()), where)
-        if hull is None:
+        if hull is None and not contact.rolls:
             self._share.take(0.0, where)
 
 

@@ -37,8 +37,9 @@ def setup(person):
                 np.ones(n),
                 np.ones(n),
                 np.tile(np.eye(3), (n, 1, 1)),
+                np.tile(pivot, (n, 1)),
             )
-            for name in ("left_foot", "right_hand")
+            for name, pivot in (("left_foot", np.zeros(3)), ("right_hand", np.array([0.07, 0.0, 0.05])))
         },
         com=rng.normal(size=(n, 3)),
         com_weight=np.where(rng.random(n) < 0.5, 1.0, 0.1),

@@ -116,7 +116,10 @@ class _Path:
             self._hold(first, stop)
         for first, stop in mask_runs(self.weight == 0.0):
             self._fly(first, stop)
-        return EffectorTarget(self.position, self.rotation, self.weight, self.rotation_weight, self.along)
+        flat = np.zeros_like(self.position)
+        return EffectorTarget(
+            self.position, self.rotation, self.weight, self.rotation_weight, self.along, flat
+        )
 
     def _hold(self, first: int, stop: int) -> None:
         """Place it on one of its contacts, which lasts from a phase up to another."""

@@ -36,6 +36,7 @@ from manikin.planning.contacts import (
     limb_holds,
     sample_limbs,
     starts_on_limbs,
+    take_seat,
 )
 from manikin.planning.guide import (
     Abstraction,
@@ -76,17 +77,20 @@ class _ContactSearch:
         self._tally.summary["backtracks"] = found.backtracks
         if found.plan is None:
             return self._tally.failed(found.failure or "", "contacts")
-        plan, scenario = self._completed(found.plan)
-        return replace(self._tally.found(plan), scenario=scenario, again=self._again)
+        whole = self._completed(found.plan)
+        if isinstance(whole, str):
+            return self._tally.failed(whole, "goal")
+        return replace(self._tally.found(whole[0]), scenario=whole[1], again=self._again)
 
-    def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None]:
-        """The plan with what comes after it, and the scenario with its supports if a file can list them."""
+    def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
+        """The plan with what ends it, or why it cannot; the scenario with supports that a file can list."""
         return plan, None
 
     def _endpoints(self, reference: FloatArray | None = None) -> Endpoints:
         return Endpoints(
             self._body, self._scene, self._scenario.contacts.friction, reference,
             natural=self._natural, friction_model=self._scenario.contact_model.friction,
+            rolls=not self._scenario.refines,
         )  # fmt: skip
 
 
@@ -98,6 +102,7 @@ class _FootSearch(_ContactSearch):
         self._reference = posture_style_of(scenario.manner).posture(body)
         self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
+        self._seat: Stage | None = None
 
     def run(self) -> ContactSearch:
         start = stage_at(self._places, self._scenario, "start")
@@ -106,12 +111,17 @@ class _FootSearch(_ContactSearch):
         goal = self._goal(start)
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
+        if "buttocks" in goal.contacts:
+            self._seat, before = goal, self._places.risen(goal)
+            if before.stage is None:
+                return self._tally.failed(f"the goal: {before.failure}", "goal")
+            goal = before.stage
         self._search = self._searched(start, goal)
         return self._result(self._search.run())
 
-    def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None]:
-        acting = self._acting(plan)
-        return acting, with_supports(self._scenario, acting)
+    def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
+        whole = self._acting(plan) if self._seat is None else self._sitting(plan, self._seat)
+        return whole if isinstance(whole, str) else (whole, with_supports(self._scenario, whole))
 
     def _searched(self, start: Stage, goal: Stage) -> WalkSearch:
         options = self._scenario.contacts
@@ -121,6 +131,13 @@ class _FootSearch(_ContactSearch):
         poser = PostureFinder(self._body, self._scene, self._reference, asked)
         settings = WalkSettings(stride=options.stride_m, grasp_force=options.grasp_force_N)
         return WalkSearch(poser, start, goal, options.friction, settings)
+
+    def _sitting(self, way: ContactPlan, seat: Stage) -> ContactPlan | str:
+        """The way, and the body sits down at its end; or why it cannot."""
+        asked = PostureFinderSettings(
+            natural=self._natural, friction_model=self._scenario.contact_model.friction
+        )
+        return take_seat(PostureFinder(self._body, self._scene, self._reference, asked), way, seat)
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""

@@ -46,6 +46,7 @@ from manikin.planning.contacts.limb_places import LimbPlaces, limb_holds
 from manikin.planning.contacts.limb_search import LimbHolds, LimbSearch, LimbSettings
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.planning.contacts.seat import leave_seat, take_seat
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPosture, TrunkPostures
 from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
@@ -57,7 +58,7 @@ __all__ = [
     "Manipulability", "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation",
     "Stage", "StrongEfort", "SurfaceTable", "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures",
     "WalkSearch", "WalkSettings", "WeightedSum", "certify_plan", "duration", "efort", "find_candidates",
-    "follow_guide", "force_ellipsoid", "force_transmission_ratio", "heading_of", "limb_holds",
+    "follow_guide", "force_ellipsoid", "force_transmission_ratio", "heading_of", "leave_seat", "limb_holds",
     "manipulability", "mirrored", "pulling_efort", "sample_limb", "sample_limbs", "starts_on_limbs",
-    "velocity_ellipsoid",
+    "take_seat", "velocity_ellipsoid",
 ]  # fmt: skip

@@ -29,6 +29,7 @@ from manikin.contact import (
 from manikin.errors import ContactError
 from manikin.kinematics import touching_pairs
 from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.planning.contacts.transition import Momentum
 from manikin.runtime.requirement import Requirement, RequirementTable, Sense
 from manikin.scene import Proximity, Scene
 
@@ -141,6 +142,8 @@ class Stage:
         com_room: How far from there the centre of mass of a motion may be, along x, y and z [m].
         via: (nq,) posture in the middle of the phase, in which the limb that moves is off everything; None
             where the plan has none.
+        momentum: Motion with which the phase begins, where its contacts could not carry the body at rest;
+            None where they can.
     """
 
     contacts: Mapping[str, Contact]
@@ -149,17 +152,20 @@ class Stage:
     min_duration: float
     com_room: tuple[float, float, float] = COM_ROOM
     via: FloatArray | None = None
+    momentum: Momentum | None = None
 
     @classmethod
     def of(
         cls, body: BodyModel, contacts: Mapping[str, Contact], q: FloatArray, min_duration: float,
         com_room: tuple[float, float, float] = COM_ROOM, via: FloatArray | None = None,
+        momentum: Momentum | None = None,
     ) -> "Stage":  # fmt: skip
         """Stage with the centre of mass of its posture."""
         com = frozen_array(Configuration(body, q).com, "com [m]", (3,))
         kept = MappingProxyType(dict(contacts))
         between = None if via is None else frozen_array(via, "posture between", (body.nq,))
-        return cls(kept, frozen_array(q, "posture", (body.nq,)), com, min_duration, com_room, between)
+        posture = frozen_array(q, "posture", (body.nq,))
+        return cls(kept, posture, com, min_duration, com_room, between, momentum)
 
     @property
     def stance(self) -> Stance:
@@ -254,6 +260,8 @@ class PlanCertificate(RequirementTable):
     ``min_room_m`` is the least room of the centre of mass on the contacts that stay, see
     :func:`~manikin.balance.static_room`, ``max_torque_share`` the largest share of a torque limit with
     which the postures can be held at rest, ``min_clearance_m`` the least distance of what does not touch.
+    A posture that cannot rest is measured in its motion, and the point to which its velocity would carry the
+    centre of mass must have room as well.
 
     Attributes:
         postures: Number of postures: at every change, in the middle of flights, at the goal.
@@ -266,11 +274,13 @@ class PlanCertificate(RequirementTable):
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """A posture, what it holds and what carries it."""
+    """A posture, what it holds, what carries it; its motion if it could not rest, and what it holds then."""
 
     q: FloatArray
     held: tuple[Contact, ...]
     carrying: tuple[Contact, ...]
+    momentum: Momentum | None = None
+    after: tuple[Contact, ...] = ()
 
 
 def certify_plan(
@@ -301,22 +311,31 @@ def _measured(
     error = turn = 0.0
     for contact in item.held:
         rotation, position = state.effector_placement(contact.effector)
-        error = max(error, float(np.linalg.norm(position - contact.position)))
-        if contact.kind is ContactKind.SOLE:
+        moved = float(np.linalg.norm(position - contact.position))
+        if contact.rolls:
+            moved, turned = contact.rolled_away(rotation, position)
+            turn = max(turn, turned)
+        elif contact.kind is ContactKind.SOLE:
             off = rotation.T @ contact.rotation_contact_to_world
             turn = max(turn, float(np.linalg.norm(pin.log3(off))))
+        error = max(error, moved)
     touched = [(contact.effector, name) for contact in item.held for name in scene.touched_obstacles(contact)]
     near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
     pair = f", {' and '.join(near.pairs[int(np.argmin(near.distance))])}" if len(near.distance) else ""
     beyond = np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)
-    stance = Stance(item.carrying, model=model)
+    stance, moving = Stance(item.carrying, model=model), item.momentum
+    acceleration = None if moving is None else moving.acceleration
+    room = static_room(stance, body.mass, state.com, acceleration=acceleration)
+    if moving is not None:
+        after = Stance(item.after, model=model)
+        room = min(room, static_room(after, body.mass, moving.extrapolated(state.com, stance)))
     return {
         "max_contact_error_m": (error, ""),
         "max_sole_turn_rad": (turn, ""),
         "min_clearance_m": (float(near.distance.min(initial=np.inf)), pair),
         "max_range_violation_rad": (float(beyond), ""),
-        "min_room_m": (float(static_room(stance, body.mass, state.com)), ""),
-        "max_torque_share": (static_torque_share(body, item.q, stance), ""),
+        "min_room_m": (float(room), ""),
+        "max_torque_share": (static_torque_share(body, item.q, stance, acceleration), ""),
     }
 
 
@@ -327,7 +346,7 @@ def _postures(plan: ContactPlan) -> list[_Held]:
     for before, after in pairwise(plan.stages):
         both = tuple(c for name, c in after.contacts.items() if before.contacts.get(name) is c)
         every = tuple({id(c): c for c in (*before.contacts.values(), *after.contacts.values())}.values())
-        found.append(_Held(after.q, every, both))
+        found.append(_Held(after.q, every, both, after.momentum, tuple(after.contacts.values())))
         if after.via is not None:
             own = tuple(after.contacts.values())
             found.append(_Held(after.via, own, own))

@@ -13,28 +13,26 @@ from itertools import islice
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.contact import Contact, FrictionModel, sole
+from manikin.contact import Contact, FrictionModel
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import GeneratedContact
 from manikin.planning.contacts.limb_places import LimbPlaces, stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
+from manikin.planning.contacts.seat import FEET, Sitter, Sitting, hand_supports, leave_seat
 from manikin.scene import Scene, Surface
 
 UP = np.array([0.0, 0.0, 1.0])
 
-FEET = ("left_foot", "right_foot")
-
-SEAT_FRICTION = 0.3
-"""Coulomb coefficient of clothes on a seat; our choice."""
-
 SEAT_HEIGHTS = (0.12, 0.40)
 """Lowest and greatest height of a seat above the feet [statures]; our choice."""
 
-FEET_BEFORE_SEAT = tuple(np.linspace(0.15, 0.30, 11))
-"""Distances from the middle of the buttocks to that of the soles that are tried [statures]."""
+FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)
+"""Distances before the middle of the buttocks at which a floor for the feet is looked for [statures]."""
+
+SITTING_TIME = 0.35
+"""Shortest time for which a body sits before it moves [s]."""
 
 CROUCH = 0.6
 """Height of a crouching body's root relative to a standing one's; our choice."""
@@ -54,6 +52,7 @@ class Endpoint:
 
     Attributes:
         stage: Contacts and posture at rest on them, or None.
+        failure: None, or the reason in one line.
     """
 
     stage: Stage | None
@@ -65,7 +64,7 @@ class Endpoints:
 
     def __init__(
         self, body: BodyModel, scene: Scene, friction: float, reference: FloatArray | None = None, *,
-        natural: bool = False, friction_model: FrictionModel = "outer",
+        natural: bool = False, friction_model: FrictionModel = "outer", rolls: bool = False,
     ) -> None:  # fmt: skip
         """Prepare a scene.
 
@@ -75,8 +74,9 @@ class Endpoints:
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
             natural: Whether hips and shoulders keep to their learnt ranges.
             friction_model: Friction model of the stances.
+            rolls: Whether a seated pelvis may roll forward on the front of the buttocks.
         """
-        self._body, self._scene, self._friction = body, scene, friction
+        self._body, self._scene, self._friction, self._rolls = body, scene, friction, rolls
         self._stature = stature_of(body)
         settings = PostureFinderSettings(natural=natural, friction_model=friction_model)
         self._poser = PostureFinder(body, scene, reference, settings)
@@ -86,22 +86,20 @@ class Endpoints:
         """Posture at a place; the lowest surface on which one exists, where no height is given.
 
         Args:
-            at: (2,) below the root, or of the middle of the buttocks on a seat [m].
+            at: (2,) below the root, or of the middle of the buttocks on a seat, which are farther forward
+                where the body can only rise from there [m].
             heading: Where to face [rad].
             height: Height of the surface to stand or sit on [m].
         """
+        if habit is Habit.SEATED:
+            return self._seated(np.asarray(at), heading, height)
         reasons: list[str] = []
-        tried = self._seated if habit is Habit.SEATED else self._standing
-        for contacts, guess in tried(np.asarray(at), heading, habit, height):
-            # A body that sits has its weight where its upright trunk puts it, not over the root.
-            place = Configuration(self._body, guess).com[:2] if habit is Habit.SEATED else None
-            posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
+        for contacts, guess in self._standing(np.asarray(at), heading, habit, height):
+            posed = self._poser.pose(contacts, contacts, guess, guess[:7], restarts=True)
             if posed.q is not None:
                 return Endpoint(Stage.of(self._body, contacts, posed.q, 0.35))
             reasons.append(posed.reason)
-        at_seat = "at the height of a seat with room for both feet before it"
-        nowhere = at_seat if habit is Habit.SEATED else "with room for both feet"
-        why = reasons[0] if reasons else f"there is no surface {nowhere}"
+        why = reasons[0] if reasons else "there is no surface with room for both feet"
         return Endpoint(None, f"no posture {habit} at {np.round(at, 3).tolist()} m: {why}")
 
     def risen(self, stage: Stage) -> Endpoint:
@@ -129,35 +127,52 @@ class Endpoints:
                 guess[2] = level + q[2] * (CROUCH if habit is Habit.CROUCHED else 1.0)
                 yield contacts, guess
 
-    def _seated(
-        self, at: FloatArray, heading: float, _habit: Habit, height: float | None
-    ) -> Iterator[tuple[dict[str, Contact], FloatArray]]:
-        """Buttocks on a seat and feet on the floor before it, the nearest to it first."""
-        size, turn = self._stature, rotation_from_yaw(heading)
-        low, high = (share * size for share in SEAT_HEIGHTS)
-        q = self._body.posture({**self._body.standing_angles, **_SITTING})
-        q[3:7] = _level_turn(heading)
-        sitting = Configuration(self._body, q).effector_placement("buttocks")[1]
+    def _seated(self, at: FloatArray, heading: float, height: float | None) -> Endpoint:
+        """The best way to sit near a place from which the body can rise.
+
+        The buttocks are on the lowest seat there on which it can, at the place or before it.
+        """
+        low, high = (share * self._stature for share in SEAT_HEIGHTS)
+        sitter = Sitter(self._body, self._footholds, self._friction, rolls=self._rolls)
+        reasons: list[str] = []
         # Below the seat there may be no floor: it is looked for where the feet may be.
-        ahead = [at + distance * size * turn[:2, 0] for distance in FEET_BEFORE_SEAT[::5]]
+        forward = self._stature * rotation_from_yaw(heading)[:2, 0]
+        ahead = [at + distance * forward for distance in FEET_BEFORE_SEAT]
         for floor in sorted({level for place in ahead for level in self._levels(place, None)}):
-            for seat in self._levels(at, height):
-                if not low <= seat - floor <= high:
+            for seat in self._surfaces(at, height):
+                place = np.array([*at, _height_at(seat, at)])
+                if not low <= place[2] - floor <= high:
                     continue
-                buttocks = sole(
-                    "buttocks", np.array([*at, seat]), heading, length=SEAT_LENGTH * size,
-                    width=SEAT_WIDTH * size, friction=SEAT_FRICTION,
-                )  # fmt: skip
-                guess = q.copy()
-                guess[:3] += buttocks.position - sitting
-                for distance in FEET_BEFORE_SEAT:
-                    wanted = {}
-                    for foot, side in zip(FEET, (0.07, -0.07), strict=True):
-                        away = turn @ np.array([distance * size, side * size, 0.0])
-                        wanted[foot] = np.array([*(buttocks.position + away)[:2], floor])
-                    feet = self._feet(wanted, heading, floor, 0.02, 0.05)
-                    if len(feet) == 2:
-                        yield {"buttocks": buttocks, **feet}, guess
+                for contacts, guess in self._with_hands(list(sitter.sittings(place, heading, seat, floor))):
+                    result = self._sat(contacts, guess)
+                    if result.stage is not None:
+                        return result
+                    reasons.append(result.failure or "")
+        nothing = "there is no surface at the height of a seat with room for both feet before it"
+        why = "; ".join(dict.fromkeys([reasons[0], reasons[-1]])) if reasons else nothing
+        return Endpoint(None, f"no posture seated at {np.round(at, 3).tolist()} m: {why}")
+
+    def _with_hands(self, sittings: list[Sitting]) -> Iterator[tuple[dict[str, Contact], FloatArray]]:
+        """Contacts and guess of each way to sit; then of each with hands that push, where they can."""
+        yield from ((item.contacts, item.guess) for item in sittings)
+        for item in sittings:
+            hands = hand_supports(
+                self._scene, item.contacts["buttocks"], self._stature, self._friction,
+                self._footholds.steepest,
+            )  # fmt: skip
+            if hands:
+                yield {**item.contacts, **hands}, item.guess
+
+    def _sat(self, contacts: dict[str, Contact], guess: FloatArray) -> Endpoint:
+        """A way to sit with its posture, where the body can rise from it."""
+        # A body that sits has its weight where its upright trunk puts it, not over the root.
+        place = Configuration(self._body, guess).com[:2]
+        posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
+        if posed.q is None:
+            return Endpoint(None, posed.reason)
+        start = Stage.of(self._body, contacts, posed.q, SITTING_TIME)
+        leaving = leave_seat(self._poser, start, frozenset(FEET))
+        return Endpoint(None, leaving.failure) if leaving.failure is not None else Endpoint(start)
 
     def _feet(
         self,
@@ -179,19 +194,17 @@ class Endpoints:
 
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""
-        levels: set[float] = set()
+        levels = (_height_at(surface, at) for surface in self._surfaces(at, height))
+        return sorted({round(level, 6) for level in levels if level is not None})
+
+    def _surfaces(self, at: FloatArray, height: float | None) -> list[Surface]:
+        """Surfaces below and above a place, the lowest first; those near a height, where one is given."""
+        found: list[tuple[float, Surface]] = []
         for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
             level = _height_at(surface, at)
             if level is not None and (height is None or abs(level - height) < 0.05):
-                levels.add(round(level, 6))
-        return sorted(levels)
-
-
-_SITTING = {
-    f"{side}_{joint}": angle
-    for side in ("left", "right")
-    for joint, angle in (("hip_flexion", 1.4), ("knee_flexion", 1.6), ("ankle_dorsiflexion", 0.1))
-}
+                found.append((level, surface))
+        return [surface for _, surface in sorted(found, key=lambda item: item[0])]
 
 
 def _level_turn(yaw: float) -> FloatArray:
@@ -262,29 +275,10 @@ def best_first(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[d
                 heapq.heappush(open_, (cost, after))
 
 
-LEANING = (0.2, 0.4, 0.6, 0.8, 0.92)
-"""Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
-
-LEANING_TIME = 0.3
-"""Shortest time between two of them [s]."""
-
-SEAT_OFF_INSET = 0.015
-"""Distance of the centre of mass to the edge of where it may rest on the feet when a seat is left [m]."""
-
-RISING_TIME = 1.8
-"""Shortest time from there to standing [s]."""
-
-SETTLING_TIME = 0.8
-"""Shortest time that the body stands then [s]."""
-
-SEATED_ROOM = (0.01, 0.01, 0.006)
-"""How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
-
-
 def stand_up(
     poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray
 ) -> tuple[Stage, ...] | str:
-    """The start on feet; its other contacts are left first, all at once.
+    """The start on feet; its other contacts are left first, see :func:`leave_seat`.
 
     Args:
         start: Contacts and posture at the start.
@@ -294,23 +288,5 @@ def stand_up(
     Returns:
         The stages up to standing on feet alone, or why a posture is missing.
     """
-    body = poser.body
-    held = {name: contact for name, contact in start.contacts.items() if name in feet}
-    if len(held) == len(start.contacts):
-        return (start,)
-    leaving = poser.pose(start.contacts, held, start.q, inset=SEAT_OFF_INSET, restarts=True)
-    if leaving.q is None:
-        return leaving.reason
-    over_feet = Configuration(body, leaving.q).com[:2]
-    stages = [start]
-    for share in LEANING:
-        place = (1.0 - share) * start.com[:2] + share * over_feet
-        posed = poser.pose(start.contacts, start.contacts, stages[-1].q, place=place)
-        if posed.q is not None:
-            stages.append(Stage.of(body, start.contacts, posed.q, LEANING_TIME, SEATED_ROOM))
-    stages.append(Stage.of(body, held, leaving.q, RISING_TIME, SEATED_ROOM))
-    risen = poser.pose(held, held, leaving.q, upright, restarts=True)
-    if risen.q is None:
-        return risen.reason
-    stages.append(Stage.of(body, held, risen.q, SETTLING_TIME))
-    return tuple(stages)
+    leaving = leave_seat(poser, start, feet, upright)
+    return leaving.stages if leaving.failure is None else leaving.failure

@@ -103,7 +103,7 @@ class PostureFinder:
         self.settings = settings or PostureFinderSettings()
         self.searches = 0
         standing = np.array(body.standing_posture())
-        self._model = ContactModel.of_body(body.mass, self.settings.friction_model)
+        self.model = ContactModel.of_body(body.mass, self.settings.friction_model)
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
@@ -112,8 +112,8 @@ class PostureFinder:
     def pose(
         self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
         guide: FloatArray | None = None, *, place: FloatArray | None = None, inset: float | None = None,
-        restarts: bool = False, placements: Mapping[str, Placement] | None = None,
-        preferences: Preferences | None = None,
+        com_weight: float | None = None, restarts: bool = False,
+        placements: Mapping[str, Placement] | None = None, preferences: Preferences | None = None,
     ) -> Posed:  # fmt: skip
         """Find a posture that holds contacts and rests on some of them alone.
 
@@ -124,6 +124,7 @@ class PostureFinder:
             guide: (7,) pose of the root to be near, or (nq,) posture to be like; none when omitted.
             place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
             inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
+            com_weight: Weight with which that place is only wished for [1/m^2]; it is required when omitted.
             restarts: Whether to try again from crouched postures.
             placements: Where further effectors should be, by name.
             preferences: Weights of what is not required; the default ones when omitted.
@@ -133,7 +134,7 @@ class PostureFinder:
                 near = np.asarray(Configuration(self.body, start if guide is None else guide).com[:2])
             else:  # over the root of a person, and over what a creature has ahead of its root
                 near = guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
-            place = self._region(carrying).nearest(near, self.settings.inset if inset is None else inset)
+            place = self.resting_place(carrying, near, self.settings.inset if inset is None else inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1
@@ -141,10 +142,10 @@ class PostureFinder:
         whole = guide is not None and len(guide) > ROOT
         problem = PostureProblem(
             self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
-            proximity=self._proximity, clearance=settings.clearance, self_clearance=settings.clearance,
-            ignore=self._touching(held), range_margin=settings.range_margin,
-            learnt_margin=settings.learnt_margin, reference=guide if whole else self._reference,
-            preferences=preferences or Preferences(),
+            com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
+            self_clearance=settings.clearance, ignore=self._touching(held),
+            range_margin=settings.range_margin, learnt_margin=settings.learnt_margin,
+            reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
         once = SolverSettings(
             tolerance=settings.tolerance, iterations=settings.iterations, restarts=False, explain=False
@@ -157,6 +158,17 @@ class PostureFinder:
                 return Posed(result.q)
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
+
+    def resting_place(
+        self, carrying: Mapping[str, Contact], near: FloatArray, inset: float
+    ) -> FloatArray | None:
+        """(2,) place nearest to another where the centre of mass can rest on contacts; None without any.
+
+        Args:
+            near: (2,) [m].
+            inset: Distance to the edges of where it may rest [m].
+        """
+        return self._region(carrying).nearest(near, inset)
 
     def led(self, guide: FloatArray) -> dict[str, Placement]:
         """Wish for the root to be near a (7,) pose, by the root's effector."""
@@ -175,6 +187,6 @@ class PostureFinder:
         """Where the body may rest; asked again and again for the same contacts."""
         key = frozenset(carrying.values())
         if key not in self._regions:
-            stance = Stance(tuple(carrying.values()), model=self._model)
+            stance = Stance(tuple(carrying.values()), model=self.model)
             self._regions[key] = StaticRegion.of(stance, self.body.mass)
         return self._regions[key]

@@ -21,7 +21,7 @@ from manikin.kinematics import Placement
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
-from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Stage
 from manikin.planning.contacts.endpoint import FEET, stand_up
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
@@ -40,6 +40,11 @@ STRONG_TRIES = 8
 
 A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so
 after that many ways the later stages decide."""
+
+EASIER = (0.4, 0.2, 0.55)
+"""Places of the centre of mass over the sole that carries, from its middle ahead, as shares of half its
+length, at which a posture is tried that asks for less strength: a thigh that is more upright turns less under
+the pelvis, and a knee has less before it."""
 
 NEAR_TRIES = 12
 """Ways after which a pair without a posture closes all that are much like it."""
@@ -78,7 +83,7 @@ class WalkSettings:
     swing_speed: float = 0.7
     shift_duration: float = 0.35
     reach_duration: float = 0.5
-    hinge_pace: float = HINGE_PACE
+    hinge_pace: float = 2.0
     grasp_force: float = 400.0
 
 
@@ -122,6 +127,11 @@ class BodyRoom:
         posture = self._postures[number]
         q = posture.at(self._place(left, right))
         return q[:7] if posture.cost <= 1.0 else q
+
+    def stooped(self, number: int) -> list[int]:
+        """A posture and up to three in which the trunk is bent more, the cheapest first."""
+        heights = [item.height for item in self._postures]
+        return [number, *(n for n, high in enumerate(heights) if high < 0.97 * heights[number])][:4]
 
     def _place(self, left: Foothold, right: Foothold) -> FloatArray:
         """(4,) x, y and height of the ground [m] and heading [rad] between two feet."""
@@ -357,14 +367,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     def _guide(self, place: "_Place") -> FloatArray:
         return self._room.guide(place.trunk, place.left, place.right)
 
-    def _strong(self, posed: Posed, carrying: Mapping[str, Contact]) -> Posed:
-        """The posture, if rest on what carries needs no more than the strength, as far as that counts."""
-        if posed.q is None or self.replanned >= STRONG_TRIES:
-            return posed
-        share = static_torque_share(self.poser.body, posed.q, Stance(list(carrying.values())))
-        on = " and ".join(carrying)
-        return posed if share <= 1.0 else Posed(None, f"resting on {on} asks for {share:.2f} of the strength")
-
     def _posed(
         self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: "_Place", q: FloatArray
     ) -> Posed:
@@ -377,20 +379,42 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             name: Placement(None, contact.rotation_contact_to_world, 0.05)
             for name, contact in held.items() if contact.kind is ContactKind.POINT
         }  # fmt: skip
-        posed = self._strong(self.poser.pose(held, carrying, q, guide, placements=flat), carrying)
+        posed = self.poser.pose(held, carrying, q, guide, placements=flat)
         if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
-            again = self.poser.pose(held, carrying, start, guide, restarts=feet_alone, placements=flat)
-            posed = self._strong(again, carrying)
-        stands = [contact for name, contact in carrying.items() if name in FEET]
-        if posed.q is None and not feet_alone and len(stands) == 1:
-            # A hand takes what is over the foot; what is beside it has to be held up by the arm.
-            over = stands[0].position[:2]
-            again = self.poser.pose(held, carrying, q, guide, place=over, placements=flat)
-            posed = self._strong(again, carrying)
+            posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone, placements=flat)
+        if posed.q is not None:
+            posed = self._easier(posed, held, carrying, place, flat)
         self._postures[key] = posed
         self._kept += held.values()  # so that no other contact gets its id
         return posed
+
+    def _easier(
+        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: "_Place",
+        flat: Mapping[str, Placement],
+    ) -> Posed:  # fmt: skip
+        """A posture that the joints can hold at rest: the given one, or one on its foot that leans ahead."""
+        body, stance = self.poser.body, Stance(list(carrying.values()))
+
+        def share_of(item: Posed) -> float:
+            return math.inf if item.q is None else static_torque_share(body, item.q, stance)
+
+        best, least = posed, share_of(posed)
+        feet = [contact for name, contact in carrying.items() if name in FEET]
+        tries = self._room.stooped(place.trunk) if len(feet) == 1 else ()
+        turn = feet[0].rotation_contact_to_world
+        middle, ahead = feet[0].position + turn @ feet[0].centre, 0.5 * feet[0].length * turn[:, 0]
+        for number, part in ((n, part) for n in tries for part in EASIER):
+            if least <= 1.0 or best.q is None:
+                break
+            at, guide = (middle + part * ahead)[:2], self._guide(replace(place, trunk=number))
+            other = self.poser.pose(held, carrying, best.q, guide, place=at, placements=flat)
+            share = share_of(other)
+            if share < least:
+                best, least = other, share
+        if least > 1.0 and self.replanned < STRONG_TRIES:
+            return Posed(None, f"resting on {' and '.join(carrying)} asks for {least:.2f} of the strength")
+        return best
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,9 @@ import pinocchio as pin
 
 from manikin.balance import MotionMargin, WrenchPolytope, motion_margin
 from manikin.body import BodyModel
-from manikin.body.limbs import end_segments, hanging_segment
+from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -311,8 +312,12 @@ def support_errors(
         pin.forwardKinematics(model, data, q)
         pin.updateFramePlacements(model, data)
         for contact in schedule.sequence[int(phases[k])].stance:
-            measure = _placement_error if contact.part is SolePart.FULL else _part_error
-            moved, turned = measure(body, data, contact)
+            if contact.rolls:
+                here = data.oMf[body.effector_frame(contact.effector)]
+                moved, turned = contact.rolled_away(here.rotation, here.translation)
+            else:
+                measure = _placement_error if contact.part is SolePart.FULL else _part_error
+                moved, turned = measure(body, data, contact)
             if settling[contact.effector][k]:
                 place = data.oMf[body.effector_frame(contact.effector)].translation
                 moved, turned = -float(contact.normal @ (place - contact.position)), 0.0
@@ -364,7 +369,7 @@ def deepest_penetration(
     for swing in schedule.sequence.swings():
         start, end = schedule.swing_interval(swing)
         rows = np.flatnonzero((motion.time >= start) & (motion.time < end))
-        ends = frozenset(end_segments(body, swing.effector))
+        ends = frozenset(segment for segment, _ in touching_pairs(body, [(swing.effector, "")]))
         obstacles = _supports(body, ends, [ignored[row] for row in rows.tolist()])
         if not obstacles:
             continue

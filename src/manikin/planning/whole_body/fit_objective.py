@@ -16,7 +16,7 @@ from scipy.special import expit
 from manikin.body import BodyModel
 from manikin.motion.dynamics import MomentumRate, MotionSampler, MotionSamples
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
-from manikin.numerics.spatial import FloatArray, rotation_vector, rotation_vector_jacobian
+from manikin.numerics.spatial import FloatArray, rotation_vector, rotation_vector_jacobian, skew
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_strength import HeldForces, excess_torque
 from manikin.planning.whole_body.fit_targets import EffectorTarget, FitTargets
@@ -167,7 +167,7 @@ class MotionObjective:
             place = motion.frames[:, number]
             by_joints = self._sampler.frame_jacobian(motion, number)
             jacobian[:, rows], residual[:, rows] = _effector_rows(target, place, by_joints, scales)
-            error = np.linalg.norm(place[:, :3, 3] - target.position, axis=1)
+            error = np.linalg.norm(_missed(target, place), axis=1)
             out.support_error = max(out.support_error, float(error[target.weight >= 1.0].max(initial=0.0)))
             turn = np.linalg.norm(residual[:, rows][:, 3:], axis=1) * scales.rotation
             out.support_turn = max(out.support_turn, float(turn[_held_rows(target)[:, 3]].max(initial=0.0)))
@@ -301,9 +301,17 @@ def _effector_rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Scaled residuals (n, 6) of an effector at its places (n, 4, 4) and their derivatives (n, 6, nv)."""
     along = (target.weight / scales.position)[:, None, None] * target.along
-    error = place[:, :3, 3] - target.position
+    error = _missed(target, place)
     jacobian, residual = np.zeros_like(by_joints), np.zeros((len(error), 6))
-    jacobian[:, :3] = along @ by_joints[:, :3]
+    rolls, frame = target.pivot[:, 2] > 0.0, target.rotation
+    moved = by_joints[:, :3]
+    if rolls.any():
+        arm = (place[:, :3, :3] @ target.pivot[:, :, None])[:, :, 0]
+        cosine, sine, by_turn = _pitch(target, place)
+        pitched = (by_turn / (cosine**2 + sine**2)[:, None])[:, None] @ by_joints[:, 3:]
+        moved = moved - skew(arm) @ by_joints[:, 3:]
+        moved = moved - (target.pivot[:, 2, None] * frame[:, :, 0])[:, :, None] * pitched
+    jacobian[:, :3] = along @ moved
     residual[:, :3] = (along @ error[:, :, None])[:, :, 0]
     relative = place[:, :3, :3] @ target.rotation.transpose(0, 2, 1)
     turn = rotation_vector(relative)
@@ -312,14 +320,40 @@ def _effector_rows(
     by_turn = rotation_vector_jacobian(turn) @ relative.transpose(0, 2, 1)
     jacobian[:, 3:] = weight[:, None, None] * by_turn @ by_joints[:, 3:]
     residual[:, 3:] = weight[:, None] * turn
+    if rolls.any():  # only turns about the other two axes of the contact count
+        own = frame.transpose(0, 2, 1)[rolls]
+        jacobian[rolls, 3:] = own @ jacobian[rolls, 3:]
+        residual[rolls, 3:] = (own @ residual[rolls, 3:, None])[:, :, 0]
+        jacobian[rolls, 4], residual[rolls, 4] = 0.0, 0.0
     return jacobian, residual
+
+
+def _pitch(target: EffectorTarget, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n,) cosine and sine of the pitch against a target and (n, 3) its derivative by a turn, all scaled."""
+    along, forward, up = place[:, :3, 0], target.rotation[:, :, 0], target.rotation[:, :, 2]
+    cosine, sine = np.sum(along * forward, axis=1), -np.sum(along * up, axis=1)
+    turn = -cosine[:, None] * np.cross(along, up) - sine[:, None] * np.cross(along, forward)
+    return cosine, sine, turn
+
+
+def _missed(target: EffectorTarget, place: FloatArray) -> FloatArray:
+    """(n, 3) way of an effector at places (n, 4, 4) from its target; of what rolls, that of its pivot [m]."""
+    error = place[:, :3, 3] - target.position
+    if not target.pivot.any():
+        return error
+    frame, pivot = target.rotation, target.pivot
+    cosine, sine, _ = _pitch(target, place)
+    rolled = pivot + np.arctan2(sine, cosine)[:, None] * pivot[:, 2:] * [1.0, 0.0, 0.0]
+    return error + (place[:, :3, :3] @ pivot[:, :, None] - frame @ rolled[:, :, None])[:, :, 0]
 
 
 def _held_rows(target: EffectorTarget) -> NDArray[np.bool_]:
     """(n, 6) whether position and orientation have to be met exactly; a grasp holds its position only."""
     position = target.weight >= 1.0
     rows = (position, position & (target.rotation_weight >= 1.0))
-    return np.repeat(np.stack(rows, axis=1), 3, axis=1)
+    held = np.repeat(np.stack(rows, axis=1), 3, axis=1)
+    held[:, 4] &= target.pivot[:, 2] == 0.0
+    return held
 
 
 def to_raw(jacobian: FloatArray, tangent: FloatArray) -> FloatArray:

@@ -27,6 +27,8 @@ class EffectorTarget:
         rotation_weight: (n,) importance of the orientation, likewise.
         along: (n, 3, 3) applied to the position error before it is weighted: the identity, or
             less than it along the surface of a contact that is still settling.
+        pivot: (n, 3) point of the effector's frame that is held instead of its origin where its last number,
+            a radius, is not zero: there the effector rolls about its y axis on a round edge [m].
     """
 
     position: FloatArray
@@ -34,16 +36,18 @@ class EffectorTarget:
     weight: FloatArray
     rotation_weight: FloatArray
     along: FloatArray
+    pivot: FloatArray
 
     @classmethod
     def free(cls, n: int) -> "EffectorTarget":
         """Target without importance at n samples, in arrays to be filled."""
         identity = np.tile(np.eye(3), (n, 1, 1))
-        return cls(np.zeros((n, 3)), identity, np.zeros(n), np.ones(n), identity.copy())
+        return cls(np.zeros((n, 3)), identity, np.zeros(n), np.ones(n), identity.copy(), np.zeros((n, 3)))
 
     def put(self, rows: NDArray[np.bool_], contact: Contact) -> None:
         """Place the effector at a contact in some rows."""
         self.position[rows], self.rotation[rows] = contact.position, contact.rotation_contact_to_world
+        self.pivot[rows] = contact.pivot if contact.rolls else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -253,7 +253,7 @@ def requirements_at(
     time = float(schedule.instants[key])
     contacts, placements = [], {}
     for name, contact in _held_at(schedule, key).items():
-        if contact.part is not SolePart.FULL:
+        if contact.part is not SolePart.FULL and not contact.rolls:
             placements[name] = _tilted(contact, time, [roll for other, roll in rolls if other == name])
         elif schedule.settling(time, name)[0]:
             placements[name] = Placement(

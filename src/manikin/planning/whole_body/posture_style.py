@@ -129,7 +129,7 @@ def _requirements(
     held = {
         c.effector: c
         for c in schedule.stance_at(time)
-        if c.part is SolePart.FULL and not schedule.settling(time, c.effector)[0]
+        if (c.part is SolePart.FULL or c.rolls) and not schedule.settling(time, c.effector)[0]
     }
     settling = {name for name in effectors if schedule.settling(time, name)[0]}
     placements = {}

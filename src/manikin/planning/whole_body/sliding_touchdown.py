@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
+from manikin.body.limbs import hangs
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
@@ -88,7 +89,7 @@ def sliding_touchdown_at(
         time: (n,) [s].
 
     Returns:
-        None where every contact is made at rest.
+        None where every contact is made at rest, and none of the trunk is left.
     """
     pairs: Ignored = frozenset()
     near, sliding = np.zeros(len(time), dtype=np.bool_), np.zeros(len(time), dtype=np.bool_)
@@ -100,6 +101,13 @@ def sliding_touchdown_at(
                 pairs |= touch_pairs(body, scene, contact)
                 near |= (time >= start - SITTING_DOWN) & (time < start + contact.settle)
                 sliding |= schedule.settling(time, contact.effector)
+    for swing in schedule.sequence.swings():
+        for contact, before in ((swing.start, True), (swing.end, False)):
+            if contact is not None and contact.settle == 0.0 and not hangs(body, contact.effector):
+                # A trunk that leaves a seat, or is about to sit, may brush over it.
+                start, end = schedule.swing_interval(swing)
+                pairs |= touch_pairs(body, scene, contact)
+                near |= (time >= (start if before else end - SITTING_DOWN)) & (time < end)
     return SlidingTouchdown(pairs, near, sliding) if pairs else None
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments, hangs
 from manikin.contact import Contact, ContactSchedule, Swing
-from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture
+from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body.birrt import Feasible, FlightLimits
@@ -330,6 +330,11 @@ def leaning_pairs(body: BodyModel, padded: Sequence[str]) -> frozenset[tuple[str
 
 
 def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
-    """Pairs of end segment and obstacle that a contact brings together."""
+    """Pairs of segment and obstacle that a contact brings together; thighs lie on a seat as buttocks do.
+
+    What slides to its place touches with its own segment alone.
+    """
     touched = scene.touched_obstacles(contact, tolerance=0.02)
-    return frozenset(product(end_segments(body, contact.effector), touched))
+    if contact.settle > 0.0:
+        return frozenset(product(end_segments(body, contact.effector), touched))
+    return touching_pairs(body, [(contact.effector, obstacle) for obstacle in touched])

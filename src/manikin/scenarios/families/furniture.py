@@ -36,6 +36,16 @@ def chairs(sketch: Sketch) -> None:
     sketch.goal(front + sketch.between(0.2, 0.6), sketch.between(-0.1, 0.1), sketch.between(-20.0, 20.0, 1))
 
 
+def sitting(sketch: Sketch) -> None:
+    """Sit down on a chair as of the family chairs, from a place before it.
+
+    From 0.2 to 0.6 m before its front edge, facing as who sits there by 20 degrees. Possible: as rising,
+    backwards in time.
+    """
+    chairs(sketch)
+    sketch.exchange()
+
+
 LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
 
 

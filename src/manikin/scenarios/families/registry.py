@@ -10,7 +10,8 @@ FAMILIES: dict[str, Family] = {
         Family(draw.__name__.replace("_", "-"), draw)
         for draw in (
             ways.flat, ways.around, levels.stairs, ways.thresholds, ways.bars, ways.hatches, levels.platforms,
-            levels.stones, levels.ramps, ways.gaps, levels.rubble, furniture.chairs, levels.roofs,
+            levels.stones, levels.ramps, ways.gaps, levels.rubble, furniture.chairs, furniture.sitting,
+            levels.roofs,
             levels.blocks, furniture.buildings, ways.tunnels, furniture.ladders, furniture.quadruped_stairs,
             furniture.quadruped_rubble,
         )

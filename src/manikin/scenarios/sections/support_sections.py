@@ -20,7 +20,16 @@ from manikin.scenarios.validation import (
 )
 
 _KIND_KEYS: dict[str, tuple[str, ...]] = {
-    "sole": ("normal", "sole", "polygon", "friction", "normal_force_cap_N", "torsion_limit_Nm", "settle_s"),
+    "sole": (
+        "normal",
+        "sole",
+        "polygon",
+        "friction",
+        "normal_force_cap_N",
+        "torsion_limit_Nm",
+        "settle_s",
+        "edge_radius_m",
+    ),
     "point": ("normal", "friction", "normal_force_cap_N"),
     "grasp": ("max_force_N", "planning_max_force_N", "max_moment_Nm", "rpy_deg"),
 }
@@ -60,6 +69,9 @@ class ContactSection(Section):
     torsion_limit_Nm: Positive | None = optional("largest moment about the normal [N.m]")
     settle_s: NonNegative | None = optional(
         "time after the touch-down in which it may still slide to its place [s]"
+    )
+    edge_radius_m: Positive | None = optional(
+        "radius of the front edge of the sole, on which it rolls (default: it lies flat) [m]"
     )
     max_force_N: Positive | None = optional(
         "grasp: largest force along each axis of the world, in a scenario of the task frame [N]"

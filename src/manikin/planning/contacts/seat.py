@@ -1,0 +1,512 @@
+"""Sit on a seat and leave it: where the buttocks and feet are, and the stages up to standing.
+
+A start that suits the body and the seat decides whether a person can rise: feet drawn back below the knees,
+thighs that do not press on the seat's edge, buttocks far enough in front.  Legs on a seat are two triangles
+seen from the side, so that all places on the seat and all slopes of the shanks are compared in closed form
+(:class:`Sitter`), and only the best few are tried with the whole body.  The body leaves the seat at rest
+where it can lean so far that its weight is over its feet, else in motion (:mod:`.transition`), else with
+hands that push on armrests, a table or the seat.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manikin.balance.criteria import static_torque_share
+from manikin.body import BodyModel, Configuration
+from manikin.body.anthropometry import ANKLE_FROM_HEEL
+from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
+from manikin.contact import Contact, Stance, point, rolling_front, sole
+from manikin.kinematics.leg_kinematics import LegKinematics
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
+from manikin.planning.contacts.footholds import Footholds
+from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.contacts.posture_finder import PostureFinder
+from manikin.planning.contacts.transition import Momentum, momentum_to_rest
+from manikin.scene import Scene, Surface
+
+FEET = ("left_foot", "right_foot")
+
+SEATED_ON = frozenset({"buttocks"})
+"""Effectors with which a body sits."""
+
+STRENGTH_SHARE = 0.95
+"""Largest share of the strength of a joint with which a seat is left."""
+
+SEAT_FRICTION = 0.3
+"""Coulomb coefficient of clothes on a seat; our choice."""
+
+SHANK_SLOPE = float(np.deg2rad(12.0))
+"""Slope of the shank that is liked, knee before ankle [rad]; people who rise have 0 to 20 degrees."""
+
+SLOPES = np.deg2rad(np.arange(-25.0, 28.1, 1.0))
+"""Slopes of the shank that are compared [rad]."""
+
+FORWARD = np.arange(0.0, 0.161, 0.01)
+"""Ways of the buttocks towards the seat's edge that are compared [statures]."""
+
+APART = 0.07
+"""Distance of the middle of a sole from the body's middle plane [statures]."""
+
+LIKED = (0.05, float(np.deg2rad(12.0)), 0.012)
+"""Way forward [statures], deviation of the shank's slope [rad] and gap between the farthest lean and the
+heels [statures] that count alike; our choice."""
+
+CALF_ROOM = 0.016
+"""Distance of the calves to the edge of the seat [m]."""
+
+SEAT_THICKNESS = 0.05
+"""Depth below the top of a seat at which calves keep that distance [m]; our choice."""
+
+FEET_SPACING = 0.01
+"""Distance of the places that are tried for the feet [m]."""
+
+TRIED = 6
+"""Sittings that are tried with the whole body."""
+
+LEAN = {
+    "hip_flexion": 1.5, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1, "lumbar_flexion": 0.8,
+    "thorax_flexion": 0.5, "neck_flexion": -0.4,
+}  # fmt: skip
+"""Angles of a body that leans far forward on a seat, its pelvis flat [rad]."""
+
+LEAN_PITCH = 0.5
+"""Pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sitting:
+    """A way to sit that is to be tried.
+
+    Attributes:
+        contacts: Of buttocks and feet.
+        guess: (nq,) posture near one that holds them.
+        cost: By which sittings are compared.
+    """
+
+    contacts: dict[str, Contact]
+    guess: FloatArray
+    cost: float
+
+
+class Sitter:
+    """Compares ways to sit of one human body."""
+
+    def __init__(self, body: BodyModel, footholds: Footholds, friction: float, *, rolls: bool = True) -> None:
+        """Take the lengths of the body; the friction is that of the soles.
+
+        Args:
+            rolls: Whether the pelvis may roll forward on the front of the buttocks; it lies flat otherwise.
+
+        Raises:
+            BodyError: If its legs are not a human's.
+        """
+        self._body, self._footholds, self._friction = body, footholds, friction
+        self._rolls = rolls
+        self.stature = stature_of(body)
+        legs = LegKinematics(body)
+        self._thigh, self._shank = legs.thigh, legs.shank
+        foot, seat = body.effector("left_foot"), body.effector("buttocks")
+        self._sole = float(foot.translation[0]), -float(foot.translation[2])
+        self._hip = legs.hip[0] - seat.translation
+        self._thigh_radius, self._shank_radius = (
+            float(body.segment(f"left_{name}").shapes[0].size[0]) for name in ("thigh", "leg")
+        )
+        self._heel = ANKLE_FROM_HEEL * float(body.sole_length or 0.0)
+        self._lean = self._farthest_lean()
+
+    def _farthest_lean(self) -> float:
+        """Way of the centre of mass before the middle of the buttocks' place where the body leans far [m]."""
+        pitch = LEAN_PITCH * self._rolls
+        q = self._body.posture(
+            _of_both_sides(self._body, {**LEAN, "hip_flexion": LEAN["hip_flexion"] + pitch})
+        )
+        q[3:7] = [0.0, np.sin(0.5 * pitch), 0.0, np.cos(0.5 * pitch)]
+        state = Configuration(self._body, q)
+        turn, place = state.effector_placement("buttocks")
+        edge = self.stature * np.array([0.5 * SEAT_LENGTH, 0.0, BUTTOCK_RADIUS])
+        return float((state.com - place - turn @ edge + edge)[0]) + self.stature * BUTTOCK_RADIUS * pitch
+
+    def sittings(self, at: FloatArray, heading: float, seat: Surface, floor: float) -> Iterator[Sitting]:
+        """Ways to sit near a place, the best first.
+
+        Args:
+            at: (3,) wanted middle of the buttocks, on the seat [m].
+            heading: Where to face [rad].
+            floor: Height of what the feet stand on [m].
+        """
+        size, turn = self.stature, rotation_from_yaw(heading)
+        room = _room_ahead(seat, at, turn[:, 0])
+        tried: list[tuple[float, float]] = []
+        feet: dict[int, dict[str, Contact]] = {}
+        for cost, forward, ahead in self._compared(float(at[2]) - floor, room):
+            if len(tried) == TRIED:
+                return
+            if any(abs(forward - other) < 0.02 and abs(ahead - foot) < 0.02 for other, foot in tried):
+                continue
+            row = round((forward + ahead) / FEET_SPACING)
+            if row not in feet:
+                wanted = at + row * FEET_SPACING * turn[:, 0]
+                feet[row] = self._feet(np.array([*wanted[:2], floor]), heading)
+            if len(feet[row]) == len(FEET):
+                buttocks = sole(
+                    "buttocks", at + forward * turn[:, 0], heading, length=SEAT_LENGTH * size,
+                    width=SEAT_WIDTH * size, friction=SEAT_FRICTION,
+                )  # fmt: skip
+                if self._rolls:
+                    buttocks = rolling_front(buttocks, BUTTOCK_RADIUS * size)
+                tried.append((forward, ahead))
+                yield Sitting({"buttocks": buttocks, **feet[row]}, self._guess(buttocks, heading), cost)
+
+    def _feet(self, middle: FloatArray, heading: float) -> dict[str, Contact]:
+        """Footholds beside a place (3,) between the feet, as far as there are any close enough."""
+        found: dict[str, Contact] = {}
+        for foot, side in zip(FEET, (1.0, -1.0), strict=True):
+            wanted = middle + rotation_from_yaw(heading) @ [0.0, side * APART * self.stature, 0.0]
+            contact = next(iter(self._footholds.near(foot, wanted, heading, self._friction)), None)
+            if contact is not None and float(np.linalg.norm(contact.position - wanted)) < 0.03:
+                found[foot] = contact
+        return found
+
+    def _compared(self, height: float, room: float) -> list[tuple[float, float, float]]:
+        """Cost, way of the buttocks forward and place of the soles before them [m], the cheapest first.
+
+        Args:
+            height: Of the seat above the floor [m].
+            room: From the wanted place forward to the seat's edge [m].
+        """
+        size, (toes, ankle) = self.stature, self._sole
+        forward, slope = (axis.ravel() for axis in np.meshgrid(FORWARD * size, SLOPES, indexing="ij"))
+        hip_x, hip_z = self._hip[0], height + self._hip[2]
+        knee_z = ankle + self._shank * np.cos(slope)
+        drop = hip_z - knee_z
+        level = np.sqrt(np.maximum(self._thigh**2 - drop**2, 0.0))
+        ahead = hip_x + level - self._shank * np.sin(slope)
+        # Room between the thigh and the seat's edge, where the thigh passes over it.
+        edge = np.clip(room - forward - hip_x, 0.0, level)
+        over = self._hip[2] - (drop * edge + self._thigh_radius * self._thigh) / np.maximum(level, 1e-6)
+        # Room between the calf and that edge, which is as thick as a board.
+        low = np.maximum(knee_z - height + SEAT_THICKNESS, 0.0)
+        calf = hip_x + level - low * np.tan(slope) - self._shank_radius / np.cos(slope) - (room - forward)
+        gap = np.maximum(ahead - self._heel - self._lean, 0.0)
+        scales = LIKED[0] * size, LIKED[1], LIKED[2] * size
+        cost = (forward / scales[0]) ** 2 + ((slope - SHANK_SLOPE) / scales[1]) ** 2 + (gap / scales[2]) ** 2
+        half = 0.5 * SEAT_LENGTH * size
+        possible = (
+            (np.abs(drop) < self._thigh) & (over >= 0.0) & (calf >= CALF_ROOM) & (room - forward >= half)
+        )
+        order = np.argsort(cost, kind="stable")
+        return [
+            (float(cost[k]), float(forward[k]), float(ahead[k] + toes)) for k in order.tolist() if possible[k]
+        ]
+
+    def _guess(self, buttocks: Contact, heading: float) -> FloatArray:
+        q = self._body.posture({**self._body.standing_angles, **_of_both_sides(self._body, _SITTING)})
+        q[3:7] = [0.0, 0.0, np.sin(0.5 * heading), np.cos(0.5 * heading)]
+        q[:3] += buttocks.position - Configuration(self._body, q).effector_placement("buttocks")[1]
+        return q
+
+
+_SITTING = {"hip_flexion": 1.4, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1}
+
+
+def _of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
+    """Angles by the full names of a body's hinges."""
+    return {name: value for name in body.joint_names for key, value in angles.items() if name.endswith(key)}
+
+
+def _room_ahead(seat: Surface, at: FloatArray, heading: FloatArray) -> float:
+    """Distance from a place on a surface forward to its edge [m]."""
+    steps = np.linspace(0.0, 1.0, 201)
+    inside = seat.outside(at + steps[:, None] * heading) <= 1e-9
+    return float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
+
+
+LEANING = (0.25, 0.5, 0.75, 0.92)
+"""Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
+
+LEANING_TIMES = (1.3, 0.9)
+"""Time of that way, to where the body comes to rest over its feet and to where it goes on in motion [s]."""
+
+SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
+"""Distances of the centre of mass to the edge of where it may rest on the feet when a seat is left, tried in
+order [m]; the first is inside the smaller soles on which it is planned."""
+
+BEHIND = (0.0, 0.02, 0.04)
+"""How far behind where it could rest the centre of mass is when a seat is left, tried in order [m]."""
+
+LEAN_WEIGHT = 300.0
+"""Weight of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice."""
+
+RISING_TIME = 0.9
+"""Shortest time from there to standing [s]; the pace of the joints mostly asks for more."""
+
+SETTLING_TIME = 0.8
+"""Shortest time that the body stands then [s]."""
+
+SEATED_ROOM = (0.01, 0.01, 0.006)
+"""How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leaving:
+    """The stages from a seat to standing on feet, or why there are none.
+
+    Attributes:
+        stages: From the start on; only that where the body does not sit.
+    """
+
+    stages: tuple[Stage, ...]
+    failure: str | None = None
+
+
+def leave_seat(
+    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray | None = None
+) -> Leaving:
+    """Rise from a seat: lean forward, leave the seat, let go with the hands, stand.
+
+    Args:
+        start: Contacts and posture at the start; hands that hold or push there stay until the weight is over
+            the feet.
+        feet: Effectors to stand on.
+        upright: (7,) pose of the root that has risen; over the feet when omitted.
+    """
+    held = {name: contact for name, contact in start.contacts.items() if name in feet}
+    if len(held) == len(start.contacts):
+        return Leaving((start,))
+    risen = poser.pose(held, held, start.q, upright, restarts=True)
+    if risen.q is None:
+        return Leaving((start,), f"no posture on {', '.join(held) or 'feet'} alone: {risen.reason}")
+    pushing = {name: contact for name, contact in start.contacts.items() if name not in SEATED_ON}
+    if len(pushing) > len(held):
+        return _pushed_up(poser, start, pushing, held, risen.q)
+    failure = None
+    for lean in _leans(poser, start, held, risen.q):
+        if lean.q is not None and lean.failure is None:
+            return _rising(poser, start, [(held, lean.q, lean.momentum)], risen.q)
+        failure = lean.failure
+    return Leaving((start,), failure)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lean:
+    """A posture in which a seat is left for the feet, or why not there.
+
+    Attributes:
+        q: (nq,) or None.
+        momentum: Its motion; None at rest.
+        failure: None, or the reason in one line.
+    """
+
+    q: FloatArray | None
+    momentum: Momentum | None = None
+    failure: str | None = None
+
+
+def _leans(
+    poser: PostureFinder, start: Stage, held: Mapping[str, Contact], risen: FloatArray
+) -> Iterator[_Lean]:
+    """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
+    body = poser.body
+    rest = Configuration(body, risen).com
+    over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSETS[-1])
+    if over is None:
+        yield _Lean(None, failure=f"{', '.join(held)} cannot carry the body at rest")
+        return
+    for inset in SEAT_OFF_INSETS[:-1]:
+        farther = poser.resting_place(held, start.com[:2], inset)
+        posed = poser.pose(start.contacts, held, start.q, place=farther, inset=inset)
+        if posed.q is not None:
+            yield _lean(poser, posed.q, held, rest, moving=False)
+    back = start.com[:2] - rest[:2]
+    back /= max(float(np.linalg.norm(back)), 1e-9)
+    reason, q = "", start.q
+    for behind in BEHIND:
+        posed = poser.pose(start.contacts, held, q, place=over + behind * back, restarts=behind == 0.0)
+        if posed.q is None:
+            reason = reason or posed.reason
+            continue
+        q = posed.q
+        yield _lean(poser, q, held, rest, moving=behind > 0.0)
+    # The farthest lean, wherever that is.
+    posed = poser.pose(start.contacts, held, q, place=over, com_weight=LEAN_WEIGHT)
+    if posed.q is None:
+        yield _Lean(None, failure=reason or posed.reason)
+        return
+    lean = _lean(poser, posed.q, held, rest, moving=True)
+    yield lean if lean.failure is None else replace(lean, failure=f"{lean.failure}; at rest: {reason}")
+
+
+def _lean(
+    poser: PostureFinder, q: FloatArray, held: Mapping[str, Contact], rest: FloatArray, *, moving: bool
+) -> _Lean:
+    """A posture with its motion to rest, where the joints are strong enough."""
+    body, momentum = poser.body, None
+    if moving:
+        com = Configuration(body, q).com
+        momentum = momentum_to_rest(Stance(list(held.values()), model=poser.model), body.mass, com, rest)
+        if momentum is None:
+            behind = float(np.linalg.norm(com[:2] - rest[:2]))
+            return _Lean(q, failure=(
+                f"a lean leaves the centre of mass {behind:.3f} m behind the middle of the feet, from where "
+                "no speed carries it over them"
+            ))  # fmt: skip
+    return _Lean(q, momentum, _too_weak(poser, q, held, momentum))
+
+
+def _pushed_up(
+    poser: PostureFinder, start: Stage, pushing: Mapping[str, Contact], held: Mapping[str, Contact],
+    risen: FloatArray,
+) -> Leaving:  # fmt: skip
+    """Leave a seat with hands that push, until the weight is over the feet."""
+    # The arms push until they are long: what is left to rise alone is as little as they let.
+    failure = None
+    for inset in SEAT_OFF_INSETS:
+        free = poser.pose(pushing, held, start.q, risen[:7], inset=inset, restarts=True)
+        if free.q is None:
+            failure = failure or f"hands cannot be let go: {free.reason}"
+            continue
+        over_feet = Configuration(poser.body, free.q).com[:2]
+        off = poser.pose(start.contacts, pushing, start.q, place=over_feet, com_weight=LEAN_WEIGHT)
+        if off.q is None:
+            failure = failure or off.reason
+            continue
+        weak = _too_weak(poser, off.q, pushing) or _too_weak(poser, free.q, held)
+        if weak is None:
+            return _rising(poser, start, [(pushing, off.q, None), (held, free.q, None)], risen)
+        failure = weak
+    return Leaving((start,), failure)
+
+
+def _too_weak(
+    poser: PostureFinder, q: FloatArray, carrying: Mapping[str, Contact], momentum: Momentum | None = None
+) -> str | None:
+    """Message that the joints are too weak for a posture; None where they are not."""
+    acceleration = None if momentum is None else momentum.acceleration
+    stance = Stance(list(carrying.values()), model=poser.model)
+    share = static_torque_share(poser.body, q, stance, acceleration)
+    if share <= STRENGTH_SHARE:
+        return None
+    if not np.isfinite(share):
+        return f"{', '.join(carrying)} cannot carry the body off the seat"
+    return f"rising on {', '.join(carrying)} needs {share:.2f} times the strength of the joints"
+
+
+def _rising(
+    poser: PostureFinder, start: Stage,
+    changes: Sequence[tuple[Mapping[str, Contact], FloatArray, Momentum | None]], risen: FloatArray,
+) -> Leaving:  # fmt: skip
+    """Stages that lean up to the first change and then have the contacts of each, up to standing."""
+    body, stages, moving = poser.body, [start], changes[0][2] is not None
+    there, before = Configuration(body, changes[0][1]).com[:2], 0.0
+    for share in (*LEANING, 1.0):
+        time = _leaning_time(share, moving)
+        stages[-1] = replace(stages[-1], min_duration=time - before)
+        place = (1.0 - share) * start.com[:2] + share * there
+        posed = poser.pose(start.contacts, start.contacts, stages[-1].q, place=place) if share < 1.0 else None
+        if posed is not None and posed.q is not None:
+            stages.append(Stage.of(body, start.contacts, posed.q, 0.0, SEATED_ROOM))
+            before = time
+    for contacts, q, momentum in changes:
+        stages.append(Stage.of(body, contacts, q, RISING_TIME, SEATED_ROOM, momentum=momentum))
+    stages.append(Stage.of(body, changes[-1][0], risen, SETTLING_TIME))
+    return Leaving(tuple(stages))
+
+
+def _leaning_time(share: float, moving: bool) -> float:
+    """Time at which a lean of least jerk, which ends at rest or not, has come a share of its way [s]."""
+    shares = np.linspace(0.0, 1.0, 101)
+    # Half of a way twice as long ends with its largest speed.
+    half = 0.5 if moving else 1.0
+    way = _least_jerk(half * shares) / _least_jerk(np.array(half))
+    return float(LEANING_TIMES[moving] * np.interp(share, way, shares))
+
+
+def _least_jerk(share: FloatArray) -> FloatArray:
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+
+HAND_AHEAD, HAND_ASIDE, HAND_ABOVE = 0.08, 0.17, 0.13
+"""Where a hand pushes best, before, beside and above the middle of the buttocks [statures]; our choice."""
+
+HAND_ROOM = 0.25
+"""Farthest that it is from there [statures]."""
+
+HAND_INSET = 0.012
+"""Distance of the middle of the palm to the edges of its surface [m]."""
+
+
+def hand_supports(
+    scene: Scene, buttocks: Contact, stature: float, friction: float, steepest: float
+) -> dict[str, Contact]:
+    """Places beside a seat on which hands can push down: armrests, a table, the seat itself.
+
+    Args:
+        friction: Coulomb coefficient.
+        steepest: Largest slope of a surface to push on [rad].
+    """
+    turn = buttocks.rotation_contact_to_world
+    result: dict[str, Contact] = {}
+    for hand, side in (("left_hand", 1.0), ("right_hand", -1.0)):
+        ideal = np.array([HAND_AHEAD, side * HAND_ASIDE, HAND_ABOVE])
+        wanted = buttocks.position + turn @ (stature * ideal)
+        best = HAND_ROOM * stature
+        for surface in scene.surfaces_facing((0.0, 0.0, 1.0), steepest):
+            if float(surface.polygon[:, 2].max()) < buttocks.position[2] - 0.02:
+                continue
+            place = _nearest_inside(surface, wanted, HAND_INSET)
+            away = np.inf if place is None else float(np.linalg.norm(place - wanted))
+            if place is not None and away < best:
+                best = away
+                result[hand] = point(
+                    hand, place, friction=friction, rotation=onto_normal(turn, surface.normal)
+                )
+    return result
+
+
+def _nearest_inside(surface: Surface, wanted: FloatArray, inset: float) -> FloatArray | None:
+    """(3,) point of a surface near a place, at a distance from its edges [m]; None where there is none."""
+    flat = wanted - surface.height(wanted[None])[0] * surface.normal
+    for reach in (0.0, 0.05, 0.1, 0.2, 0.3, 0.45):
+        angle = np.linspace(0.0, 2.0 * np.pi, 1 if reach == 0.0 else 32, endpoint=False)
+        ring = flat + reach * (np.cos(angle)[:, None] * surface.rotation[:, 0]
+                               + np.sin(angle)[:, None] * surface.rotation[:, 1])  # fmt: skip
+        corners = inset * (surface.rotation[:, :2] @ np.array([[1, 1, -1, -1], [1, -1, 1, -1]])).T
+        outside = surface.outside((ring[:, None] + corners).reshape(-1, 3)).reshape(len(ring), 4)
+        inside = (outside <= 1e-9).all(axis=1)
+        if inside.any():
+            return ring[int(np.argmax(inside))]
+    return None
+
+
+def take_seat(poser: PostureFinder, way: ContactPlan, sat: Stage) -> ContactPlan | str:
+    """A way to before a seat, and the body sits down on it: rising backwards in time.
+
+    Every balanced motion is balanced backwards as well, with the same forces.
+
+    Args:
+        way: Ends on the feet of ``sat``, or near them.
+        sat: Contacts and posture on the seat.
+
+    Returns:
+        The plan, whose last stage is that on the seat; or why there is none.
+    """
+    body, feet = poser.body, way.stages[-1].contacts
+    contacts = {name: contact for name, contact in sat.contacts.items() if name not in feet} | dict(feet)
+    posed = poser.pose(contacts, contacts, sat.q, place=sat.com[:2], restarts=True)
+    if posed.q is None:
+        return f"no posture on the seat with the feet where they are: {posed.reason}"
+    seated = Stage.of(body, contacts, posed.q, SETTLING_TIME)
+    rising = leave_seat(poser, seated, frozenset(feet), way.goal[:7])
+    if rising.failure is not None:
+        return f"cannot sit down: {rising.failure}"
+    risen, touch = rising.stages[-1], rising.stages[-2]
+    momentum = None if touch.momentum is None else touch.momentum.backwards
+    stages = (
+        *way.stages,
+        Stage.of(body, feet, risen.q, RISING_TIME),
+        Stage.of(body, contacts, touch.q, SETTLING_TIME, SEATED_ROOM, momentum=momentum),
+    )
+    return ContactPlan.of(body, stages, seated.q)

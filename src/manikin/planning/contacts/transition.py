@@ -1,0 +1,157 @@
+"""Leave a contact in motion: one convex test of the way of the centre of mass after it.
+
+Who rises from a chair leaves it while the centre of mass is still behind the feet, and its speed carries it
+over them.  The way from there to rest is a Bezier curve whose only free point is one of its inner ones, so
+that the moment ``c x m (c'' - g)`` is linear in it and balance on the contacts that stay, at instants of the
+way, is a linear program (CROC: Fernbach, Tonneau, Stasse, Carpentier and Taix 2020, IEEE T-RO 36:676).  Speed
+at the start and duration are tried one after the other, the slowest first.  While the contact is still held,
+more wrenches are admissible than without it: the test of the contacts that stay covers that instant as well.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.optimize import linprog
+
+from manikin.balance import WrenchPolytope, wrench_polytope
+from manikin.balance.criteria import admissible_com_polygon, support_height
+from manikin.balance.margin import wrench_levers
+from manikin.contact import Stance
+from manikin.numerics.polygon import signed_distance
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
+
+FORWARD_SPEEDS = (0.0, 0.15, 0.3, 0.45, 0.6)
+"""Level speeds at the start that are tried, up to what people have who rise from a chair [m/s]."""
+
+UPWARD_SPEEDS = (0.0, 0.15, 0.3)
+"""Upward speeds at the start that are tried [m/s]."""
+
+DURATIONS = (1.6, 1.2, 0.9)
+"""Durations of the way that are tried; people rise within 0.7 to 1.6 s from there [s]."""
+
+MARGIN = 3.0
+"""Least margin of the way, about the centre of mass, of a body of 75 kg and 1.75 m [N.m]; our choice."""
+
+STEEPEST_LIFT = 4.0
+"""Largest upward or downward acceleration on the way [m/s^2]; people who rise reach 3; our choice."""
+
+CARRIED_ROOM = 0.03
+"""How far outside of where it could rest the velocity may seem to carry the centre of mass [m]."""
+
+SAMPLES = 12
+"""Instants of the way at which balance is imposed."""
+
+_DEGREE = 5
+_BINOMIAL = (1.0, 5.0, 10.0, 10.0, 5.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Momentum:
+    """Motion of the centre of mass at the instant at which a contact is left.
+
+    Attributes:
+        velocity: (3,) [m/s].
+        acceleration: (3,) [m/s^2].
+        duration: Of the way from there to rest [s].
+        margin: Least margin on that way, about the centre of mass [N.m].
+    """
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    duration: float
+    margin: float
+
+    @property
+    def backwards(self) -> "Momentum":
+        """The same motion backwards in time, with which a contact is made."""
+        return replace(self, velocity=frozen_array(-self.velocity, "velocity", (3,)))
+
+    def extrapolated(self, com: FloatArray, staying: Stance) -> FloatArray:
+        """(3,) where the velocity would carry a centre of mass over the contacts (Hof 2008) [m]."""
+        height = float(com[2]) - support_height(staying)
+        return com + self.velocity * [1.0, 1.0, 0.0] * np.sqrt(max(height, 0.0) / GRAVITY)
+
+
+def momentum_to_rest(
+    staying: Stance, mass: float, com: FloatArray, rest: FloatArray, least: float | None = None
+) -> Momentum | None:
+    """Slowest motion with which contacts may be left at ``com``, to come to rest on the others.
+
+    Args:
+        staying: Contacts that stay.
+        mass: Of the body [kg].
+        com: (3,) centre of mass at the start [m].
+        rest: (3,) where it comes to rest, in balance there [m].
+        least: Margin to keep [N.m]; :data:`MARGIN` scaled by the mass when omitted.
+
+    Returns:
+        The motion at the start; None where no speed leads to rest in balance.
+    """
+    polytope = wrench_polytope(staying.bounded(mass))
+    least = MARGIN * mass / 75.0 if least is None else least
+    ahead = (rest - com) * [1.0, 1.0, 0.0]
+    ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
+    resting = admissible_com_polygon(polytope, mass)
+    height = max(float(com[2]) - support_height(staying), 0.0)
+    for forward, upward, duration in product(FORWARD_SPEEDS, UPWARD_SPEEDS, DURATIONS):
+        velocity = forward * ahead + upward * np.array([0.0, 0.0, 1.0])
+        # Where the velocity would carry it must be where it can rest, or nearly so for a rising body.
+        carried = com[:2] + velocity[:2] * np.sqrt(height / GRAVITY)
+        if len(resting) < 3 or signed_distance(carried, resting) < -CARRIED_ROOM:
+            continue
+        way = _way(polytope, mass, com, velocity, rest, duration)
+        if way is not None and way.margin >= least:
+            return way
+    return None
+
+
+def _way(
+    polytope: WrenchPolytope, mass: float, com: FloatArray, velocity: FloatArray, rest: FloatArray,
+    duration: float,
+) -> Momentum | None:  # fmt: skip
+    """The way with the largest margin: points ``com, com + v T / 5, free, rest, rest, rest``."""
+    origin = polytope.reference
+    points = np.array([com, com + velocity * duration / _DEGREE, np.zeros(3), rest, rest, rest])
+    points[[0, 1, 3, 4, 5]] -= origin
+    share = np.linspace(0.0, 1.0, SAMPLES + 1)
+    place, bend = _basis(share), _second(share) / duration**2
+    gravity = np.array([0.0, 0.0, -GRAVITY])
+    rows, bounds = [], []
+    for number, (at, turn) in enumerate(zip(place, bend, strict=True)):
+        known, push = at @ points, turn @ points - gravity
+        # c x b with c = known + at_2 y and b = push + turn_2 y: the product of y with itself is zero.
+        force, moment = mass * turn[2] * np.eye(3), mass * (turn[2] * skew(known) - at[2] * skew(push))
+        wrench = mass * np.concatenate([push, np.cross(known, push)])
+        lever = wrench_levers(polytope.H, (known + at[2] * 0.5 * (points[1] + points[3]))[None])[0]
+        rows.append(np.column_stack([polytope.H @ np.vstack([force, moment]), lever]))
+        bounds.append(polytope.h - polytope.H @ wrench)
+        lift = float(push[2]) - GRAVITY
+        rows.append(np.array([[0.0, 0.0, turn[2], 0.0], [0.0, 0.0, -turn[2], 0.0]]))
+        # At first it does not fall: legs too weak to rise could seem strong enough.
+        bounds.append(np.array([STEEPEST_LIFT - lift, (STEEPEST_LIFT if number else 0.0) + lift]))
+    solution = linprog(
+        [0.0, 0.0, 0.0, -1.0], A_ub=np.vstack(rows), b_ub=np.concatenate(bounds),
+        bounds=[(-2.0, 2.0)] * 3 + [(None, None)], method="highs",
+    )  # fmt: skip
+    if not solution.success:
+        return None
+    points[2] = solution.x[:3]
+    start = frozen_array(bend[0] @ points, "acceleration", (3,))
+    return Momentum(frozen_array(velocity, "velocity", (3,)), start, duration, float(solution.x[3]))
+
+
+def _basis(share: FloatArray) -> FloatArray:
+    """(n, 6) Bernstein polynomials of degree 5 at shares of the way."""
+    k = np.arange(_DEGREE + 1)
+    return np.array(_BINOMIAL) * share[:, None] ** k * (1.0 - share[:, None]) ** (_DEGREE - k)
+
+
+def _second(share: FloatArray) -> FloatArray:
+    """(n, 6) their second derivatives by the share."""
+    k = np.arange(_DEGREE - 1)
+    lower = np.array([1.0, 3.0, 3.0, 1.0]) * share[:, None] ** k[:4] * (1.0 - share[:, None]) ** (3 - k[:4])
+    second = np.zeros((len(share), _DEGREE + 1))
+    for first, weight in ((0, 1.0), (1, -2.0), (2, 1.0)):
+        second[:, first : first + 4] += 20.0 * weight * lower
+    return second

@@ -1,0 +1,145 @@
+"""Seats: a start that suits body and seat, rising at rest or in motion, sitting down."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from manikin.balance import static_room, static_torque_share
+from manikin.balance.margin import stability_margins
+from manikin.balance.wrench import pseudo_wrench, wrench_polytope
+from manikin.body import Configuration, human
+from manikin.contact import Stance, sole
+from manikin.pipeline.stages.contact_stage import find_supports
+from manikin.planning.contacts import Endpoints, Habit, PostureFinder, certify_plan, leave_seat
+from manikin.planning.contacts.seat import hand_supports
+from manikin.planning.contacts.transition import momentum_to_rest
+from manikin.scenarios import load_scenario
+from manikin.scene import Box, Obstacle, Scene
+
+FEET = Stance([
+    sole("left_foot", (0.0, 0.09, 0.0), length=0.26, width=0.10, friction=0.7),
+    sole("right_foot", (0.0, -0.09, 0.0), length=0.26, width=0.10, friction=0.7),
+])  # fmt: skip
+REST = np.array([0.0, 0.0, 0.95])
+
+
+def on_chair(*, stature, mass, sex, height, task=None):
+    """A chair closed below, so that the feet stay before it."""
+    scenario = load_scenario("stand-up-chair").replaced(
+        body={"model": "human", "stature_m": stature, "mass_kg": mass, "sex": sex},
+        scene=[
+            {"name": "seat", "padded": True, "box": [0.42, 0.46, height], "position": [0, 0, 0.5 * height]},
+            {"name": "back", "box": [0.04, 0.46, 0.5], "position": [-0.25, 0.0, height + 0.3]},
+        ],
+        task=task or {"start": {"at": [0.0, 0.0], "posture": "seated"}, "goal": {"at": [0.3, 0.0]}},
+    )  # fmt: skip
+    return scenario.in_task_frame()
+
+
+def planned(scenario):
+    body, scene = scenario.build_body(), scenario.build_scene()
+    found = find_supports(scenario, body, scene, np.random.default_rng(0))
+    assert found.failure is None
+    certificate = certify_plan(body, scene, found.plan)
+    assert certificate.held, certificate.first_broken
+    return found
+
+
+def test_a_small_woman_rises_from_a_chair():
+    """1.55 m and 52 kg, a seat 0.45 m high: contacts hold, the feet before the seat."""
+    found = planned(on_chair(stature=1.55, mass=52.0, sex="female", height=0.45))
+    start = found.plan.stages[0].contacts
+    assert start["left_foot"].position[0] - 0.5 * start["left_foot"].length > 0.21
+
+
+def test_the_pelvis_rolls_so_that_the_spine_need_not_bend():
+    """The weight is 4.5 cm inside the feet with less than half of the bend that lumbar and thorax have."""
+    found = planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
+    body, off = human(1.75, 75.0, "male"), next(s for s in found.plan.stages if "buttocks" not in s.contacts)
+    assert static_room(off.stance, body.mass, off.com) > 0.044
+    bend = {name: angle for name, angle in zip(body.joint_names, off.q[7:], strict=True) if "flexion" in name}
+    assert bend["lumbar_flexion"] < 0.5
+    assert bend["thorax_flexion"] < 0.35
+    turn, place = Configuration(body, off.q).effector_placement("buttocks")
+    assert np.arctan2(-turn[2, 0], turn[0, 0]) > 0.3
+    moved, tilt = found.plan.stages[0].contacts["buttocks"].rolled_away(turn, place)
+    assert max(moved, tilt) < 1e-3
+
+
+def test_a_person_sits_down():
+    """The last change makes the contact of the buttocks, on the seat, and feet stay where they are."""
+    task = {"start": {"at": [0.7, 0.1]}, "goal": {"at": [0.0, 0.0], "posture": "seated"}}
+    found = planned(on_chair(stature=1.70, mass=66.0, sex="female", height=0.44, task=task))
+    before, last = found.plan.stages[-2:]
+    assert set(last.contacts) - set(before.contacts) == {"buttocks"}
+    assert all(last.contacts[foot] is before.contacts[foot] for foot in before.contacts)
+    assert last.contacts["buttocks"].position[2] == pytest.approx(0.44)
+    assert found.plan.goal_com[0] < last.com[0]
+
+
+def test_a_seat_that_cannot_be_left_at_rest_is_left_in_motion():
+    """Feet so far in front that no lean brings the weight over them: speed does, and only then."""
+    body = human(1.75, 75.0, "male")
+    scene = Scene([Obstacle("seat", Box((0.4, 0.5, 0.45)), translation=(0.0, 0.0, 0.225))])
+    start = Endpoints(body, scene, 0.7).find(np.zeros(2), 0.0, Habit.SEATED).stage
+    poser = PostureFinder(body, scene)
+    farther = np.array([0.09, 0.0, 0.0])
+    moved = {
+        name: replace(contact, position=contact.position + farther) if "foot" in name else contact
+        for name, contact in start.contacts.items()
+    }
+    posed = poser.pose(moved, moved, start.q, place=start.com[:2], restarts=True)
+    leaving = leave_seat(poser, type(start).of(body, moved, posed.q, 0.35), frozenset(FEET.effectors))
+    assert leaving.failure is None
+    off = leaving.stages[-2]
+    heel = off.contacts["left_foot"].position[0] - 0.5 * off.contacts["left_foot"].length
+    assert off.com[0] < heel
+    assert 0.1 <= off.momentum.velocity[0] <= 0.6
+    on_feet = off.stance
+    assert static_room(on_feet, body.mass, off.com) == -np.inf
+    assert static_room(on_feet, body.mass, off.com, acceleration=off.momentum.acceleration) > 0.0
+    assert off.com == pytest.approx(Configuration(body, off.q).com)
+
+
+@pytest.mark.parametrize("behind", [0.02, 0.05])
+def test_speed_carries_the_centre_of_mass_over_the_feet(behind):
+    """The instant at which a contact is left is balanced, by a polytope about the centre of mass itself."""
+    com = np.array([-0.13 - behind, 0.0, 0.6])
+    found = momentum_to_rest(FEET, 70.0, com, REST)
+    assert found.velocity[0] > 0.0
+    polytope = wrench_polytope(FEET.bounded(70.0))
+    wrench = pseudo_wrench(70.0, com, found.acceleration, None, polytope.reference)
+    assert stability_margins(polytope, wrench, com).wrench >= found.margin - 1e-6
+    assert found.extrapolated(com, FEET)[0] > -0.13
+
+
+def test_no_speed_helps_too_far_behind_the_feet():
+    assert momentum_to_rest(FEET, 70.0, np.array([-0.40, 0.0, 0.6]), REST) is None
+
+
+def test_no_speed_is_asked_for_over_the_feet():
+    found = momentum_to_rest(FEET, 70.0, np.array([-0.05, 0.0, 0.6]), REST)
+    assert np.linalg.norm(found.velocity) == 0.0
+
+
+def test_hands_push_until_the_weight_is_over_the_feet():
+    """Half the strength of an adult: hands on armrests carry with the feet when the seat is left."""
+    body = human(1.75, 75.0, "male", strength=0.5)
+    seat = Obstacle("seat", Box((0.42, 0.46, 0.06)), translation=(0.02, 0.0, 0.40))
+    arms = [
+        Obstacle(f"{side}_armrest", Box((0.32, 0.05, 0.04)), translation=(0.05, sign * 0.27, 0.64))
+        for side, sign in (("left", 1.0), ("right", -1.0))
+    ]
+    scene = Scene([seat, *arms])
+    poser = PostureFinder(body, scene)
+    sat = Endpoints(body, scene, 0.7).find(np.zeros(2), 0.0, Habit.SEATED).stage
+    held = {**sat.contacts, **hand_supports(scene, sat.contacts["buttocks"], 1.75, 0.7, 0.9)}
+    posed = poser.pose(held, held, sat.q, place=sat.com[:2], restarts=True)
+    leaving = leave_seat(poser, type(sat).of(body, held, posed.q, 0.35), frozenset(FEET.effectors))
+    assert leaving.failure is None
+    off, free = leaving.stages[-3:-1]
+    assert set(off.contacts) == {"left_foot", "right_foot", "left_hand", "right_hand"}
+    assert set(free.contacts) == {"left_foot", "right_foot"}
+    assert static_torque_share(body, off.q, off.stance) <= 0.95
+    assert off.contacts["left_hand"].position[2] == pytest.approx(0.66)
