@@ -1,6 +1,6 @@
 """Contacts of a walk: balanced, free, on surfaces, one change at a time; or an explained failure."""
 
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -111,6 +111,33 @@ def test_goals_on_the_flat_are_reached(x, y, heading):
     assert found.failure is None
     for foot, contact in found.plan.stages[-1].contacts.items():
         assert np.linalg.norm(contact.position - goal.contacts[foot].position) <= 0.06
+
+
+def block(name, size, at, yaw=0.0):
+    return Obstacle(name, Box(size), translation=at, rotation=rotation_from_yaw(yaw))
+
+
+WAYS = {
+    # Strides of people, 0.6 m and more, where flat steps of 0.36 m cannot reach over.
+    "over a slab 0.3 m long": ([block("slab", (0.30, 2.0, 0.12), (0.75, 0.0, 0.06))], (1.5, 0.0), 6),
+    # The foot that lands is on the far side of the bar, and so is not near the posture it was lifted from.
+    "over a thin bar": ([block("bar", (0.10, 3.0, 0.30), (0.75, 0.0, 0.15))], (1.5, 0.0), 6),
+    "through a gap of 0.5 m": (
+        [block(side, (0.3, 1.0, 2.2), (0.9, y, 1.1)) for side, y in (("right", -0.75), ("left", 0.75))],
+        (1.6, 0.0), 12,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_ways_that_people_take_are_found_with_as_many_steps(way):
+    """Steps are counted; nobody needs more than these."""
+    obstacles, goal, most = WAYS[way]
+    found, _, _ = planned(Scene(obstacles), goal)
+    assert found.failure is None
+    stages = found.plan.stages
+    landed = sum(len(after.contacts) > len(before.contacts) for before, after in pairwise(stages))
+    assert landed <= most
 
 
 def test_a_high_step_is_made_in_postures_that_the_joints_can_hold():
