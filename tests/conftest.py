@@ -3,8 +3,10 @@
 import fcntl
 import gc
 import hashlib
+import multiprocessing
 import os
 import pickle
+from concurrent.futures import ProcessPoolExecutor
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 
@@ -24,7 +26,7 @@ FEET = ("left_foot", "right_foot")
 # The examples of a property do not depend on the machine: no clock, the same draws in every run, no memory of
 # others. `--hypothesis-profile=thorough` draws more, and others in each run.
 settings.register_profile(
-    "standard", deadline=None, derandomize=True, database=None, max_examples=25,
+    "standard", deadline=None, derandomize=True, database=None, max_examples=15,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 settings.register_profile("thorough", settings.get_profile("standard"), derandomize=False, max_examples=300)
@@ -103,7 +105,8 @@ class Runs:
     """Whole runs of scenarios, each made once for all tests and all workers of a session.
 
     A run is known by its scenario, variant, overrides, body, seed and place. Its directory belongs to all
-    tests: they read it and copy what they change.
+    tests: they read it and copy what they change. It is made in a process of its own, as by the command line:
+    what a worker did before would change its last bits.
     """
 
     def __init__(self, folder):
@@ -142,7 +145,11 @@ class Runs:
 
         scenario = load_scenario(name, variant, overrides)
         scenario = scenario.with_body(*body) if body else scenario
-        return run(scenario.moved(*moved) if moved else scenario, seed=seed, out=place / "run")
+        scenario = scenario.moved(*moved) if moved else scenario
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(["manikin.pipeline.runner"])
+        with ProcessPoolExecutor(1, mp_context=context) as process:
+            return process.submit(run, scenario, seed=seed, out=place / "run").result()
 
 
 @pytest.fixture(scope="session")

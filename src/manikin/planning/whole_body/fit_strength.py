@@ -102,7 +102,7 @@ def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wante
         states: n states.
         wanted: Share of the strength that costs nothing.
     """
-    data_of = {id(model): model.createData() for model in held.models}
+    data_of = {key: model.createData() for key, model in {id(each): each for each in held.models}.items()}
     n, hinges = len(states.q), np.array(held.hinges)
     torque = np.empty((n, body.nv - 6))
     external: list[pin.StdVec_Force] = []
