@@ -5,6 +5,7 @@ import json
 import pytest
 
 from manikin.cli.app import main
+from manikin.errors import TimeLimitError
 from manikin.pipeline import benchmark
 from manikin.pipeline.benchmark import BenchmarkTask, run_benchmark, run_task
 from manikin.reports.benchmark_tables import family_rows, write_benchmark_page
@@ -31,6 +32,17 @@ def test_a_task_ends_after_its_processor_time_and_says_where_it_was():
     assert entry["outcome"] == "failed"
     assert entry["failure"]["stage"] == "contacts"
     assert entry["failure"]["reason"] == "did not end within 0.05 s of processor time"
+
+
+def test_a_task_that_is_ended_later_has_come_as_far_as_it_has(monkeypatch):
+    def endless(_scenario, stages):
+        stages("wholebody", 0.0)
+        raise TimeLimitError("did not end")
+
+    monkeypatch.setattr(benchmark, "_whole", endless)
+    entry = run_task(BenchmarkTask("flat", 0, "all"))
+    assert (entry["outcome"], entry["contacts"], entry["planned"]) == ("contacts", True, False)
+    assert entry["failure"]["stage"] == "wholebody"
 
 
 def test_a_defect_becomes_an_entry(monkeypatch):

@@ -51,6 +51,10 @@ StageName = Literal["contacts", "all"]
 STAGES: tuple[StageName, ...] = ("contacts", "all")
 
 
+_AFTER = {"planned": ("execution",), "contacts": ("centroidal", "wholebody", "execution", "check")}
+"""Stages in which a task that is ended has come so far already."""
+
+
 @dataclass(frozen=True)
 class BenchmarkTask:
     """One scene and what is done with it.
@@ -98,7 +102,9 @@ def run_task(task: BenchmarkTask) -> dict[str, Any]:
             summary = _contacts(scenario, stages) if task.stage == "contacts" else _whole(scenario, stages)
             entry |= _outcome(summary, task.stage)
     except TimeLimitError as error:
-        entry["failure"] = _failure(stages.current, str(error))
+        reached = [name for name, stages_after in _AFTER.items() if stages.current in stages_after]
+        entry |= dict.fromkeys(reached, True)
+        entry |= {"outcome": (reached or ["failed"])[0], "failure": _failure(stages.current, str(error))}
     except ManikinError as error:
         entry["failure"] = _failure("scenario" if entry["scene"] is None else stages.current, str(error))
     except Exception as error:  # a defect of the library is an entry as well, and ends no other task

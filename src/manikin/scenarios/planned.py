@@ -366,10 +366,12 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
 def _entry(contact: Contact, friction: float) -> dict[str, Any]:
     position = [float(x) for x in contact.position]
     if contact.kind is ContactKind.GRASP:
-        turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
-        rpy_deg = [float(x) for x in turn]
-        return {"position": position, "rpy_deg": rpy_deg, "max_force_N": contact.max_force}
-    entry: dict[str, Any] = {"position": position, "yaw_deg": math.degrees(contact.yaw)}
+        entry: dict[str, Any] = {"position": position, "max_force_N": contact.max_force}
+        if contact.oriented:
+            turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
+            entry["rpy_deg"] = [float(x) for x in turn]
+        return entry
+    entry = {"position": position, "yaw_deg": math.degrees(contact.yaw)}
     if contact.kind is ContactKind.POINT:
         entry["kind"] = "point"
     if abs(contact.normal[2] - 1.0) > 1e-12:

@@ -9,21 +9,22 @@ from hypothesis import strategies as st
 
 from manikin.balance import StaticRegion
 from manikin.body import Configuration, human
-from manikin.contact import Stance, sole, soles_overlap
+from manikin.contact import ContactKind, Stance, sole, soles_overlap
 from manikin.numerics.spatial import rotation_from_yaw
 from manikin.planning.contacts import (
     Endpoints,
     Footholds,
-    GuideLine,
     Habit,
     PostureFinder,
     WalkSearch,
     WalkSettings,
     certify_plan,
 )
-from manikin.scene import Box, Obstacle, Scene
+from manikin.planning.contacts.handholds import Handholds
+from manikin.scene import Box, Cylinder, Obstacle, Scene
 
 BODY = human(1.75, 75.0, "male")
+ALONG_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 STEPS = Scene(
     [
         Obstacle("low", Box((0.36, 1.0, 0.15)), translation=(0.68, 0.0, 0.075)),
@@ -156,6 +157,42 @@ def test_a_step_that_no_leg_can_make_is_explained():
     assert found.searches <= 62
 
 
+def test_a_hand_joins_where_feet_alone_do_not_make_a_step():
+    """Up a block of 0.55 m beside a rail: each change is of one contact, and rest is within the strength."""
+    scene = Scene([
+        Obstacle("block", Box((0.9, 1.0, 0.55)), translation=(0.9, 0.0, 0.275)),
+        Obstacle("rail", Cylinder(0.02, 2.0), rotation=ALONG_X, translation=(0.6, 0.45, 1.0)),
+    ])  # fmt: skip
+    found, _, _ = planned(scene, (0.95, 0.0))
+    assert found.failure is None
+    hands = [c for stage in found.plan.stages for name, c in stage.contacts.items() if name.endswith("hand")]
+    assert hands
+    for contact in hands:
+        assert scene.touched_obstacles(contact) in (("rail",), ("block",))
+    certificate = certify_plan(BODY, scene, found.plan)
+    assert certificate.changes == 1
+    assert certificate.value("max_contact_error_m") < 3e-4
+    assert certificate.value("min_room_m") > 0.0
+    assert set(found.plan.stages[-1].contacts) == {"left_foot", "right_foot"}
+
+
+def test_holds_are_in_reach_and_on_what_a_hand_can_hold_or_lean_on():
+    """A bar at the left is grasped; a table at the right carries a palm at one point."""
+    scene = Scene([
+        Obstacle("rail", Cylinder(0.02, 2.0), rotation=ALONG_X, translation=(0.0, 0.45, 1.0)),
+        Obstacle("table", Box((1.0, 0.6, 0.04)), translation=(0.2, -0.7, 0.75)),
+        Obstacle("far", Box((1.0, 1.0, 0.04)), translation=(3.0, 0.0, 0.75)),
+    ])  # fmt: skip
+    root = np.array(BODY.standing_posture())[:7]
+    found = Handholds(BODY, scene, 0.7).near([root], 0.0, 20)
+    kinds = {(item.effector, item.kind, *scene.touched_obstacles(item)) for item in found}
+    assert ("left_hand", ContactKind.GRASP, "rail") in kinds
+    assert ("right_hand", ContactKind.POINT, "table") in kinds
+    assert not any("far" in item for item in kinds)
+    for item in found:
+        assert np.linalg.norm(item.position - root[:3]) < 1.0
+
+
 def test_a_step_that_a_later_stage_refused_is_not_taken_again():
     """Nor one much like it: 8 cm; the start, of no step, cannot be refused."""
     ends = Endpoints(BODY, STEPS, 0.7)
@@ -210,15 +247,6 @@ def test_a_steep_sole_carries_nobody():
     region = StaticRegion.of(Stance([contact]), 75.0)
     assert region.is_empty
     assert region.nearest(np.zeros(2), 0.03) is None
-
-
-def test_a_guide_counts_turns_on_the_spot():
-    turns = np.linspace(0.0, 1.0, 11)
-    poses = np.array([[0, 0, 0.9, 0, 0, np.sin(t / 2), np.cos(t / 2)] for t in turns])
-    line = GuideLine.through(poses)
-    assert line.length == pytest.approx(0.35, abs=1e-9)
-    np.testing.assert_allclose(line.at(0.175), [0, 0, 0.9, 0, 0, np.sin(0.25), np.cos(0.25)], atol=1e-9)
-    np.testing.assert_allclose(line.at(9.0), poses[-1], atol=1e-12)
 
 
 @pytest.mark.parametrize("seam", [None, 0.0])

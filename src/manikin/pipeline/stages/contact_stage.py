@@ -1,7 +1,7 @@
 """Contact stage: supports for a scenario that gives start and goal alone ([Tonneau2015]_ chapters 6 and 7).
 
-A body goes on its feet, and the hands join in where it ends with an act; or any limbs make contacts
-(algorithm 7).
+A body goes on its feet, and the hands join in where they are needed and where it ends with an act; a creature
+goes on all its limbs, and a climber's limbs follow a guide (algorithm 7).
 """
 
 from collections.abc import Iterator
@@ -24,6 +24,8 @@ from manikin.planning.contacts import (
     ExtendSettings,
     Extension,
     LimbPlaces,
+    LimbSearch,
+    LimbSettings,
     PostureFinder,
     PostureFinderSettings,
     Stage,
@@ -31,6 +33,7 @@ from manikin.planning.contacts import (
     WalkSettings,
     follow_guide,
     heading_of,
+    limb_holds,
     sample_limbs,
     starts_on_limbs,
     take_seat,
@@ -60,6 +63,28 @@ class _ContactSearch:
         self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
         self._natural = scenario.contacts.ranges == "learnt"
+        self._search: WalkSearch | LimbSearch | None = None
+
+    def _again(self, phase: int, reason: str) -> ContactSearch:
+        """Another plan, without the change of contact of a phase of the last one."""
+        if self._search is None or not self._search.refuse(phase):
+            return self._tally.failed(reason, "contacts")
+        return self._result(self._search.run())
+
+    def _result(self, found: Extension) -> ContactSearch:
+        self._tally.summary["attempts"] += 1
+        self._tally.summary["postures"] = found.searches
+        self._tally.summary["backtracks"] = found.backtracks
+        if found.plan is None:
+            return self._tally.failed(found.failure or "", "contacts")
+        whole = self._completed(found.plan)
+        if isinstance(whole, str):
+            return self._tally.failed(whole, "goal")
+        return replace(self._tally.found(whole[0]), scenario=whole[1], again=self._again)
+
+    def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
+        """The plan with what ends it, or why it cannot; the scenario with supports that a file can list."""
+        return plan, None
 
     def _endpoints(self, reference: FloatArray | None = None) -> Endpoints:
         return Endpoints(
@@ -78,7 +103,6 @@ class _FootSearch(_ContactSearch):
         self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
         self._seat: Stage | None = None
-        self._walk: WalkSearch | None = None
 
     def run(self) -> ContactSearch:
         start = stage_at(self._places, self._scenario, "start")
@@ -92,35 +116,21 @@ class _FootSearch(_ContactSearch):
             if before.stage is None:
                 return self._tally.failed(f"the goal: {before.failure}", "goal")
             goal = before.stage
-        self._walk = self._search(start, goal)
-        return self._result(self._walk.run())
+        self._search = self._searched(start, goal)
+        return self._result(self._search.run())
 
-    def _again(self, phase: int, reason: str) -> ContactSearch:
-        """Another plan, without the step of a phase of the last one."""
-        if self._walk is None or not self._walk.refuse(phase):
-            return self._tally.failed(reason, "contacts")
-        return self._result(self._walk.run())
+    def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
+        whole = self._acting(plan) if self._seat is None else self._sitting(plan, self._seat)
+        return whole if isinstance(whole, str) else (whole, with_supports(self._scenario, whole))
 
-    def _result(self, found: Extension) -> ContactSearch:
-        self._tally.summary["attempts"] += 1
-        self._tally.summary["postures"] = found.searches
-        self._tally.summary["backtracks"] = found.backtracks
-        if found.plan is None:
-            return self._tally.failed(found.failure or "", "contacts")
-        plan = self._acting(found.plan) if self._seat is None else self._sitting(found.plan, self._seat)
-        if isinstance(plan, str):
-            return self._tally.failed(plan, "goal")
-        return replace(
-            self._tally.found(plan), scenario=with_supports(self._scenario, plan), again=self._again
-        )
-
-    def _search(self, start: Stage, goal: Stage) -> WalkSearch:
+    def _searched(self, start: Stage, goal: Stage) -> WalkSearch:
         options = self._scenario.contacts
         asked = PostureFinderSettings(
             natural=self._natural, friction_model=self._scenario.contact_model.friction
         )
         poser = PostureFinder(self._body, self._scene, self._reference, asked)
-        return WalkSearch(poser, start, goal, options.friction, WalkSettings(stride=options.stride_m))
+        settings = WalkSettings(stride=options.stride_m, grasp_force=options.grasp_force_N)
+        return WalkSearch(poser, start, goal, options.friction, settings)
 
     def _sitting(self, way: ContactPlan, seat: Stage) -> ContactPlan | str:
         """The way, and the body sits down at its end; or why it cannot."""
@@ -189,7 +199,7 @@ class _LimbSearch(_ContactSearch):
             natural=self._natural, friction_model=scenario.contact_model.friction
         )
         self._poser = PostureFinder(body, scene, self._reference, settings.scaled(safe))
-        samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
+        self._samples = samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
         self._places = LimbPlaces(
             body, scene, self._limbs, self._kinds, contact_rules(scenario, body), self._reference, samples
         )
@@ -203,6 +213,9 @@ class _LimbSearch(_ContactSearch):
         first = next(starts)
         if first.stage is None:
             return self._tally.failed(first.failure or "", "start")
+        if self._body.stature is None:
+            self._search = self._searched(first.stage, goal)
+            return self._result(self._search.run())
         # Another guide begins at another start, as long as there are some.
         stages = [first.stage]
         others = (item.stage for item in starts if item.stage is not None)
@@ -219,6 +232,13 @@ class _LimbSearch(_ContactSearch):
             lambda line, _: follow_guide(self._poser, self._places, line, stages[-1], settings),
         )
 
+    def _searched(self, start: Stage, goal: FloatArray) -> LimbSearch:
+        holds = limb_holds(
+            self._body, self._scene, self._limbs, self._kinds, contact_rules(self._scenario, self._body),
+            self._reference, self._samples, np.array([start.q[:7], goal]),
+        )  # fmt: skip
+        return LimbSearch(self._poser, holds, start, goal, self._places.reach, self._limb_settings())
+
     @property
     def _climbs(self) -> bool:
         return self._scenario.file.task.goal.posture == CLIMBING
@@ -227,9 +247,8 @@ class _LimbSearch(_ContactSearch):
         """Lengths by the size of the body, times by how fast a body of that size moves."""
         options, plain = self._scenario.contacts, ExtendSettings()
         size, pace = self._size, float(np.sqrt(self._size))
-        human = self._body.stature is not None
         return ExtendSettings(
-            stride=options.stride_m * size if human else STRIDE * self._places.reach,
+            stride=options.stride_m * size,
             same_place=plain.same_place * size,
             lift=plain.lift * max(size, SMALLEST),
             swing_duration=plain.swing_duration * pace,
@@ -237,6 +256,19 @@ class _LimbSearch(_ContactSearch):
             shift_duration=plain.shift_duration * pace,
             hinge_pace=plain.hinge_pace / pace,
             goal_distance=plain.goal_distance * max(size, SMALLEST) if not self._climbs else NEAR_GOAL,
+        )
+
+    def _limb_settings(self) -> LimbSettings:
+        """The same of a creature."""
+        plain, pace, safe = LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
+        return LimbSettings(
+            stride=STRIDE * self._places.reach,
+            lift=plain.lift * safe,
+            swing_duration=plain.swing_duration * pace,
+            swing_speed=plain.swing_speed * pace,
+            shift_duration=plain.shift_duration * pace,
+            hinge_pace=plain.hinge_pace / pace,
+            goal_distance=plain.goal_distance * safe,
         )
 
     def _starts(self) -> Iterator[Endpoint]:
@@ -263,8 +295,17 @@ class _LimbSearch(_ContactSearch):
 
     def _standing(self, at: FloatArray, yaw: float, height: float | None) -> FloatArray:
         """(nq,) reference posture at a place, as high as if it stood there."""
-        level = height if height is not None else self._scenario.start_level
+        level = self._level(at) if height is None else height
         return carried_to(self._reference, at, yaw, level)
+
+    def _level(self, at: FloatArray) -> float:
+        """Height of the lowest surface at a place [m]."""
+        levels = [
+            float(surface.polygon[0, 2])
+            for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), 0.1)
+            if surface.outside(np.array([[*at, surface.polygon[0, 2]]]))[0] <= 0.0
+        ]
+        return min(levels, default=self._scenario.start_level)
 
     def _guide(self, start: FloatArray, goal: FloatArray) -> RootGuide:
         ends = np.array([start, goal])

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.planning.contacts.best_first import Extension, heading_of
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage
 from manikin.planning.contacts.posture_finder import PostureFinder
 
@@ -41,27 +42,6 @@ class PartialPlan:
         """How far along the guide the root is: the mean of the contacts that are held [m]."""
         held = [self.along[name] for name in self.last.contacts]
         return float(np.mean(held)) if held else 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Extension:
-    """A contact plan, or why there is none.
-
-    Attributes:
-        backtracks: Changes taken back.
-        reached: Share of the guide that the farthest attempt got to.
-    """
-
-    plan: ContactPlan | None
-    searches: int
-    backtracks: int
-    failure: str | None = None
-    reached: float = 1.0
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether there is a plan."""
-        return self.plan is not None
 
 
 TURN_LENGTH = 0.35
@@ -102,12 +82,6 @@ class GuideLine:
         pair = self.poses[last - 1 : last + 1]
         turn = Slerp([0.0, 1.0], Rotation.from_quat(pair[:, 3:]))(share).as_quat()
         return np.concatenate([(1.0 - share) * pair[0, :3] + share * pair[1, :3], turn])
-
-
-def heading_of(pose: FloatArray) -> float:
-    """Heading of a (7,) pose: direction of its x axis seen from above [rad]."""
-    forward = Rotation.from_quat(pose[3:]).as_matrix()[:, 0]
-    return float(np.arctan2(forward[1], forward[0]))
 
 
 Change = TypeVar("Change")

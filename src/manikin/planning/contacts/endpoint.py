@@ -16,7 +16,6 @@ from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, FrictionModel
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
-from manikin.planning.contacts.depth_first import PartialPlan, SearchLog
 from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import GeneratedContact
 from manikin.planning.contacts.limb_places import LimbPlaces, stature_of
@@ -277,21 +276,17 @@ def best_first(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[d
 
 
 def stand_up(
-    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray, log: SearchLog
-) -> PartialPlan | None:
+    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray
+) -> tuple[Stage, ...] | str:
     """The start on feet; its other contacts are left first, see :func:`leave_seat`.
 
     Args:
         start: Contacts and posture at the start.
         feet: Effectors to stand on.
         upright: (7,) pose of the root that has risen.
-        log: Where a missing posture is noted.
 
     Returns:
-        The stages up to standing on feet alone; None where a posture is missing.
+        The stages up to standing on feet alone, or why a posture is missing.
     """
     leaving = leave_seat(poser, start, feet, upright)
-    if leaving.failure is not None:
-        log.refuse(leaving.failure)
-        return None
-    return PartialPlan(leaving.stages, dict.fromkeys(leaving.stages[-1].contacts, 0.0))
+    return leaving.stages if leaving.failure is None else leaving.failure

@@ -1,4 +1,4 @@
-"""Contacts of any limbs along a guide of the root: algorithm 7 of [Tonneau2015]_ 7.2.
+"""Contacts of a climber's limbs along a guide of the root: algorithm 7 of [Tonneau2015]_ 7.2.
 
 The guide is followed limb by limb.  The limb that is farthest behind is put to a new place, its
 contact broken and made; all others are maintained.  A change counts only when three postures exist,
@@ -7,7 +7,8 @@ limb off the line between its contacts, and one that already holds the new one. 
 shorter step, another place or another limb is tried, and then the change before is taken back.  Limbs go to
 contacts of the :class:`~manikin.planning.contacts.ContactGenerator` until the root is at its goal.
 
-A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
+A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`, a creature
+:mod:`manikin.planning.contacts.limb_search`.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,9 +21,9 @@ from scipy.spatial.transform import Rotation
 from manikin.contact import Contact, ContactKind
 from manikin.kinematics import Placement
 from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.best_first import Extension
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import (
-    Extension,
     GuideLine,
     PartialPlan,
     SearchLog,

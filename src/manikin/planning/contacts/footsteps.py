@@ -10,9 +10,8 @@ has postures is tested by the caller; a pair without is closed with :meth:`Foots
 best way is found.
 """
 
-import heapq
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import coal
@@ -23,6 +22,7 @@ from scipy.spatial import cKDTree
 
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.best_first import Graph
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import collision_parts, local_box
@@ -38,6 +38,12 @@ REACH_MARGIN = 0.02
 
 HIGHEST = 0.48
 """Largest difference in height of two soles, of a body of 1.75 m [m]."""
+
+HELD_HIGHEST = 0.80
+"""The same of a body that has something to hold on to or lean on [m]."""
+
+HELD_COST = 4.0 * STEP
+"""Cost of a step that is higher than :data:`HIGHEST`: hands come and go [s]."""
 
 NARROWEST = 0.115
 """Least distance of the middles of two soles across, of a body of 1.75 m [m]."""
@@ -62,6 +68,9 @@ GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 
 No bound on the cost of a way follows: the estimate counts turns, and may be more than the least cost.
 """
+
+SAME_GREED = 3
+"""Ways after which the search for another one begins with the factor that found the last."""
 
 ALIKE = 0.08
 """Distance of footholds up to which a step is much like one that was refused [m]; our choice."""
@@ -105,6 +114,7 @@ class FootstepSearch:
         pair_cost: Cost of the body between two footholds.
         column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
+        highest: Largest difference in height of two soles, of a body of 1.75 m [m].
     """
 
     scene: Scene
@@ -116,6 +126,7 @@ class FootstepSearch:
     pair_cost: PairCost
     column: tuple[float, float, float]
     stride: float = 0.4
+    highest: float = HIGHEST
     expanded: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
@@ -127,9 +138,11 @@ class FootstepSearch:
         self._closed: set[tuple[int, int]] = set()
         self._refused: list[tuple[FloatArray, FloatArray]] = []
         self._offsets = _offsets(self.scale)
+        self._first_greed = self._ways = 0
         self._field = _Field(
-            self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale
-        )
+            self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale,
+            (HIGHEST * self.scale, self.highest * self.scale),
+        )  # fmt: skip
         places = np.array([hold.position for hold in self._holds])
         self._ahead: list[float] = self._field.costs(
             places, np.array([hold.yaw for hold in self._holds])
@@ -153,50 +166,25 @@ class FootstepSearch:
 
         Consecutive ones are of different feet; the first two and the last two are those of start and goal.
         """
-        for greed, most in GREED:
-            way, exhausted = self._search(greed, most)
-            if way is not None or exhausted:
-                return way
-        return None
+        graph = Graph(
+            self._left, self._followers, self._tested, lambda node: node.ends and self._at_goal(node)
+        )
+        way, counts = graph.best([_Node(0, 1), _Node(1, -1)], GREED[self._first_greed :])
+        self.expanded += sum(counts)
+        self._ways += 1
+        if self._ways >= SAME_GREED:
+            self._first_greed += len(counts) - 1
+        # The foot that is not the first to stand is where it is at the start.
+        return None if way is None else [1 - way[0].hold, *(node.hold for node in way)]
 
-    def _search(self, greed: float, most: int) -> tuple[list[int] | None, bool]:
-        """A way with one factor on the estimate, or None and whether there is none at all."""
-        open_: list[tuple[float, int, float, _Node, _Node | None, bool]] = []
-        parents: dict[_Node, _Node | None] = {}
-        for number, side in ((0, 1), (1, -1)):
-            node = _Node(number, side)
-            open_.append((greed * self._ahead[number], number, 0.0, node, None, True))
-        heapq.heapify(open_)
-        count, expanded = len(open_), 0
-        while open_:
-            _, _, cost, node, parent, tested = heapq.heappop(open_)
-            if node in parents:
-                continue
-            if not tested and parent is not None:
-                total = cost + self._tested(parent, node)
-                if math.isfinite(total):
-                    count += 1
-                    rank = total + greed * self._ahead[node.hold]
-                    heapq.heappush(open_, (rank, count, total, node, parent, True))
-                continue
-            parents[node] = parent
-            if node.ends and self._at_goal(node):
-                return self._way(node, parents), False
-            if expanded == most:
-                return None, False
-            expanded += 1
-            self.expanded += 1
-            ends = self._at_goal(node)
-            for number, step_cost in self._steps(node):
-                after = _Node(number, -node.side, ends)
-                closed = after in parents or (node.hold, number) in self._closed
-                if closed or not math.isfinite(self._ahead[number]):
-                    continue
-                count += 1
-                total = cost + step_cost
-                rank = total + greed * self._ahead[number]
-                heapq.heappush(open_, (rank, count, total, after, node, False))
-        return None, True
+    def _left(self, node: _Node) -> float:
+        return self._ahead[node.hold]
+
+    def _followers(self, node: _Node) -> Iterator[tuple[_Node, float]]:
+        ends = self._at_goal(node)
+        for number, cost in self._steps(node):
+            if (node.hold, number) not in self._closed and math.isfinite(self._ahead[number]):
+                yield _Node(number, -node.side, ends), cost
 
     def farthest(self) -> tuple[float, Foothold]:
         """Least cost that was left at a foothold which was reached [s], and that foothold."""
@@ -210,15 +198,6 @@ class FootstepSearch:
 
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
-
-    def _way(self, node: _Node, parents: "dict[_Node, _Node | None]") -> list[int]:
-        way: list[int] = []
-        at: _Node | None = node
-        while at is not None:
-            way.append(at.hold)
-            at = parents[at]
-        # The foot that is not the first to stand is where it is at the start.
-        return [1 - way[-1], *way[::-1]]
 
     def _tested(self, parent: _Node, node: _Node) -> float:
         """Cost of the body's room at a step; infinite where the foot or the body has none."""
@@ -255,7 +234,7 @@ class FootstepSearch:
         places = stand.position[:2] + ahead[:, None] * turn + across[:, None] * side
         yaws = stand.yaw + out * turns
         goal = 3 if node.side > 0 else 2
-        found = self.footholds.lay(places, yaws, float(stand.position[2]), HIGHEST * self.scale)
+        found = self.footholds.lay(places, yaws, float(stand.position[2]), self.highest * self.scale)
         ends = self._holds[goal]
         costs = self._step_costs(
             stand, out,
@@ -296,7 +275,7 @@ class FootstepSearch:
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
         apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
         made = self.reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
-        made &= (rise <= HIGHEST * size) & (turned >= -0.8) & (turned <= 1.1)
+        made &= (rise <= self.highest * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
         cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
         cost += (
@@ -337,7 +316,9 @@ class _Field:
         goal: tuple[Foothold, Foothold],
         column: tuple[float, float, float],
         stride: float,
+        highest: tuple[float, float],
     ) -> None:
+        easy, self._highest = highest
         ends = np.array([hold.position for hold in (*start, *goal)])
         room = 1.5 + 0.25 * float(np.linalg.norm(ends[0] - ends[2]))
         low, high = ends[:, :2].min(axis=0) - room, ends[:, :2].max(axis=0) + room
@@ -375,8 +356,9 @@ class _Field:
         slower = 0.5 * (slow[near[:, 0]] + slow[near[:, 1]])
         length = pace * slower * np.linalg.norm(away[:, :2], axis=1) + 1.2 * rise
         size = len(self._points)
+        length += np.where(rise > easy, 8.0 * (rise - 0.2) + HELD_COST, 0.0)
         self._near, self._rise = near, rise
-        passable = rise <= HIGHEST
+        passable = rise <= self._highest
         near, length = near[passable], length[passable]
         graph = csr_array((length + 1e-9, (near[:, 0], near[:, 1])), shape=(size, size))
         middle = 0.5 * (goal[0].position + goal[1].position)
@@ -406,7 +388,8 @@ class _Field:
         while before[row] >= 0:
             highest = max(highest, abs(float(self._points[row, 2] - self._points[before[row], 2])))
             row = int(before[row])
-        return f"every way over the ground has a step of {highest:.2f} m; feet make at most {HIGHEST:.2f} m"
+        most = f"feet make at most {self._highest:.2f} m"
+        return f"every way over the ground has a step of {highest:.2f} m; {most}"
 
     def costs(self, places: FloatArray, yaws: FloatArray) -> FloatArray:
         """(k,) estimates of the costs from places (k, 3) [m] with headings (k,) [rad] to the goal [s]."""

@@ -1,7 +1,8 @@
 """Places for one limb near where it should be: footholds of soles, and offers of the contact generator."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -9,12 +10,12 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.body.limbs import is_further
-from manikin.contact import ContactKind
+from manikin.contact import Contact, ContactKind
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.planning.contacts.best_first import heading_of
 from manikin.planning.contacts.candidates import Candidates, Situation
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
-from manikin.planning.contacts.depth_first import heading_of
 from manikin.planning.contacts.efort import Task
 from manikin.planning.contacts.generator import (
     ContactGenerator,
@@ -23,6 +24,7 @@ from manikin.planning.contacts.generator import (
     Hindrance,
 )
 from manikin.planning.contacts.heuristics import Efort, Heuristic
+from manikin.planning.contacts.limb_search import LimbHolds
 from manikin.planning.contacts.samples import LimbSamples, sample_limbs
 from manikin.scene import Scene, Surface
 
@@ -235,3 +237,96 @@ class LimbPlaces:
         outside = surface.outside((places[:, None] + corners).reshape(-1, 3)).reshape(len(places), -1)
         inside = places[(outside <= 0.0).all(axis=1)]
         return inside[0] if len(inside) else None
+
+
+INSET = 0.06
+"""Distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice."""
+
+SPACING = 0.1
+"""Distance of neighbouring places of a limb, by its reach; our choice."""
+
+
+def limb_holds(
+    body: BodyModel, scene: Scene, limbs: Sequence[Limb], kinds: Mapping[str, ContactKind],
+    rules: ContactRules, reference: FloatArray, samples: Mapping[str, LimbSamples],
+    ends: FloatArray,
+) -> list[LimbHolds]:  # fmt: skip
+    """Places of limbs around a start and a goal, on what is level.
+
+    Args:
+        kinds: How each touches, by name of the limb.
+        reference: (nq,) posture in which every limb is where it should be relative to the root.
+        ends: (2, 7) poses of the root at start and goal.
+    """
+    state, root = Configuration(body, reference), pin.XYZQUATToSE3(reference[:7])
+    size = float(np.mean([samples[limb.name].hull[1] for limb in limbs]))
+    turn = rotation_from_yaw(heading_of(ends[1]))
+    low, high = ends[:, :3].min(axis=0) - 2.0 * size, ends[:, :3].max(axis=0) + 2.0 * size
+    surfaces = [
+        item
+        for item in scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
+        if (item.polygon.min(axis=0) <= high).all() and (item.polygon.max(axis=0) >= low).all()
+    ]
+    known: dict[tuple[ContactKind, bytes], tuple[FloatArray, list[FloatArray]]] = {}
+    found: list[LimbHolds] = []
+    for limb in limbs:
+        kind, reach = kinds[limb.name], samples[limb.name].reach
+        points = footprint(body, limb, kind, rules) if kind is ContactKind.SOLE else INSET * size * _SQUARE
+        key = kind, points.tobytes()
+        if key not in known:
+            known[key] = _grid_places(surfaces, points, turn, (low, high), SPACING * size)
+        places, turns = known[key]
+        there = root.actInv(pin.SE3(*state.segment_placement(reach.segment)))
+        wanted = np.asarray(root.actInv(state.effector_placement(limb.effector)[1]))
+        found.append(LimbHolds(
+            limb.effector, places, partial(_contact_at, body, limb, kind, rules, places, turns),
+            partial(_has_room, scene, size, places, turns), reach,
+            (there.rotation, there.translation), wanted,
+        ))  # fmt: skip
+    return found
+
+
+def _contact_at(
+    body: BodyModel, limb: Limb, kind: ContactKind, rules: ContactRules, places: FloatArray,
+    turns: Sequence[FloatArray], row: int,
+) -> Contact:  # fmt: skip
+    return make_contact(body, limb, kind, places[row], turns[row], rules)
+
+
+def _has_room(scene: Scene, size: float, places: FloatArray, turns: Sequence[FloatArray], row: int) -> bool:
+    """Whether a ball just above a place is free."""
+    return scene.nearest(places[row] + 0.06 * size * turns[row][:, 2])[1] > 0.035 * size
+
+
+_SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
+
+
+def _steps_of(half: FloatArray, spacing: float) -> list[tuple[int, float]]:
+    """Number of steps each way, and their length [m]: at least two on what is small."""
+    gaps = np.minimum(spacing, 0.5 * half)
+    return [(int(np.ceil(extent / gap)), float(gap)) for extent, gap in zip(half, gaps, strict=True)]
+
+
+def _grid_places(
+    surfaces: Sequence[Surface], points: FloatArray, turn: FloatArray,
+    box: tuple[FloatArray, FloatArray], spacing: float,
+) -> tuple[FloatArray, list[FloatArray]]:  # fmt: skip
+    """Places (m, 3) [m] with rotations (3, 3) of contacts of one shape on a grid."""
+    low, high = box
+    places: list[FloatArray] = []
+    turns: list[FloatArray] = []
+    for surface in surfaces:
+        corners = np.clip(surface.polygon, low - 1.0, high + 1.0)
+        middle, axes = 0.5 * (corners.min(axis=0) + corners.max(axis=0)), surface.rotation[:, :2]
+        half = np.abs((corners - middle) @ axes).max(axis=0)
+        steps = [np.arange(-n, n + 1) * gap for n, gap in _steps_of(half, spacing)]
+        grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 2)
+        middle = middle - ((middle - surface.polygon[0]) @ surface.normal) * surface.normal
+        at = middle + grid @ axes.T
+        at = at[((at >= low) & (at <= high)).all(axis=1)]
+        rotation = onto_normal(turn, surface.normal)
+        outside = surface.outside((at[:, None] + points @ rotation.T).reshape(-1, 3)).reshape(len(at), -1)
+        on = (outside <= 0.0).all(axis=1)
+        places += list(at[on])
+        turns += [rotation] * int(on.sum())
+    return np.array(places).reshape(-1, 3), turns

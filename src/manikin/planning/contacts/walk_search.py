@@ -7,23 +7,25 @@ A pair without a posture is closed, and the search goes on with the next best wa
 """
 
 import math
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance.criteria import static_torque_share
 from manikin.body import BodyModel
-from manikin.contact import Contact, Stance
+from manikin.contact import Contact, ContactKind, Stance
+from manikin.kinematics import Placement
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage
-from manikin.planning.contacts.depth_first import Extension, SearchLog
 from manikin.planning.contacts.endpoint import FEET, stand_up
 from manikin.planning.contacts.footholds import Foothold, Footholds
-from manikin.planning.contacts.footsteps import STEP, FootstepSearch
+from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
+from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
@@ -47,6 +49,18 @@ the pelvis, and a knee has less before it."""
 NEAR_TRIES = 12
 """Ways after which a pair without a posture closes all that are much like it."""
 
+HIGH = 0.3
+"""Step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]."""
+
+HIGH_TRIES = 2
+"""Ways after which a high step without a posture closes all that are much like it."""
+
+HAND_TRIES = 4
+"""Ways that feet alone do not make after which hands may join at any step."""
+
+HOLDS = 6
+"""Most places of hands that are tried at a step."""
+
 
 @dataclass(frozen=True)
 class WalkSettings:
@@ -58,7 +72,9 @@ class WalkSettings:
         swing_duration: Shortest flight of a foot [s].
         swing_speed: Its mean speed on longer ways [m/s].
         shift_duration: Shortest time between two flights [s].
+        reach_duration: Shortest time between a hand's change and the next one [s].
         hinge_pace: Mean speed of the hinge that turns most [rad/s].
+        grasp_force: Largest force of a grasp along each axis [N].
     """
 
     stride: float = 0.4
@@ -66,7 +82,9 @@ class WalkSettings:
     swing_duration: float = 0.7
     swing_speed: float = 0.7
     shift_duration: float = 0.35
+    reach_duration: float = 0.5
     hinge_pace: float = 2.0
+    grasp_force: float = 400.0
 
 
 @dataclass
@@ -124,91 +142,69 @@ class BodyRoom:
         return np.array([middle[0], middle[1], low + 0.4 * (float(middle[2]) - low), yaw])
 
 
-@dataclass
-class WalkSearch:
-    """Search for the contacts of a walk that can be asked again with more pairs closed.
+class WalkSearch(PosedSearch[int, tuple[int, int]]):
+    """Search for the contacts of a walk that can be asked again with more pairs closed."""
 
-    Attributes:
-        poser: Finds postures of a body with soles in its scene.
-        start: Contacts and posture at the start; those of no feet are left first.
-        goal: Contacts and posture at the goal, on feet.
-        friction: Coulomb coefficient of the soles.
-        settings: Paces and bounds.
-    """
+    def __init__(
+        self, poser: PostureFinder, start: Stage, goal: Stage, friction: float = 0.7,
+        settings: WalkSettings | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare a search.
 
-    poser: PostureFinder
-    start: Stage
-    goal: Stage
-    friction: float = 0.7
-    settings: WalkSettings = WalkSettings()
-
-    def __post_init__(self) -> None:
-        body, scene = self.poser.body, self.poser.scene
-        self._log = SearchLog(self.poser, self.settings.searches)
-        scale = stature_of(body) / 1.75
+        Args:
+            poser: Finds postures of a body with soles in its scene.
+            start: Contacts and posture at the start; those of no feet are left first.
+            goal: Contacts and posture at the goal, on feet.
+            friction: Coulomb coefficient of soles and palms.
+            settings: Paces and bounds.
+        """
+        self.start, self.goal, self.friction = start, goal, friction
+        self.settings = settings or WalkSettings()
+        super().__init__(poser, self.settings.searches)
+        body, scene = poser.body, poser.scene
+        self._scale = scale = stature_of(body) / 1.75
+        self._handholds = Handholds(body, scene, friction, self.settings.grasp_force)
         self._room = BodyRoom(body, scene)
-        first = self.goal.contacts[FEET[0]]
-        steepest = min(math.radians(30.0), math.atan(0.8 * self.friction))
+        first = goal.contacts[FEET[0]]
+        steepest = min(math.radians(30.0), math.atan(0.8 * friction))
         self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
         self._contacts: dict[tuple[str, int], Contact] = {}
-        self._postures: dict[tuple[int, int, bool, int], Posed] = {}
+        self._postures: dict[tuple[frozenset[int], frozenset[str], int], Posed] = {}
+        self._kept: list[Contact] = []
+        self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
-        start, goal = (self._holds(stage) for stage in (self.start, self.goal))
         self.search = FootstepSearch(
-            scene,
-            self._footholds,
-            start,
-            goal,
-            scale,
-            StepReach.of(body),
-            self._room.cost,
-            (radius, low, high),
-            self.settings.stride,
-        )
-        for number, (stage, foot) in enumerate((s, f) for s in (self.start, self.goal) for f in FEET):
+            scene, self._footholds, self._holds(start), self._holds(goal), scale, StepReach.of(body),
+            self._pair_cost, (radius, low, high), self.settings.stride,
+            HELD_HIGHEST if self._handholds.exist else HIGHEST,
+        )  # fmt: skip
+        for number, (stage, foot) in enumerate((s, f) for s in (start, goal) for f in FEET):
             self._contacts[foot, number] = stage.contacts[foot]
         self._risen: tuple[Stage, ...] = ()
-        self._steps: list[tuple[int, int] | None] = []
-        self.reasons: Counter[str] = Counter()
-        self.replanned = 0
 
-    def run(self) -> Extension:
-        """The best way whose postures exist, or why there is none."""
-        upright = self._room.guide(0, *self._holds(self.start))
-        first = stand_up(self.poser, self.start, frozenset(FEET), upright, self._log)
-        if first is None:
-            left = ", ".join(set(self.start.contacts) - set(FEET))
-            return self._failed(f"cannot leave {left}")
-        self._risen = first.stages
-        while not self._log.is_spent:
-            way = self.search.best()
-            if way is None:
-                why = self.search.walled_off()
-                return self._failed(
-                    "no footsteps lead to the goal" if why is None
-                    else f"the goal is walled off from the start: {why}"
-                )  # fmt: skip
-            plan = self._planned(way)
-            if plan is not None:
-                return Extension(plan, self._log.searches, self.replanned)
-            self.replanned += 1
-        return self._failed(f"no contacts after {self._log.searches} postures")
+    def _best(self) -> list[int] | str:
+        if not self._risen:
+            upright = self._room.guide(0, *self._holds(self.start))
+            risen = stand_up(self.poser, self.start, frozenset(FEET), upright)
+            if isinstance(risen, str):
+                self.reasons[risen] += 1
+                return f"cannot leave {', '.join(sorted(set(self.start.contacts) - set(FEET)))}"
+            self._risen = risen
+        way = self.search.best()
+        if way is not None:
+            return way
+        why = self.search.walled_off()
+        walled = f"the goal is walled off from the start: {why}"
+        return "no footsteps lead to the goal" if why is None else walled
 
-    def refuse(self, phase: int) -> bool:
-        """Close the step of a phase of the last plan, and what is much like it; False where it has none."""
-        pair = self._steps[phase] if phase < len(self._steps) else None
-        if pair is None:
-            return False
-        self.search.refuse(*pair)
-        return True
+    def _close(self, move: tuple[int, int]) -> None:
+        self.search.refuse(*move)
 
-    def _failed(self, what: str) -> Extension:
-        most = self.reasons.most_common(1)
-        why = f"; most often: {most[0][0]}" if most else ""
-        if self.search.walled_off() is None and self.search.expanded:
-            place = self.search.farthest()[1].position
-            what += f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
-        return Extension(None, self._log.searches, self.replanned, f"{what}{why}", 0.0)
+    def _farthest(self) -> str:
+        if self.search.walled_off() is not None or not self.search.expanded:
+            return ""
+        place = self.search.farthest()[1].position
+        return f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
 
     def _holds(self, stage: Stage) -> tuple[Foothold, Foothold]:
         left, right = (stage.contacts[foot] for foot in FEET)
@@ -220,34 +216,36 @@ class WalkSearch:
             self._contacts[key] = self._footholds.contact(foot, self.search.hold(number), self.friction)
         return self._contacts[key]
 
-    def _planned(self, way: Sequence[int]) -> ContactPlan | None:
-        """Plan of a way; None where a pair had no posture, which is closed then."""
+    def _planned(self, way: list[int]) -> ContactPlan | None:
         stages = list(self._risen)
-        self._steps = [None] * len(stages)
+        self._moves = [None] * len(stages)
         feet = FEET if way[0] == 0 else (FEET[1], FEET[0])
         names = [feet[k % 2] for k in range(len(way))]
-        pairs = [self._pair(names[k], way[k : k + 2]) for k in range(len(way) - 1)]
-        trunks = self._room.postures(pairs).tolist()
-        q = stages[-1].q
+        places = [_Place(*self._pair(names[k], way[k : k + 2]), 0) for k in range(len(way) - 1)]
+        trunks = self._room.postures([(place.left, place.right) for place in places]).tolist()
+        q, hands, body = stages[-1].q, dict[str, Contact](), self.poser.body
         for k in range(len(way) - 2):
             leaving, standing, landing = (self._contact(names[k + j], way[k + j]) for j in range(3))
             if leaving.same_place(landing):
                 continue
-            lifted = self._posed(names[k : k + 2], way[k : k + 2], 1, trunks[k], q)
-            if lifted.q is None:
-                return self._refuse(way[k], way[k + 1], f"{names[k]} cannot be lifted: {lifted.reason}")
-            landed = self._posed(names[k + 1 : k + 3], way[k + 1 : k + 3], 0, trunks[k + 1], lifted.q)
-            if landed.q is None:
-                why = f"{landing.effector} cannot be put down: {landed.reason}"
-                return self._refuse(way[k + 1], way[k + 2], why)
+            before, after = (replace(places[j], trunk=trunks[j]) for j in (k, k + 1))
+            changes, held, step = self._moved((leaving, standing, landing), before, after, hands, q)
+            if step.lifted is None or step.landed is None:
+                first = k if step.lifted is None else k + 1
+                return self._refuse(way[first], way[first + 1], step.reason)
             distance = float(np.linalg.norm(landing.position - leaving.position))
             flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
-            body = self.poser.body
-            stages.append(Stage.of(body, {standing.effector: standing}, lifted.q, flight))
-            both = {standing.effector: standing, landing.effector: landing}
-            stages.append(Stage.of(body, both, landed.q, self.settings.shift_duration))
-            self._steps += [(way[k + 1], way[k + 2])] * 2
-            q = landed.q
+            lifted = Stage.of(body, {standing.effector: standing, **held}, step.lifted, flight)
+            both = {standing.effector: standing, landing.effector: landing, **held}
+            stages += [*changes, lifted, Stage.of(body, both, step.landed, self.settings.shift_duration)]
+            self._moves += [(way[k + 1], way[k + 2])] * (2 + len(changes))
+            q, hands = step.landed, held
+        if hands:
+            left = self._left(stages[-1].contacts, places[-1], hands, q)
+            if left is None:
+                return self._refuse(way[-2], way[-1], f"{' and '.join(hands)} cannot be left")
+            stages += left
+            self._moves += [(way[-2], way[-1])] * len(left)
         contacts = stages[-1].contacts
         posed = self.poser.pose(contacts, contacts, self.goal.q, self.goal.q[:7], restarts=True)
         if posed.q is None:
@@ -258,7 +256,8 @@ class WalkSearch:
 
     def _refuse(self, stand: int, step: int, reason: str) -> None:
         self.reasons[reason] += 1
-        if self.replanned < NEAR_TRIES:
+        rise = abs(float(self.search.hold(stand).position[2] - self.search.hold(step).position[2]))
+        if self.replanned < (NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES):
             self.search.close(stand, step)
         else:
             self.search.refuse(stand, step)
@@ -268,46 +267,169 @@ class WalkSearch:
         one, other = (self.search.hold(number) for number in numbers)
         return (one, other) if first == FEET[0] else (other, one)
 
+    def _pair_cost(self, left: Foothold, right: Foothold) -> float:
+        """Cost of the trunk's room, and of hands where feet alone do not make the step."""
+        cost = self._room.cost(left, right)
+        rise = abs(float(left.position[2] - right.position[2]))
+        if rise <= HIGHEST * self._scale or not math.isfinite(cost):
+            return cost
+        place = _Place(left, right, 0)
+        return cost + HELD_COST if self._holds_near(place, place) else math.inf
+
+    def _holds_near(self, before: "_Place", after: "_Place") -> list[Contact]:
+        holds = before.left, before.right, after.left, after.right
+        key = *map(id, holds), before.trunk, after.trunk
+        if key not in self._near:
+            roots = [self._guide(place)[:7] for place in (before, after)]
+            ground = min(float(hold.position[2]) for hold in holds)
+            self._near[key] = self._handholds.near(roots, ground, HOLDS)
+        return self._near[key]
+
+    def _moved(
+        self, feet: Sequence[Contact], before: "_Place", after: "_Place", hands: dict[str, Contact],
+        q: FloatArray,
+    ) -> "tuple[list[Stage], dict[str, Contact], _Step]":  # fmt: skip
+        """What hands do before a step, what they hold then, and the step: the first that has postures."""
+        first: _Step | None = None
+        for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
+            step = self._step(feet, before, after, start, held)
+            if step.landed is not None:
+                return changes, held, step
+            first = first or step
+        return [], hands, first or _Step(None, None, f"{' and '.join(hands)} cannot be left")
+
+    def _hands_before(
+        self, feet: Sequence[Contact], before: "_Place", after: "_Place", hands: dict[str, Contact],
+        q: FloatArray,
+    ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:  # fmt: skip
+        """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
+        standing = {foot.effector: foot for foot in feet}
+        bare = self._left({**standing, **hands}, before, hands, q)
+        if bare is not None:
+            yield bare, {}, bare[-1].q if bare else q
+        if hands:
+            yield [], hands, q
+        rise = np.ptp([hold.position[2] for place in (before, after) for hold in (place.left, place.right)])
+        if bare is None or (rise < HIGH * self._scale and self.replanned < HAND_TRIES):
+            return
+        start = bare[-1].q if bare else q
+        holds = self._holds_near(before, after)
+        pairs = [
+            pair for pair in combinations(holds[: HOLDS // 2], 2) if pair[0].effector != pair[1].effector
+        ]
+        for contacts in [*((hold,) for hold in holds), *pairs[:2]]:
+            stages, held, at = list(bare), dict[str, Contact](), start
+            for contact in contacts:
+                carrying = {**standing, **held}
+                held[contact.effector] = contact
+                posed = self._posed({**standing, **held}, carrying, before, at)
+                if posed.q is None:
+                    self.reasons[f"{contact.effector} cannot be put down: {posed.reason}"] += 1
+                    break
+                at = posed.q
+                stages.append(
+                    Stage.of(self.poser.body, {**standing, **held}, at, self.settings.reach_duration)
+                )
+            else:
+                yield stages, held, at
+
+    def _left(
+        self, contacts: Mapping[str, Contact], place: "_Place", hands: Mapping[str, Contact], q: FloatArray
+    ) -> list[Stage] | None:
+        """Stages in which hands leave one after the other; None where they cannot."""
+        held, stages = dict(contacts), list[Stage]()
+        for hand in hands:
+            carrying = {name: contact for name, contact in held.items() if name != hand}
+            posed = self._posed(held, carrying, place, q)
+            if posed.q is None:
+                return None
+            q, held = posed.q, carrying
+            stages.append(self._reached(held, q))
+        return stages
+
+    def _reached(self, contacts: Mapping[str, Contact], q: FloatArray) -> Stage:
+        return Stage.of(self.poser.body, contacts, q, self.settings.reach_duration)
+
+    def _step(
+        self, feet: Sequence[Contact], before: "_Place", after: "_Place", q: FloatArray,
+        hands: Mapping[str, Contact],
+    ) -> "_Step":  # fmt: skip
+        """Postures in which a foot leaves one place and lands on another, the other one stands."""
+        leaving, standing, landing = feet
+        carrying = {standing.effector: standing, **hands}
+        lifted = self._posed({leaving.effector: leaving, **carrying}, carrying, before, q)
+        if lifted.q is None:
+            return _Step(None, None, f"{leaving.effector} cannot be lifted: {lifted.reason}")
+        landed = self._posed({**carrying, landing.effector: landing}, carrying, after, lifted.q)
+        why = f"{landing.effector} cannot be put down: {landed.reason}"
+        return _Step(lifted.q, landed.q, why if landed.q is None else "")
+
+    def _guide(self, place: "_Place") -> FloatArray:
+        return self._room.guide(place.trunk, place.left, place.right)
+
     def _posed(
-        self, names: Sequence[str], way: Sequence[int], rests: int, trunk: int, q: FloatArray
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: "_Place", q: FloatArray
     ) -> Posed:
-        """Posture on a pair of footholds that rests on one of them; looked for once with each trunk."""
-        key = way[0], way[1], bool(rests), trunk
+        """Posture that holds contacts and rests on some; looked for once with each trunk."""
+        key = frozenset(map(id, held.values())), frozenset(carrying), place.trunk
         if key in self._postures:
             return self._postures[key]
-        held = {name: self._contact(name, number) for name, number in zip(names, way, strict=True)}
-        carrying: Mapping[str, Contact] = {names[rests]: held[names[rests]]}
-        guide = self._room.guide(trunk, *self._pair(names[0], way))
-        posed = self.poser.pose(held, carrying, q, guide)
-        if posed.q is None:
+        guide, feet_alone = self._guide(place), set(held) <= set(FEET)
+        flat = {
+            name: Placement(None, contact.rotation_contact_to_world, 0.05)
+            for name, contact in held.items() if contact.kind is ContactKind.POINT
+        }  # fmt: skip
+        posed = self.poser.pose(held, carrying, q, guide, placements=flat)
+        if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
-            posed = self.poser.pose(held, carrying, start, guide, restarts=True)
+            posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone, placements=flat)
         if posed.q is not None:
-            posed = self._easier(posed, held, held[names[rests]], self._pair(names[0], way), trunk)
+            posed = self._easier(posed, held, carrying, place, flat)
         self._postures[key] = posed
+        self._kept += held.values()  # so that no other contact gets its id
         return posed
 
     def _easier(
-        self, posed: Posed, held: Mapping[str, Contact], carrying: Contact, pair: tuple[Foothold, Foothold],
-        trunk: int,
+        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: "_Place",
+        flat: Mapping[str, Placement],
     ) -> Posed:  # fmt: skip
-        """A posture on one foot that the joints can hold at rest: the given one, or one that leans ahead."""
-        body, stance, name = self.poser.body, Stance([carrying]), carrying.effector
+        """A posture that the joints can hold at rest: the given one, or one on its foot that leans ahead."""
+        body, stance = self.poser.body, Stance(list(carrying.values()))
 
         def share_of(item: Posed) -> float:
             return math.inf if item.q is None else static_torque_share(body, item.q, stance)
 
         best, least = posed, share_of(posed)
-        turn = carrying.rotation_contact_to_world
-        middle, ahead = carrying.position + turn @ carrying.centre, 0.5 * carrying.length * turn[:, 0]
-        for number, part in ((n, part) for n in self._room.stooped(trunk) for part in EASIER):
+        feet = [contact for name, contact in carrying.items() if name in FEET]
+        tries = self._room.stooped(place.trunk) if len(feet) == 1 else ()
+        turn = feet[0].rotation_contact_to_world
+        middle, ahead = feet[0].position + turn @ feet[0].centre, 0.5 * feet[0].length * turn[:, 0]
+        for number, part in ((n, part) for n in tries for part in EASIER):
             if least <= 1.0 or best.q is None:
                 break
-            place, guide = (middle + part * ahead)[:2], self._room.guide(number, *pair)
-            other = self.poser.pose(held, {name: carrying}, best.q, guide, place=place)
+            at, guide = (middle + part * ahead)[:2], self._guide(replace(place, trunk=number))
+            other = self.poser.pose(held, carrying, best.q, guide, place=at, placements=flat)
             share = share_of(other)
             if share < least:
                 best, least = other, share
         if least > 1.0 and self.replanned < STRONG_TRIES:
-            return Posed(None, f"resting on {name} asks for {least:.2f} of the strength")
+            return Posed(None, f"resting on {' and '.join(carrying)} asks for {least:.2f} of the strength")
         return best
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Two footholds, and the number of the trunk's posture between them."""
+
+    left: Foothold
+    right: Foothold
+    trunk: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Postures as a foot leaves and lands, as far as there are any, and why not."""
+
+    lifted: FloatArray | None
+    landed: FloatArray | None
+    reason: str = ""

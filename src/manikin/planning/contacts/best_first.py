@@ -1,0 +1,186 @@
+"""Best-first search for contacts with whole postures along the best way only; what feet and limbs share.
+
+A cheap search finds the best way through nodes, which are contacts that are held.  Whole postures are looked
+for along it; where one is missing, the move is closed or made dearer, and the cheap search finds the next
+best way.  A move that a later stage refuses is treated in the same way.
+"""
+
+import heapq
+import math
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.contact_plan import ContactPlan
+from manikin.planning.contacts.posture_finder import PostureFinder
+
+Node = TypeVar("Node")
+Move = TypeVar("Move")
+
+
+@dataclass(frozen=True, eq=False)
+class Graph(Generic[Node]):
+    """What a cheap search knows of nodes.
+
+    Attributes:
+        ahead: Estimate of the cost from a node to the goal.
+        followers: Nodes after one, with the cost of each.
+        tested: What a step to a node costs beyond that, infinite where it is not possible; asked when the
+            step is about to be taken.
+        ended: Whether a node is a goal.
+    """
+
+    ahead: Callable[[Node], float]
+    followers: Callable[[Node], Iterable[tuple[Node, float]]]
+    tested: Callable[[Node, Node], float]
+    ended: Callable[[Node], bool]
+
+    def best(
+        self, starts: Sequence[Node], greeds: Sequence[tuple[float, int]]
+    ) -> tuple[list[Node] | None, list[int]]:
+        """Nodes of the best way to a goal, or None, and how many were expanded with each factor.
+
+        Args:
+            starts: Where ways begin.
+            greeds: Factors on the estimate, tried in turn, each with the nodes that may be expanded with it.
+        """
+        expanded: list[int] = []
+        for greed, most in greeds:
+            way, count = self._search(starts, greed, most)
+            expanded.append(count)
+            if way is not None or count < most:
+                return way, expanded
+        return None, expanded
+
+    def _search(self, starts: Sequence[Node], greed: float, most: int) -> tuple[list[Node] | None, int]:
+        """A way with one factor on the estimate, and how many nodes were expanded; fewer than most: all."""
+        open_: list[tuple[float, int, float, Node, Node | None, bool]]
+        open_ = [(greed * self.ahead(node), k, 0.0, node, None, True) for k, node in enumerate(starts)]
+        heapq.heapify(open_)
+        parents: dict[Node, Node | None] = {}
+        count, expanded = len(open_), 0
+        while open_:
+            _, _, cost, node, parent, tested = heapq.heappop(open_)
+            if node in parents:
+                continue
+            if not tested and parent is not None:
+                total = cost + self.tested(parent, node)
+                if math.isfinite(total):
+                    count += 1
+                    heapq.heappush(
+                        open_, (total + greed * self.ahead(node), count, total, node, parent, True)
+                    )
+                continue
+            parents[node] = parent
+            if self.ended(node):
+                way = [node]
+                while (before := parents[way[-1]]) is not None:
+                    way.append(before)
+                return way[::-1], expanded
+            if expanded == most:
+                return None, expanded
+            expanded += 1
+            for after, step in self.followers(node):
+                if after not in parents:
+                    count += 1
+                    total = cost + step
+                    heapq.heappush(
+                        open_, (total + greed * self.ahead(after), count, total, after, node, False)
+                    )
+        return None, min(expanded, most - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """A contact plan, or why there is none.
+
+    Attributes:
+        searches: Postures that were looked for.
+        backtracks: Ways of which a posture was missing, or changes taken back.
+        reached: Share of a guide that the farthest attempt got to.
+    """
+
+    plan: ContactPlan | None
+    searches: int
+    backtracks: int
+    failure: str | None = None
+    reached: float = 1.0
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether there is a plan."""
+        return self.plan is not None
+
+
+class PosedSearch(ABC, Generic[Node, Move]):
+    """Search for the best way whose postures exist; it can be asked again with more moves refused.
+
+    Attributes:
+        poser: Finds postures.
+        reasons: Why postures are missing, and how often.
+        replanned: Ways of which a posture was missing.
+    """
+
+    def __init__(self, poser: PostureFinder, most: int) -> None:
+        """Begin to count the postures that ``poser`` looks for, ``most`` at most."""
+        self.poser, self._before, self._most = poser, poser.searches, most
+        self.reasons: Counter[str] = Counter()
+        self.replanned = 0
+        self._moves: list[Move | None] = []
+
+    def run(self) -> Extension:
+        """The best way whose postures exist, or why there is none."""
+        while self._searches < self._most:
+            way = self._best()
+            if isinstance(way, str):
+                return self._failed(way)
+            plan = self._planned(way)
+            if plan is not None:
+                return Extension(plan, self._searches, self.replanned)
+            self.replanned += 1
+        return self._failed(f"no contacts after {self._searches} postures")
+
+    def refuse(self, phase: int) -> bool:
+        """Close the move of a phase of the last plan, and what is much like it; False where it has none."""
+        move = self._moves[phase] if phase < len(self._moves) else None
+        if move is None:
+            return False
+        self._close(move)
+        return True
+
+    @property
+    def _searches(self) -> int:
+        return self.poser.searches - self._before
+
+    def _failed(self, what: str) -> Extension:
+        most = self.reasons.most_common(1)
+        why = f"; most often: {most[0][0]}" if most else ""
+        return Extension(None, self._searches, self.replanned, f"{what}{self._farthest()}{why}")
+
+    @abstractmethod
+    def _best(self) -> list[Node] | str:
+        """The best way, or why there is none."""
+
+    @abstractmethod
+    def _planned(self, way: list[Node]) -> ContactPlan | None:
+        """Plan of a way; None where a posture is missing, whose move is closed then."""
+
+    @abstractmethod
+    def _close(self, move: Move) -> None:
+        """Close a move, and what is much like it."""
+
+    @abstractmethod
+    def _farthest(self) -> str:
+        """How far the search came, in words that follow what it did not find."""
+
+
+def heading_of(pose: FloatArray) -> float:
+    """Heading of a (7,) pose: direction of its x axis seen from above [rad]."""
+    forward = Rotation.from_quat(pose[3:]).as_matrix()[:, 0]
+    return float(np.arctan2(forward[1], forward[0]))

@@ -1,0 +1,389 @@
+"""Contacts of the limbs of a creature from start to goal: a best-first search over sets of contacts.
+
+A state is the set of contacts that are held; a move breaks one of them and makes one of the same limb
+elsewhere.  Of each state the pose of the root is known that suits its contacts best; reach of every limb from
+there, and balance on the contacts that stay, are the cheap tests.  Whole postures are looked for along the
+best way only: one that still holds the old contact and rests on the others, one with the limb off the line
+between its contacts, and one that already holds the new one ([Tonneau2015]_ 7.2).  What has no posture is
+closed, what is much like it costs more, and the search goes on with the next best way.
+
+A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from manikin.contact import Contact, ContactKind
+from manikin.kinematics import Placement, ReachVolume
+from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
+from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
+from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder
+
+GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))
+"""Factors on the estimate, tried in turn, each with the states that may be expanded with it; our choice."""
+
+GOAL_REACH = 1.5
+"""Distance from the root at the goal within which limbs have to have places, by their reach."""
+
+STEEPEST_TRUNK = 0.5
+"""Largest pitch of a trunk that follows its contacts [rad]; our choice."""
+
+LEVELLED = 0.8
+"""Share of the slope of its contacts to which a trunk pitches; our choice."""
+
+AROUND = 0.45
+"""Distance from where a limb should be up to which places are tried [strides]; our choice."""
+
+COMFORT = 2.0
+"""Cost of a limb that is as far from where it should be as it reaches, in moves; our choice."""
+
+SWAY = 0.12
+"""Distance of the root from the polygon of the contacts that stay at most, by the reach; our choice."""
+
+State = tuple[int, ...]
+"""Place of each limb, by its row among those of the limb; the first is that of the start."""
+
+
+@dataclass(frozen=True)
+class LimbSettings:
+    """How limbs are moved; the values are our choice.
+
+    Attributes:
+        stride: Way of a limb that costs least [m].
+        searches: Most postures that are looked for.
+        lift: How far a limb in flight keeps from the line between its contacts [m].
+        swing_duration: Shortest flight of a limb [s].
+        swing_speed: Its mean speed on longer ways [m/s].
+        shift_duration: Shortest time between two flights [s].
+        hinge_pace: Mean speed of the hinge that turns most [rad/s].
+        goal_distance: Distance of the root from its goal at which it is reached [m].
+        goal_turn: Angle between the root's heading and the goal's at which it is reached [rad].
+    """
+
+    stride: float = 0.4
+    searches: int = 900
+    lift: float = 0.08
+    swing_duration: float = 0.7
+    swing_speed: float = 0.7
+    shift_duration: float = 0.35
+    hinge_pace: float = HINGE_PACE
+    goal_distance: float = 0.08
+    goal_turn: float = math.radians(12.0)
+
+
+@dataclass(frozen=True, eq=False)
+class LimbHolds:
+    """Places for one limb.
+
+    Attributes:
+        effector: Of the limb.
+        positions: (m, 3) [m].
+        contact: Makes the contact of a row.
+        is_free: Whether there is room for the limb's end at a row.
+        reach: Of the limb.
+        root_to_segment: Rotation (3, 3) and place (3,) of the segment that carries it, from the root.
+        wanted: (3,) where the limb should be from the root [m].
+    """
+
+    effector: str
+    positions: FloatArray
+    contact: Callable[[int], Contact]
+    is_free: Callable[[int], bool]
+    reach: ReachVolume
+    root_to_segment: tuple[FloatArray, FloatArray]
+    wanted: FloatArray
+
+    def room(self, places: FloatArray) -> FloatArray:
+        """(k,) distance of places (k, 3) seen from the root to the end of the reach [m]; negative outside."""
+        turn, at = self.root_to_segment
+        return self.reach.residual((places - at) @ turn)
+
+
+class LimbSearch(PosedSearch[State, tuple[State, State]]):
+    """Search for the contacts of any limbs, which can be asked again with more moves closed."""
+
+    def __init__(
+        self, poser: PostureFinder, holds: Sequence[LimbHolds], start: Stage, goal: FloatArray, size: float,
+        settings: LimbSettings | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare a search.
+
+        Args:
+            poser: Finds postures.
+            holds: Places of each limb that makes contacts.
+            start: Contacts and posture at the start; limbs without a contact make one where they can.
+            goal: (7,) pose of the root at the goal.
+            size: Mean distance that the limbs reach [m].
+            settings: Paces and bounds.
+        """
+        self.settings = settings or LimbSettings()
+        super().__init__(poser, self.settings.searches)
+        self.holds, self.start, self.goal, self.size = holds, start, goal, size
+        root = start.q[:7]
+        self._yaw, turn = heading_of(goal), rotation_from_yaw(heading_of(root))
+        first = [
+            start.contacts[item.effector].position
+            if item.effector in start.contacts else root[:3] + turn @ item.wanted
+            for item in holds
+        ]  # fmt: skip
+        self._places = [np.vstack([at, item.positions]) for at, item in zip(first, holds, strict=True)]
+        self._trees = [cKDTree(item.positions) if len(item.positions) else None for item in holds]
+        self._wanted = np.array([item.wanted for item in holds])
+        self._contacts: dict[tuple[int, int], Contact] = {}
+        self._free: dict[tuple[int, int], bool] = {}
+        self._next: dict[State, list[tuple[State, float]]] = {}
+        self._ahead: dict[State, float] = {}
+        self._stuck: set[tuple[State, int]] = set()
+        self._dearer: dict[int, FloatArray] = {}  # (n, 2, 3) places of a limb and the root, by limb
+        self._roots: dict[State, FloatArray] = {}
+        self._postures: dict[tuple[object, ...], Posed] = {}
+
+    def _best(self) -> list[State] | str:
+        first = (0,) * len(self.holds)
+        self._frame_costs([first])
+        graph = Graph(
+            lambda state: self._ahead[state], self._followers, self._tested,
+            lambda state: self._ahead[state] <= 0.0,
+        )  # fmt: skip
+        return self._walled_off or graph.best([first], GREED)[0] or "no contacts lead to the goal"
+
+    @cached_property
+    def _walled_off(self) -> str:
+        """Why no chain of places leads from the start to the goal; empty where one does."""
+        shared = {id(item.positions): item.positions for item in self.holds}
+        places = np.vstack([self._at((0,) * len(self.holds)), *shared.values()])
+        tree = cKDTree(places)
+        near = tree.query_ball_point(self.goal[:3], GOAL_REACH * self.size)
+        if not near:
+            return "the goal is walled off from the start: no limb has a place within reach of it"
+        pairs = tree.query_pairs(self.size, output_type="ndarray")
+        graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(places),) * 2)
+        part = connected_components(graph, directed=False)[1]
+        if set(part[: len(self.holds)]) & set(part[near]):
+            return ""
+        return f"the goal is walled off from the start: a gap is wider than {self.size:.2f} m"
+
+    def _farthest(self) -> str:
+        left, whole = min(self._ahead.values()), self._ahead[(0,) * len(self.holds)]
+        return f" beyond {100.0 * (1.0 - min(1.0, left / max(whole, 1e-9))):.0f} % of the way"
+
+    # --- the cheap search ---------------------------------------------------------------------
+
+    def _at(self, state: State) -> FloatArray:
+        """(n, 3) places of a state [m]."""
+        return np.array([places[row] for places, row in zip(self._places, state, strict=True)])
+
+    def _frames(self, places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Roots (k, 3) [m], headings and pitches (k,) [rad] that suit places (k, n, 3) of the limbs best."""
+        middle, mean = places.mean(axis=1), self._wanted.mean(axis=0)
+        away, flat = places - middle[:, None], self._wanted - mean
+        sine = (flat[:, 0] * away[..., 1] - flat[:, 1] * away[..., 0]).sum(axis=1)
+        cosine = (flat[:, 0] * away[..., 0] + flat[:, 1] * away[..., 1]).sum(axis=1)
+        yaw = np.arctan2(sine, cosine)
+        along = np.cos(yaw)[:, None] * away[..., 0] + np.sin(yaw)[:, None] * away[..., 1]
+        slope = (along * away[..., 2]).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-9)
+        pitch = np.clip(-LEVELLED * np.arctan(slope), -STEEPEST_TRUNK, STEEPEST_TRUNK)
+        return middle - rotations(yaw, pitch, np.zeros(len(places))) @ mean, yaw, pitch
+
+    def _frame_costs(self, states: Sequence[State]) -> FloatArray:
+        """Costs (k,) of how far limbs are from where they should be, infinite out of reach."""
+        places = np.array([self._at(state) for state in states])
+        roots, yaw, pitch = self._frames(places)
+        turn = rotations(yaw, pitch, np.zeros(len(yaw)))
+        local = np.einsum("kji,knj->kni", turn, places - roots[:, None])
+        off = np.linalg.norm(local - self._wanted, axis=2) / self.size
+        cost = (COMFORT * off**2).sum(axis=1)
+        for k, item in enumerate(self.holds):
+            cost[item.room(local[:, k]) < 0.0] = np.inf
+        away = np.linalg.norm(roots - self.goal[:3], axis=1)
+        off_heading = np.abs(np.mod(yaw - self._yaw + math.pi, 2.0 * math.pi) - math.pi)
+        n, stride = len(self.holds), self.settings.stride
+        near = (away <= self.settings.goal_distance) & (off_heading <= self.settings.goal_turn)
+        ahead = n * (away + 0.6 * self.size * off_heading) / stride
+        for state, left, there, root in zip(states, ahead.tolist(), near.tolist(), roots, strict=True):
+            self._ahead.setdefault(state, 0.0 if there else left + 1e-6)
+            self._roots[state] = root
+        return cost
+
+    def _followers(self, state: State) -> list[tuple[State, float]]:
+        """States after one move, with what it costs."""
+        if state in self._next:
+            return self._next[state]
+        root, yaw, pitch = (value[0] for value in self._frames(self._at(state)[None]))
+        turn = rotations(yaw, pitch, np.array(0.0))
+        away = self.goal[:3] - root
+        onward = min(1.0, 0.5 * self.settings.stride / max(float(np.linalg.norm(away)), 1e-9)) * away
+        states: list[State] = []
+        steps: list[float] = []
+        for k, tree in enumerate(self._trees):
+            if tree is None or (state, k) in self._stuck:
+                continue
+            here, wanted = self._places[k][state[k]], root + turn @ self._wanted[k]
+            # From behind where it should be to ahead of it.
+            rows = set[int]()
+            for ahead in (0.0, 1.0, 2.0):
+                place = wanted + ahead * onward
+                rows |= set(tree.query_ball_point(place, AROUND * self.settings.stride))
+            rows |= set(tree.query(wanted + onward, k=min(3, tree.n))[1].ravel().tolist())
+            for row in sorted(rows):
+                way = float(np.linalg.norm(self._places[k][row + 1] - here))
+                if row + 1 != state[k] and way > 0.15 * self.settings.stride:
+                    states.append((*state[:k], row + 1, *state[k + 1 :]))
+                    steps.append(1.0 + 0.5 * (way / (2.0 * self.settings.stride)) ** 2)
+        costs = self._frame_costs(states) if states else np.zeros(0)
+        self._next[state] = [
+            (after, step + cost)
+            for after, step, cost in zip(states, steps, costs.tolist(), strict=True)
+            if math.isfinite(cost)
+        ]
+        return self._next[state]
+
+    def _tested(self, before: State, after: State) -> float:
+        """What a move costs beyond its way; infinite where it is closed, blocked or without balance."""
+        k = self._moved(before, after)
+        if (before, k) in self._stuck:
+            return math.inf
+        key = k, after[k]
+        if key not in self._free:
+            self._free[key] = self.holds[k].is_free(after[k] - 1)
+        if not self._free[key]:
+            return math.inf
+        staying = [j for j in range(len(self.holds)) if j != k and self._held(j, before[j])]
+        at = self._at(after)
+        roots = np.array([self._roots[before][:2], self._roots[after][:2]])
+        hull = convex_polygon(at[staying, :2])
+        if float(np.min(signed_distance(roots, hull))) < -SWAY * self.size:
+            return math.inf
+        dearer = self._dearer.get(k)
+        if dearer is None:
+            return 0.0
+        away = np.linalg.norm(dearer - np.concatenate([at[k], self._roots[after]]).reshape(2, 3), axis=2)
+        return 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+
+    def _moved(self, before: State, after: State) -> int:
+        return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)
+
+    def _held(self, k: int, row: int) -> bool:
+        return row > 0 or self.holds[k].effector in self.start.contacts
+
+    def _close(self, move: tuple[State, State]) -> None:
+        before, after = move
+        k = self._moved(before, after)
+        self._next[before] = [item for item in self._next.get(before, []) if item[0] != after]
+        place = np.array([[self._at(after)[k], self._roots[after]]])
+        self._dearer[k] = np.vstack([self._dearer.get(k, np.zeros((0, 2, 3))), place])
+
+    # --- whole postures -------------------------------------------------------------------------
+
+    def _contact(self, k: int, row: int) -> Contact:
+        if row == 0:
+            return self.start.contacts[self.holds[k].effector]
+        if (k, row) not in self._contacts:
+            self._contacts[k, row] = replace(self.holds[k].contact(row - 1), oriented=False)
+        return self._contacts[k, row]
+
+    def _contacts_of(self, state: State) -> dict[str, Contact]:
+        return {
+            item.effector: self._contact(k, row)
+            for k, (item, row) in enumerate(zip(self.holds, state, strict=True)) if self._held(k, row)
+        }  # fmt: skip
+
+    def _guide(self, state: State) -> FloatArray:
+        """(7,) pose of the root that suits a state."""
+        root, yaw, pitch = (value[0] for value in self._frames(self._at(state)[None]))
+        return np.concatenate([root, quaternions(yaw, pitch, np.array(0.0))])
+
+    def _planned(self, way: list[State]) -> ContactPlan | None:
+        body, stages = self.poser.body, [self.start]
+        self._moves = [None]
+        for before, after in pairwise(way):
+            k = self._moved(before, after)
+            name, held, landed = self.holds[k].effector, self._contacts_of(before), self._contacts_of(after)
+            staying = {other: contact for other, contact in held.items() if other != name}
+            lifted = self._posed(held, staying, self._guide(before), stages[-1].q, (before, k, False))
+            if lifted.q is None:
+                self._stuck.add((before, k))
+                return self._refused(before, after, f"{name} cannot leave its contact: {lifted.reason}")
+            landing = self._posed(landed, staying, self._guide(after), lifted.q, (after, k, True))
+            if landing.q is None:
+                return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
+            old = held.get(name)
+            if old is None:
+                # The limb is free already: it reaches its contact while the phase before lasts.
+                longest = max(stages[-1].min_duration, self.settings.swing_duration)
+                stages[-1] = replace(stages[-1], min_duration=longest)
+            else:
+                via = self._between(staying, lifted.q, landing.q, (old, landed[name]), (before, after))
+                if via is None:
+                    return self._refused(before, after, f"{name} finds no way around")
+                distance = float(np.linalg.norm(landed[name].position - old.position))
+                flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
+                stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
+                self._moves.append((before, after))
+            stages.append(Stage.of(body, landed, landing.q, self.settings.shift_duration))
+            self._moves.append((before, after))
+        contacts = stages[-1].contacts
+        end = self.poser.pose(contacts, contacts, stages[-1].q, self.goal)
+        if end.q is None or np.linalg.norm(end.q[:3] - self.goal[:3]) > self.settings.goal_distance:
+            self._ahead[way[-1]] = 1e-3
+            self.reasons[f"at the goal: {end.reason or 'the root stays away from it'}"] += 1
+            if len(way) > 1:
+                self._close((way[-2], way[-1]))
+            return None
+        return ContactPlan.of(body, stages, end.q, self.settings.hinge_pace)
+
+    def _refused(self, before: State, after: State, reason: str) -> None:
+        self.reasons[reason] += 1
+        self._close((before, after))
+
+    def _between(
+        self, staying: Mapping[str, Contact], lifting: FloatArray, landing: FloatArray,
+        ends: tuple[Contact, Contact], move: tuple[State, State],
+    ) -> FloatArray | None:  # fmt: skip
+        """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
+        before, after = ends
+        middle = 0.5 * (before.position + after.position)
+        start = np.concatenate(
+            [0.5 * (lifting[:3] + landing[:3]), landing[3:7], 0.5 * (lifting + landing)[7:]]
+        )
+        for number, place in enumerate(self._off_the_line(middle, before, after, start[:3])):
+            wish = {before.effector: Placement(place, None, None, 0.5 / self.settings.lift**2)}
+            posed = self._posed(staying, staying, start[:7], start, (*move, number), wish)
+            if posed.q is not None:
+                return posed.q
+        return None
+
+    def _off_the_line(
+        self, middle: FloatArray, before: Contact, after: Contact, root: FloatArray
+    ) -> Iterator[FloatArray]:
+        """Places for a limb in flight: what stands out of a wall is passed on the body's side."""
+        inward = (root - middle) * [1.0, 1.0, 0.0]
+        inward /= max(float(np.linalg.norm(inward)), 1e-9)
+        for share in (0.7, 0.0, 2.0):
+            out = 0.5 * (before.normal + after.normal) + share * inward
+            yield middle + self.settings.lift * out / max(float(np.linalg.norm(out)), 1e-9)
+
+    def _posed(
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], guide: FloatArray,
+        start: FloatArray, key: tuple[object, ...], wishes: Mapping[str, Placement] | None = None,
+    ) -> Posed:  # fmt: skip
+        """A posture whose points stand upright on their surfaces, as far as they can; looked for once."""
+        if key not in self._postures:
+            upright = {
+                name: Placement(None, contact.rotation_contact_to_world, 0.05)
+                for name, contact in held.items() if contact.kind is ContactKind.POINT
+            }  # fmt: skip
+            self._postures[key] = self.poser.pose(
+                held, carrying, start, guide, placements={**upright, **(wishes or {})}
+            )
+        return self._postures[key]
