@@ -91,8 +91,7 @@ def plan_guide(
     found: list[FloatArray] = []
     failures: list[GuideFailure] = []
     touched: dict[str, FloatArray] = {}
-    # The fit has the last word: where a posture is not found from the one before, its best attempt will do.
-    settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False, restarts=False)
+    settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False)
     for k, instant in enumerate(time):
         contacts, placements = _requirements(schedule, float(instant), effectors, k)
         placements.update(_settling(body, schedule, float(instant), q, touched))
