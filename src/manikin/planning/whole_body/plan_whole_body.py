@@ -67,6 +67,9 @@ FIRST_DECREASE = 0.02
 LATER_DECREASE = 0.005
 """Relative decrease below which a later repair, or a fit that begins again, stops."""
 
+MISSED = 0.1
+"""Share of a guide's postures that may be missed without another search with restarts."""
+
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
 
@@ -278,7 +281,7 @@ class _Planner:
             settings.knot_spacing, settings.samples_per_span, sudden=True, penalties=PENALTIES,
             patience=LATER_DECREASE,
         )  # fmt: skip
-        self._guides: dict[tuple[tuple[PlannedSwing, ...], PostureStyle, Guide | None], Guide] = {}
+        self._guides: dict[tuple[tuple[PlannedSwing, ...], PostureStyle, Guide | None, bool], Guide] = {}
 
     def run(self, began: float, progress: Progress) -> WholeBodyResult:
         swings = tuple(self.flights.plan(swing) for swing in self.flights.flights())
@@ -327,15 +330,20 @@ class _Planner:
         """Fit a motion to the swings; where it misses a little, fit on with more weight on that.
 
         The first fit is led by the manner, or by the key postures where that one is caught and theirs is not.
+        The fit has the last word on a guide: only where it is caught, a guide that missed many postures is
+        sought again with restarts.
         """
         share = manner.moment_factor * self.settings.fit.moment_share
         scales = replace(self.settings.fit, moment_share=share)
 
-        def led_by(known: Guide | None) -> FitAttempt[_Goal]:
-            guide = self.guide(swings, manner, known)
+        def led_by(known: Guide | None, restarts: bool = False) -> FitAttempt[_Goal]:
+            guide = self.guide(swings, manner, known, restarts)
             progress(0.4)
             attempt = self.job.attempt(_Goal(self, swings, guide, manner, straight_toes), scales)
             progress(0.8)
+            if attempt.is_caught and not restarts and len(guide.failures) > MISSED * len(guide.time):
+                again = led_by(known, restarts=True)
+                return attempt if again.is_caught else again
             return attempt
 
         first = led_by(self.known)
@@ -357,10 +365,14 @@ class _Planner:
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
 
     def guide(
-        self, swings: tuple[PlannedSwing, ...], manner: PostureStyle, known: Guide | None = None
+        self,
+        swings: tuple[PlannedSwing, ...],
+        manner: PostureStyle,
+        known: Guide | None = None,
+        restarts: bool = False,
     ) -> Guide:
-        """The guide to the swings, found once for each manner and set of known postures."""
-        key = swings, manner, known
+        """The guide to the swings, found once for each manner, set of known postures and way of search."""
+        key = swings, manner, known, restarts
         if key not in self._guides:
             schedule = self.trajectory.schedule
             time = guide_times(schedule.instants, self.settings.guide_spacing)
@@ -371,7 +383,7 @@ class _Planner:
             self._guides[key] = plan_guide(
                 self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time), com,
                 ignored_pairs(self.body, self.scene, schedule, time), reference,
-                self.settings.fit.safe_distance, manner.preferences, tuple(toes),
+                self.settings.fit.safe_distance, manner.preferences, tuple(toes), restarts,
             )  # fmt: skip
         return self._guides[key]
 

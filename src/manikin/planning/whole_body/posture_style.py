@@ -73,7 +73,7 @@ def plan_guide(
     body: BodyModel, proximity: Proximity, schedule: ContactSchedule, time: FloatArray,
     effectors: dict[str, EffectorTarget], com: FloatArray, ignored: tuple[Ignored, ...],
     reference: FloatArray, clearance: float, preferences: Preferences | None = None,
-    exact: Sequence[int] = (),
+    exact: Sequence[int] = (), restarts: bool = False,
 ) -> Guide:  # fmt: skip
     """Find a posture at each time, each one starting from the one before.
 
@@ -86,12 +86,13 @@ def plan_guide(
         clearance: Wanted distance to everything [m].
         preferences: What the postures should look like; the generator's own when omitted.
         exact: Joints that keep to the reference whatever the posture before.
+        restarts: Whether a posture that is not found from the one before is sought from others as well.
     """
     q = reference[0]
     found: list[FloatArray] = []
     failures: list[GuideFailure] = []
     touched: dict[str, FloatArray] = {}
-    settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False)
+    settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False, restarts=restarts)
     for k, instant in enumerate(time):
         contacts, placements = _requirements(schedule, float(instant), effectors, k)
         placements.update(_settling(body, schedule, float(instant), q, touched))
