@@ -341,7 +341,8 @@ class _Planner:
             progress(0.4)
             attempt = self.job.attempt(_Goal(self, swings, guide, manner, straight_toes), scales)
             progress(0.8)
-            if attempt.is_caught and not restarts and len(guide.failures) > MISSED * len(guide.time):
+            missed = len(guide.failures) > MISSED * len(guide.time)
+            if missed and not restarts and attempt.is_caught:
                 again = led_by(known, restarts=True)
                 return attempt if again.is_caught else again
             return attempt
