@@ -10,7 +10,7 @@ import pytest
 import typer
 
 import manikin
-from manikin.cli.app import app
+from manikin.cli import app
 from manikin.motion.file import write_motions
 from manikin.reports import figures
 from manikin.scenarios import list_variants, load_scenario

@@ -16,7 +16,7 @@ from manikin.balance import (
 )
 from manikin.contact import Stance, grasp, point, sole
 from manikin.errors import InputError
-from manikin.numerics.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
+from manikin.numerics.polytope import convex_polygon, polygon_of_halfplanes, signed_distance
 
 MASS = 60.0
 # [Qiu2012]_ 4.2.8, Fig. 4.4 and Fig. 4.5.

@@ -33,15 +33,15 @@ from manikin.recordings.dynamics.recorded_dynamics import (
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
 from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import least_shift
+from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording
-from manikin.recordings.readers.read import READERS, read_recording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import reconstruct
 from manikin.recordings.supports.recorded_stances import FRICTION, recorded_schedule
 from manikin.recordings.supports.support_levels import effector_places
 from manikin.recordings.supports.supports import supports_of
-from manikin.walking.segments.segmentation import PathSegments, ShoulderPaths, segment_path
+from manikin.walking.segmentation import PathSegments, ShoulderPaths, segment_path
 
 SHOULDERS = ("left_upper_arm", "right_upper_arm")
 """Segments that begin at the shoulders."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from manikin.analysis import Analysis, AnalysisOptions
 from manikin.analysis import analyze as measure
 from manikin.motion.file import MotionFile
+from manikin.recordings.readers import read_recording
 from manikin.recordings.readers.markers import MarkerRecording
-from manikin.recordings.readers.read import read_recording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.runtime.display import Displayed
 from manikin.viewer import serve

@@ -18,7 +18,7 @@ from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytop
 from manikin.body import BodyModel, Configuration
 from manikin.contact import ContactKind, Stance, default_normal_force_cap
 from manikin.errors import InputError
-from manikin.numerics.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
+from manikin.numerics.polytope import convex_polygon, polygon_of_halfplanes, signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_array, skew
 
 

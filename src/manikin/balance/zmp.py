@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.balance.criteria import support_height, zero_moment_point
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.motion import Motion
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, cross, rotation_from_normal, skew
 
 FLATNESS = 1e-3

@@ -92,8 +92,8 @@ def run_job(job: "Scenario", directory: Path | None, interruption: Interruption,
         interruption.check()
         if directory is None:
             return JobOutcome(dict(result.summary), None, None)
+        from manikin.reports.export import write_outputs
         from manikin.reports.pages import write_run_page
-        from manikin.reports.write_outputs import write_outputs
 
         if draw:
             write_outputs(directory, progress)

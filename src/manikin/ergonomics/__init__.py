@@ -5,6 +5,7 @@ from manikin.ergonomics.body_parts import Bearing, bearing_of
 from manikin.ergonomics.postural_angles import ArmAngles, PosturalAngles, postural_angles, upright_neck
 from manikin.ergonomics.report import Ergonomics, LowestMargin, ergonomics_of, lowest_margin
 from manikin.ergonomics.rula_reba import (
+    Circumstances,
     RebaSteps,
     RulaSteps,
     reba_action_level,
@@ -12,7 +13,6 @@ from manikin.ergonomics.rula_reba import (
     rula_action_level,
     rula_score,
 )
-from manikin.ergonomics.scoring import Circumstances
 from manikin.ergonomics.strength import CumulativeEffort, JointStrength, cumulative_effort, joint_strength
 
 __all__ = [

@@ -14,6 +14,8 @@ from manikin.ergonomics.postural_angles import PosturalAngles, postural_angles
 from manikin.ergonomics.rula_reba import (
     ACTIONS,
     RISKS,
+    Circumstances,
+    Scores,
     reba_action_level,
     reba_coupling,
     reba_load,
@@ -24,7 +26,6 @@ from manikin.ergonomics.rula_reba import (
     rula_score,
     rula_steps,
 )
-from manikin.ergonomics.scoring import Circumstances, Scores
 from manikin.ergonomics.strength import durations
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray

@@ -16,7 +16,7 @@ from manikin.contact import ContactSchedule, Stance, default_normal_force_cap
 from manikin.contact.from_motion import stance_at
 from manikin.ergonomics.assessment import PosturalAssessment, assess_posture
 from manikin.ergonomics.body_parts import parts_of
-from manikin.ergonomics.scoring import Circumstances
+from manikin.ergonomics.rula_reba import Circumstances
 from manikin.ergonomics.strength import (
     LOADED,
     CumulativeEffort,

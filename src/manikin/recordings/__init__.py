@@ -23,12 +23,12 @@ from manikin.recordings.dynamics.recorded_dynamics import (
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
 from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import LeastShift, least_shift
+from manikin.recordings.readers import read_recording
 from manikin.recordings.readers.acclaim import Skeleton, read_amc, read_asf
 from manikin.recordings.readers.bvh import read_bvh
 from manikin.recordings.readers.c3d import read_c3d
 from manikin.recordings.readers.markers import Event, ForcePlate, Gap, MarkerRecording
 from manikin.recordings.readers.opensim import read_mot, read_trc
-from manikin.recordings.readers.read import read_recording
 from manikin.recordings.readers.skeleton_recording import Recording, Subject
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import person_of, reconstruct
@@ -64,10 +64,9 @@ from manikin.recordings.statistics.phases import (
     published_phases,
     sequence_consistency,
 )
-from manikin.recordings.supports.plate_supports import TimingError, timing_errors
 from manikin.recordings.supports.recorded_stances import recorded_schedule
 from manikin.recordings.supports.recorded_supports import RecordedSupports, Support, SupportPhase
-from manikin.recordings.supports.supports import supports_of
+from manikin.recordings.supports.supports import TimingError, supports_of, timing_errors
 
 __all__ = [
     "Event", "ForcePlate", "Gap", "GroupStatistics", "LeastShift", "MarkerRecording", "Origin", "Overhead",

@@ -200,7 +200,7 @@ def write_analysis(
     summary = summary_of(analysis, plan)
     sheet, pictures = recording_sheet(analysis, SHEET) if draw else "", {}
     if draw and plan is not None and plan.com.trajectory is not None:
-        from manikin.reports.figures.write_figures import comparison_pictures
+        from manikin.reports.figures import comparison_pictures
 
         pictures = comparison_pictures(compare_with_recording(plan))
     content = MotionFile(body=analysis.body) if plan is None else plan.content

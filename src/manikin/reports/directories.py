@@ -49,9 +49,9 @@ from manikin.reports.figures import (
     placements_figure,
     published_lowest,
     push_map_figure,
+    save_figure,
     words_figure,
 )
-from manikin.reports.figures.write_figures import save_figure
 from manikin.runtime import __version__
 from manikin.runtime.files import ResultDirectory, atomic_path, csv_text, to_json, writing
 from manikin.simulation import PushMap, PushTrials

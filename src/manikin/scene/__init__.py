@@ -4,12 +4,11 @@ from manikin.runtime.display import make_callable
 from manikin.scene.covering import SphereCover, cover
 from manikin.scene.distance import Clearance, Proximity, ProximityResult, segment_of
 from manikin.scene.footing import Footing, FootingTable, Places
-from manikin.scene.grasp_line import GraspLine
 from manikin.scene.mesh import Mesh, load_mesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Sphere
 from manikin.scene.scene import Scene
 from manikin.scene.spheres import SphereProximity
-from manikin.scene.surface import Surface
+from manikin.scene.surface import GraspLine, Surface
 
 __all__ = [
     "Box", "Capsule", "Clearance", "Cylinder", "Footing", "FootingTable", "GraspLine", "HalfSpace",

@@ -1,9 +1,21 @@
 """How people walk: paths, footprints, segments, words, whole-body walks ([Truong2010]_ chapters 3 to 6)."""
 
-from manikin.walking.footsteps.footprints import Footprint, Footprints
-from manikin.walking.footsteps.stepper import StepRule, place_footprints, walked_footprints
+from manikin.walking.footprints import Footprint, Footprints
 from manikin.walking.gait.follow_path import Walk, WalkController, WalkFrame, walk_along
 from manikin.walking.gait.motion_library import MotionLibrary, load_library, save_library
+from manikin.walking.goal_categories import (
+    CategorySpread,
+    CategoryStatistics,
+    HolonomicEnds,
+    HolonomicZone,
+    PathDeviation,
+    category_goals,
+    category_of,
+    category_statistics,
+    holonomic_ends,
+    holonomic_zone,
+    path_deviation,
+)
 from manikin.walking.path.path_plan import walking_path, walking_paths
 from manikin.walking.path.route import WalkRoute, Waypoint, walking_route
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, floor_plan
@@ -18,20 +30,7 @@ from manikin.walking.path.walking_model import (
     experiment_targets,
 )
 from manikin.walking.path.walking_path import WalkingPath, WalkingResiduals, WalkingTask, walked
-from manikin.walking.segments.goal_categories import (
-    CategorySpread,
-    CategoryStatistics,
-    HolonomicEnds,
-    HolonomicZone,
-    PathDeviation,
-    category_goals,
-    category_of,
-    category_statistics,
-    holonomic_ends,
-    holonomic_zone,
-    path_deviation,
-)
-from manikin.walking.segments.segmentation import (
+from manikin.walking.segmentation import (
     HOLONOMIC,
     KINDS,
     NONHOLONOMIC,
@@ -43,6 +42,7 @@ from manikin.walking.segments.segmentation import (
     ShoulderPaths,
     segment_path,
 )
+from manikin.walking.stepper import StepRule, place_footprints, walked_footprints
 
 __all__ = [
     "HOLONOMIC", "KINDS", "LITERAL_ORDER", "NONHOLONOMIC", "PROSE_ORDER", "RECORDED_TURNS", "RECORDED_WALKS",

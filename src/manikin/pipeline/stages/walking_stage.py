@@ -47,10 +47,10 @@ from manikin.walking import (
     walked_footprints,
     walking_route,
 )
-from manikin.walking.footsteps.footprints import FEET
-from manikin.walking.footsteps.stepper import walked_supports
+from manikin.walking.footprints import FEET
 from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_path import TOLERANCE
+from manikin.walking.stepper import walked_supports
 
 FRICTION = 0.8
 """Coefficient of friction of the soles of a walker."""

@@ -22,7 +22,6 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 from scipy.linalg import solveh_banded
-from scipy.spatial.transform import Rotation
 
 from manikin.balance import pseudo_wrench, zero_moment_point
 from manikin.body import BodyModel
@@ -146,17 +145,6 @@ def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArr
     first, last = pin.difference(model, q[0], q[1]), pin.difference(model, q[-2], q[-1])
     v = rate * np.vstack([2.0 * first - inner[0], inner, 2.0 * last - inner[-1]])
     return v, np.gradient(v, 1.0 / rate, axis=0, edge_order=2)
-
-
-def level_heading(q: FloatArray) -> float:
-    """Mean heading of (n, nq) postures, from the world's x [rad].
-
-    It is that of the pelvis' x axis, or of its z axis, from the hips to the head, for a person who lies.
-    """
-    turn = Rotation.from_quat(q[:, 3:7])
-    ahead, above = (turn.apply(axis).mean(axis=0)[:2] for axis in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
-    way = ahead if np.hypot(*ahead) >= np.hypot(*above) else above
-    return float(np.arctan2(way[1], way[0]))
 
 
 def _rate(found: Reconstruction) -> float:

@@ -14,8 +14,8 @@ from manikin.body.segments import Shape, ShapeKind
 from manikin.errors import InputError, ManikinError
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF, smoothed
+from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording
-from manikin.recordings.readers.read import READERS, read_recording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import person_of, reconstruct

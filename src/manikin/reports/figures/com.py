@@ -33,7 +33,7 @@ from manikin.reports.figures.style import (
 )
 from manikin.reports.figures.timeline import timeline
 from manikin.reports.figures.views import VIEWS, View, distinct_contacts, draw_contact, draw_obstacles
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 
 
 def planes_figure(record: RunRecord) -> Figure:

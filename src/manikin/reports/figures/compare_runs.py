@@ -36,7 +36,7 @@ from manikin.reports.figures.style import (
     support_keys,
 )
 from manikin.reports.figures.views import ALONG_X, ALONG_Y, VIEWS
-from manikin.runtime.palette import COLOURS, readable
+from manikin.runtime.display import COLOURS, readable
 
 
 def compare_margin_figure(comparison: RunComparison) -> Figure:

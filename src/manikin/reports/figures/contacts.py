@@ -29,7 +29,7 @@ from manikin.reports.figures.views import (
     finite_obstacles,
     panel_ticks,
 )
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 from manikin.scene import Scene
 
 MARGIN = 0.3

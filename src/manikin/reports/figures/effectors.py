@@ -21,7 +21,7 @@ from manikin.reports.figures.style import (
     span_at_least,
 )
 from manikin.reports.figures.timeline import timeline
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 
 _AXIS_COLOURS = ("#0072B2", "#009E73", "#E69F00")
 

@@ -30,7 +30,7 @@ from manikin.reports.figures.style import (
 )
 from manikin.reports.figures.timeline import timeline
 from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, sections
-from manikin.runtime.palette import COLOURS, CYCLE, colours_of, readable
+from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
 from manikin.scene import HalfSpace, Plane, Scene
 from manikin.simulation import PushMap
 from manikin.simulation.push_map import told_apart

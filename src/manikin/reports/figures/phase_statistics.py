@@ -24,7 +24,7 @@ from manikin.reports.figures.style import (
     note,
     support_colour,
 )
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 
 SHARE = 0.5
 """Share of the places inside an ellipse, for a normal distribution."""

@@ -30,7 +30,7 @@ from manikin.reports.figures.views import (
     finite_obstacles,
     panel_ticks,
 )
-from manikin.runtime.palette import COLOURS, colours_of, side_colour
+from manikin.runtime.display import COLOURS, colours_of, side_colour
 from manikin.scene import Box, Obstacle, Scene
 
 MOST = 9

@@ -16,7 +16,7 @@ from matplotlib.transforms import Bbox, Transform
 from manikin.errors import FigureError
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
-from manikin.runtime.palette import COLOURS, readable
+from manikin.runtime.display import COLOURS, readable
 
 _WIDTH = 0.64
 """Width of a character over the size of its font, of the widest digits."""

@@ -32,7 +32,7 @@ from manikin.reports.figures.style import (
     support_colour,
     support_keys,
 )
-from manikin.runtime.palette import COLOURS, CYCLE, colours_of, readable
+from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
 
 AT_LIMIT = 1e-3
 """A duration this close to its bound is at it [s]."""

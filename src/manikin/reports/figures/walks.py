@@ -14,7 +14,7 @@ from matplotlib.patches import Patch, Polygon
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.reports.figures.style import draw_heading, dress, legend_in_title, need, new_figure, new_grid
-from manikin.runtime.palette import COLOURS
+from manikin.runtime.display import COLOURS
 from manikin.walking import (
     HOLONOMIC,
     NONHOLONOMIC,
@@ -27,7 +27,7 @@ from manikin.walking import (
     floor_plan,
     segment_path,
 )
-from manikin.walking.segments.goal_categories import THESIS_RADIUS
+from manikin.walking.goal_categories import THESIS_RADIUS
 from manikin.walking.words import STRAIGHT, THESIS_WORDS, EqualPaths, WordPath, WordSlice
 
 EVERY = 0.5

@@ -19,7 +19,7 @@ from manikin.body import BodyModel
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.signals import fourier_basis, shifted
 from manikin.numerics.spatial import FloatArray, quaternions, rotations
-from manikin.recordings.reconstruction.anatomy import SIDES
+from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.motion_library import ROOT, MotionLibrary
 from manikin.walking.gait.stance_foot import FootPlacement, Sole
 

@@ -12,7 +12,7 @@ from manikin.body import BodyModel
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.signals import SHARES, low_passed
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.reconstruction.anatomy import SIDES
+from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.stance_foot import Sole, borders
 
 SLOW, SLOW_SHARE = 0.3, 0.15

@@ -20,8 +20,17 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, PlanarTransform, finite_number, frozen_array
 from manikin.numerics.spline import BSpline
 from manikin.runtime.parallel import side_by_side
-from manikin.walking.path.path_program import DEGREE, PathStructure
-from manikin.walking.path.path_solver import Guess, bent, cheapest, lacking, programme_of, sharpened, solve
+from manikin.walking.path.path_program import (
+    DEGREE,
+    Guess,
+    PathStructure,
+    bent,
+    cheapest,
+    lacking,
+    programme_of,
+    sharpened,
+    solve,
+)
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
 from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective
 from manikin.walking.path.walking_path import WalkingPath, WalkingTask

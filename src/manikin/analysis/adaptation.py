@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from manikin.analysis.adaptation.contact_adaptation import (
+from manikin.analysis.contact_adaptation import (
     landing_flat,
     leaving_with_the_hinge,
     on_one_seat,
@@ -18,7 +18,7 @@ from manikin.analysis.adaptation.contact_adaptation import (
     within_toe_strength,
     without_remnants,
 )
-from manikin.analysis.adaptation.posture_adaptation import (
+from manikin.analysis.posture_adaptation import (
     AdaptedMotion,
     adapt_postures,
     rate_on_contacts,

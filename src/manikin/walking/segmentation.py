@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.errors import InputError
 from manikin.numerics.signals import SHARES, low_passed
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.recordings.readers.marker_sets import SIDES, segment_joint
 from manikin.recordings.readers.skeleton_recording import Recording
-from manikin.recordings.reconstruction.anatomy import SIDES, segment_joint
 from manikin.walking.path.walking_path import SampledWalk
 
 BREADTH = 0.36
