@@ -12,6 +12,7 @@ from manikin.contact import Contact, ContactKind
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import ContactPlan
+from manikin.planning.contacts.transition import MARGIN as RISING_MARGIN
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.sequence import flat_sequence
@@ -277,6 +278,10 @@ ABOVE = 0.01
 LOWEST = 0.1
 """Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
 
+LEAD = 0.2
+"""Time for which a CoM that leaves a seat at rest may go on at its velocity within its room there [s]: rising
+earlier it would ask a trunk that leans to be thrown back; our choice."""
+
 DIP = 0.001
 """Depth that the CoM of a rising body may be below those of its postures [m]; our choice."""
 
@@ -298,6 +303,7 @@ A body that sits down keeps the defaults.
 
 PLANNING_RISING = {
     "degree": 5,
+    "min_margin": RISING_MARGIN,
     "weights": {"margin": 0.2, "smoothness": 10.0, "duration": 5.0, "acceleration": [1.0, 1.0, 1.0]},
 }
 """Options of the planner of a body that leaves a seat, likewise: a seated trunk cannot follow any path."""
@@ -334,6 +340,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
             drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
             phase["com_near"] = [x, y, z - drop]
             phase["com_within_m"] = list(stage.com_room)
+            if "buttocks" in before and "buttocks" not in stage.contacts and stage.momentum is None:
+                phase["com_lead_s"] = LEAD
         before = dict(stage.contacts)
         phases.append(phase)
     long, wide = _sole_size(scenario, plan)

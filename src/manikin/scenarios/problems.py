@@ -284,8 +284,10 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
     for key, phase in enumerate(values.explicit_supports().phases[: values.seated_from]):
         if phase.com_near is None:
             continue
-        for axis, (middle, room) in enumerate(zip(phase.com_near, phase.com_within_m, strict=True)):
-            planes += [KeyPlane(key, sign * np.eye(3)[axis], sign * middle + room) for sign in (1.0, -1.0)]
+        for lead in sorted({0.0, phase.com_lead_s}):
+            for axis, (middle, room) in enumerate(zip(phase.com_near, phase.com_within_m, strict=True)):
+                for sign in (1.0, -1.0):
+                    planes.append(KeyPlane(key, sign * np.eye(3)[axis], sign * middle + room, lead))
     return tuple(planes)
 
 

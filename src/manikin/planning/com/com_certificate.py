@@ -231,7 +231,8 @@ def _position_residuals(
         yield Residual(requirement, float(excess[phase][worst]), "m", phase, float(times[phase][worst]))
     for index, plane in enumerate(problem.key_planes):
         time = float(trajectory.schedule.instants[plane.key])
-        beyond = float(plane.violation(trajectory.position(time)))
+        carried = trajectory.position(time) + plane.lead * trajectory.velocity(time)
+        beyond = float(plane.violation(carried))
         yield Residual(f"key plane {index} at T_{plane.key}", beyond, "m", plane.key - 1, time)
 
 

@@ -24,19 +24,22 @@ class KeyPlane:
 
     At a key instant the CoM is the last Bezier point of a phase, an unknown of the programme:
     the constraint is linear and met exactly, and nothing is asked of the rest of the motion.
+    With a lead it is kept of ``p + lead v``, where its velocity would carry the CoM: that bounds its speed.
     It is ours; [Qiu2012]_ 7.2.3 only says that "some constraints" are modified.
 
     Attributes:
         key: Index of the key instant; 1 is the end of the first phase.
         normal: (3,) unit vector out of the permitted half-space.
         offset: Distance of the plane from the world origin along the normal [m].
+        lead: Time for which the velocity carries the CoM on before it is compared [s].
     """
 
     key: int
     normal: FloatArray
     offset: float
+    lead: float = 0.0
 
-    def __init__(self, key: int, normal: ArrayLike, offset: float) -> None:
+    def __init__(self, key: int, normal: ArrayLike, offset: float, lead: float = 0.0) -> None:
         """Normalise the normal, and the offset with it."""
         vector = frozen_array(normal, "key plane normal", (3,))
         length = float(np.linalg.norm(vector))
@@ -47,6 +50,7 @@ class KeyPlane:
         object.__setattr__(self, "key", int(key))
         object.__setattr__(self, "normal", frozen_array(vector / length, "key plane normal", (3,)))
         object.__setattr__(self, "offset", finite_number(offset, "key plane offset [m]") / length)
+        object.__setattr__(self, "lead", finite_number(lead, "key plane lead [s]", at_least=0.0))
 
     @classmethod
     def towards(cls, key: int, start: ArrayLike, goal: ArrayLike, beyond: float = 0.0) -> "KeyPlane":

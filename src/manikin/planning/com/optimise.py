@@ -185,7 +185,7 @@ def build_programme(problem: CentroidalProblem, facets: FacetIndices, faces: Rea
             margin_space=problem.margin_space,
             geometric=tuple(constraint.function for constraint in problem.geometric),
             limited_distance=problem.support_distance is not None,
-            key_planes=tuple(plane.key for plane in problem.key_planes),
+            key_planes=tuple((plane.key, plane.lead) for plane in problem.key_planes),
             loaded=tuple(number for number, phase in enumerate(problem.sequence) if phase.load is not None),
             reach=tuple(len(rows) for rows in faces),
         )

@@ -41,7 +41,7 @@ class ComStructure:
         samples: n_s, samples of each phase but one.
         rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
-        key_planes: Key instant of each plane.
+        key_planes: Key instant and lead [s] of each plane.
         loaded: Phases with a load.
         reach: Number of faces of its region imposed in each phase.
     """
@@ -53,7 +53,7 @@ class ComStructure:
     margin_space: MarginSpace
     geometric: tuple[Callable[[Any, Any, Any], Any], ...]
     limited_distance: bool
-    key_planes: tuple[int, ...] = ()
+    key_planes: tuple[tuple[int, float], ...] = ()
     loaded: tuple[int, ...] = ()
     reach: tuple[int, ...] = ()
 
@@ -266,9 +266,13 @@ def _add_end_conditions(builder: _Builder) -> None:
 
 def _add_key_planes(builder: _Builder) -> None:
     """How far the CoM is beyond each plane at its key instant, the end of the phase before."""
-    for index, key in enumerate(builder.structure.key_planes):
+    degree = builder.structure.degree
+    for index, (key, lead) in enumerate(builder.structure.key_planes):
         normal, offset = builder.parameter(f"normal{index}", 3), builder.parameter(f"offset{index}", 1)
-        builder.add("key_plane", builder.bezier[key - 1][-1, :] @ normal - offset)
+        points, place = builder.bezier[key - 1], builder.bezier[key - 1][-1, :]
+        if lead > 0.0:
+            place = place + lead * degree / builder.durations[key - 1] * _differences(points, 1)[-1, :]
+        builder.add("key_plane", place @ normal - offset)
 
 
 def _objective(builder: _Builder) -> ca.SX:

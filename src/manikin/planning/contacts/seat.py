@@ -249,6 +249,9 @@ SETTLING_TIME = 0.8
 SEATED_ROOM = (0.01, 0.01, 0.006)
 """How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
 
+SEAT_OFF_ROOM = (0.01, 0.01, 0.002)
+"""The same where the seat is left at rest [m]: there a trunk ends its lean, no higher and no lower."""
+
 
 @dataclass(frozen=True, eq=False)
 class Leaving:
@@ -409,8 +412,9 @@ def _rising(
         if posed is not None and posed.q is not None:
             stages.append(Stage.of(body, start.contacts, posed.q, 0.0, SEATED_ROOM))
             before = time
-    for contacts, q, momentum in changes:
-        stages.append(Stage.of(body, contacts, q, RISING_TIME, SEATED_ROOM, momentum=momentum))
+    for number, (contacts, q, momentum) in enumerate(changes):
+        room = SEATED_ROOM if moving or number else SEAT_OFF_ROOM
+        stages.append(Stage.of(body, contacts, q, RISING_TIME, room, momentum=momentum))
     stages.append(Stage.of(body, changes[-1][0], risen, SETTLING_TIME))
     return Leaving(tuple(stages))
 

@@ -151,6 +151,10 @@ class PhaseSection(Section):
         "at the start [m]",
     )
 
+    com_lead_s: NonNegative = preset(
+        0.0, "time after which it would still be as near if it went on at the velocity that it has then [s]"
+    )
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.max_duration_s is not None and self.max_duration_s < self.min_duration_s:
