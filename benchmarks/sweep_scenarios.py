@@ -26,6 +26,7 @@ LOWEST_COM = {
 """Lowest CoM heights of people under a beam [m] ([Qiu2012]_ 3.2.3, "about")."""
 
 CAUSES = {f"beam-{case}@slippery": "friction of 0.05 is too low" for case in ("H1C1", "H2C1", "H3C1", "H2C3")}
+CAUSES["stand-up-chair@slippery"] = "friction of 0.02 is too low"
 """What the reason of an expected failure names, beside those of the tests."""
 
 BODIES = [
@@ -40,6 +41,7 @@ BODIES = [
         for name in ("car-ingress", "beam-H2C2", "beam-H3C1")
         for stature in (1.65, 1.85)
     ],
+    *[("stand-up-chair", stature, None, None) for stature in (1.50, 1.60, 1.65, 1.70, 1.88)],
 ]
 """Scenario, stature [m], mass [kg] and sex; those of the scenario where None."""
 
