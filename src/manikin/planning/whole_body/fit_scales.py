@@ -52,8 +52,8 @@ class MotionScales:
     max_iterations: int = 30
     decrease: float = 0.06
     stages: tuple[float, ...] = (3.0, 1.0, 0.3)
-    constrained_steps: int = 15
-    constrained_decrease: float = 0.02
+    constrained_steps: int = 40
+    constrained_decrease: float = 0.003
     multiplier_rounds: int = 8
     restoring_steps: int = 3
     tolerance: float = 0.1
