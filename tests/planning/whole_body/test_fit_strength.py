@@ -105,12 +105,12 @@ def test_derivatives_are_those_of_inverse_dynamics_whose_root_lacks_nothing(body
         for column in range(excess.value.shape[1]):
             value = excess.value[s, column]
             if value == 0.0:
-                assert not np.any(excess.by_posture[s, column])
+                assert not np.any(excess.by_state[0][s, column])
                 continue
             hinge = excess.hinges[column]
             assert value == pytest.approx(at[hinge] - 0.05, abs=1e-12)
-            np.testing.assert_allclose(excess.by_posture[s, column], by_posture[hinge], atol=1e-5)
-            assert excess.by_acceleration[s, column, 8] == pytest.approx((more - at)[hinge], abs=1e-9)
+            np.testing.assert_allclose(excess.by_state[0][s, column], by_posture[hinge], atol=1e-5)
+            assert excess.by_state[2][s, column, 8] == pytest.approx((more - at)[hinge], abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -273,17 +273,12 @@ class MotionObjective:
     ) -> MomentumRate:
         """The momentum's rate with a row for each joint torque beyond the strength."""
         excess = excess_torque(self._body, motion.states, forces, scales.strength_share)
-        first, second, third = momentum.jacobians
-        by_posture = to_raw(excess.by_posture, motion.tangent) / scales.torque_share
-        by_acceleration = to_raw(excess.by_acceleration, motion.tangent) / scales.torque_share
-        return MomentumRate(
-            np.hstack([momentum.value, excess.value / scales.torque_share]),
-            (
-                np.concatenate([first, by_posture], axis=1),
-                np.concatenate([second, np.zeros_like(by_posture)], axis=1),
-                np.concatenate([third, by_acceleration], axis=1),
-            ),
+        rows = (to_raw(by, motion.tangent) / scales.torque_share for by in excess.by_state)
+        first, second, third = (
+            np.concatenate(pair, axis=1) for pair in zip(momentum.jacobians, rows, strict=True)
         )
+        value = np.hstack([momentum.value, excess.value / scales.torque_share])
+        return MomentumRate(value, (first, second, third))
 
 
 def _effector_rows(

@@ -1,11 +1,10 @@
 """Joint torques beyond the strength as residuals of the whole-body fit, with their derivatives.
 
 The torques that inverse dynamics asks of the joints with the contact forces of an earlier motion are
-differentiated by posture and acceleration (:func:`pinocchio.computeRNEADerivatives`). What wrench the root
-then lacks is given by changes of those forces at the points of the contacts, least in the sum of squares,
-weighed by the load of each contact. A single support has one such change, so that a step along these
-derivatives shifts its centre of pressure as the true one does; between several supports the forces are shared
-anew after each fit.
+differentiated by the state (:func:`pinocchio.computeRNEADerivatives`). What wrench the root then lacks is
+given by changes of those forces at the points of the contacts, least in the sum of squares, weighed by the
+load of each contact. A single support has one such change, so that a step along these derivatives shifts its
+centre of pressure as the true one does; between several supports the forces are shared anew after each fit.
 """
 
 from dataclasses import dataclass
@@ -112,14 +111,12 @@ class ExcessTorque:
     Attributes:
         hinges: (k,) the hinges that have one at some sample.
         value: (n, k) excess of their shares, zero where there is none.
-        by_posture: (n, k, nv) its derivative by the tangent of the configuration.
-        by_acceleration: (n, k, nv) its derivative by the acceleration.
+        by_state: (n, k, nv) its derivatives by the tangent of the configuration, velocity and acceleration.
     """
 
     hinges: NDArray[np.int64]
     value: FloatArray
-    by_posture: FloatArray
-    by_acceleration: FloatArray
+    by_state: tuple[FloatArray, FloatArray, FloatArray]
 
 
 def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wanted: float) -> ExcessTorque:
@@ -150,14 +147,14 @@ def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wante
     excess = np.where(held.known[:, None], np.maximum(torque / limit - wanted, 0.0), 0.0)[:, hinges]
     active = np.flatnonzero(np.any(excess > 0.0, axis=0))
     value, rows = excess[:, active], hinges[active]
-    by_posture, by_acceleration = np.zeros((2, n, len(rows), body.nv))
+    by_state = np.zeros((3, n, len(rows), body.nv))
     for s in np.flatnonzero(np.any(value > 0.0, axis=1)):
         model = held.models[s]
-        by_q, _, by_a = pin.computeRNEADerivatives(
+        by_q, by_v, by_a = pin.computeRNEADerivatives(
             model, data_of[id(model)], states.q[s], states.v[s], states.a[s], external[s]
         )
         scale = (value[s] > 0.0) / limit[s, rows]
         full = np.triu(by_a) + np.triu(by_a, 1).T
-        for out, by in ((by_posture, by_q), (by_acceleration, full)):
+        for out, by in zip(by_state, (by_q, by_v, full), strict=True):
             out[s] = scale[:, None] * (by[6 + rows] + answer[s, rows] @ by[:6])
-    return ExcessTorque(rows, value, by_posture, by_acceleration)
+    return ExcessTorque(rows, value, (by_state[0], by_state[1], by_state[2]))

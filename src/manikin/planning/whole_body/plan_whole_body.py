@@ -80,7 +80,7 @@ PENALTIES = MappingProxyType(
         "max_joint_limit_violation_rad": ("joint_limit",),
         "max_velocity_share": ("joint_velocity",),
         "max_missing_wrench": ("force", "moment_share"),
-        "max_torque_share": ("force", "moment_share", "torque_share"),
+        "max_torque_share": ("torque_share",),
     }
 )
 """Scales that decide each residual of the certificate; contacts and centre of mass are constraints."""
