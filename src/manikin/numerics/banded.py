@@ -181,6 +181,9 @@ class BlockBandedSystem:
         return csr_matrix((values.ravel(), (rows, np.repeat(np.arange(n), width))), shape=(size, n))
 
 
+VANISHED = 1e-3
+"""Share of linearised residuals at which they count as met."""
+
 UNANSWERED = 1e-9
 """Share of a change of the multipliers that the residuals must answer with, or no step can meet them."""
 
@@ -216,12 +219,15 @@ class FactorisedSystem:
             jacobian: (n, m, d) derivatives of the residuals by the spline's values; zero where free.
             residual: (n, m), zero where free.
             multiplier: (n, m) from which the rounds begin.
-            rounds: Number of further solutions.
+            rounds: Most further solutions; fewer where the residuals have vanished but for :data:`VANISHED`.
         """
         step = self.solve(right)
         left = residual + self._along(jacobian, step)
         direction, size = left, float(np.sum(left**2))
+        enough = VANISHED**2 * size
         for _ in range(rounds):
+            if size <= enough:
+                break
             change = self.solve(self.rows @ (direction[:, None, :] @ jacobian)[:, 0])
             answer = self._along(jacobian, change)
             curvature = float(np.sum(direction * answer))

@@ -34,6 +34,12 @@ MOST_DAMPING = 1.0e6
 RESTORING_DAMPING = 100.0
 """Largest one of a step that only restores the contacts."""
 
+LENGTHS = 1.0, 0.5, 0.25
+"""Shares of a constrained step that are tried, until one makes the objective less."""
+
+REFUSED = 4
+"""Constrained steps in a row that make nothing better, after which no more are tried."""
+
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
@@ -92,24 +98,29 @@ class MotionFit:
         The multipliers that hold them come with the step, so that the augmented objective falls along it
         and what is left of their errors is of second order in the step.
         """
-        taken = 0
-        while taken < scales.constrained_steps:
+        taken = refused = 0
+        while taken < scales.constrained_steps and refused < REFUSED:
             taken += 1
             current.assemble(self._system)
             before = self._multiplier
             step, after = self._system.factorised(self._damping).constrained(
                 self._system.right, *self._constraints(current), before, scales.multiplier_rounds
             )
-            trial_points = points + _within_reach(step)
             current.shift_tasks(before, after)
-            trial = self._objective.linearise(trial_points, scales, after)
+            step = _within_reach(step)
+            for length in LENGTHS:
+                trial_points = points + length * step
+                trial = self._objective.linearise(trial_points, scales, after)
+                if trial.cost < current.cost:
+                    break
             self._adapt_damping(current, trial)
             if trial.cost >= current.cost:
                 current.shift_tasks(after, before)
+                refused += 1
                 continue
             # The squared multipliers in the augmented objective say nothing of the motion.
             decrease = (current.cost - trial.cost) / (current.cost - 0.5 * float(np.sum(after**2)))
-            points, current, self._multiplier = trial_points, trial, after
+            points, current, self._multiplier, refused = trial_points, trial, after, 0
             if decrease < scales.constrained_decrease:
                 break
         return points, current, taken
@@ -124,7 +135,7 @@ class MotionFit:
             current.assemble(self._system)
             # A step this small needs little damping, which would keep it from the constraints.
             factor = self._system.factorised(np.minimum(self._damping, RESTORING_DAMPING))
-            step = factor.smallest(*self._constraints(current), 2 * scales.multiplier_rounds)
+            step = factor.smallest(*self._constraints(current), scales.multiplier_rounds)
             trial = self._objective.linearise(points + _within_reach(step), scales, self._multiplier)
             if self._missed(trial) >= self._missed(current):
                 break

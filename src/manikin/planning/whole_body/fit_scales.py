@@ -30,7 +30,7 @@ class MotionScales:
         stages: Factors by which the tasks' scales are loosened, one solution after the other.
         constrained_steps: Upper bound of the steps that meet the contacts, after those.
         constrained_decrease: Relative decrease of the objective below which they stop.
-        multiplier_rounds: Updates of the multipliers of contacts and centre of mass in each of them.
+        multiplier_rounds: Most updates of the multipliers of contacts and centre of mass in each of them.
         restoring_steps: Upper bound of the steps that only restore the contacts, after those.
         tolerance: Largest error of a constraint at convergence, in units of its own scale.
     """
@@ -54,7 +54,7 @@ class MotionScales:
     stages: tuple[float, ...] = (3.0, 1.0, 0.3)
     constrained_steps: int = 40
     constrained_decrease: float = 0.003
-    multiplier_rounds: int = 8
+    multiplier_rounds: int = 20
     restoring_steps: int = 3
     tolerance: float = 0.1
 

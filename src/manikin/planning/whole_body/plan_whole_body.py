@@ -73,6 +73,9 @@ MISSED = 0.1
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
 
+MOMENTUM = frozenset({"max_missing_wrench"})
+"""Requirement that a rate of the momentum nearer to its plan keeps."""
+
 PENALTIES = MappingProxyType(
     {
         "max_meeting_error_m": ("position",),
@@ -358,11 +361,18 @@ class _Planner:
         if last.fine > 0 and broken & INEXACT:
             return None
         inexact, weak = bool(broken & INEXACT), "max_torque_share" in broken
+        if weak and self._settles(last.certificate["max_torque_share"].time_s or 0.0):
+            broken |= MOMENTUM
         scales = self.job.updated(last.scales, broken, narrow=number > 0)
         if inexact or weak:
             goal = replace(goal, forces=last.motion) if weak else goal
             return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
+
+    def _settles(self, time: float) -> bool:
+        """Whether a contact made at speed still settles: only the momentum then decides the torques."""
+        schedule, instant = self.trajectory.schedule, np.array([time])
+        return any(schedule.settling(instant, name)[0] for name in schedule.sequence.effectors)
 
     def guide(
         self,
