@@ -84,7 +84,7 @@ PENALTIES = MappingProxyType(
         "max_velocity_share": ("joint_velocity",),
         "max_physics_violation": ("missing_wrench", "margin_violation"),
         "min_margin": ("margin_violation", "missing_wrench"),
-        "max_torque_share": ("torque_share",),
+        "max_torque_share": (),
     }
 )
 """Scales that decide each residual of the certificate; contacts are constraints."""
