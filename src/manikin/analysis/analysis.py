@@ -29,7 +29,7 @@ from manikin.recordings.dynamics.shifted_motion import LeastShift
 from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.recorded_supports import RecordedSupports, SupportPhase
+from manikin.recordings.supports.body_supports import RecordedSupports, SupportPhase
 from manikin.recordings.supports.supports import TimingError, timing_errors
 from manikin.runtime.display import Displayed
 from manikin.walking.segmentation import PathSegments

@@ -18,7 +18,7 @@ from manikin.analysis.analysis import (
 )
 from manikin.balance.zmp import LEAST_LOAD
 from manikin.body.limbs import with_knees_and_elbows
-from manikin.body.load import HANDS, carrying
+from manikin.body.strength import HANDS, carrying
 from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion

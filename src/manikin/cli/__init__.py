@@ -15,7 +15,16 @@ import typer
 from manikin.cli.analyze import analyze
 from manikin.cli.balance import balance, contact
 from manikin.cli.benchmark import benchmark
-from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED, JsonOption, complain, print_json
+from manikin.cli.console import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    Interruption,
+    JsonOption,
+    complain,
+    print_json,
+)
 from manikin.cli.ergonomics import ergonomics
 from manikin.cli.push import push
 from manikin.cli.run import run
@@ -24,7 +33,6 @@ from manikin.cli.view import compare, export, view
 from manikin.cli.walk import library, walk, words
 from manikin.errors import InputError, ManikinError
 from manikin.runtime import __version__
-from manikin.runtime.progress import Interruption
 
 __all__ = ["main"]
 

@@ -74,7 +74,7 @@ def compare(
     if json:
         print_json(comparison.as_dict())
         return
-    from manikin.reports.comparison import report, report_console
+    from manikin.reports.comparison_tables import report, report_console
 
     report_console().print(report(comparison))
     if out is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.body.load import hand_masses
+from manikin.body.strength import hand_masses
 from manikin.contact import (
     CarriedLoad,
     Contact,
@@ -26,7 +26,7 @@ from manikin.contact import (
 from manikin.numerics.spatial import frozen_array, rotation_from_normal, rotation_from_rpy
 from manikin.planning.contacts import ContactRules
 from manikin.planning.whole_body.posture_style import READY
-from manikin.scenarios.sections import ContactSection, SoleSection
+from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
 from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.scene import Scene
 

@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 
 from manikin.contact import Stance, default_normal_force_cap
 from manikin.errors import InputError, ScenarioError
-from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.scenarios.sections.planning_sections import FRICTION_MODEL_TEXT, FrictionModelName
+from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
 from manikin.scenarios.sequence import build_contact
 from manikin.scenarios.validation import (
     Positive,

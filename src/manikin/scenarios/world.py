@@ -10,7 +10,7 @@ from manikin.errors import ScenarioError
 from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy, turned_root
 from manikin.planning.contacts import Endpoints, Habit
 from manikin.planning.whole_body.posture_style import posture_style_of
-from manikin.scenarios.sections import ObstacleSection
+from manikin.scenarios.sections.task_sections import ObstacleSection
 from manikin.scenarios.sequence import friction_of
 from manikin.scenarios.values import ScenarioValues
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere, load_mesh

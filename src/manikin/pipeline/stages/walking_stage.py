@@ -25,7 +25,12 @@ from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import walk_before, walking_supports
-from manikin.scenarios.sections import StandSection, WalkerSection, WalkingSection, WaypointSection
+from manikin.scenarios.sections.task_sections import (
+    StandSection,
+    WalkerSection,
+    WalkingSection,
+    WaypointSection,
+)
 from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.walking import (

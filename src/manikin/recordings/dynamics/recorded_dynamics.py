@@ -34,7 +34,7 @@ from manikin.motion.motion import Motion
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, finite_number, frozen_array
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.recorded_supports import RecordedSupports
+from manikin.recordings.supports.body_supports import RecordedSupports
 from manikin.recordings.supports.support_levels import JOINTS
 
 MOTION_CUTOFF = 6.0

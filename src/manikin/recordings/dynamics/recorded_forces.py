@@ -293,7 +293,7 @@ def motion_on_contacts(
     are zero but for rounding.
 
     Args:
-        schedule: Its stances, of :func:`manikin.recordings.supports.recorded_supports.recorded_schedule`.
+        schedule: Its stances, of :func:`manikin.recordings.supports.body_supports.recorded_schedule`.
         start: The schedule's clock at the motion's first instant [s].
         margins: Of the same motion on the same stances, where they are known already.
     """

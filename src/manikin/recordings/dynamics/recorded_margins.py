@@ -86,7 +86,7 @@ def recorded_margins(
     """Margins of a recorded motion on its stances.
 
     Args:
-        schedule: Of :func:`manikin.recordings.supports.recorded_supports.recorded_schedule`.
+        schedule: Of :func:`manikin.recordings.supports.body_supports.recorded_schedule`.
         start: The schedule's clock at the motion's first instant [s].
     """
     phases = schedule.phase_at(dynamics.time + start)

@@ -20,7 +20,7 @@ from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import person_of, reconstruct
 from manikin.recordings.statistics.phases import PhaseSequence
-from manikin.recordings.supports.recorded_supports import RecordedSupports
+from manikin.recordings.supports.body_supports import RecordedSupports
 from manikin.recordings.supports.supports import supports_of
 
 PARTS: Mapping[str, tuple[str, ...]] = MappingProxyType(

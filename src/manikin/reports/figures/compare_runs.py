@@ -10,8 +10,8 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.pipeline.run_directory import ComTrack
-from manikin.reports.comparison import RunComparison, TimingRow
-from manikin.reports.comparison.compare import STAGES, tracks_of
+from manikin.reports.alignment import TimingRow
+from manikin.reports.comparison import STAGES, RunComparison, tracks_of
 from manikin.reports.figures.com import draw_paths, frame_plane, mark_instants, planes_grid
 from manikin.reports.figures.scene import (
     GAP,

@@ -10,7 +10,7 @@ from manikin.contact import Stance
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.comparison.alignment import (
+from manikin.reports.alignment import (
     PhasePair,
     PhaseTime,
     TimingRow,
