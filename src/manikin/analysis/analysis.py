@@ -23,8 +23,7 @@ from manikin.recordings.dynamics.plate_forces import (
     mass_on_plates,
     plate_forces,
 )
-from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins
+from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics, RecordedMargins
 from manikin.recordings.dynamics.shifted_motion import LeastShift
 from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording

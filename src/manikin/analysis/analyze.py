@@ -26,12 +26,13 @@ from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.recordings.dynamics.recorded_dynamics import (
     CUTOFF,
     RecordedDynamics,
+    RecordedMargins,
     dynamics_of,
+    recorded_margins,
     touch_downs_of,
     with_mass,
 )
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import least_shift
 from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording

@@ -68,8 +68,7 @@ def contact(
     """Find the contact of one limb that serves a task best."""
     from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
     from manikin.scenarios import load_scenario
-    from manikin.scenarios.sequence import contact_rules
-    from manikin.scenarios.world import start_posture
+    from manikin.scenarios.world import contact_rules, start_posture
 
     job = load_scenario(scenario)
     with stdout_kept_clean():

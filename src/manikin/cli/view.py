@@ -29,8 +29,7 @@ def view(
     if contacts:
         from manikin.planning.contacts.single_contact import LiveContacts
         from manikin.scenarios import load_scenario
-        from manikin.scenarios.sequence import contact_rules
-        from manikin.scenarios.world import start_posture
+        from manikin.scenarios.world import contact_rules, start_posture
         from manikin.viewer import serve_contacts
 
         job = load_scenario(source)

@@ -1,6 +1,12 @@
 """Ergonomics of any motion: RULA and REBA, torques against strength, effort, the lowest margin."""
 
-from manikin.ergonomics.assessment import Assessment, assess_posture
+from manikin.ergonomics.assessment import (
+    Assessment,
+    JointStrength,
+    assess_posture,
+    cumulative_effort,
+    joint_strength,
+)
 from manikin.ergonomics.body_parts import bearing_of
 from manikin.ergonomics.postural_angles import postural_angles, upright_neck
 from manikin.ergonomics.report import Ergonomics, LowestMargin, ergonomics_of, lowest_margin
@@ -13,7 +19,6 @@ from manikin.ergonomics.rula_reba import (
     rula_action_level,
     rula_score,
 )
-from manikin.ergonomics.strength import JointStrength, cumulative_effort, joint_strength
 
 __all__ = [
     "Assessment", "Circumstances", "Ergonomics", "JointStrength", "LowestMargin", "RebaSteps",

@@ -13,14 +13,15 @@ from manikin.recordings.dynamics.plate_forces import (
 )
 from manikin.recordings.dynamics.recorded_dynamics import (
     RecordedDynamics,
+    RecordedMargins,
     dynamics_of,
     motion_of,
+    recorded_margins,
     smoothed,
     touch_downs_of,
     with_mass,
 )
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import LeastShift, least_shift
 from manikin.recordings.readers import read_recording
 from manikin.recordings.readers.acclaim import read_amc, read_asf

@@ -19,7 +19,7 @@ from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable, Worst, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections.task_sections import StateSection
-from manikin.scenarios.sequence import friction_of
+from manikin.scenarios.world import friction_of
 from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest, torque_share
 from manikin.verification.holding import (
     REACHED,

@@ -31,8 +31,8 @@ from manikin.scenarios.sections.task_sections import (
     WalkingSection,
     WaypointSection,
 )
-from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.validation import Path as KeyPath
+from manikin.scenarios.world import flat_sequence
 from manikin.walking import (
     LITERAL_ORDER,
     PROSE_ORDER,
