@@ -1,4 +1,4 @@
-"""Scene of a scenario, its stances and whether they fit the scene, and the posture of its body at the start."""
+"""Scene of a scenario, its stances and whether they fit, and the posture of its body at the start."""
 
 import math
 from dataclasses import replace

@@ -290,7 +290,7 @@ def compare_torques(
             apart = mine - plates
             found.append(
                 TorqueComparison(
-                    joint, len(mine), float(np.sqrt(np.mean(apart**2))), float(apart.mean()),
+                    joint, len(mine), _rms(apart), float(apart.mean()),
                     float(np.abs(mine).max()), float(np.abs(plates).max()),
                 )
             )  # fmt: skip

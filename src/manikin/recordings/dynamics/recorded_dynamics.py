@@ -17,8 +17,8 @@ the cutoff), and one banded system of equations for any other (Eilers, "A perfec
 How far recorded people are from losing their balance ([Qiu2012]_ 4.4): every phase has one polytope of
 admissible wrenches; in every frame :func:`manikin.balance.motion_margin` measures the distance of the wrench
 to its facets with moments about the centre of mass (4.2.9, remark 2, and 4.56), for a point mass (4.54) and
-for the whole body with its angular momentum (4.55, by the derivatives of the motion instead of a difference of
-two frames).
+for the whole body with its angular momentum (4.55, by the derivatives of the motion instead of a difference
+of two frames).
 """
 
 from collections.abc import Sequence
