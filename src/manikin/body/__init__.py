@@ -3,9 +3,10 @@
 from manikin.body.anthropometry import Anthropometry
 from manikin.body.configuration import Configuration, difference, integrate, interpolate, random_configuration
 from manikin.body.creature import LimbSpec, creature_from_urdf
-from manikin.body.further_bodies import insect, kudoh, point_mass
+from manikin.body.further_bodies import kudoh, point_mass
 from manikin.body.human import body_from_signature, human
 from manikin.body.joint_volume import JointVolume, volume_of
+from manikin.body.legged import insect, quadruped
 from manikin.body.limbs import (
     are_mirrored,
     limb_named,
@@ -16,7 +17,6 @@ from manikin.body.limbs import (
 )
 from manikin.body.model import BodyModel
 from manikin.body.natural_range import NaturalRange, human_volumes
-from manikin.body.quadruped import quadruped
 from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
 from manikin.body.strength import carrying
 
