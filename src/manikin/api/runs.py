@@ -1,4 +1,4 @@
-"""Runs: planned, executed, walked, pushed and compared, to print, draw and watch."""
+"""Runs and recordings: planned, executed, walked, pushed, read, measured; to print, draw and watch."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -110,8 +110,6 @@ class Run(Displayed):
 
     def view(self, port: int = 8080) -> None:
         """Play the motion in the browser until Ctrl-C, on this computer only."""
-        from manikin.viewer import serve
-
         serve(self.record.content, port, print)
 
     def simulate(self, *, push: Mapping[str, float] | None = None) -> "Run":
