@@ -149,14 +149,7 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
 
 
 def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
-    """Build the stances as the file lists them, with full soles.
-
-    Args:
-        planning: With the smaller soles, friction and force caps that planning balances on.
-
-    Raises:
-        ScenarioError: If there are no supports, or a contact slides between phases.
-    """
+    """Build the stances as the file lists them, with full soles; otherwise as :func:`stance_sequence`."""
     supports = values.explicit_supports()
     cap = supports.normal_force_cap_N
     if planning:
