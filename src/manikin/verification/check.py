@@ -238,15 +238,12 @@ class _Check:
                 bound = self._reach.between(first.effector, second.effector)
                 yield apart / max(bound, 1e-9), f"{first.effector} and {second.effector}, {change.where}"
 
-    def _within_lengths(self, change: _Change) -> bool:
-        return all(share <= 1.0 for share, _ in self._shares(change))
-
     def _reached(self) -> Requirement | None:
         """Where no posture is given, one is looked for; not where lengths say that there is none."""
         missed = Worst("max_reach_gap_m", "miss of the nearest posture", REACHED, 1e-9)
         search = PostureSearch(self._body)
         for change in self._changes:
-            if change.q is None and change.held and self._within_lengths(change):
+            if change.q is None and change.held and all(share <= 1.0 for share, _ in self._shares(change)):
                 same = {contact.effector: contact for contact in change.held}
                 if len(same) == len(change.held):
                     missed.take(search.gap(change.held, change.com), change.where)
