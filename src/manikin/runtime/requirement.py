@@ -6,7 +6,7 @@ report page.
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 Sense = Literal["<=", ">=", ">"]
@@ -114,3 +114,49 @@ def requirement_table(rows: Iterable[Requirement | None]) -> RequirementTable:
         rows: Requirements; None for a quantity that the result does not have.
     """
     return RequirementTable(tuple(row for row in rows if row is not None and math.isfinite(row.limit)))
+
+
+@dataclass
+class Worst:
+    """Takes measurements of one quantity and keeps the worst one.
+
+    Attributes:
+        key: Name of the quantity in results; ends in its unit, ``_m``, ``_deg`` or ``_N``, if it has one.
+        name: The quantity in words.
+        limit: The value allowed.
+        tolerance: Rounding up to which the limit counts as kept.
+        sense: What a value has to be relative to the limit; of a ``min_...`` always at least that.
+        value: The worst value so far, or None.
+        where: Where it was measured.
+    """
+
+    key: str
+    name: str
+    limit: float
+    tolerance: float = 0.0
+    sense: Sense = "<="
+    value: float | None = field(default=None, init=False)
+    where: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        if self.key.startswith("min_"):
+            self.sense = ">="
+
+    def take(self, value: float, where: str) -> None:
+        """Take one measurement; a NaN is worse than any number."""
+        worse = self.value is None or value != value
+        if not worse and self.value is not None:
+            worse = value > self.value if self.sense == "<=" else value < self.value
+        if worse:
+            self.value, self.where = float(value), where
+
+    @property
+    def row(self) -> Requirement | None:
+        """The requirement; None if nothing was measured."""
+        if self.value is None:
+            return None
+        ending = self.key.rpartition("_")[2]
+        unit = ending if ending in ("m", "deg", "N") else ""
+        return Requirement(
+            self.key, self.name, unit, self.value, self.sense, self.limit, None, self.where, self.tolerance
+        )

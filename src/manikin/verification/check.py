@@ -14,19 +14,24 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.contact import Contact
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, rotation_from_quaternion
 from manikin.runtime.display import Displayed
-from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
+from manikin.runtime.requirement import Requirement, RequirementTable, Worst, requirement_table
 from manikin.scenarios import Scenario
-from manikin.scenarios.sequence import friction_of
+from manikin.scenarios.sections.task_sections import StateSection
+from manikin.scenarios.world import friction_of
 from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest, torque_share
-from manikin.verification.holding import HeldPosture, HoldingRows, Kinematics
+from manikin.verification.holding import (
+    REACHED,
+    HeldPosture,
+    HoldingRows,
+    Kinematics,
+    PostureSearch,
+    ReachBounds,
+)
 from manikin.verification.plan_file import PlannedContacts, PlannedStage, load_contact_plan
-from manikin.verification.reach import REACHED, PostureSearch, ReachBounds
 from manikin.verification.solids import Solid
-from manikin.verification.task import task_rows
 from manikin.verification.touching import ContactRows, Rules
-from manikin.verification.worst import Worst
 
 BALANCE = 1e-3
 """Distance of the centre of mass from where it could rest up to which a body counts as balanced [m]."""
@@ -191,14 +196,10 @@ class _Check:
 
     def _order(self) -> list[Requirement | None]:
         """One contact is made or broken at each change, both hands at once for an act; one is there."""
-        most = Worst("max_changes", "contacts made and broken at one change", "", "<=", 1.0)
-        least = Worst("min_contacts", "contacts of a stage", "", ">=", 1.0)
+        most = Worst("max_changes", "contacts made and broken at one change", 1.0)
+        least = Worst("min_contacts", "contacts of a stage", 1.0)
         said = Worst(
-            "max_com_difference_m",
-            "difference between the centre of mass given and the posture's",
-            "m",
-            "<=",
-            1e-3,
+            "max_com_difference_m", "difference between the centre of mass given and the posture's", 1e-3
         )
         for number, (before, after) in enumerate(pairwise(self._plan.stages), start=1):
             kept = sum(before.contacts.get(name) is c for name, c in after.contacts.items())
@@ -223,9 +224,8 @@ class _Check:
     def _within_reach(self) -> Requirement | None:
         """Contacts that are held at once are no farther apart than the body's segments are long."""
         farthest = Worst(
-            "max_reach_share", "distance of two contacts over the longest way through the body", "", "<=",
-            1.0, 1e-6,
-        )  # fmt: skip
+            "max_reach_share", "distance of two contacts over the longest way through the body", 1.0, 1e-6
+        )
         for change in self._changes:
             for share, pair in self._shares(change):
                 farthest.take(share, pair)
@@ -238,28 +238,21 @@ class _Check:
                 bound = self._reach.between(first.effector, second.effector)
                 yield apart / max(bound, 1e-9), f"{first.effector} and {second.effector}, {change.where}"
 
-    def _within_lengths(self, change: _Change) -> bool:
-        return all(share <= 1.0 for share, _ in self._shares(change))
-
     def _reached(self) -> Requirement | None:
         """Where no posture is given, one is looked for; not where lengths say that there is none."""
-        missed = Worst("max_reach_gap_m", "miss of the nearest posture", "m", "<=", REACHED, 1e-9)
+        missed = Worst("max_reach_gap_m", "miss of the nearest posture", REACHED, 1e-9)
         search = PostureSearch(self._body)
         for change in self._changes:
-            if change.q is None and change.held and self._within_lengths(change):
+            if change.q is None and change.held and all(share <= 1.0 for share, _ in self._shares(change)):
                 same = {contact.effector: contact for contact in change.held}
                 if len(same) == len(change.held):
                     missed.take(search.gap(change.held, change.com), change.where)
         return missed.row
 
     def _balance(self) -> tuple[list[Requirement | None], float]:
-        off = Worst(
-            "max_balance_shift_m", "distance of the centre of mass from a place of rest", "m", "<=", BALANCE
-        )
-        lacking = Worst(
-            "max_dynamic_shortfall", "share of the weight missing on the way", "", "<=", SHORTFALL
-        )
-        effort = Worst("max_torque_share", "share of the strength that rest takes", "", "<=", 1.0, 1e-6)
+        off = Worst("max_balance_shift_m", "distance of the centre of mass from a place of rest", BALANCE)
+        lacking = Worst("max_dynamic_shortfall", "share of the weight missing on the way", SHORTFALL)
+        effort = Worst("max_torque_share", "share of the strength that rest takes", 1.0, 1e-6)
         room = np.inf
         for change in self._changes:
             if change.dynamic:
@@ -300,3 +293,74 @@ class _Check:
 
 def _middle(contacts: Sequence[Contact]) -> FloatArray:
     return np.mean([contact.position for contact in contacts], axis=0) if contacts else np.zeros(3)
+
+
+PLACE = 0.25
+"""Largest level distance of the body from where the task has it start or end [m]."""
+
+TURN_DEG = 30.0
+"""Largest angle from the heading that the task gives [deg]."""
+
+LEVEL = 0.05
+"""Largest difference between the height of the contacts and that of the task [m]."""
+
+
+def task_rows(scenario: Scenario, plan: PlannedContacts) -> list[Requirement | None]:
+    """Requirements of both ends; of an act, whose end the planner chooses, that the hands are on its object.
+
+    Args:
+        scenario: With a task.
+        plan: In the world.
+    """
+    task, first, last = scenario.file.task, plan.stages[0], plan.stages[-1]
+    rows = _end_rows("start", task.start, dict(first.contacts), first.posture)
+    if task.act is None:
+        return rows + _end_rows("goal", task.goal, dict(last.contacts), plan.goal)
+    hands = sum("hand" in name for name in last.contacts)
+    row = Worst("goal_hands", f"hands on {task.act.on}", 1.0, sense=">=")
+    row.take(hands, "goal")
+    return [*rows, row.row]
+
+
+def _end_rows(
+    end: str, state: StateSection, contacts: dict[str, Contact], q: FloatArray | None
+) -> list[Requirement | None]:
+    place = Worst(f"{end}_distance_m", f"distance from the place of the {end}", PLACE)
+    turn = Worst(f"{end}_turn_deg", f"angle from the heading of the {end}", TURN_DEG)
+    level = Worst(f"{end}_height_m", f"difference from the height of the {end}", LEVEL)
+    seats = Worst(f"{end}_seats", f"seats of the {end}", 1.0, sense=">=")
+    feet = {name: c for name, c in contacts.items() if name != "buttocks" and "hand" not in name} or contacts
+    seat = contacts.get("buttocks") or contacts.get("pelvis")
+    if state.posture == "seated":
+        seats.take(float(seat is not None), end)
+    target = state.at if state.at is not None else None if state.com is None else state.com[:2]
+    if target is not None and contacts:
+        place.take(min(float(np.linalg.norm(at - target)) for at in _places(seat, feet, q)), end)
+    if state.heading_deg is not None or state.at is not None:
+        heading = np.deg2rad(state.heading_deg or 0.0)
+        if (own := _heading(feet, q)) is not None:
+            off = np.angle(np.exp(1j * (own - heading)))
+            turn.take(abs(float(np.rad2deg(off))), end)
+    if state.height_m is not None and state.posture != "climbing":
+        resting = [seat] if seat is not None else list(feet.values())
+        if resting:
+            mean = np.mean([contact.position[2] for contact in resting])
+            level.take(abs(float(mean - state.height_m)), end)
+    return [seats.row, place.row, turn.row, level.row]
+
+
+def _places(seat: Contact | None, feet: dict[str, Contact], q: FloatArray | None) -> list[FloatArray]:
+    """(2,) where the body may be said to be: on its seat, or between its feet and at its root [m]."""
+    if seat is not None:
+        return [seat.position[:2]]
+    middle = np.mean([contact.position[:2] for contact in feet.values()], axis=0)
+    return [middle] if q is None else [middle, q[:2]]
+
+
+def _heading(feet: dict[str, Contact], q: FloatArray | None) -> float | None:
+    """Heading of the root, or of the feet [rad]."""
+    if q is not None:
+        forward = rotation_from_quaternion(q[None, 3:7])[0, :, 0]
+        return float(np.arctan2(forward[1], forward[0]))
+    turns = [np.exp(1j * contact.yaw) for name, contact in feet.items() if "foot" in name]
+    return float(np.angle(np.sum(turns))) if turns else None

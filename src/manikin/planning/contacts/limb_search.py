@@ -23,7 +23,7 @@ from scipy.spatial import cKDTree
 
 from manikin.contact import Contact, ContactKind
 from manikin.kinematics import Placement, ReachVolume
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
