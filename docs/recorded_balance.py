@@ -51,9 +51,13 @@ from manikin.recordings import (
     with_mass,
 )
 from manikin.recordings.dynamics.plate_forces import JOINTS, UNSURE, compare_torques
-from manikin.recordings.dynamics.recorded_dynamics import CUTOFF, TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH
+from manikin.recordings.dynamics.recorded_dynamics import (
+    CUTOFF,
+    TOUCH_DOWN_CUTOFF,
+    TOUCH_DOWN_WIDTH,
+    margins_of_wrenches,
+)
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
-from manikin.recordings.dynamics.recorded_margins import margins_of_wrenches
 from manikin.recordings.dynamics.shifted_motion import ASIDE, INSIDE, LARGEST_SHIFT, PLACE_ERROR
 from manikin.recordings.supports.recorded_stances import FRICTION
 from manikin.runtime.display import readable

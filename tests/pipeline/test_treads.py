@@ -12,7 +12,7 @@ from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import GRAVITY
 from manikin.planning.com import plan_com
 from manikin.scenarios import Scenario, load_scenario
-from manikin.scenarios.sequence import stance_sequence
+from manikin.scenarios.world import stance_sequence
 
 TREAD = 0.25
 RISE = 0.15

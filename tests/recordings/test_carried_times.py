@@ -8,7 +8,7 @@ from manikin.kinematics import PointTargets
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import GRAVITY
 from manikin.recordings import Reconstruction, dynamics_of, read_recording, reconstruct
-from manikin.recordings.supports.recorded_supports import Support
+from manikin.recordings.supports.body_supports import Support
 from manikin.recordings.supports.running_supports import AT_END, CUTOFF, FALLING, by_the_force
 from manikin.recordings.supports.supports import supports_of, timing_errors
 

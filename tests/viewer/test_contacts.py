@@ -26,7 +26,7 @@ def live():
 
 @pytest.fixture
 def viewer(live):
-    from manikin.viewer.contacts import ContactViewer
+    from manikin.viewer.drive import ContactViewer
 
     live.q[:] = live.body.standing_posture()
     live.aim(0.0, 0.0)

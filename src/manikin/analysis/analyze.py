@@ -18,7 +18,7 @@ from manikin.analysis.analysis import (
 )
 from manikin.balance.zmp import LEAST_LOAD
 from manikin.body.limbs import with_knees_and_elbows
-from manikin.body.load import HANDS, carrying
+from manikin.body.strength import HANDS, carrying
 from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
@@ -26,12 +26,13 @@ from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.recordings.dynamics.recorded_dynamics import (
     CUTOFF,
     RecordedDynamics,
+    RecordedMargins,
     dynamics_of,
+    recorded_margins,
     touch_downs_of,
     with_mass,
 )
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import least_shift
 from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording

@@ -57,13 +57,6 @@ def zero_moment_point(
     return np.stack([x, y], axis=-1)
 
 
-def center_of_pressure(points: ArrayLike, normal_forces: ArrayLike) -> FloatArray:
-    """(..., d) mean of contact points (n, d) [m] weighted by normal forces (..., n) [N]; NaN without load."""
-    f = np.asarray(normal_forces, dtype=np.float64)
-    total = f.sum(axis=-1, keepdims=True)
-    return f @ np.asarray(points, dtype=np.float64) / np.where(total > 0, total, np.nan)
-
-
 def foot_rotation_indicator(
     wrench: ArrayLike,
     plane_height: float = 0.0,

@@ -15,7 +15,17 @@ import typer
 from manikin.cli.analyze import analyze
 from manikin.cli.balance import balance, contact
 from manikin.cli.benchmark import benchmark
-from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED, JsonOption, complain, print_json
+from manikin.cli.console import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    Interruption,
+    JsonOption,
+    complain,
+    flag,
+    print_json,
+)
 from manikin.cli.ergonomics import ergonomics
 from manikin.cli.push import push
 from manikin.cli.run import run
@@ -24,7 +34,6 @@ from manikin.cli.view import compare, export, view
 from manikin.cli.walk import library, walk, words
 from manikin.errors import InputError, ManikinError
 from manikin.runtime import __version__
-from manikin.runtime.progress import Interruption
 
 __all__ = ["main"]
 
@@ -66,8 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @app.callback(invoke_without_command=True)
 def _root(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    context: typer.Context, version: Annotated[bool, flag("--version", "Print the version.")] = False
 ) -> None:
     if version:
         typer.echo(f"manikin {__version__}")

@@ -1,4 +1,9 @@
-"""RULA ([McAtamney1993]_) and REBA ([Hignett2000]_), assessments of upper limbs and of the entire body."""
+"""RULA ([McAtamney1993]_) and REBA ([Hignett2000]_), assessments of upper limbs and of the entire body.
+
+Both methods say "upright", "twisted", "abducted", "across the midline" without a number, but every measured
+posture is a little twisted. Thresholds here are our choice, near what an observer would notice, in degrees
+as the published ones.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -248,9 +253,8 @@ def reba_steps(
 ) -> Mapping[str, RebaSteps]:
     """Step scores of a motion, by side.
 
-    Where the paper gives no number (upright, twisted, abducted, rotated, gravity-assisted) those of
-    :mod:`manikin.ergonomics.rula_reba` are taken; an arm is assisted by gravity when it hangs, within 20
-    degrees of the vertical, from a trunk that is bent by more than that.
+    Ours: an arm is assisted by gravity when it hangs, within 20 degrees of the vertical, from a trunk that is
+    bent by more than that.
 
     Args:
         angles: (n,) each.
@@ -415,9 +419,6 @@ def rula_steps(
     angles: PosturalAngles, bearing: Bearing, given: Circumstances | None = None
 ) -> Mapping[str, RulaSteps]:
     """Step scores of a motion, by side.
-
-    Where the paper gives no number (upright, abducted, twisted, out to the side, end of range) those of
-    :mod:`manikin.ergonomics.rula_reba` are taken.
 
     Args:
         angles: (n,) each.

@@ -30,7 +30,7 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import MOTION, SUMMARY, ComTrack, RunRecord, point_mass_track
 from manikin.reports.analysis_sheet import recording_sheet
-from manikin.reports.comparison.compare import RunComparison, compare_runs
+from manikin.reports.comparison import RunComparison, compare_runs
 from manikin.reports.pages import analysis_page, render
 from manikin.runtime.files import ResultDirectory, columns_csv, csv_text, make_directory, write_result
 from manikin.runtime.parallel import side_by_side

@@ -20,8 +20,6 @@ from manikin.runtime.display import COLOURS, colours_of, readable, side_colour
 TENTHS = 10.0
 """Coordinates are rounded to the inverse of this [1/px]."""
 
-INK = "#222222"
-
 
 class SvgDrawing:
     """Collects what is drawn; x goes to the right and y downward, in pixels of the page.

@@ -22,6 +22,7 @@ Figures without content are left out.
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -210,10 +211,8 @@ def clip_figures(
     }
     figures = {}
     for name, draw in drawn.items():
-        try:
+        with suppress(FigureError):  # nothing to show
             figures[name] = draw()
-        except FigureError:
-            continue  # nothing to show
     return figures
 
 

@@ -15,9 +15,9 @@ from manikin.planning.contacts import ContactPlan
 from manikin.planning.contacts.transition import MARGIN as RISING_MARGIN
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.validation import validate
 from manikin.scenarios.values import ScenarioValues, build_body
+from manikin.scenarios.world import flat_sequence
 from manikin.walking.footprints import FEET, Footprint, Footprints
 
 STATURE = 1.75

@@ -26,9 +26,8 @@ from manikin.planning.com import (
 )
 from manikin.planning.com.com_constraints import CeilingHeight, Zone, height_below, keep_out
 from manikin.scenarios.expressions import SupportLevel
-from manikin.scenarios.sequence import stance_sequence
 from manikin.scenarios.values import ScenarioValues, build_body
-from manikin.scenarios.world import build_scene
+from manikin.scenarios.world import build_scene, stance_sequence
 from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 HOVERING = 0.3
@@ -97,7 +96,8 @@ def _constraint(body: BodyModel, obstacle: Obstacle, soles: Sequence[Contact]) -
     if free >= stature + HEAD_CLEARANCE:
         return None
     fold = fold_under(body, free)
-    footprint = _upright_footprint(scale) if fold is None else fold.footprint
+    upright = 0.2 * scale * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    footprint = upright if fold is None else fold.footprint
     zone = Zone.below(outline, [_turned(footprint, yaw) for yaw in headings], ONSET * scale)
     top = level + 1.1 * float(standing.com[2])
     if fold is None:
@@ -133,11 +133,6 @@ def _outline(obstacle: Obstacle) -> FloatArray:
         return obstacle.to_world(obstacle.shape.vertices)[:, :2]
     (x0, y0, _), (x1, y1, _) = obstacle.bounds
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-
-
-def _upright_footprint(scale: float) -> FloatArray:
-    """Rectangle that an upright trunk covers."""
-    return 0.2 * scale * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
 
 def _turned(points: FloatArray, yaw: float) -> FloatArray:

@@ -50,9 +50,10 @@ from manikin.numerics.spatial import (
 )
 from manikin.recordings.dynamics.recorded_dynamics import (
     RecordedDynamics,
+    RecordedMargins,
     dynamics_of_postures,
+    margins_within,
 )
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, margins_within
 from manikin.recordings.reconstruction.proportions import Reconstruction, level_heading
 
 PLACE_ERROR = 0.005

@@ -23,8 +23,15 @@ from manikin.numerics.signals import lasting, mask_runs, switch
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.recordings.readers.markers import ForcePlate
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.body_supports import ground_supports, hand_supports, lying, seat_supports
-from manikin.recordings.supports.recorded_supports import RecordedSupports, Support, median_place
+from manikin.recordings.supports.body_supports import (
+    RecordedSupports,
+    Support,
+    ground_supports,
+    hand_supports,
+    lying,
+    median_place,
+    seat_supports,
+)
 from manikin.recordings.supports.running_supports import by_the_force, while_carried
 from manikin.recordings.supports.support_levels import (
     BALL,

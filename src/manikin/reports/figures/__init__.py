@@ -1,4 +1,7 @@
-"""Figures of runs and of recordings, one function each; no window and no global state is used."""
+"""Figures of runs and of recordings, one function each; no window and no global state is used.
+
+A figure raises :class:`~manikin.errors.FigureError` if there is nothing for it to show.
+"""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -135,13 +138,8 @@ def _write(
 ) -> list[Path]:
     written = []
     for number, (name, draw) in enumerate(figures.items()):
-        try:
-            figure = draw(data)
-        except FigureError:
-            figure = None
-        if figure is not None:
-            path = folder / f"{name}.png"
-            save_figure(figure, path)
+        with suppress(FigureError):
+            save_figure(draw(data), path := folder / f"{name}.png")
             written.append(path)
         if on_done is not None:
             on_done((number + 1) / len(figures))

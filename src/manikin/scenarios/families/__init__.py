@@ -2,9 +2,9 @@
 
 from manikin.errors import InputError
 from manikin.scenarios.families import furniture, levels
-from manikin.scenarios.families.family import Family, Sketch, draw_scene
+from manikin.scenarios.families.family import Family, draw_scene
 
-__all__ = ["FAMILIES", "Family", "Sketch", "chosen_families", "draw_scene"]
+__all__ = ["FAMILIES", "Family", "chosen_families", "draw_scene"]
 
 FAMILIES: dict[str, Family] = {
     family.name: family

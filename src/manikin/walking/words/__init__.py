@@ -17,7 +17,6 @@ from manikin.walking.words.word_solver import (
     STRAIGHT,
     THESIS_WORDS,
     WordPath,
-    WordResiduals,
     residuals,
     word_path,
     word_paths,
@@ -25,6 +24,6 @@ from manikin.walking.words.word_solver import (
 
 __all__ = [
     "HEADINGS", "STRAIGHT", "THESIS_GRID", "THESIS_WORDS", "EqualPaths", "WordGrid", "WordPath",
-    "WordResiduals", "WordSlice", "bent_to", "count_words", "equal_paths", "residuals", "shares",
-    "solve_slice", "solve_slices", "word_path", "word_paths",
+    "WordSlice", "bent_to", "count_words", "equal_paths", "residuals", "shares", "solve_slice",
+    "solve_slices", "word_path", "word_paths",
 ]  # fmt: skip

@@ -1,20 +1,17 @@
-"""Two runs side by side: timing, centre of mass, margins, postures; as tables for the terminal."""
+"""A comparison as tables for the terminal."""
 
 from rich.console import Console, Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from manikin.reports.comparison.alignment import PhasePair, PhaseTime, TimingRow, align_phases, timing_rows
-from manikin.reports.comparison.compare import (
+from manikin.reports.alignment import PhaseTime
+from manikin.reports.comparison import (
     RunComparison,
     com_difference,
-    compare_runs,
     margin_difference,
     shared_tracks,
 )
-
-__all__ = ["PhasePair", "RunComparison", "TimingRow", "align_phases", "compare_runs", "timing_rows"]
 
 
 def report(comparison: RunComparison) -> Group:
