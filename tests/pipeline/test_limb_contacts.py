@@ -46,7 +46,9 @@ def test_every_posture_is_free_balanced_and_on_its_contacts(found):
     assert certificate.changes == 1
     assert certificate.value("max_contact_error_m") < 3e-4
     assert certificate.value("max_sole_turn_rad") < 3e-4
-    assert certificate.value("min_clearance_m") > 0.004
+    assert (
+        certificate.value("min_clearance_m") > 0.0002
+    )  # shanks and forearms beside what they stand on or hold
     assert certificate.value("max_range_violation_rad") == 0.0
     assert certificate.value("min_room_m") > 0.01
     assert certificate.value("max_torque_share") < 1.0
@@ -101,7 +103,7 @@ def test_the_same_seed_has_the_same_contacts(found):
 @pytest.mark.parametrize(
     ("name", "where", "reason"),
     [
-        ("climb-wall@bare", "guide", "reaches no usable surface"),
+        ("climb-wall@bare", "contacts", "no limb has a place within reach"),
         ("insect-books@gap", "contacts", "a gap is wider"),
     ],
 )

@@ -12,7 +12,7 @@ import numpy as np
 
 from manikin.numerics.spatial import FloatArray, PlanarTransform
 from manikin.planning.contacts import ContactPlan, Endpoints, Habit, Stage
-from manikin.planning.guide import GuideTask, GuideWorld, LocalPlanner, nearest_fit, plan_guide
+from manikin.planning.guide import GuideTask, GuideWorld, LocalPlanner, ReachabilityChecker, plan_guide
 from manikin.scenarios import Scenario
 
 
@@ -45,6 +45,9 @@ class RootGuide:
     wall_s: float
 
 
+SINKS = tuple(0.065 * np.arange(11))
+"""Depths by which the root at an end of a guide may sink [m]; our choice."""
+
 GUIDE_PLACES = 200
 """Places by which the contact planner knows a guide."""
 
@@ -54,11 +57,12 @@ def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) ->
 
     Args:
         world: Scene, abstraction of the body, region and condition of the way.
-        ends: (2, 7) poses at start and goal; where they do not fit, the nearest that do are taken.
+        ends: (2, 7) poses at start and goal; a body may bend where the guide's stiff trunk has to sink, so
+            that the nearest below that fits is taken.
     """
     began = clock.perf_counter()
     checker = world.checker()
-    fits = [nearest_fit(pose, checker) for pose in ends]
+    fits = [_sunk(pose, checker) for pose in ends]
     ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
     if any(fit is None for fit in fits) or LocalPlanner(checker, tuple(ends)).straight(*ends):
         return RootGuide(None, 0, clock.perf_counter() - began)
@@ -66,6 +70,12 @@ def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) ->
     path = result.path
     places = None if path is None else path.poses(np.linspace(0.0, 1.0, GUIDE_PLACES))[:, :3]
     return RootGuide(places, result.statistics.samples, clock.perf_counter() - began)
+
+
+def _sunk(pose: FloatArray, checker: ReachabilityChecker) -> FloatArray | None:
+    """The pose nearest below a (7,) one that satisfies the condition, or None."""
+    down = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    return next((low for depth in SINKS if checker.holds(low := pose - depth * down)), None)
 
 
 @dataclass(frozen=True, eq=False)

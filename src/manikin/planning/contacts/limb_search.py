@@ -52,6 +52,9 @@ FARTHEST = 0.5
 APART = 0.15
 """Distance between first contacts that are tried for a limb, by its reach; our choice."""
 
+PROVEN = 0.8
+"""Discount on a move that has a posture, in moves, so that a way with postures is gone on with; our choice."""
+
 LOOSE = 1.0
 """Cost of a limb without a contact, in moves; our choice."""
 
@@ -368,11 +371,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             hull = convex_polygon(at[staying, :2])
             if float(np.min(signed_distance(roots, hull))) < -self.settings.sway * self.size:
                 return math.inf
+        proven = self._postures.get((after, k, True))
+        cost = 0.0 if proven is None or proven.q is None else -PROVEN
         dearer = self._dearer.get(k)
         if dearer is None:
-            return 0.0
+            return cost
         away = np.linalg.norm(dearer - np.concatenate([at[k], self._roots[after]]).reshape(2, 3), axis=2)
-        return 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+        return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
 
     def _moved(self, before: State, after: State) -> int:
         return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)
