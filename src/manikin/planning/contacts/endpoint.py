@@ -1,7 +1,6 @@
 """Where a task starts or ends: postures on contacts, from a place, a heading and a habit.
 
-A start may also be on any limbs, each near where a posture has it (:func:`starts_on_limbs`), and a start that
-holds on by more than feet is left for the feet first (:func:`stand_up`).
+A start may also be on any limbs, each near where a posture has it (:func:`starts_on_limbs`).
 """
 
 import heapq
@@ -271,20 +270,3 @@ def best_first(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[d
                 known.add(after)
                 cost = sum(item[number][0] for item, number in zip(items, after, strict=True))
                 heapq.heappush(open_, (cost, after))
-
-
-def stand_up(
-    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray
-) -> tuple[Stage, ...] | str:
-    """The start on feet; its other contacts are left first, see :func:`leave_seat`.
-
-    Args:
-        start: Contacts and posture at the start.
-        feet: Effectors to stand on.
-        upright: (7,) pose of the root that has risen.
-
-    Returns:
-        The stages up to standing on feet alone, or why a posture is missing.
-    """
-    leaving = leave_seat(poser, start, feet, upright)
-    return leaving.stages if leaving.failure is None else leaving.failure

@@ -53,7 +53,7 @@ APART = 0.15
 """Distance between first contacts that are tried for a limb, by its reach; our choice."""
 
 PROVEN = 0.8
-"""Discount on a move that has a posture, in moves, so that a way with postures is gone on with; our choice."""
+"""Discount on a move that has a posture, so that ways with postures are gone on with [moves]; our choice."""
 
 LOOSE = 1.0
 """Cost of a limb without a contact, in moves; our choice."""
