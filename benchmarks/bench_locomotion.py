@@ -13,7 +13,7 @@ import pytest
 
 from manikin.walking import LITERAL_ORDER, PROSE_ORDER, START, WalkObstacle, experiment_targets, walking_path
 from manikin.walking.path.path_plan import _guesses, kinds_of_guesses
-from manikin.walking.path.path_solver import solve
+from manikin.walking.path.path_program import solve
 
 sys.path.append(str(Path(__file__).parents[1] / "docs"))
 

@@ -23,7 +23,7 @@ from manikin.body import human
 from manikin.body.human_parts import HUMAN_HINGES
 from manikin.body.strength import HUMAN_STRENGTH, DirectionStrength, LegStrength, hinge_strength
 from manikin.motion.file import DATASETS
-from manikin.reports import benchmark_tables
+from manikin.reports import summary_table
 from manikin.reports.summary_table import counts_line
 from manikin.scenarios import json_schema
 from manikin.scenarios.families import FAMILIES
@@ -281,7 +281,7 @@ def benchmark_table(stage: str) -> str:
         return NOT_YET
     report = kept[stage]
     first, count = report["first_seed"], report["seeds"]
-    table = result_tables.markdown_rows(benchmark_tables.HEADER, benchmark_tables.family_rows(report))
+    table = result_tables.markdown_rows(summary_table.FAMILY_HEADER, summary_table.family_rows(report))
     limit = f"{report['time_limit_s']:g} s of processor time per task"
     return f"{table}\nSeeds {first} to {first + count - 1}, {limit}, manikin {report['manikin']}.\n"
 

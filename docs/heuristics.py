@@ -34,8 +34,7 @@ from manikin.planning.contacts import (
     Task,
     sample_limbs,
 )
-from manikin.reports.figures import ChoicePanel, contact_choice_figure
-from manikin.reports.figures.write_figures import save_figure
+from manikin.reports.figures import ChoicePanel, contact_choice_figure, save_figure
 from manikin.scene import Box, Obstacle, Scene
 
 DOCS = Path(__file__).parent

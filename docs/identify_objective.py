@@ -23,12 +23,11 @@ from scipy.stats import t as student
 from manikin.errors import InputError, SolverError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.numerics.spline import BSpline, basis_matrix
-from manikin.walking.path.path_program import DEGREE, PathProgram
-from manikin.walking.path.path_solver import parameters_of, programme_of
+from manikin.walking.path.path_program import DEGREE, PathProgram, parameters_of, programme_of
 from manikin.walking.path.walk_obstacles import Walker
 from manikin.walking.path.walking_model import TERMS, WalkObjective, to_body, to_world
 from manikin.walking.path.walking_path import WalkingPath, WalkingTask
-from manikin.walking.segments.segmentation import ShoulderPaths
+from manikin.walking.segmentation import ShoulderPaths
 
 SWAY = 0.5
 """Frequency above which a trunk sways with its steps and strides, which the model does not [Hz]."""

@@ -57,10 +57,10 @@ from manikin.motion.file import read_motions
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_array
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import ExecutionRequirements
+from manikin.reports.figures import save_figure
 from manikin.reports.figures.style import dress, new_figure
-from manikin.reports.figures.write_figures import save_figure
+from manikin.runtime.display import COLOURS, CYCLE
 from manikin.runtime.files import atomic_path
-from manikin.runtime.palette import COLOURS, CYCLE
 from manikin.runtime.parallel import side_by_side
 from manikin.scene import Scene
 from manikin.simulation import Push, execute, push_on_the_way

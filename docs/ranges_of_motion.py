@@ -32,7 +32,7 @@ from manikin.body.natural_range import FILE, FORMAT, UNIT
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.recordings import Recording, read_recording
-from manikin.recordings.reconstruction.anatomy import JOINTS, SIDES, segment_joint
+from manikin.recordings.readers.marker_sets import JOINTS, SIDES, segment_joint
 from manikin.runtime.files import atomic_path
 
 HERE = Path(__file__).parent

@@ -22,7 +22,7 @@ from manikin.balance import force_space, zero_moment_point
 from manikin.body.configuration import Configuration
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
-from manikin.numerics.polygon import polygon_of_halfplanes
+from manikin.numerics.polytope import polygon_of_halfplanes
 from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about
 from manikin.recordings import (
     ForcePlate,
@@ -51,12 +51,16 @@ from manikin.recordings import (
     with_mass,
 )
 from manikin.recordings.dynamics.plate_forces import JOINTS, UNSURE, compare_torques
-from manikin.recordings.dynamics.recorded_dynamics import CUTOFF, TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH
+from manikin.recordings.dynamics.recorded_dynamics import (
+    CUTOFF,
+    TOUCH_DOWN_CUTOFF,
+    TOUCH_DOWN_WIDTH,
+    margins_of_wrenches,
+)
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
-from manikin.recordings.dynamics.recorded_margins import margins_of_wrenches
 from manikin.recordings.dynamics.shifted_motion import ASIDE, INSIDE, LARGEST_SHIFT, PLACE_ERROR
 from manikin.recordings.supports.recorded_stances import FRICTION
-from manikin.runtime.palette import readable
+from manikin.runtime.display import readable
 
 PAGE = Path(__file__).with_name("recorded-balance.md")
 IMAGES = Path(__file__).parent / "images"

@@ -16,6 +16,7 @@ from manikin.pipeline.run_directory import RunRecord
 from manikin.planning.com import KeyframeProblem, plan_com_through_key_frames
 from manikin.recordings import Reconstruction, RecordedSupports, read_recording, reconstruct, supports_of
 from manikin.reports.analysis_directory import compare_with_recording
+from manikin.reports.figures import save_figure
 from manikin.reports.figures.compare_runs import (
     compare_planes_figure,
     compare_scene_figure,
@@ -24,7 +25,6 @@ from manikin.reports.figures.compare_runs import (
 from manikin.reports.figures.scene import draw_moment
 from manikin.reports.figures.style import dress, new_grid
 from manikin.reports.figures.views import ALONG_X, ALONG_Y
-from manikin.reports.figures.write_figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGES = PAGE.parent / "images"

@@ -33,7 +33,7 @@ from manikin.recordings import (
     touch_downs_of,
 )
 from manikin.recordings.supports.running_supports import AT_END, CUTOFF, FALLING, vertical_acceleration
-from manikin.reports.figures.write_figures import save_figure
+from manikin.reports.figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGE = PAGE.parent / "images" / "runs-force.png"

@@ -35,8 +35,8 @@ from manikin.reports.figures import (
     phase_durations_figure,
     placements_figure,
     published_lowest,
+    save_figure,
 )
-from manikin.reports.figures.write_figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGES = PAGE.parent / "images"

@@ -15,7 +15,7 @@ from manikin.recordings import Reconstruction, RecordedSupports
 from manikin.recordings.supports.support_levels import effector_places
 from manikin.reports.figures.style import dress, label_room, new_grid
 from manikin.reports.figures.views import ALONG_Y, View, draw_body
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 
 MOST = 14
 """Postures drawn at the most."""

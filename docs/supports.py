@@ -28,7 +28,7 @@ from manikin.recordings import (
     supports_of,
     timing_errors,
 )
-from manikin.reports.figures.write_figures import save_figure
+from manikin.reports.figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGES = PAGE.parent / "images"

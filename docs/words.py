@@ -14,8 +14,7 @@ from clothoid_words import clothoid_words
 
 from manikin.numerics.spatial import FloatArray
 from manikin.reports.directories import WordsDirectory, partition_as_dict
-from manikin.reports.figures import equal_paths_figure, holonomic_zone_figure, words_figure
-from manikin.reports.figures.write_figures import save_figure
+from manikin.reports.figures import equal_paths_figure, holonomic_zone_figure, save_figure, words_figure
 from manikin.walking import (
     LITERAL_ORDER,
     PROSE_ORDER,

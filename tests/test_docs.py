@@ -10,7 +10,7 @@ import pytest
 import typer
 
 import manikin
-from manikin.cli.app import app
+from manikin.cli import app
 from manikin.motion.file import write_motions
 from manikin.reports import figures
 from manikin.scenarios import list_variants, load_scenario
@@ -171,7 +171,7 @@ def test_every_figure_is_set_beside_those_of_the_thesis():
 
 
 def test_every_module_is_in_the_api_reference():
-    """Modules of one file and modules of rooms; ``__init__`` only hands names on."""
+    """Modules of one file, and packages that define something; other ``__init__`` only hand names on."""
     listed = re.findall(
         r"^::: (manikin[\w.]*)", "\n".join(p.read_text() for p in (DOCS / "api").glob("*.md")), re.M
     )
@@ -180,6 +180,11 @@ def test_every_module_is_in_the_api_reference():
         ".".join(path.relative_to(source).with_suffix("").parts)
         for path in (source / "manikin").rglob("*.py")
         if path.name not in ("__init__.py", "__main__.py", "version.py")
+    }
+    modules |= {
+        ".".join(path.parent.relative_to(source).parts)
+        for path in (source / "manikin").rglob("*/__init__.py")
+        if re.search(r"^(def|class) ", path.read_text(encoding="utf-8"), re.M)
     }
     assert set(listed) - {"manikin"} == modules
     assert len(listed) == len(set(listed))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from manikin.cli.app import app
+from manikin.cli import app
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

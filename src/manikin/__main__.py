@@ -2,6 +2,6 @@
 
 import sys
 
-from manikin.cli.app import main
+from manikin.cli import main
 
 sys.exit(main(sys.argv[1:]))

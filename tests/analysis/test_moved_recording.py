@@ -9,7 +9,7 @@ from manikin.analysis import Analysis, analyze
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.recordings import read_recording
 from manikin.recordings.readers.markers import MarkerRecording
-from manikin.recordings.supports.recorded_supports import median_place
+from manikin.recordings.supports.body_supports import median_place
 
 TURN, PLACE = rotation_from_yaw(np.radians(37.0)), np.array([10.0, -7.0, 0.0])
 

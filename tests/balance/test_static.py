@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from manikin.balance import StaticRegion, static_room, static_torque_share
 from manikin.body import Configuration, insect
 from manikin.contact import FRICTION_MODELS, ContactModel, Stance, grasp, point, sole
-from manikin.numerics.polygon import signed_distance
+from manikin.numerics.polytope import signed_distance
 
 CORNERS = [(0.2, 0.2, 0.0), (-0.2, 0.2, 0.0), (-0.2, -0.2, 0.0), (0.2, -0.2, 0.0)]
 

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE
 from manikin.motion.file import read_motions
 

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 import manikin
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from manikin.motion.file import write_motions
 from manikin.reports.figures import FIGURES
@@ -378,7 +378,7 @@ def test_terminated_process_ends_like_an_interrupted_one(number):
     """SIGTERM unwinds the program, and SIGINT does where a shell has set it to be ignored."""
     code = (
         "import signal, sys, time\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-        "import manikin.cli.app as cli\n"
+        "import manikin.cli as cli\n"
         "def wait(*a):\n print('ready', flush=True)\n time.sleep(60)\n"
         "cli.app = lambda **k: wait()\nsys.exit(cli.main([]))"
     )

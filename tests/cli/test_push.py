@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from manikin.simulation import HeldImpulse
 from manikin.simulation.push_search import DirectionSearch

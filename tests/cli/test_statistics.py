@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE
 
 

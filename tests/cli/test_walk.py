@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE, FAILED
 from manikin.scenarios import load_scenario
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE, INTERRUPTED
 from manikin.walking import words
 from manikin.walking.words import WordGrid, partition

@@ -17,7 +17,7 @@ from manikin.contact import (
 )
 from manikin.contact import sole as make_sole
 from manikin.errors import ContactError
-from manikin.numerics.polygon import signed_distance
+from manikin.numerics.polytope import signed_distance
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 HINGE = 0.0644

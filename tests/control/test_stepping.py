@@ -21,7 +21,7 @@ from manikin.control.recovery.recovery_controller import held_posture
 from manikin.control.recovery.turning import Turning, _swayed
 from manikin.control.stepping import StepSettings, SwingFoot, capture_after, step_goals
 from manikin.errors import InputError
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import GRAVITY
 
 KUDOH = kudoh()

@@ -188,7 +188,7 @@ def test_folder_that_does_not_exist_gives_one_line(content, tmp_path):
 
 WRITER = """
 import sys
-from manikin.runtime.progress import Interruption
+from manikin.cli.console import Interruption
 from manikin.motion.file import MotionFile, read_motions, write_motions
 content = read_motions(sys.argv[1])
 with Interruption() as interruption:

@@ -4,11 +4,12 @@ import json
 
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.errors import TimeLimitError
 from manikin.pipeline import benchmark
 from manikin.pipeline.benchmark import BenchmarkTask, run_benchmark, run_task
-from manikin.reports.benchmark_tables import family_rows, write_benchmark_page
+from manikin.reports.pages import write_benchmark_page
+from manikin.reports.summary_table import family_rows
 from manikin.scenarios.families import FAMILIES
 
 

@@ -8,7 +8,7 @@ import yaml
 
 from manikin.balance import support_polygon
 from manikin.contact import Stance
-from manikin.numerics.polygon import signed_distance
+from manikin.numerics.polytope import signed_distance
 from manikin.pipeline import runner
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.scenarios import load_scenario

@@ -5,7 +5,7 @@ import json
 import pytest
 import yaml
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.errors import ScenarioError
 from manikin.motion.file import read_motions
 from manikin.pipeline import runner

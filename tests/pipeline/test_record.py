@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.contact import ContactSchedule
 from manikin.errors import InputError, MotionFileError
 from manikin.motion.file import write_motions
 from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import RunDirectory, read_run
 from manikin.planning.com import CentroidalTrajectory
-from manikin.reports.write_outputs import write_outputs
+from manikin.reports.export import write_outputs
 from manikin.scenarios import load_scenario
 
 SUMMARY = {"scenario": "platform", "succeeded": True, "failure": None}

@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 from manikin.body import human, random_configuration
-from manikin.body.load import with_masses
+from manikin.body.strength import with_masses
 from manikin.contact import CarriedLoad, ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control.dynamics import Dynamics
 from manikin.errors import ScenarioError

@@ -8,11 +8,11 @@ from manikin.balance.motion_forces import _force_points
 from manikin.contact import sole
 from manikin.control.edge_forces import contact_geometry, points_along
 from manikin.errors import ScenarioError
-from manikin.numerics.polygon import signed_distance
+from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import GRAVITY
 from manikin.planning.com import plan_com
 from manikin.scenarios import Scenario, load_scenario
-from manikin.scenarios.sequence import stance_sequence
+from manikin.scenarios.world import stance_sequence
 
 TREAD = 0.25
 RISE = 0.15

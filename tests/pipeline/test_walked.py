@@ -7,7 +7,7 @@ from manikin.pipeline.runner import run
 from manikin.scenarios import load_scenario
 from manikin.scenarios.planned import walking_supports
 from manikin.walking import walking_path
-from manikin.walking.footsteps.stepper import place_footprints
+from manikin.walking.stepper import place_footprints
 
 
 def check(result):

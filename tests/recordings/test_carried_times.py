@@ -8,10 +8,9 @@ from manikin.kinematics import PointTargets
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import GRAVITY
 from manikin.recordings import Reconstruction, dynamics_of, read_recording, reconstruct
-from manikin.recordings.supports.plate_supports import timing_errors
-from manikin.recordings.supports.recorded_supports import Support
+from manikin.recordings.supports.body_supports import Support
 from manikin.recordings.supports.running_supports import AT_END, CUTOFF, FALLING, by_the_force
-from manikin.recordings.supports.supports import supports_of
+from manikin.recordings.supports.supports import supports_of, timing_errors
 
 RATE, LIFT = 120.0, 0.3
 TOES = np.array([0.25, 0.0, 0.0])

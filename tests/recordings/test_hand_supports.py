@@ -13,7 +13,7 @@ from manikin.kinematics import PointTargets
 from manikin.kinematics.tracking import follow
 from manikin.numerics.signals import lasting, mask_runs, switch
 from manikin.recordings import Reconstruction, read_recording, reconstruct, supports_of
-from manikin.recordings.supports.recorded_supports import RecordedSupports, Support
+from manikin.recordings.supports.body_supports import RecordedSupports, Support
 from manikin.recordings.supports.support_levels import effector_places
 
 BODY = human(1.75, 75.0)

@@ -7,8 +7,7 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from manikin.body import human
-from manikin.body.further_bodies import insect
+from manikin.body import human, insect
 from manikin.errors import BodyError, InputError
 from manikin.kinematics import PointTargets
 from manikin.recordings import Recording, read_bvh, read_recording, reconstruct

@@ -39,7 +39,7 @@ from manikin.recordings import (
 )
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
 from manikin.recordings.reconstruction.reconstruct import unmeasured_upright
-from manikin.recordings.supports.recorded_supports import Support
+from manikin.recordings.supports.body_supports import Support
 
 RATE, FRAMES = 100.0, 301
 TIME = np.arange(FRAMES) / RATE

@@ -11,7 +11,7 @@ from manikin.contact import ContactKind, SolePart
 from manikin.errors import InputError
 from manikin.kinematics import PointTargets
 from manikin.recordings import Reconstruction, recorded_schedule
-from manikin.recordings.supports.recorded_supports import RecordedSupports, Support
+from manikin.recordings.supports.body_supports import RecordedSupports, Support
 from manikin.recordings.supports.supports import sole_points
 
 RATE, FRAMES, START = 100.0, 101, 2.0

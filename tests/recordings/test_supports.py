@@ -12,10 +12,9 @@ from manikin.errors import InputError
 from manikin.kinematics import PointTargets
 from manikin.numerics.spatial import GRAVITY
 from manikin.recordings import ForcePlate, Reconstruction, read_recording, reconstruct
-from manikin.recordings.supports.plate_supports import plate_loads, timing_errors
-from manikin.recordings.supports.recorded_supports import RecordedSupports, Support, SupportPhase
+from manikin.recordings.supports.body_supports import RecordedSupports, Support, SupportPhase
 from manikin.recordings.supports.support_levels import slowest_speed, track
-from manikin.recordings.supports.supports import supports_of, supports_of_points
+from manikin.recordings.supports.supports import plate_loads, supports_of, supports_of_points, timing_errors
 
 STAND, SWING = 0.5, 0.45
 TOES = np.array([0.25, 0.0, 0.0])

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 import yaml
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.scenarios.world import start_posture

@@ -7,8 +7,8 @@ from manikin.errors import InputError, ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.scenarios.planned import LEAST, walk_before, walking_supports
 from manikin.walking import walking_path
-from manikin.walking.footsteps.footprints import FEET
-from manikin.walking.footsteps.stepper import StepRule, place_footprints
+from manikin.walking.footprints import FEET
+from manikin.walking.stepper import StepRule, place_footprints
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,7 @@ from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene.mesh import Mesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 from manikin.verification.clearance import BodyShapes
-from manikin.verification.solids import REACH, Solid
-from manikin.verification.triangles import segment_segment, segment_triangle, winding_numbers
+from manikin.verification.solids import REACH, Solid, segment_segment, segment_triangle, winding_numbers
 
 SHAPES = (
     Box([0.4, 0.3, 0.5]), Cylinder(0.2, 0.5), Capsule(0.15, 0.3), Sphere(0.25),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration, human, point_mass
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE
 from manikin.errors import BodyError
 from manikin.planning.contacts.single_contact import LiveContacts, Role
@@ -26,7 +26,7 @@ def live():
 
 @pytest.fixture
 def viewer(live):
-    from manikin.viewer.contacts import ContactViewer
+    from manikin.viewer.drive import ContactViewer
 
     live.q[:] = live.body.standing_posture()
     live.aim(0.0, 0.0)

@@ -7,7 +7,7 @@ import urllib.request
 import numpy as np
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.cli.console import DONE
 from manikin.errors import InputError
 from manikin.scene import Box, Obstacle, Scene

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from manikin.errors import InputError
 from manikin.walking import START, ShoulderPaths, category_of, category_statistics, experiment_targets
-from manikin.walking.segments.goal_categories import HEADINGS_DEG, CategorySpread, seen_from
+from manikin.walking.goal_categories import HEADINGS_DEG, CategorySpread, seen_from
 
 RATE = 100.0
 ZONES = {"F": 1.0, "S": 0.0, "B": -1.0}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manikin.errors import InputError
-from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
+from manikin.walking.footprints import FEET, Footprint, Footprints
 
 
 def two_steps():

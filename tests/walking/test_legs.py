@@ -4,8 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from manikin.body import human, random_configuration
-from manikin.body.further_bodies import insect
+from manikin.body import human, insect, random_configuration
 from manikin.errors import BodyError
 from manikin.kinematics.leg_kinematics import HINGES, LegKinematics
 from manikin.walking.gait.stance_foot import FootPlacement, Sole

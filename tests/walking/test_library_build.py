@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from manikin.cli.app import main
+from manikin.cli import main
 from manikin.errors import InputError
 from manikin.numerics.signals import fourier_basis
 from manikin.recordings import read_recording, reconstruct

@@ -17,7 +17,6 @@ from manikin.walking import (
     experiment_targets,
     walked,
     walking_path,
-    walking_paths,
 )
 
 QUARTER = np.pi / 2
@@ -47,7 +46,7 @@ def experiment():
     targets = list(experiment_targets())
     assert len(targets) == 106
     assert len({tuple(target[:2]) for target in targets}) == 32
-    return walking_paths(START, [target for number, target in enumerate(targets) if number // 2 % 4 == 0])
+    return [walking_path(START, goal) for number, goal in enumerate(targets) if number // 2 % 4 == 0]
 
 
 @settings(max_examples=15)
@@ -233,13 +232,6 @@ def test_same_task_gives_the_same_bits():
     assert np.array_equal(one.place, two.place)
 
 
-@pytest.mark.slow
-def test_processes_give_what_one_gives():
-    goals = [(1.0, 0.0, 0.0), (-1.0, 1.0, 0.5), (2.0, 1.0, 0.0)]
-    alone, shared = walking_paths(START, goals), walking_paths(START, goals, workers=2)
-    assert all(np.array_equal(a.place, b.place) for a, b in zip(alone, shared, strict=True))
-
-
 @pytest.mark.parametrize(
     ("goal", "options", "message"),
     [
@@ -255,13 +247,6 @@ def test_absurd_tasks_are_refused_in_one_line(goal, options, message):
     with pytest.raises(InputError) as caught:
         walking_path(START, goal, **options)
     assert str(caught.value) == message
-
-
-def test_a_bad_goal_among_many_is_named():
-    with pytest.raises(InputError, match=r"walking goal 1 \[m, m, rad\]"):
-        walking_paths(START, [(1, 0, 0), (np.inf, 0, 0)])
-    with pytest.raises(InputError, match="workers is 0"):
-        walking_paths(START, [(1, 0, 0)], workers=0)
 
 
 @pytest.mark.parametrize("distance", [0.01, 40.0, 100.0])

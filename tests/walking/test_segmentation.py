@@ -18,7 +18,6 @@ from manikin.walking import (
     NONHOLONOMIC,
     STANDING,
     START,
-    OnlineSegmentation,
     SegmentationRule,
     ShoulderPaths,
     segment_path,
@@ -252,16 +251,10 @@ def _wander(seed, n, rate):
 
 
 @given(wandering, st.sampled_from([0.0, 0.01, 0.05, 0.3]))
-def test_on_line_labels_are_those_of_function_1_delayed(paths, half_step):
-    rule = SegmentationRule(half_step=half_step)
-    online = OnlineSegmentation(paths.rate, rule)
-    given_out = [online.step(left, right) for left, right in zip(paths.left, paths.right, strict=True)]
-    delay = min(online.delay, len(paths))
-    assert given_out[:delay] == [None] * delay
-    labels = [*given_out[delay:], *online.finish()]
-    assert labels == segment_path(paths, rule, online=True).labels.tolist()
+def test_on_line_labels_are_those_of_function_1(paths, half_step):
+    online = segment_path(paths, SegmentationRule(half_step=half_step), online=True).labels
     off = SegmentationRule(half_step=half_step, cutoff=None, noise=0.0, boundary=None)
-    assert labels == segment_path(paths, off).labels.tolist()
+    assert online.tolist() == segment_path(paths, off).labels.tolist()
 
 
 @given(wandering)
@@ -325,8 +318,6 @@ def test_shoulders_of_a_recording_are_its_upper_arms():
         (lambda: SegmentationRule(noise=-1.0), "noise"),
         (lambda: SegmentationRule(boundary=0.0), "boundary"),
         (lambda: segment_path(moved(1.0, 0.0)).share("sideways"), "holonomic"),
-        (lambda: OnlineSegmentation(RATE).step([0.0, 0.0], [0.0, 0.0]), "meet"),
-        (lambda: list(OnlineSegmentation(RATE).finish()), "at least 2"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(make, message):

@@ -12,8 +12,8 @@ from manikin.contact import sole, soles_overlap
 from manikin.errors import InputError
 from manikin.numerics.spline import BSpline
 from manikin.walking import walking_path
-from manikin.walking.footsteps.footprints import FEET
-from manikin.walking.footsteps.stepper import SIDE, StepRule, place_footprints
+from manikin.walking.footprints import FEET
+from manikin.walking.stepper import SIDE, StepRule, place_footprints
 
 ROUNDING = 1e-9
 

@@ -5,8 +5,8 @@ import pytest
 
 from manikin.errors import InputError
 from manikin.walking import StepRule, walk_along, walked_footprints, walking_path
-from manikin.walking.footsteps.footprints import FEET
-from manikin.walking.footsteps.stepper import SIDE, within_reach
+from manikin.walking.footprints import FEET
+from manikin.walking.stepper import SIDE, within_reach
 
 START = (0.0, 0.0, 0.0)
 WAYS = {"straight": ((3.0, 0.0, 0.0), 0.6), "curved": ((2.0, 2.0, np.pi / 2), 0.5),

@@ -11,5 +11,6 @@ from manikin.analysis.analyze import (
 )
 
 __all__ = [
-    "Analysis", "AnalysisEntry", "AnalysisJob", "AnalysisOptions", "analyze", "analyze_file", "recordings_in",
+    "Analysis", "AnalysisEntry", "AnalysisJob", "AnalysisOptions", "analyze", "analyze_file",
+    "recordings_in",
 ]  # fmt: skip

@@ -23,16 +23,15 @@ from manikin.recordings.dynamics.plate_forces import (
     mass_on_plates,
     plate_forces,
 )
-from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins
+from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics, RecordedMargins
 from manikin.recordings.dynamics.shifted_motion import LeastShift
 from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.plate_supports import TimingError, timing_errors
-from manikin.recordings.supports.recorded_supports import RecordedSupports, SupportPhase
+from manikin.recordings.supports.body_supports import RecordedSupports, SupportPhase
+from manikin.recordings.supports.supports import TimingError, timing_errors
 from manikin.runtime.display import Displayed
-from manikin.walking.segments.segmentation import PathSegments
+from manikin.walking.segmentation import PathSegments
 
 LARGE_RESIDUAL = 0.02
 """Median distance between the body and what was recorded above which the body does not fit [m]."""

@@ -18,7 +18,7 @@ from manikin.analysis.analysis import (
 )
 from manikin.balance.zmp import LEAST_LOAD
 from manikin.body.limbs import with_knees_and_elbows
-from manikin.body.load import HANDS, carrying
+from manikin.body.strength import HANDS, carrying
 from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
@@ -26,22 +26,23 @@ from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.recordings.dynamics.recorded_dynamics import (
     CUTOFF,
     RecordedDynamics,
+    RecordedMargins,
     dynamics_of,
+    recorded_margins,
     touch_downs_of,
     with_mass,
 )
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
 from manikin.recordings.dynamics.shifted_motion import least_shift
+from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording
-from manikin.recordings.readers.read import READERS, read_recording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import reconstruct
 from manikin.recordings.supports.recorded_stances import FRICTION, recorded_schedule
 from manikin.recordings.supports.support_levels import effector_places
 from manikin.recordings.supports.supports import supports_of
-from manikin.walking.segments.segmentation import PathSegments, ShoulderPaths, segment_path
+from manikin.walking.segmentation import PathSegments, ShoulderPaths, segment_path
 
 SHOULDERS = ("left_upper_arm", "right_upper_arm")
 """Segments that begin at the shoulders."""

@@ -4,7 +4,6 @@ from manikin.balance.criteria import (
     StaticRegion,
     admissible_com_polygon,
     admissible_zmp_polygon,
-    center_of_pressure,
     centroidal_moment_pivot,
     foot_rotation_indicator,
     static_room,
@@ -13,11 +12,9 @@ from manikin.balance.criteria import (
     support_polygon,
     zero_moment_point,
 )
-from manikin.balance.friction import ContactLimits, LimitKind, contact_limits
+from manikin.balance.friction import LimitKind, contact_limits
 from manikin.balance.margin import (
     BalanceReport,
-    GroundPoint,
-    StabilityMargins,
     evaluate_balance,
     force_space,
     moment_space,
@@ -26,23 +23,21 @@ from manikin.balance.margin import (
 from manikin.balance.motion_margin import MotionMargin, motion_margin
 from manikin.balance.wrench import (
     LimitingConstraint,
-    LimitShare,
     WrenchPolytope,
     pseudo_wrench,
     wrench_polytope,
     wrench_polytopes,
 )
-from manikin.balance.zmp import SupportPlane, least_zmp_distance, support_plane
+from manikin.balance.zmp import least_zmp_distance, support_plane
 from manikin.runtime.display import make_callable
 
 __all__ = [
-    "BalanceReport", "ContactLimits", "GroundPoint", "LimitKind", "LimitShare", "LimitingConstraint",
-    "MotionMargin", "StabilityMargins", "StaticRegion", "SupportPlane", "WrenchPolytope",
-    "admissible_com_polygon", "admissible_zmp_polygon", "center_of_pressure", "centroidal_moment_pivot",
-    "contact_limits", "evaluate_balance", "foot_rotation_indicator", "force_space", "least_zmp_distance",
-    "moment_space", "motion_margin", "pseudo_wrench", "stability_margins", "static_room",
-    "static_torque_share", "support_height", "support_plane", "support_polygon", "wrench_polytope",
-    "wrench_polytopes", "zero_moment_point",
+    "BalanceReport", "LimitKind", "LimitingConstraint", "MotionMargin", "StaticRegion", "WrenchPolytope",
+    "admissible_com_polygon", "admissible_zmp_polygon", "centroidal_moment_pivot", "contact_limits",
+    "evaluate_balance", "foot_rotation_indicator", "force_space", "least_zmp_distance", "moment_space",
+    "motion_margin", "pseudo_wrench", "stability_margins", "static_room", "static_torque_share",
+    "support_height", "support_plane", "support_polygon", "wrench_polytope", "wrench_polytopes",
+    "zero_moment_point",
 ]  # fmt: skip
 
 

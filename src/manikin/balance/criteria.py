@@ -18,7 +18,7 @@ from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytop
 from manikin.body import BodyModel, Configuration
 from manikin.contact import ContactKind, Stance, default_normal_force_cap
 from manikin.errors import InputError
-from manikin.numerics.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
+from manikin.numerics.polytope import convex_polygon, polygon_of_halfplanes, signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_array, skew
 
 
@@ -55,13 +55,6 @@ def zero_moment_point(
     x = o[..., 0] + (drop * w[..., 0] - w[..., 4]) / vertical
     y = o[..., 1] + (drop * w[..., 1] + w[..., 3]) / vertical
     return np.stack([x, y], axis=-1)
-
-
-def center_of_pressure(points: ArrayLike, normal_forces: ArrayLike) -> FloatArray:
-    """(..., d) mean of contact points (n, d) [m] weighted by normal forces (..., n) [N]; NaN without load."""
-    f = np.asarray(normal_forces, dtype=np.float64)
-    total = f.sum(axis=-1, keepdims=True)
-    return f @ np.asarray(points, dtype=np.float64) / np.where(total > 0, total, np.nan)
 
 
 def foot_rotation_indicator(

@@ -13,8 +13,7 @@ import numpy as np
 from manikin.contact import Contact, ContactKind, FrictionModel
 from manikin.contact.contact import friction_model as checked
 from manikin.numerics.facet_enumeration import fan_of_generators
-from manikin.numerics.polygon import convex_polygon
-from manikin.numerics.polytope import facet_rows
+from manikin.numerics.polytope import convex_polygon, facet_rows
 from manikin.numerics.spatial import FloatArray, cross
 
 

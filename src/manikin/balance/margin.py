@@ -20,8 +20,7 @@ from manikin.balance.criteria import (
 from manikin.balance.wrench import LimitingConstraint, WrenchPolytope, pseudo_wrench, wrench_polytope
 from manikin.contact import ContactKind, FrictionModel, Stance
 from manikin.errors import InputError
-from manikin.numerics.polygon import signed_distance
-from manikin.numerics.polytope import Polytope, least_change
+from manikin.numerics.polytope import Polytope, least_change, signed_distance
 from manikin.numerics.spatial import FloatArray, cross, frozen_array, skew
 from manikin.runtime.display import Displayed
 

@@ -23,7 +23,7 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Sta
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.dynamics import CarriedForces, FreeDynamics, centroidal_motion
-from manikin.numerics.polygon import chord
+from manikin.numerics.polytope import chord
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_about
 from manikin.scene.distance import moves_by_joint

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.balance.criteria import support_height, zero_moment_point
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.motion import Motion
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, cross, rotation_from_normal, skew
 
 FLATNESS = 1e-3
@@ -150,17 +150,16 @@ def zmp_path(schedule: ContactSchedule, time: FloatArray, wrench: FloatArray) ->
     return ZmpPath(time, point, distance, phase, planes)
 
 
-def contact_wrench(motion: Motion, schedule: ContactSchedule, switching: float = 0.1) -> FloatArray:
+def contact_wrench(motion: Motion, schedule: ContactSchedule) -> FloatArray:
     """(n, 6) wrench of all contacts on the body about the world origin [N, N.m].
 
     Args:
         motion: Its contact moments are about the planned contacts' origins.
-        schedule: The planned contacts.
-        switching: After lift-off the moments stay about the contact left for this long [s].
+        schedule: The planned contacts; after a lift-off the moments stay about the contact left for 0.1 s.
     """
     total = np.zeros((len(motion.time), 6))
     for column, name in enumerate(motion.contact_names):
-        origins = _contact_origins(schedule, name, motion.time - switching, motion.time)
+        origins = _contact_origins(schedule, name, motion.time - 0.1, motion.time)
         force = motion.contact_force[:, column, :3]
         total[:, :3] += force
         total[:, 3:] += motion.contact_force[:, column, 3:] + cross(origins, force)

@@ -30,10 +30,9 @@ from manikin.body.human_parts import (
     palm_rotation,
     upright_capsule,
 )
-from manikin.body.load import HANDS, carrying
 from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
-from manikin.body.strength import DEFAULT_AGE, check_strength, hinge_strength
+from manikin.body.strength import DEFAULT_AGE, HANDS, carrying, check_strength, hinge_strength
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, skew
 

@@ -60,7 +60,7 @@ class BodyModel(Displayed):
         lengths: Lengths of a human that were measured instead of scaled [m].
         off_axis_masses: Whether a human's centres of mass lie off the lines between joints.
         loads: What each hand carries [kg], by the name of its effector; the masses are part of the hands'
-            segments, see :func:`manikin.body.load.carrying`.
+            segments, see :func:`manikin.body.strength.carrying`.
     """
 
     name: str

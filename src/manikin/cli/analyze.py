@@ -12,6 +12,7 @@ from manikin.cli.console import (
     DONE,
     FAILED,
     FiguresOption,
+    Interruption,
     JobsOption,
     JsonOption,
     LoadHandOption,
@@ -25,7 +26,6 @@ from manikin.cli.console import (
     stdout_kept_clean,
 )
 from manikin.errors import InputError
-from manikin.runtime.progress import Interruption
 
 if TYPE_CHECKING:
     from manikin.analysis.adaptation import Method

@@ -1,11 +1,19 @@
-"""``manikin balance``: polytope and margins of one stance."""
+"""``manikin balance`` and ``manikin contact``: margins of one stance, the best contact of one limb."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from manikin.cli.console import JsonOption, flattened, print_json, print_table, stdout_kept_clean
+from manikin.cli.console import (
+    DONE,
+    FAILED,
+    JsonOption,
+    flattened,
+    print_json,
+    print_table,
+    stdout_kept_clean,
+)
 
 
 def balance(
@@ -23,3 +31,62 @@ def balance(
         print_json(report)
     else:
         print_table(flattened(report))
+
+
+def contact(
+    scenario: Annotated[
+        str, typer.Argument(metavar="NAME|FILE.yaml", help="Scenario: its body, scene and start.")
+    ],
+    limb: Annotated[str, typer.Option(metavar="L", help="Limb that shall make a contact.")],
+    task: Annotated[
+        tuple[float, float, float], typer.Option(metavar="X Y Z", help="Direction of the task in the world.")
+    ],
+    role: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|body|object", help="Whether the limb moves the body along the task or an object."
+        ),
+    ] = "auto",
+    pull: Annotated[bool, typer.Option("--pull", help="Hold on and pull instead of pressing.")] = False,
+    kind: Annotated[
+        str | None,
+        typer.Option(metavar="sole|point|grasp", help="How it touches; default: the limb's own way."),
+    ] = None,
+    heuristic: Annotated[
+        str, typer.Option(metavar="H", help="efort, distance, manipulability or random.")
+    ] = "efort",
+    samples: Annotated[
+        int, typer.Option(metavar="N", min=100, max=1_000_000, help="Samples of the limb.")
+    ] = 10_000,
+    seed: Annotated[int | None, typer.Option(metavar="N", min=0, help="Default: the scenario's.")] = None,
+    at: Annotated[tuple[float, float] | None, typer.Option(metavar="X Y", help="Where to stand [m].")] = None,
+    heading: Annotated[float | None, typer.Option(metavar="DEG", help="Where to face.")] = None,
+    posture: Annotated[str | None, typer.Option(metavar="P", help="Posture; default: the start's.")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the answer.")] = None,
+    json: JsonOption = False,
+) -> int:
+    """Find the contact of one limb that serves a task best."""
+    from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
+    from manikin.scenarios import load_scenario
+    from manikin.scenarios.world import contact_rules, start_posture
+
+    job = load_scenario(scenario)
+    with stdout_kept_clean():
+        body, scene = job.build_body(), job.build_scene()
+        q = start_posture(job, body, scene, at=at, heading_deg=heading, posture=posture)
+        question = ContactQuestion.of(
+            limb, task, role, pull, heuristic, kind, samples, job.seed if seed is None else seed
+        )
+        answer = find_contact(body, scene, q, question, contact_rules(job, body))
+        if figure is not None:
+            from manikin.reports.export import write_contact_figure
+
+            write_contact_figure(body, scene, answer, figure)
+    report = answer.as_dict()
+    if json:
+        print_json(report)
+    else:
+        print_table({key: value for key, value in report.items() if key != "q"})
+        if not report["found"]:
+            typer.echo(f"no contact: {report['failure']}", err=True)
+    return DONE if report["found"] else FAILED

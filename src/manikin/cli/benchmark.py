@@ -85,13 +85,14 @@ def benchmark(
             chosen, numbers, stage=cast("tasks.StageName", stage), path=directory, jobs=jobs,
             time_limit=time_limit, fresh=fresh, report=report,
         )  # fmt: skip
-    from manikin.reports.benchmark_tables import failure_lines, text_table, write_benchmark_page
+    from manikin.reports.pages import write_benchmark_page
+    from manikin.reports.summary_table import failure_lines, family_table
 
     page = None if directory is None else write_benchmark_page(directory, result)
     if json:
         print_json(result)
         return DONE
-    typer.echo(text_table(result))
+    typer.echo(family_table(result))
     for line in failure_lines(result):
         typer.echo(line)
     if page is not None:

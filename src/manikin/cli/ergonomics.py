@@ -106,8 +106,7 @@ def ergonomics(
 
         write_result(csv, result.csv())
     if figure is not None:
-        from manikin.reports.figures import ergonomics_figure
-        from manikin.reports.figures.write_figures import save_figure
+        from manikin.reports.figures import ergonomics_figure, save_figure
 
         save_figure(ergonomics_figure(result, f"Ergonomics of {source.resolve().stem}, {which}"), figure)
     report = {"motion": which} | result.as_dict()

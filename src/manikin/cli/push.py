@@ -9,6 +9,7 @@ import typer
 from manikin.cli.console import (
     DONE,
     FiguresOption,
+    Interruption,
     JobsOption,
     JsonOption,
     OutOption,
@@ -20,7 +21,6 @@ from manikin.cli.console import (
     run_job,
 )
 from manikin.errors import InputError
-from manikin.runtime.progress import Interruption
 
 if TYPE_CHECKING:
     from manikin.scenarios import Scenario

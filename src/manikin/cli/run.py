@@ -9,6 +9,7 @@ from manikin.cli.console import (
     DONE,
     FAILED,
     FiguresOption,
+    Interruption,
     JobsOption,
     JsonOption,
     LoadHandOption,
@@ -19,7 +20,6 @@ from manikin.cli.console import (
     refuse,
     run_job,
 )
-from manikin.runtime.progress import Interruption
 
 ALL = "all"
 """In place of a scenario: every built-in one with its variants."""

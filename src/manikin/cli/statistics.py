@@ -7,9 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from manikin.cli.console import BAD_INPUT, DONE, JsonOption, SexOption, bars, complain, print_json, refuse
+from manikin.cli.console import (
+    BAD_INPUT,
+    DONE,
+    Interruption,
+    JsonOption,
+    SexOption,
+    bars,
+    complain,
+    print_json,
+    refuse,
+)
 from manikin.errors import InputError
-from manikin.runtime.progress import Interruption
 
 if TYPE_CHECKING:
     from manikin.recordings.statistics.clip_statistics import From, GroupStatistics, StatisticsSettings

@@ -1,11 +1,11 @@
-"""``manikin view``: a motion in the browser, or the contacts of a body that is moved by hand."""
+"""``manikin view``, ``compare`` and ``export``: runs and motions watched, compared, written for others."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from manikin.cli.console import announce, refuse
+from manikin.cli.console import JsonOption, MotionArgument, announce, bars, print_json, refuse
 
 
 def view(
@@ -29,8 +29,7 @@ def view(
     if contacts:
         from manikin.planning.contacts.single_contact import LiveContacts
         from manikin.scenarios import load_scenario
-        from manikin.scenarios.sequence import contact_rules
-        from manikin.scenarios.world import start_posture
+        from manikin.scenarios.world import contact_rules, start_posture
         from manikin.viewer import serve_contacts
 
         job = load_scenario(source)
@@ -48,3 +47,54 @@ def view(
     from manikin.viewer import serve
 
     serve(content, port=port, announce=announce, others=others)
+
+
+def compare(
+    context: typer.Context,
+    first: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    second: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory to compare with it.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Draw figures of both and write comparison.json there.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Timing, centre of mass, margins and postures of two runs side by side."""
+    from manikin.pipeline.run_directory import read_run
+
+    records = read_run(first), read_run(second)
+    from manikin.reports.comparison import compare_runs
+
+    comparison = compare_runs(*records)
+    if out is not None:
+        from manikin.reports.export import write_comparison_outputs
+
+        with bars(context.obj) as progress:
+            write_comparison_outputs(comparison, out, progress)
+    if json:
+        print_json(comparison.as_dict())
+        return
+    from manikin.reports.comparison_tables import report, report_console
+
+    report_console().print(report(comparison))
+    if out is not None:
+        typer.echo(f"figures in {out}", err=True)
+
+
+def export(
+    source: MotionArgument,
+    format: Annotated[str, typer.Option("--format", metavar="bvh|csv", help="File format.")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: beside the motion.")] = None,
+    motion: Annotated[
+        str | None, typer.Option(metavar="planned|executed", help="Default: executed if there is one.")
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Samples per second; default: 100 (bvh), all (csv).")
+    ] = None,
+) -> None:
+    """Write a motion for other programs."""
+    from manikin.reports.export import check_format, export_motion
+
+    check_format(format)
+    from manikin.motion.file import read_motions
+
+    typer.echo(str(export_motion(read_motions(source), source, format, out=out, which=motion, rate=rate)))

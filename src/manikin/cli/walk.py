@@ -1,6 +1,8 @@
-"""``manikin walk``: the walk of a whole body to a place, or of a walker steered with keys."""
+"""``manikin walk``, ``words`` and ``library``: walks of a body, their words and their recorded cycles."""
 
 import math
+from collections import Counter
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -8,12 +10,15 @@ import typer
 from manikin.cli.console import (
     DONE,
     FiguresOption,
+    JobsOption,
     JsonOption,
     OutOption,
     SexOption,
     announce,
+    bars,
     directory_of,
     print_json,
+    print_table,
     refuse,
     run_job,
 )
@@ -104,4 +109,114 @@ def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> 
     around = None if scene is None else load_scenario(scene).build_scene()
     place = (start[0], start[1], math.radians(start[2]))
     serve_drive(WalkController(person, place=place), around, port, announce)
+    return DONE
+
+
+def words(
+    context: typer.Context,
+    out: OutOption = None,
+    slices: Annotated[
+        str, typer.Option(metavar="DEG,DEG|all", help="Final headings, each a multiple of 10 from 0 to 350.")
+    ] = "all",
+    jobs: JobsOption = None,
+    figures: Annotated[
+        bool | None, typer.Option("--figures/--no-figures", help="Draw the figures into the directory.")
+    ] = None,
+    json: JsonOption = False,
+) -> int:
+    """Partition the goals of a walk by the word of the best path; an interrupted run is continued."""
+    headings = _headings(slices)
+    directory = directory_of(out, "words", json=json)
+    refuse(figures is True and directory is None, "--figures", "there is no directory to draw into")
+    from manikin.pipeline.batch import usable_cores
+    from manikin.reports.directories import solve_partition
+    from manikin.walking.words import THESIS_GRID
+
+    with bars(context.obj) as progress:
+        summary = solve_partition(
+            headings, THESIS_GRID, directory, jobs=jobs or usable_cores(), draw=figures is not False,
+            progress=progress,
+        )  # fmt: skip
+    if json:
+        print_json(summary)
+    else:
+        _print(summary)
+        typer.echo(f"files in {directory}", err=True)
+    return DONE
+
+
+def _headings(text: str) -> list[int]:
+    """Headings [deg] of an option.
+
+    Raises:
+        InputError: If it is not a list of headings.
+    """
+    from manikin.walking.words import HEADINGS
+
+    if text == "all":
+        return list(HEADINGS)
+    valid = {str(heading): heading for heading in HEADINGS}
+    parts = [part.strip() for part in text.split(",")]
+    for part in parts:
+        if part not in valid:
+            raise InputError(
+                f"--slices {text}: {part!r} is no slice; valid: all, or 0, 10, ... 350 with commas between"
+            )
+    return sorted({valid[part] for part in parts})
+
+
+def _print(summary: dict[str, Any]) -> None:
+    """Words, number of goals and share of each."""
+    width = max(len(word) for word in summary["counts"])
+    for word, count in summary["counts"].items():
+        typer.echo(f"{word:{width}}  {count:6d}  {100 * summary['shares'][word]:6.2f} %")
+    typer.echo(f"{'all':{width}}  {summary['solved']:6d}")
+
+
+library = typer.Typer(
+    help="Walking cycles by velocity, from recorded motion.", no_args_is_help=True, rich_markup_mode=None
+)
+
+
+@library.callback()
+def _group() -> None:
+    """Walking cycles by velocity, from recorded motion."""
+
+
+@library.command()
+def build(
+    context: typer.Context,
+    directory: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR",
+            help="Folder with clips_locomotion.csv and, in mocap, the BVH and AMC files it names.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="File to write (.npz).")] = Path("walking_library.npz"),
+    json: JsonOption = False,
+) -> int:
+    """Cut cycles from recordings and write them, as Fourier coefficients, to a file."""
+    from manikin.walking.gait.library_build import build_library
+    from manikin.walking.gait.motion_library import save_library
+
+    if not out.parent.is_dir() or out.is_dir():
+        raise InputError(f"--out is {out}; valid: a file in a folder that exists")
+    with bars(context.obj) as progress:
+        built = build_library(directory, lambda share, remark: progress("library", share, remark))
+        save_library(built.library, out)
+    classes = Counter(built.library.kinds)
+    summary = {
+        "file": str(out),
+        "size_bytes": out.stat().st_size,
+        "cycles": len(built.library),
+        "classes": dict(classes),
+        "windows_without_cycle": [f"{w.file} {w.first}-{w.last}" for w in built.without_cycle],
+        "windows_near_others": [f"{w.file} {w.first}-{w.last}" for w in built.near_others],
+        "acknowledgements": list(built.library.acknowledgements),
+    }
+    if json:
+        print_json(summary)
+    else:
+        print_table(summary | {"classes": ", ".join(f"{number} {kind}" for kind, number in classes.items())})
     return DONE

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.errors import ContactError
-from manikin.numerics.polygon import convex_polygon
+from manikin.numerics.polytope import convex_polygon
 from manikin.numerics.spatial import (
     GRAVITY,
     FloatArray,

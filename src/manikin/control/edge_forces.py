@@ -10,7 +10,7 @@ from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
 from manikin.control.dynamics import DynamicsState
-from manikin.numerics.polygon import chord, inset_polygon
+from manikin.numerics.polytope import chord, inset_polygon
 from manikin.numerics.spatial import FloatArray, skew
 
 

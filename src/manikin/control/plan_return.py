@@ -31,7 +31,7 @@ from manikin.control.recovery.standing import SupportArea
 from manikin.control.reference import ReferenceSample
 from manikin.control.settings import ReturnSettings
 from manikin.control.supports import SupportMode, SupportState
-from manikin.numerics.polygon import convex_polygon
+from manikin.numerics.polytope import convex_polygon
 from manikin.numerics.spatial import GRAVITY, FloatArray
 
 LEAST_HEIGHT = 0.2

@@ -14,16 +14,17 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import ContactSchedule, Stance, default_normal_force_cap
 from manikin.contact.from_motion import stance_at
-from manikin.ergonomics.assessment import PosturalAssessment, assess_posture
-from manikin.ergonomics.body_parts import parts_of
-from manikin.ergonomics.scoring import Circumstances
-from manikin.ergonomics.strength import (
+from manikin.ergonomics.assessment import (
     LOADED,
     CumulativeEffort,
     JointStrength,
+    PosturalAssessment,
+    assess_posture,
     cumulative_effort,
     joint_strength,
 )
+from manikin.ergonomics.body_parts import parts_of
+from manikin.ergonomics.rula_reba import Circumstances
 from manikin.errors import BodyError
 from manikin.motion import Motion
 from manikin.motion.dynamics import CarriedForces, centroidal_motion

@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
-from manikin.body.load import with_masses
+from manikin.body.strength import with_masses
 from manikin.contact import CarriedLoad, ContactSchedule
 from manikin.motion.configuration_spline import (
     StateSamples,

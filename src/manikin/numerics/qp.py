@@ -147,14 +147,10 @@ class QuadraticProgram:
 class WarmQPSolver:
     """Solves a sequence of similar dense programs, each from the working set of the one before.
 
-    A solution is checked whatever DAQP says of it.
-
-    Attributes:
-        tolerance: Largest violation of a row or bound in an accepted solution, in their units.
+    A solution is checked whatever DAQP says of it: no row or bound may be violated by more than 1e-3.
     """
 
-    def __init__(self, tolerance: float = 1e-3) -> None:
-        self.tolerance = tolerance
+    def __init__(self) -> None:
         self._model: Any = None
         self._shape = (-1, -1)
 
@@ -174,7 +170,7 @@ class WarmQPSolver:
         x, _, flag, info = self._model.solve()
         if flag <= 0:  # its working set is not worth starting from
             self._model = None
-        solved = flag > 0 and bool(np.all(np.isfinite(x))) and program.violation(x) <= self.tolerance
+        solved = flag > 0 and bool(np.all(np.isfinite(x))) and program.violation(x) <= 1e-3
         return QPSolution(np.array(x), solved, f"daqp {flag}", int(info["iterations"]), np.array(info["lam"]))
 
 

@@ -30,7 +30,7 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import MOTION, SUMMARY, ComTrack, RunRecord, point_mass_track
 from manikin.reports.analysis_sheet import recording_sheet
-from manikin.reports.comparison.compare import RunComparison, compare_runs
+from manikin.reports.comparison import RunComparison, compare_runs
 from manikin.reports.pages import analysis_page, render
 from manikin.runtime.files import ResultDirectory, columns_csv, csv_text, make_directory, write_result
 from manikin.runtime.parallel import side_by_side
@@ -200,7 +200,7 @@ def write_analysis(
     summary = summary_of(analysis, plan)
     sheet, pictures = recording_sheet(analysis, SHEET) if draw else "", {}
     if draw and plan is not None and plan.com.trajectory is not None:
-        from manikin.reports.figures.write_figures import comparison_pictures
+        from manikin.reports.figures import comparison_pictures
 
         pictures = comparison_pictures(compare_with_recording(plan))
     content = MotionFile(body=analysis.body) if plan is None else plan.content

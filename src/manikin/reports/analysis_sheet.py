@@ -15,12 +15,10 @@ from manikin.analysis import Analysis
 from manikin.body import BodyModel
 from manikin.body.segments import end_of
 from manikin.numerics.spatial import FloatArray, turned_root
-from manikin.runtime.palette import COLOURS, colours_of, readable, side_colour
+from manikin.runtime.display import COLOURS, colours_of, readable, side_colour
 
 TENTHS = 10.0
 """Coordinates are rounded to the inverse of this [1/px]."""
-
-INK = "#222222"
 
 
 class SvgDrawing:

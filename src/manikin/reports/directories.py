@@ -22,6 +22,7 @@ Figures without content are left out.
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -49,9 +50,9 @@ from manikin.reports.figures import (
     placements_figure,
     published_lowest,
     push_map_figure,
+    save_figure,
     words_figure,
 )
-from manikin.reports.figures.write_figures import save_figure
 from manikin.runtime import __version__
 from manikin.runtime.files import ResultDirectory, atomic_path, csv_text, to_json, writing
 from manikin.simulation import PushMap, PushTrials
@@ -210,10 +211,8 @@ def clip_figures(
     }
     figures = {}
     for name, draw in drawn.items():
-        try:
+        with suppress(FigureError):  # nothing to show
             figures[name] = draw()
-        except FigureError:
-            continue  # nothing to show
     return figures
 
 

@@ -13,10 +13,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from manikin.analysis import Analysis
 from manikin.pipeline.run_directory import REPORT, read_summary
-from manikin.reports.summary_table import verdict_line
+from manikin.reports.summary_table import FAMILY_HEADER, family_rows, verdict_line
 from manikin.runtime import __version__
+from manikin.runtime.display import readable
 from manikin.runtime.files import FIGURES, write_result
-from manikin.runtime.palette import readable
+from manikin.scenarios.families import FAMILIES
 
 FIRST = ("scene", "postures", "margin", "com", "contacts")
 """Figures that come first, in this order; the others follow by name."""
@@ -120,6 +121,18 @@ def analysis_page(
     return render(
         "analysis", name=analysis.name, summary=summary, sheet=sheet, pictures=pictures, missing=missing
     )
+
+
+def write_benchmark_page(directory: Path, result: Mapping[str, Any]) -> Path:
+    """Write ``report.html`` of a benchmark beside its results, and return the file.
+
+    Raises:
+        MotionFileError: If it cannot be written.
+    """
+    descriptions = {name: family.description for name, family in FAMILIES.items()}
+    rows = family_rows(result)
+    page = render("benchmark", result=result, header=FAMILY_HEADER, rows=rows, descriptions=descriptions)
+    return write_result(directory / REPORT, page)
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

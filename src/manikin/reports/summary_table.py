@@ -1,6 +1,6 @@
-"""Results of runs in words: the verdict and requirements of one, one table of many."""
+"""Results of runs in words: the verdict and requirements of one, tables of many and of benchmarks."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Any
 
 HEADER = (
@@ -32,13 +32,20 @@ def result_rows(report: Mapping[str, Any]) -> list[tuple[str, ...]]:
 
 def text_table(report: Mapping[str, Any]) -> str:
     """The table in columns of equal width."""
-    rows = [HEADER, UNITS, *result_rows(report)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(HEADER) - 1)]
-    lines = [
-        "  ".join([*(cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)), row[-1]])
+    return _columns([HEADER, UNITS, *result_rows(report)])
+
+
+def _columns(rows: Sequence[tuple[str, ...]], right: Container[int] = ()) -> str:
+    """Rows in columns of equal width, some of them by their numbers aligned to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = (
+        "  ".join(
+            cell.rjust(width) if number in right else cell.ljust(width)
+            for number, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
         for row in rows
-    ]
-    return "\n".join(line.rstrip() for line in lines)
+    )
+    return "\n".join(lines)
 
 
 def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
@@ -154,3 +161,51 @@ def counts_line(report: Mapping[str, Any]) -> str:
 def number(value: float | None, digits: int, unit: str = "", scale: float = 1.0) -> str:
     """A value with a number of decimals, or :data:`NOTHING`."""
     return NOTHING if value is None else f"{scale * value:.{digits}f}{unit}"
+
+
+FAMILY_HEADER = (
+    "family", "tasks", "contacts", "certified", "planned", "proved", "contacts [s]: median", "95 %",
+    "motion [s]", "computing / motion", "failures by stage",
+)  # fmt: skip
+"""Columns of the table; times are processor time, of motions the median."""
+
+
+def family_rows(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """One row of texts for each family under :data:`FAMILY_HEADER`, all of them together last.
+
+    Args:
+        result: As :func:`manikin.pipeline.benchmark.run_benchmark` returns it.
+    """
+    rows = [*result["families"].items(), ("all", result["total"])]
+    return [_family_row(name, counts, whole=result["stage"] == "all") for name, counts in rows]
+
+
+def _family_row(name: str, counts: Mapping[str, Any], *, whole: bool) -> tuple[str, ...]:
+    seconds = counts["contacts_s"]
+    return (
+        name,
+        str(counts["tasks"]),
+        str(counts["contacts"]),
+        NOTHING if counts["checked"] is None else str(counts["checked"]),
+        *(str(counts[key]) if whole else NOTHING for key in ("planned", "proved")),
+        number(seconds["median"], 2),
+        number(seconds["p95"], 2),
+        number(counts["duration_s"], 1),
+        number(counts["computing_over_motion"], 1),
+        ", ".join(f"{stage} {count}" for stage, count in counts["failures"].items()) or NOTHING,
+    )
+
+
+def family_table(result: Mapping[str, Any]) -> str:
+    """The table in columns of equal width."""
+    return _columns([FAMILY_HEADER, *family_rows(result)], right=range(1, len(FAMILY_HEADER) - 1))
+
+
+def failure_lines(result: Mapping[str, Any]) -> Iterator[str]:
+    """Every task that failed with its stage and reason, and every one whose contacts the check refuses."""
+    for entry in result["tasks"]:
+        if entry["checked"] is not None and not entry["checked"]["certified"]:
+            yield f"{entry['family']}-{entry['seed']} (check): {entry['checked']['verdict']}"
+        if entry["failure"] is not None:
+            failure = entry["failure"]
+            yield f"{entry['family']}-{entry['seed']} ({failure['stage']}): {failure['reason']}"

@@ -6,7 +6,7 @@ report page.
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 Sense = Literal["<=", ">=", ">"]
@@ -114,3 +114,46 @@ def requirement_table(rows: Iterable[Requirement | None]) -> RequirementTable:
         rows: Requirements; None for a quantity that the result does not have.
     """
     return RequirementTable(tuple(row for row in rows if row is not None and math.isfinite(row.limit)))
+
+
+@dataclass
+class Worst:
+    """Takes measurements of one quantity and keeps the worst one.
+
+    Attributes:
+        key: Name of the quantity in results.
+        name: The quantity in words.
+        unit: Of the values.
+        sense: What a value has to be relative to the limit.
+        limit: The value allowed.
+        tolerance: Rounding up to which the limit counts as kept.
+        value: The worst value so far, or None.
+        where: Where it was measured.
+    """
+
+    key: str
+    name: str
+    unit: str
+    sense: Sense
+    limit: float
+    tolerance: float = 0.0
+    value: float | None = field(default=None, init=False)
+    where: str = field(default="", init=False)
+
+    def take(self, value: float, where: str) -> None:
+        """Take one measurement; a NaN is worse than any number."""
+        worse = self.value is None or value != value
+        if not worse and self.value is not None:
+            worse = value > self.value if self.sense == "<=" else value < self.value
+        if worse:
+            self.value, self.where = float(value), where
+
+    @property
+    def row(self) -> Requirement | None:
+        """The requirement; None if nothing was measured."""
+        if self.value is None:
+            return None
+        return Requirement(
+            self.key, self.name, self.unit, self.value, self.sense, self.limit, where=self.where,
+            tolerance=self.tolerance,
+        )  # fmt: skip

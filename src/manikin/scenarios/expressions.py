@@ -47,39 +47,35 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Pow: operator.pow, ast.UAdd: operator.pos, ast.USub: operator.neg,
 }  # fmt: skip
 
+_VARIABLES = ("x", "y", "z")
+_VALID = "valid: numbers, x, y, z, pi, e, + - * / ** and functions such as sin, atan, sqrt"
+
 _Evaluator = Callable[[Mapping[str, Any], ModuleType], Any]
 
 
 class Expression:
-    """A parsed expression in named variables.
+    """A parsed expression in x, y and z.
 
     Attributes:
         text: The source, as written.
-        variables: Names it may use, in the order of the call's arguments.
     """
 
-    def __init__(self, text: str, variables: tuple[str, ...] = ("x", "y", "z")) -> None:
+    def __init__(self, text: str) -> None:
         """Parse ``text``.
 
         Raises:
-            ScenarioError: If it is not an arithmetic expression in ``variables``.
+            ScenarioError: If it is not an arithmetic expression in x, y and z.
         """
         self.text = text
-        self.variables = variables
-        self._evaluate = _parse(text, variables)
+        self._evaluate = _parse(text)
 
-    def __call__(self, *values: Any) -> Any:
-        """Evaluate at one value per variable: floats, arrays or CasADi expressions."""
-        if len(values) != len(self.variables):
-            raise ScenarioError(
-                f"expression {self.text!r} got {len(values)} values; valid: one for each of {self.variables}"
-            )
-        environment = dict(zip(self.variables, values, strict=True))
-        return self._evaluate(environment, functions_for(*values))
+    def __call__(self, x: Any, y: Any, z: Any) -> Any:
+        """Evaluate at floats, arrays or CasADi expressions."""
+        return self._evaluate({"x": x, "y": y, "z": z}, functions_for(x, y, z))
 
-    def __reduce__(self) -> "tuple[type[Expression], tuple[str, tuple[str, ...]]]":
+    def __reduce__(self) -> "tuple[type[Expression], tuple[str]]":
         """Copies and other processes parse the text again."""
-        return Expression, (self.text, self.variables)
+        return Expression, (self.text,)
 
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"
@@ -94,48 +90,48 @@ def functions_for(*values: Any) -> ModuleType:
     return np
 
 
-def _parse(text: str, variables: tuple[str, ...]) -> _Evaluator:
+def _parse(text: str) -> _Evaluator:
     if len(text) > MAX_LENGTH:
         raise ScenarioError(f"expression has {len(text)} characters; valid: at most {MAX_LENGTH}")
     try:
         tree = ast.parse(text.strip(), mode="eval")
         if _depth(tree.body) > MAX_DEPTH:
             raise ScenarioError(f"expression is nested too deeply; valid: at most {MAX_DEPTH} levels")
-        return _build(tree.body, text, variables)
+        return _build(tree.body, text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ScenarioError(f"expression {text!r} cannot be read; {_valid(variables)}") from None
+        raise ScenarioError(f"expression {text!r} cannot be read; {_VALID}") from None
 
 
 def _depth(node: ast.AST) -> int:
     return 1 + max((_depth(child) for child in ast.iter_child_nodes(node)), default=0)
 
 
-def _build(node: ast.AST, text: str, variables: tuple[str, ...]) -> _Evaluator:
+def _build(node: ast.AST, text: str) -> _Evaluator:
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         # A numpy float: overflow and division by zero give inf, which the caller can refuse with a place.
         number = np.float64(str(node.value))
         return lambda _values, _functions: number
-    if isinstance(node, ast.Name) and node.id in CONSTANTS and node.id not in variables:
+    if isinstance(node, ast.Name) and node.id in CONSTANTS:
         constant = np.float64(CONSTANTS[node.id])
         return lambda _values, _functions: constant
-    if isinstance(node, ast.Name) and node.id in variables:
+    if isinstance(node, ast.Name) and node.id in _VARIABLES:
         name = node.id
         return lambda values, _functions: values[name]
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
         apply = _OPERATORS[type(node.op)]
-        left, right = _build(node.left, text, variables), _build(node.right, text, variables)
+        left, right = _build(node.left, text), _build(node.right, text)
         return lambda values, functions: apply(left(values, functions), right(values, functions))
     if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
         apply = _OPERATORS[type(node.op)]
-        operand = _build(node.operand, text, variables)
+        operand = _build(node.operand, text)
         return lambda values, functions: apply(operand(values, functions))
     if isinstance(node, ast.Call):
-        return _build_call(node, text, variables)
+        return _build_call(node, text)
     shown = ast.get_source_segment(text.strip(), node) if isinstance(node, ast.expr) else None
-    raise ScenarioError(f"expression {text!r} uses {shown or type(node).__name__!r}; {_valid(variables)}")
+    raise ScenarioError(f"expression {text!r} uses {shown or type(node).__name__!r}; {_VALID}")
 
 
-def _build_call(node: ast.Call, text: str, variables: tuple[str, ...]) -> _Evaluator:
+def _build_call(node: ast.Call, text: str) -> _Evaluator:
     name = node.func.id if isinstance(node.func, ast.Name) else ""
     if name not in _NUMPY_NAMES:
         shown = ast.get_source_segment(text.strip(), node.func)
@@ -144,15 +140,10 @@ def _build_call(node: ast.Call, text: str, variables: tuple[str, ...]) -> _Evalu
     if len(node.args) != wanted or node.keywords:
         raise ScenarioError(f"expression {text!r} gives {name} {len(node.args)} arguments; valid: {wanted}")
     numpy_name = _NUMPY_NAMES[name]
-    arguments = [_build(argument, text, variables) for argument in node.args]
+    arguments = [_build(argument, text) for argument in node.args]
     return lambda values, functions: getattr(functions, numpy_name)(
         *(argument(values, functions) for argument in arguments)
     )
-
-
-def _valid(variables: tuple[str, ...]) -> str:
-    names = ", ".join((*variables, *(c for c in CONSTANTS if c not in variables)))
-    return f"valid: numbers, {names}, + - * / ** and functions such as sin, atan, sqrt"
 
 
 @dataclass(frozen=True, eq=False)

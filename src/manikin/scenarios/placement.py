@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from manikin.numerics.spatial import IDENTITY, PlanarTransform
-from manikin.scenarios.sections import ContactSection, StateSection
+from manikin.scenarios.sections.support_sections import ContactSection
+from manikin.scenarios.sections.task_sections import StateSection
 from manikin.scenarios.validation import FrameMoves, Section
 
 TASK_GRID = 9

@@ -14,10 +14,10 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import ContactPlan
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.validation import validate
 from manikin.scenarios.values import ScenarioValues, build_body
-from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
+from manikin.scenarios.world import flat_sequence
+from manikin.walking.footprints import FEET, Footprint, Footprints
 
 STATURE = 1.75
 """Stature of the body that the lengths here are for [m]."""

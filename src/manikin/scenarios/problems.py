@@ -26,9 +26,8 @@ from manikin.planning.com import (
 )
 from manikin.planning.com.com_constraints import CeilingHeight, Zone, height_below, keep_out
 from manikin.scenarios.expressions import SupportLevel
-from manikin.scenarios.sequence import stance_sequence
 from manikin.scenarios.values import ScenarioValues, build_body
-from manikin.scenarios.world import build_scene
+from manikin.scenarios.world import build_scene, stance_sequence
 from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 HOVERING = 0.3

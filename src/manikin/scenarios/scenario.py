@@ -200,8 +200,8 @@ class Scenario(Displayed, ScenarioValues):
         return build_scene(self)
 
     def build_sequence(self, *, planning: bool = False) -> StanceSequence:
-        """Build the stances of the supports, see :func:`manikin.scenarios.sequence.stance_sequence`."""
-        from manikin.scenarios.sequence import stance_sequence
+        """Build the stances of the supports, see :func:`manikin.scenarios.world.stance_sequence`."""
+        from manikin.scenarios.world import stance_sequence
 
         return stance_sequence(self, planning=planning)
 
@@ -221,8 +221,8 @@ class Scenario(Displayed, ScenarioValues):
         return keyframe_problem(self)
 
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
-        """Check that contacts lie on surfaces, see :func:`manikin.scenarios.sequence.check_contacts`."""
-        from manikin.scenarios.sequence import check_contacts
+        """Check that contacts lie on surfaces, see :func:`manikin.scenarios.world.check_contacts`."""
+        from manikin.scenarios.world import check_contacts
 
         check_contacts(self, scene, tolerance)
 

@@ -10,9 +10,8 @@ from pydantic import Field, model_validator
 
 from manikin.contact import Stance, default_normal_force_cap
 from manikin.errors import InputError, ScenarioError
-from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.scenarios.sections.planning_sections import FRICTION_MODEL_TEXT, FrictionModelName
-from manikin.scenarios.sequence import build_contact
+from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
 from manikin.scenarios.validation import (
     Positive,
     Section,
@@ -25,6 +24,7 @@ from manikin.scenarios.validation import (
     required,
     validate,
 )
+from manikin.scenarios.world import build_contact
 from manikin.scenarios.yaml_reader import read_yaml
 
 if TYPE_CHECKING:

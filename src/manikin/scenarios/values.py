@@ -27,18 +27,13 @@ from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, froz
 from manikin.scenarios.expressions import Expression, HeightBand, SupportLevel
 from manikin.scenarios.placement import start_heading_deg, task_frame
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.sections import (
-    ActSection,
+from manikin.scenarios.sections.planning_sections import (
     ComConstraintSection,
-    ContactSection,
     ContactsSection,
     PlanningSection,
-    PushSection,
-    RecoverySection,
-    SoleSection,
-    SupportsSection,
-    WalkingSection,
 )
+from manikin.scenarios.sections.support_sections import ContactSection, SoleSection, SupportsSection
+from manikin.scenarios.sections.task_sections import ActSection, PushSection, RecoverySection, WalkingSection
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.validation import place
 

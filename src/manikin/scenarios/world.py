@@ -1,19 +1,235 @@
-"""Scene of a scenario, and the posture of its body at the start."""
+"""Scene of a scenario, its stances and whether they fit, and the posture of its body at the start."""
 
+import math
+from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
+from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.body.strength import hand_masses
+from manikin.contact import (
+    CarriedLoad,
+    Contact,
+    Phase,
+    Stance,
+    StanceSequence,
+    grasp,
+    point,
+    roll_feet,
+    rolling_front,
+    sole,
+    soles_overlap,
+)
 from manikin.errors import ScenarioError
-from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy, turned_root
-from manikin.planning.contacts import Endpoints, Habit
-from manikin.planning.whole_body.posture_style import posture_style_of
-from manikin.scenarios.sections import ObstacleSection
-from manikin.scenarios.sequence import friction_of
-from manikin.scenarios.values import ScenarioValues
+from manikin.numerics.spatial import (
+    FloatArray,
+    finite_number,
+    frozen_array,
+    rotation_from_normal,
+    rotation_from_rpy,
+    turned_root,
+)
+from manikin.planning.contacts import ContactRules, Endpoints, Habit
+from manikin.planning.whole_body.posture_style import READY, posture_style_of
+from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
+from manikin.scenarios.sections.task_sections import ObstacleSection
+from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere, load_mesh
+
+
+def build_contact(
+    effector: str,
+    entry: ContactSection,
+    friction: float,
+    default_sole: SoleSection,
+    *,
+    planning: bool = False,
+    force_cap: float | None = None,
+) -> Contact:
+    """Build one contact from its section and the defaults around it.
+
+    Args:
+        friction: Coulomb coefficient where the contact gives none.
+        default_sole: Sole size where the contact gives none.
+        planning: Let ``default_sole`` shrink a sole the contact gives itself.
+        force_cap: Cap on the normal force where the contact gives none [N].
+
+    Raises:
+        ContactError: If a value is out of its range.
+    """
+    kind = entry.kind_for(effector)
+    if kind == "grasp":
+        rpy = None if entry.rpy_deg is None else np.radians(entry.rpy_deg)
+        return grasp(
+            effector,
+            entry.position,
+            max_force=(planning and entry.planning_max_force_N) or entry.max_force_N or 0.0,
+            max_moment=entry.max_moment_Nm or 0.0,
+            rotation=None if rpy is None else rotation_from_rpy(*rpy),
+        )
+    friction = entry.friction or friction
+    force_cap = entry.normal_force_cap_N or force_cap
+    if kind == "point":
+        return point(
+            effector, entry.position, friction=friction,
+            rotation=rotation_from_normal(entry.normal or (0.0, 0.0, 1.0), math.radians(entry.yaw_deg)),
+            normal_force_cap=force_cap,
+        )  # fmt: skip
+    own = entry.sole or default_sole
+    shrink = planning and entry.sole is not None
+    made = sole(
+        effector,
+        entry.position,
+        math.radians(entry.yaw_deg),
+        length=min(own.length_m, default_sole.length_m) if shrink else own.length_m,
+        width=min(own.width_m, default_sole.width_m) if shrink else own.width_m,
+        polygon=entry.polygon,
+        friction=friction,
+        normal=entry.normal,
+        normal_force_cap=force_cap,
+        torsion_limit=entry.torsion_limit_Nm,
+        settle=entry.settle_s or 0.0,
+    )
+    return made if entry.edge_radius_m is None else rolling_front(made, entry.edge_radius_m)
+
+
+PATCH_WIDTH = 0.7
+"""Width of the front of a sole that has to lie on a hold, relative to the sole's."""
+
+HINGE_ROOM = 0.005
+"""Distance of that part to the hinge of the toes, which would give way [m]."""
+
+
+def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
+    """Rules of the file's ``contacts`` for a body.
+
+    Args:
+        body: Its body; one without soles has no front of them.
+    """
+    options, patch = values.contacts, None
+    if options.forefoot_m is not None and body.sole_length and body.sole_width:
+        end = _toe_hinge(body) - HINGE_ROOM
+        patch = (end - options.forefoot_m, end, PATCH_WIDTH * body.sole_width)
+    return ContactRules(friction_of(values), options.grasp_force_N, 0.0, patch)
+
+
+def friction_of(values: ScenarioValues) -> float:
+    """Coulomb coefficient of the file's supports, or of its contacts where those are found."""
+    supports = values.file.supports
+    return values.contacts.friction if supports is None else supports.friction
+
+
+def _toe_hinge(body: BodyModel) -> float:
+    """Place of the hinge of the toes on the sole's x axis; its tip without such a hinge [m]."""
+    foot = body.effector("left_foot")
+    toes = [segment for segment in body.segments if segment.parent == foot.segment and segment.hinges]
+    own = foot.rotation.T @ (toes[0].origin - foot.translation) if toes else None
+    return 0.5 * (body.sole_length or 0.0) if own is None else float(own[0])
+
+
+def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
+    """Build the stances of the explicit supports; feet that roll have heel and toe phases.
+
+    Args:
+        planning: With the smaller soles, friction and force caps that planning balances on.
+
+    Raises:
+        ScenarioError: If there are no supports, or a contact slides between phases.
+    """
+    sequence, supports = flat_sequence(values, planning=planning), values.explicit_supports()
+    if supports.foot == "flat":
+        return sequence
+    with values.refusing(("supports", "foot")):
+        return roll_feet(sequence, (TOE_HINGE_FROM_HEEL - 0.5) * supports.sole.length_m)
+
+
+def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
+    """Build the stances as the file lists them, with full soles; otherwise as :func:`stance_sequence`."""
+    supports = values.explicit_supports()
+    cap = supports.normal_force_cap_N
+    if planning:
+        cap = supports.planning_normal_force_cap_N or cap
+    model = values.contact_model
+    if cap is not None:
+        model = replace(model, normal_force_cap=cap)
+    with values.refusing(("supports", "phases")):
+        phases, held = [], zip(supports.resolved_phases(), carried_loads(values), strict=True)
+        for section, (contacts, load) in zip(supports.phases, held, strict=True):
+            stance = Stance([_contact(values, *item, planning) for item in contacts.items()], model=model)
+            phases.append(Phase(stance, section.min_duration_s, section.max_duration_s, load))
+        return StanceSequence(phases)
+
+
+def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
+    """What each phase of the supports carries that is no part of the body.
+
+    Raises:
+        ScenarioError: If the load is carried in phases that the supports do not have.
+    """
+    load, phases = values.file.body.load, values.explicit_supports().phases
+    if load is None or load.lasts:
+        return [None] * len(phases)
+    first = 0 if load.from_phase is None else load.from_phase
+    last = len(phases) - 1 if load.until_phase is None else load.until_phase
+    for key, number, least in (("from_phase", first, 0), ("until_phase", last, first)):
+        if not least <= number < len(phases):
+            raise values.error(
+                ("body", "load", key),
+                f"is {number}; valid: {least} to {len(phases) - 1}, phases of the supports",
+            )
+    body = build_body(values)
+    masses = hand_masses(body, load.mass_kg, load.hand)
+    ready = Configuration(body, READY.posture(body))
+    hands = np.mean([ready.effector_placement(name)[1] for name in masses], axis=0)
+    ahead = rotation_from_rpy(0.0, 0.0, math.radians(values.start_heading_deg))
+    carried = CarriedLoad(masses, frozen_array(ahead @ (hands - ready.com), "offset of the load [m]", (3,)))
+    return [carried if first <= number <= last else None for number in range(len(phases))]
+
+
+def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> None:
+    """Check that every contact of the supports lies on a surface of the scene.
+
+    Args:
+        tolerance: Largest gap and overhang of a contact point [m].
+
+    Raises:
+        ScenarioError: For the first contact that is off every surface or overlaps another.
+    """
+    for number, stance in enumerate(phase.stance for phase in flat_sequence(values)):
+        for first, second in combinations(stance, 2):
+            if soles_overlap(first, second):
+                raise values.error(
+                    ("supports", "phases", number, second.effector),
+                    f"overlaps {first.effector}; valid: soles that lie side by side",
+                )
+        for contact in stance:
+            with values.refusing(("supports", "phases", number, contact.effector)):
+                scene.touched_obstacles(contact, tolerance)
+
+
+def _contact(values: ScenarioValues, effector: str, entry: ContactSection, planning: bool) -> Contact:
+    supports = values.explicit_supports()
+    friction, default_sole = supports.friction, supports.sole
+    if planning:
+        friction = supports.planning_friction or friction
+        default_sole = supports.planning_sole or default_sole
+    if effector == "buttocks":
+        stature = values.file.body.stature_m  # the rectangle of the buttocks that presses on a seat
+        default_sole = SoleSection(length_m=SEAT_LENGTH * stature, width_m=SEAT_WIDTH * stature)
+    cap = supports.contact_normal_force_cap_N
+    if entry.polygon is None or not planning:
+        return build_contact(effector, entry, friction, default_sole, planning=planning, force_cap=cap)
+    # What touches of a sole over an edge is drawn together about its own middle, as a whole sole is.
+    real = entry.sole or (default_sole if effector == "buttocks" else supports.sole)
+    made = build_contact(effector, entry, friction, real, force_cap=cap)
+    shares = (min(1.0, default_sole.length_m / real.length_m), min(1.0, default_sole.width_m / real.width_m))
+    points = made.centre + np.array([*shares, 1.0]) * (made.points - made.centre)
+    return replace(made, points=frozen_array(points, "points of a sole [m]", (None, 3)))
 
 
 def build_obstacle(entry: ObstacleSection, folder: Path) -> Obstacle:

@@ -1,10 +1,9 @@
 """Obstacles, support surfaces, and distances between the body and the scene."""
 
 from manikin.runtime.display import make_callable
-from manikin.scene.covering import SphereCover, cover
-from manikin.scene.distance import Clearance, Proximity, ProximityResult, segment_of
-from manikin.scene.footing import Footing, FootingTable, Places
-from manikin.scene.grasp_line import GraspLine
+from manikin.scene.covering import cover
+from manikin.scene.distance import Proximity, segment_of
+from manikin.scene.footing import FootingTable, Places
 from manikin.scene.mesh import Mesh, load_mesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Sphere
 from manikin.scene.scene import Scene
@@ -12,9 +11,8 @@ from manikin.scene.spheres import SphereProximity
 from manikin.scene.surface import Surface
 
 __all__ = [
-    "Box", "Capsule", "Clearance", "Cylinder", "Footing", "FootingTable", "GraspLine", "HalfSpace",
-    "Mesh", "Obstacle", "Places", "Plane", "Proximity", "ProximityResult", "Scene", "Sphere",
-    "SphereCover", "SphereProximity", "Surface", "cover", "load_mesh", "segment_of",
+    "Box", "Capsule", "Cylinder", "FootingTable", "HalfSpace", "Mesh", "Obstacle", "Places", "Plane",
+    "Proximity", "Scene", "Sphere", "SphereProximity", "Surface", "cover", "load_mesh", "segment_of",
 ]  # fmt: skip
 
 

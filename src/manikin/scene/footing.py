@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.contact.contact import MOST_CORNERS
-from manikin.numerics.polygon import convex_polygon, fewer_corners
+from manikin.numerics.polytope import convex_polygon, fewer_corners
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.scene.surface import Surface
 

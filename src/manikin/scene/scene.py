@@ -14,10 +14,9 @@ from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.collision import Meter, collision_parts, part_meter
 from manikin.scene.footing import FootingTable
-from manikin.scene.grasp_line import GraspLine, grasp_lines, grasp_strips, palm_places
 from manikin.scene.merging import COPLANAR, merged_surfaces
 from manikin.scene.obstacle import HalfSpace, Obstacle
-from manikin.scene.surface import Surface
+from manikin.scene.surface import GraspLine, Surface, grasp_lines, grasp_strips, palm_places
 
 FLOOR = "floor"
 """Name of the floor obstacle."""

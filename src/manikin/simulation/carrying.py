@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 
 from manikin.balance.motion_margin import MotionMargin, motion_margin
 from manikin.contact import Contact, ContactKind, ContactModel, SolePart, Stance
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, cross, rotation_from_normal
 
 PRESSES = 1.0

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from manikin.body.load import with_masses
+from manikin.body.strength import with_masses
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
 from manikin.simulation.carrying import CarriedPoints, Sensed, Touch

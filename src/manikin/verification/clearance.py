@@ -17,8 +17,7 @@ from manikin.body.segments import Shape, ShapeKind
 from manikin.numerics.spatial import FloatArray
 from manikin.scene.mesh import Mesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Plane, Sphere
-from manikin.verification.solids import REACH, Solid, box_distance
-from manikin.verification.triangles import segment_segment, segment_triangle
+from manikin.verification.solids import REACH, Solid, box_distance, segment_segment, segment_triangle
 
 _ROUNDS = 46
 _PRISM = 48

@@ -24,8 +24,8 @@ from manikin.numerics.spatial import FloatArray, check_rotation
 from manikin.runtime import __version__
 from manikin.runtime.files import read_json
 from manikin.scenarios import Scenario, ScenarioFile, load_scenario
-from manikin.scenarios.sections import BodySection, ContactSection, SoleSection
-from manikin.scenarios.sequence import build_contact, friction_of
+from manikin.scenarios.sections.planning_sections import BodySection
+from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
 from manikin.scenarios.validation import (
     Duration,
     Number,
@@ -38,6 +38,7 @@ from manikin.scenarios.validation import (
     required,
     validate,
 )
+from manikin.scenarios.world import build_contact, friction_of
 
 FORMAT = "manikin-contact-plan-1"
 """Value of the key ``format``."""

@@ -9,10 +9,9 @@ from scipy.spatial import ConvexHull, QhullError
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import FloatArray
-from manikin.runtime.requirement import Requirement
+from manikin.runtime.requirement import Requirement, Worst
 from manikin.verification.plan_file import nominal_size
 from manikin.verification.solids import Solid
-from manikin.verification.worst import Worst
 
 ON_SURFACE = 2e-3
 """Largest distance of a contact from the surface that it lies on [m]."""

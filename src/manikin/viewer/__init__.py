@@ -51,7 +51,7 @@ def serve_contacts(
     Raises:
         InputError: If the port is taken.
     """
-    from manikin.viewer.contacts import ContactViewer
+    from manikin.viewer.drive import ContactViewer
 
     _run(ContactViewer(live, port), announce)
 

@@ -11,7 +11,7 @@ from manikin.motion import Motion
 from manikin.motion.file import MotionFile
 from manikin.motion.motion import effector_positions
 from manikin.numerics.spatial import FloatArray
-from manikin.runtime.palette import readable
+from manikin.runtime.display import readable
 from manikin.viewer.canvas import COLOURS, BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
 
 FRAME_RATE = 30.0

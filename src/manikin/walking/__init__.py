@@ -1,10 +1,20 @@
 """How people walk: paths, footprints, segments, words, whole-body walks ([Truong2010]_ chapters 3 to 6)."""
 
-from manikin.walking.footsteps.footprints import Footprint, Footprints
-from manikin.walking.footsteps.stepper import StepRule, place_footprints, walked_footprints
+from manikin.walking.footprints import Footprints
 from manikin.walking.gait.follow_path import Walk, WalkController, WalkFrame, walk_along
-from manikin.walking.gait.motion_library import MotionLibrary, load_library, save_library
-from manikin.walking.path.path_plan import walking_path, walking_paths
+from manikin.walking.gait.motion_library import load_library, save_library
+from manikin.walking.goal_categories import (
+    CategorySpread,
+    CategoryStatistics,
+    HolonomicZone,
+    category_goals,
+    category_of,
+    category_statistics,
+    holonomic_ends,
+    holonomic_zone,
+    path_deviation,
+)
+from manikin.walking.path.path_plan import walking_path
 from manikin.walking.path.route import WalkRoute, Waypoint, walking_route
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, floor_plan
 from manikin.walking.path.walking_model import (
@@ -17,41 +27,26 @@ from manikin.walking.path.walking_model import (
     WalkObjective,
     experiment_targets,
 )
-from manikin.walking.path.walking_path import WalkingPath, WalkingResiduals, WalkingTask, walked
-from manikin.walking.segments.goal_categories import (
-    CategorySpread,
-    CategoryStatistics,
-    HolonomicEnds,
-    HolonomicZone,
-    PathDeviation,
-    category_goals,
-    category_of,
-    category_statistics,
-    holonomic_ends,
-    holonomic_zone,
-    path_deviation,
-)
-from manikin.walking.segments.segmentation import (
+from manikin.walking.path.walking_path import WalkingPath, walked
+from manikin.walking.segmentation import (
     HOLONOMIC,
     KINDS,
     NONHOLONOMIC,
     STANDING,
-    OnlineSegmentation,
-    PathSegment,
     PathSegments,
     SegmentationRule,
     ShoulderPaths,
     segment_path,
 )
+from manikin.walking.stepper import StepRule, place_footprints, walked_footprints
 
 __all__ = [
-    "HOLONOMIC", "KINDS", "LITERAL_ORDER", "NONHOLONOMIC", "PROSE_ORDER", "RECORDED_TURNS", "RECORDED_WALKS",
-    "STANDING", "START", "TEST_TARGETS", "CategorySpread", "CategoryStatistics", "Footprint", "Footprints",
-    "HolonomicEnds", "HolonomicZone", "MotionLibrary", "OnlineSegmentation", "PathDeviation", "PathSegment",
-    "PathSegments", "SegmentationRule", "ShoulderPaths", "StepRule", "Walk", "WalkController", "WalkFrame",
-    "WalkObjective", "WalkObstacle", "WalkRoute", "Walker", "WalkingPath", "WalkingResiduals", "WalkingTask",
-    "Waypoint", "category_goals", "category_of", "category_statistics", "experiment_targets", "floor_plan",
-    "holonomic_ends", "holonomic_zone", "load_library", "path_deviation", "place_footprints", "save_library",
-    "segment_path", "walk_along", "walked", "walked_footprints", "walking_path", "walking_paths",
-    "walking_route",
+    "HOLONOMIC", "KINDS", "LITERAL_ORDER", "NONHOLONOMIC", "PROSE_ORDER", "RECORDED_TURNS",
+    "RECORDED_WALKS", "STANDING", "START", "TEST_TARGETS", "CategorySpread", "CategoryStatistics",
+    "Footprints", "HolonomicZone", "PathSegments", "SegmentationRule", "ShoulderPaths", "StepRule",
+    "Walk", "WalkController", "WalkFrame", "WalkObjective", "WalkObstacle", "WalkRoute", "Walker",
+    "WalkingPath", "Waypoint", "category_goals", "category_of", "category_statistics",
+    "experiment_targets", "floor_plan", "holonomic_ends", "holonomic_zone", "load_library",
+    "path_deviation", "place_footprints", "save_library", "segment_path", "walk_along", "walked",
+    "walked_footprints", "walking_path", "walking_route",
 ]  # fmt: skip

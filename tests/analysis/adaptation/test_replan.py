@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manikin.analysis.adaptation import adapt_recording, crop
-from manikin.analysis.adaptation.adapt_recording import HEIGHT_ROOM
-from manikin.analysis.adaptation.contact_adaptation import (
+from manikin.analysis.adaptation import HEIGHT_ROOM, adapt_recording, crop
+from manikin.analysis.contact_adaptation import (
     EARLY,
     REMNANT,
     RISEN,
@@ -22,7 +21,7 @@ from manikin.analysis.adaptation.contact_adaptation import (
     within_toe_strength,
     without_remnants,
 )
-from manikin.analysis.adaptation.effector_adaptation import CUT_HEIGHT, effector_paths
+from manikin.analysis.posture_adaptation import CUT_HEIGHT, effector_paths
 from manikin.balance import pseudo_wrench, wrench_polytope
 from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, sole
 from manikin.errors import InputError

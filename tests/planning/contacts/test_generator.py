@@ -34,8 +34,7 @@ from manikin.planning.contacts.generator import NATURAL_SLACK, UsableEfort, _ord
 from manikin.planning.contacts.limb_collisions import TOUCH, DeepSamples, yielding
 from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
 from manikin.scenarios import load_scenario
-from manikin.scenarios.sequence import contact_rules
-from manikin.scenarios.world import start_posture
+from manikin.scenarios.world import contact_rules, start_posture
 from manikin.scene import Box, Capsule, Cylinder, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
 from manikin.scene.collision import pair_meter
 

@@ -10,7 +10,7 @@ from manikin.motion.motion import LIFT, foot_positions
 from manikin.numerics.spatial import rotation_from_quaternion
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages.context import schedule_in_world
-from manikin.reports.write_outputs import write_outputs
+from manikin.reports.export import write_outputs
 from manikin.scenarios import load_scenario
 
 

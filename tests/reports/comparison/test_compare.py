@@ -13,8 +13,9 @@ from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, poin
 from manikin.errors import FigureError
 from manikin.motion.file import MotionFile
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.comparison import align_phases, compare_runs, timing_rows
-from manikin.reports.comparison.comparison_table import report
+from manikin.reports.alignment import align_phases, timing_rows
+from manikin.reports.comparison import compare_runs
+from manikin.reports.comparison_tables import report
 from manikin.reports.figures import COMPARISONS, write_comparison
 
 LEFT, RIGHT = point("left_foot", (0, 0.1, 0), friction=0.7), point("right_foot", (0, -0.1, 0), friction=0.7)

@@ -8,9 +8,8 @@ from scipy.integrate import solve_ivp
 from manikin.errors import InputError
 from manikin.walking import START
 from manikin.walking.words import STRAIGHT, WordPath, residuals, word_path, word_paths, word_program
-from manikin.walking.words.word_path import words_of
 from manikin.walking.words.word_program import DEGREE, basis
-from manikin.walking.words.word_solver import cheapest, guesses
+from manikin.walking.words.word_solver import cheapest, guesses, words_of
 
 BEGIN = np.array(START)
 

@@ -19,7 +19,7 @@ from manikin.body.limbs import end_segments
 from manikin.contact import Contact, ContactKind, sole
 from manikin.control.dynamics import DynamicsState
 from manikin.errors import BodyError, InputError
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
 
 

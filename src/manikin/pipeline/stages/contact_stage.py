@@ -48,8 +48,7 @@ from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_brace
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import with_supports
-from manikin.scenarios.sequence import contact_rules
-from manikin.scenarios.world import CLIMBING, carried_to
+from manikin.scenarios.world import CLIMBING, carried_to, contact_rules
 from manikin.scene import Scene
 
 

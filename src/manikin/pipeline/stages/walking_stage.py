@@ -25,9 +25,14 @@ from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import walk_before, walking_supports
-from manikin.scenarios.sections import StandSection, WalkerSection, WalkingSection, WaypointSection
-from manikin.scenarios.sequence import flat_sequence
+from manikin.scenarios.sections.task_sections import (
+    StandSection,
+    WalkerSection,
+    WalkingSection,
+    WaypointSection,
+)
 from manikin.scenarios.validation import Path as KeyPath
+from manikin.scenarios.world import flat_sequence
 from manikin.walking import (
     LITERAL_ORDER,
     PROSE_ORDER,
@@ -47,10 +52,10 @@ from manikin.walking import (
     walked_footprints,
     walking_route,
 )
-from manikin.walking.footsteps.footprints import FEET
-from manikin.walking.footsteps.stepper import walked_supports
+from manikin.walking.footprints import FEET
 from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_path import TOLERANCE
+from manikin.walking.stepper import walked_supports
 
 FRICTION = 0.8
 """Coefficient of friction of the soles of a walker."""

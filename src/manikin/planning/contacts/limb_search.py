@@ -27,7 +27,7 @@ from manikin.body import Configuration
 from manikin.body.limbs import limb_placement, limb_slots
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.kinematics import Placement
-from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage

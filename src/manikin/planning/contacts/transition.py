@@ -18,7 +18,7 @@ from manikin.balance import WrenchPolytope, wrench_polytope
 from manikin.balance.criteria import admissible_com_polygon, support_height
 from manikin.balance.margin import wrench_levers
 from manikin.contact import Stance
-from manikin.numerics.polygon import signed_distance
+from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
 
 FORWARD_SPEEDS = (0.0, 0.15, 0.3, 0.45, 0.6)

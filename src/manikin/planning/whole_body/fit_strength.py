@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
-from manikin.body.load import with_masses
+from manikin.body.strength import with_masses
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples

@@ -17,9 +17,12 @@ from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.motion import Motion
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
-from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
+from manikin.recordings.dynamics.recorded_dynamics import (
+    RecordedDynamics,
+    RecordedMargins,
+    margins_of_wrenches,
+)
 from manikin.recordings.dynamics.recorded_forces import torques_of
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, margins_of_wrenches
 from manikin.recordings.readers.markers import ForcePlate
 
 CUTOFF = 20.0
@@ -287,7 +290,7 @@ def compare_torques(
             apart = mine - plates
             found.append(
                 TorqueComparison(
-                    joint, len(mine), float(np.sqrt(np.mean(apart**2))), float(apart.mean()),
+                    joint, len(mine), _rms(apart), float(apart.mean()),
                     float(np.abs(mine).max()), float(np.abs(plates).max()),
                 )
             )  # fmt: skip

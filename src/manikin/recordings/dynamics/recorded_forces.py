@@ -36,8 +36,7 @@ from manikin.contact import ContactSchedule, Stance
 from manikin.motion.motion import Motion
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about, wrench_map
-from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
+from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics, RecordedMargins, recorded_margins
 
 SOFTNESS = 1e-6
 """``e``, per mean eigenvalue of ``G G^T``: so small that little of an admissible wrench is left."""
@@ -293,7 +292,7 @@ def motion_on_contacts(
     are zero but for rounding.
 
     Args:
-        schedule: Its stances, of :func:`manikin.recordings.supports.recorded_stances.recorded_schedule`.
+        schedule: Its stances, of :func:`manikin.recordings.supports.body_supports.recorded_schedule`.
         start: The schedule's clock at the motion's first instant [s].
         margins: Of the same motion on the same stances, where they are known already.
     """

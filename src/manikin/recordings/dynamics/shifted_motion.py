@@ -50,11 +50,11 @@ from manikin.numerics.spatial import (
 )
 from manikin.recordings.dynamics.recorded_dynamics import (
     RecordedDynamics,
+    RecordedMargins,
     dynamics_of_postures,
-    level_heading,
+    margins_within,
 )
-from manikin.recordings.dynamics.recorded_margins import RecordedMargins, margins_within
-from manikin.recordings.reconstruction.proportions import Reconstruction
+from manikin.recordings.reconstruction.proportions import Reconstruction, level_heading
 
 PLACE_ERROR = 0.005
 """``e``: of the centre of mass by markers [m]."""

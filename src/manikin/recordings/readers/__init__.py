@@ -1,1 +1,42 @@
 """Readers of BVH, ASF with AMC, C3D, TRC and MOT files."""
+
+from pathlib import Path
+
+from manikin.errors import InputError
+from manikin.recordings.readers.acclaim import read_amc
+from manikin.recordings.readers.bvh import read_bvh
+from manikin.recordings.readers.c3d import read_c3d
+from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.opensim import read_trc
+from manikin.recordings.readers.skeleton_recording import Recording
+
+READERS = {".bvh": read_bvh, ".amc": read_amc, ".c3d": read_c3d, ".trc": read_trc}
+"""Readers with their defaults, by ending."""
+
+PARTS = {".asf": ".amc", ".mot": ".trc", ".sto": ".trc"}
+"""Endings of what is read along with a recording, and of the recording."""
+
+
+def read_recording(path: str | Path, frames: tuple[int, int] | None = None) -> Recording | MarkerRecording:
+    """Read a recording with the reader of its ending; options are those of the readers themselves.
+
+    Args:
+        path: The file: BVH or AMC for a skeleton, C3D or TRC for markers.
+        frames: First frame and the one after the last, counted from 0 in the file; None for all.
+
+    Raises:
+        InputError: If the ending is unknown, the file cannot be read, or it does not have the frames.
+    """
+    ending = Path(path).suffix.lower()
+    reader = READERS.get(ending)
+    if reader is None and ending in PARTS:
+        raise InputError(f"{path}: is part of a recording only; valid: its {PARTS[ending]} file")
+    if reader is None:
+        raise InputError(f"{path}: no reader for {ending[:40]!r}; valid: {', '.join(READERS)}")
+    found: Recording | MarkerRecording = reader(path)
+    if frames is None:
+        return found
+    first, stop = frames
+    if not 0 <= first < stop <= len(found):
+        raise InputError(f"{path}: frames {first} to {stop}; valid: within 0 to {len(found)}, rising")
+    return found.cut(first, stop)

@@ -28,10 +28,9 @@ from manikin.errors import InputError
 from manikin.kinematics.point_targets import PointTargets, SegmentPlacements
 from manikin.kinematics.tracking import follow, improved
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.readers.marker_sets import MarkerSet, marker_set
+from manikin.recordings.readers.marker_sets import SIDES, MarkerSet, marker_set
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Subject
-from manikin.recordings.reconstruction.anatomy import SIDES
 from manikin.recordings.reconstruction.orientation_targets import placing_targets
 from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle, unit
 

@@ -14,10 +14,9 @@ from scipy.spatial.transform import Rotation
 from manikin.body import BodyModel
 from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.readers.marker_sets import MarkerSet
+from manikin.recordings.readers.marker_sets import SIDES, MarkerSet
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
-from manikin.recordings.reconstruction.anatomy import SIDES
 from manikin.recordings.reconstruction.proportions import (
     CENTRES,
     far_point,

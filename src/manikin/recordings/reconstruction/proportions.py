@@ -14,8 +14,8 @@ from manikin.body.joint_volume import ball_angles, ball_rotation
 from manikin.errors import InputError
 from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.recordings.readers.marker_sets import SIDES, joint_of
 from manikin.recordings.readers.skeleton_recording import Recording
-from manikin.recordings.reconstruction.anatomy import SIDES, joint_of
 from manikin.runtime.display import Displayed
 
 CENTRES = tuple(
@@ -284,3 +284,14 @@ def human_of(
     if mass is None:
         mass = REFERENCE_MASS * (stature / REFERENCE_STATURE) ** 2
     return human(stature, mass, sex, lengths=lengths, off_axis_masses=True)
+
+
+def level_heading(q: FloatArray) -> float:
+    """Mean heading of (n, nq) postures, from the world's x [rad].
+
+    It is that of the pelvis' x axis, or of its z axis, from the hips to the head, for a person who lies.
+    """
+    turn = Rotation.from_quat(q[:, 3:7])
+    ahead, above = (turn.apply(axis).mean(axis=0)[:2] for axis in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
+    way = ahead if np.hypot(*ahead) >= np.hypot(*above) else above
+    return float(np.arctan2(way[1], way[0]))

@@ -14,13 +14,13 @@ from manikin.body.segments import Shape, ShapeKind
 from manikin.errors import InputError, ManikinError
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF, smoothed
+from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording
-from manikin.recordings.readers.read import READERS, read_recording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import person_of, reconstruct
 from manikin.recordings.statistics.phases import PhaseSequence
-from manikin.recordings.supports.recorded_supports import RecordedSupports
+from manikin.recordings.supports.body_supports import RecordedSupports
 from manikin.recordings.supports.supports import supports_of
 
 PARTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -72,22 +72,15 @@ class RecordedClip:
         return PhaseSequence(self.name, self.group, self.supports.phases)
 
 
-def clip_of(
-    found: Reconstruction, name: str, group: str, *, start: float = 0.0, cutoff: float = MOTION_CUTOFF,
-    supports: RecordedSupports | None = None,
-) -> RecordedClip:  # fmt: skip
+def clip_of(found: Reconstruction, name: str, group: str, *, start: float = 0.0) -> RecordedClip:
     """Supports, centre of mass and highest points of a reconstructed recording.
 
     Args:
         found: At least four instants at an even rate, not yet smoothed.
         group: What it is compared with.
         start: What the first frame of the recording is on its clock [s].
-        cutoff: Of the postures [Hz], see :func:`~manikin.recordings.dynamics.recorded_dynamics.smoothed`.
-        supports: Where they are known; those of :func:`~manikin.recordings.supports.supports.supports_of` if
-            None.
     """
-    known = supports_of(found, start=start) if supports is None else supports
-    still = smoothed(found, cutoff)
+    known, still = supports_of(found, start=start), smoothed(found, MOTION_CUTOFF)
     com, tops = com_and_tops(still.body, still.q)
     standing, _ = com_and_tops(still.body, still.body.standing_posture()[None])
     return RecordedClip(

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from manikin.errors import InputError
 from manikin.numerics.signals import Spread
-from manikin.recordings.supports.recorded_supports import SupportPhase
+from manikin.recordings.supports.body_supports import SupportPhase
 from manikin.recordings.supports.supports import FEET
 
 FLIGHT = "flight"

@@ -23,10 +23,8 @@ from manikin.contact.from_motion import schedule_of_support
 from manikin.errors import InputError
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_yaw
-from manikin.recordings.dynamics.recorded_dynamics import level_heading
-from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.body_supports import SEAT, TRUNK
-from manikin.recordings.supports.recorded_supports import RecordedSupports, Support, median_place
+from manikin.recordings.reconstruction.proportions import Reconstruction, level_heading
+from manikin.recordings.supports.body_supports import SEAT, TRUNK, RecordedSupports, Support, median_place
 from manikin.recordings.supports.support_levels import REST
 from manikin.recordings.supports.supports import sole_points
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.recorded_supports import Support, median_place
+from manikin.recordings.supports.body_supports import Support, median_place
 from manikin.recordings.supports.support_levels import CUTOFF as SUPPORT_LEVELS_CUTOFF
 from manikin.recordings.supports.support_levels import Track, com_path, slowest_speed, track
 

@@ -1,5 +1,22 @@
-"""Figures of runs and of recordings, one function each; no window and no global state is used."""
+"""Figures of runs and of recordings, one function each; no window and no global state is used.
 
+A figure raises :class:`~manikin.errors.FigureError` if there is nothing for it to show.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from manikin.errors import FigureError
+from manikin.pipeline.run_directory import RunRecord
+from manikin.reports.comparison import RunComparison
 from manikin.reports.figures.com import (
     LowestPoints,
     com_distances_figure,
@@ -26,10 +43,11 @@ from manikin.reports.figures.walks import (
     equal_paths_figure,
     holonomic_ends_figure,
     holonomic_zone_figure,
+    walk_paths_figure,
     walking_paths_figure,
     words_figure,
 )
-from manikin.reports.figures.write_figures import COMPARISONS, FIGURES, write_comparison, write_figures
+from manikin.runtime.files import atomic_path, writing
 
 __all__ = [
     "COMPARISONS", "FIGURES", "ChoicePanel", "LowestPoints", "com_distances_figure", "com_figure",
@@ -41,3 +59,108 @@ __all__ = [
     "push_map_figure", "scene_figure", "timing_figure", "tracking_figure", "walking_paths_figure",
     "words_figure", "write_comparison", "write_figures", "zmp_figure",
 ]  # fmt: skip
+
+
+FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
+    "com": com_figure,
+    "margin": margin_figure,
+    "footprints": footprint_figure,
+    "walk_paths": walk_paths_figure,
+    "zmp": zmp_figure,
+    "planes": planes_figure,
+    "contacts": contacts_figure,
+    "timing": timing_figure,
+    "scene": scene_figure,
+    "postures": postures_figure,
+    "flights": flights_figure,
+    "effectors": effectors_figure,
+    "tracking": tracking_figure,
+}
+"""Every figure of a run by the name of its file."""
+
+
+COMPARISONS: dict[str, Callable[[RunComparison], Figure]] = {
+    "compare_timing": compare_timing_figure,
+    "compare_planes": compare_planes_figure,
+    "compare_scene": compare_scene_figure,
+    "compare_margin": compare_margin_figure,
+    "compare_postures": compare_postures_figure,
+}
+"""Every figure of two runs by the name of its file."""
+
+T = TypeVar("T")
+
+
+def write_figures(
+    record: RunRecord, folder: str | Path, on_done: Callable[[float], None] | None = None
+) -> list[Path]:
+    """Draw the figures that apply and write them as PNG files, each atomically.
+
+    A figure that the run has no data for (no execution, no hand, a wall) is left out.
+
+    Args:
+        on_done: Told the share of figures done after each.
+
+    Returns:
+        The files written.
+
+    Raises:
+        MotionFileError: If the folder cannot be written to.
+    """
+    return _write(FIGURES, record, Path(folder), on_done)
+
+
+def write_comparison(
+    comparison: RunComparison, folder: str | Path, on_done: Callable[[float], None] | None = None
+) -> list[Path]:
+    """Draw the figures of two runs that apply, as :func:`write_figures` does for one.
+
+    Raises:
+        MotionFileError: If the folder cannot be written to.
+    """
+    return _write(COMPARISONS, comparison, Path(folder), on_done)
+
+
+def comparison_pictures(comparison: RunComparison) -> dict[str, bytes]:
+    """PNG files of the figures of two runs that apply, by what they show."""
+    result = {}
+    for name, draw in COMPARISONS.items():
+        with suppress(FigureError):
+            result[name.replace("_", " ")] = png_of(draw(comparison))
+    return result
+
+
+def _write(
+    figures: Mapping[str, Callable[[T], Figure]],
+    data: T,
+    folder: Path,
+    on_done: Callable[[float], None] | None,
+) -> list[Path]:
+    written = []
+    for number, (name, draw) in enumerate(figures.items()):
+        with suppress(FigureError):
+            save_figure(draw(data), path := folder / f"{name}.png")
+            written.append(path)
+        if on_done is not None:
+            on_done((number + 1) / len(figures))
+    return written
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as a PNG file, atomically.
+
+    Raises:
+        MotionFileError: If it cannot be written.
+    """
+    with writing(path), atomic_path(path) as temporary:
+        temporary.write_bytes(png_of(figure))
+
+
+def png_of(figure: Figure) -> bytes:
+    """Content of a PNG file."""
+    # One drawing instead of the two of savefig; and the same data gives the same bytes.
+    canvas, content = FigureCanvasAgg(figure), BytesIO()
+    canvas.draw()
+    image = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+    image.save(content, format="png", compress_level=4, dpi=(figure.dpi, figure.dpi))
+    return content.getvalue()

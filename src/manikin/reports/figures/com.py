@@ -33,7 +33,7 @@ from manikin.reports.figures.style import (
 )
 from manikin.reports.figures.timeline import timeline
 from manikin.reports.figures.views import VIEWS, View, distinct_contacts, draw_contact, draw_obstacles
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 
 
 def planes_figure(record: RunRecord) -> Figure:
@@ -41,9 +41,6 @@ def planes_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a planned CoM, or at least one motion.
-
-    Raises:
-        FigureError: If it has neither.
     """
     tracks = need(record.tracks, "a motion of the centre of mass")
     phases = need(record.phases, "phases")
@@ -142,9 +139,6 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
     Args:
         groups: At least one with a height.
         standing: Height of the centre of mass in standing, drawn as a line [m].
-
-    Raises:
-        FigureError: If there is no height.
     """
     shown = need([item for item in groups if item.com], "a height of the centre of mass")
     figure, grid = new_grid(9.6, 4.4, "Lowest centre of mass", 1, 2, top=0.8, across=0.9)
@@ -193,9 +187,6 @@ def com_distances_figure(
         limit: Drawn as a dashed line [m].
         published: Largest distances by effector, such as those of
             :func:`~manikin.recordings.statistics.phases.published_distances`.
-
-    Raises:
-        FigureError: If nothing is known of any effector.
     """
     known = published or {}
     result = [(clip, item) for clip in clips for item in support_distances(clip)]
@@ -253,9 +244,6 @@ def com_paths_figure(
         clips: At least one; a colour for each group.
         origins: Of each motion, from where it is seen.
         overhead: Height of what they pass under, drawn as a line; None for nothing [m].
-
-    Raises:
-        FigureError: If there is no motion, or not one origin for each.
     """
     motions = list(need(list(clips), "a recorded motion"))
     if len(motions) != len(origins):
@@ -318,9 +306,6 @@ def com_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a planned CoM, or at least one motion.
-
-    Raises:
-        FigureError: If it has neither.
     """
     tracks = need(record.tracks, "a motion of the centre of mass")
     shown = timeline(

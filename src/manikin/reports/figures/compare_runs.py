@@ -10,8 +10,8 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.pipeline.run_directory import ComTrack
-from manikin.reports.comparison import RunComparison, TimingRow
-from manikin.reports.comparison.compare import STAGES, tracks_of
+from manikin.reports.alignment import TimingRow
+from manikin.reports.comparison import STAGES, RunComparison, tracks_of
 from manikin.reports.figures.com import draw_paths, frame_plane, mark_instants, planes_grid
 from manikin.reports.figures.scene import (
     GAP,
@@ -36,15 +36,11 @@ from manikin.reports.figures.style import (
     support_keys,
 )
 from manikin.reports.figures.views import ALONG_X, ALONG_Y, VIEWS
-from manikin.runtime.palette import COLOURS, readable
+from manikin.runtime.display import COLOURS, readable
 
 
 def compare_margin_figure(comparison: RunComparison) -> Figure:
-    """Draw the margins of each stage over matched phases, each phase drawn equally wide.
-
-    Raises:
-        FigureError: If no stage with the same unit of margin is there in both runs, or no phase matches.
-    """
+    """Draw the margins of each stage over matched phases, each phase drawn equally wide."""
     rows = [row for row in comparison.rows if row.first is not None and row.second is not None]
     need(rows, "a phase that both runs have", "two runs")
     first, second = tracks_of(comparison.first), tracks_of(comparison.second)
@@ -100,9 +96,6 @@ def compare_postures_figure(comparison: RunComparison) -> Figure:
     """Draw the bodies of both runs at matching key instants, one row each ([Qiu2012]_ Fig. 7.19).
 
     Under each pair stand the joints that differ most.
-
-    Raises:
-        FigureError: If a run has no such motion or no body, or no phase matches.
     """
     which = need(comparison.postures_of, "a whole-body motion of the same kind in both runs")
     postures = list(need(comparison.postures, "a phase that both runs have"))
@@ -151,9 +144,6 @@ def compare_timing_figure(comparison: RunComparison) -> Figure:
     """Draw both runs as a bar of phases, and the durations side by side ([Qiu2012]_ Fig. 7.16).
 
     Lines join the key instants of matched phases; phases without a match are hatched.
-
-    Raises:
-        FigureError: If a run has no contact schedule.
     """
     rows = need(comparison.rows, "phases of both runs")
     most = max(len(row.supports) for row in rows)
@@ -217,11 +207,7 @@ def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str
 
 
 def compare_planes_figure(comparison: RunComparison) -> Figure:
-    """Draw both CoM paths on xy, xz and yz, enlarged to the paths ([Qiu2012]_ Fig. 7.18).
-
-    Raises:
-        FigureError: If a run has no CoM.
-    """
+    """Draw both CoM paths on xy, xz and yz, enlarged to the paths ([Qiu2012]_ Fig. 7.18)."""
     tracks = _tracks(comparison)
     seen = np.vstack([track.position for track in tracks.values()])
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -241,11 +227,7 @@ def compare_planes_figure(comparison: RunComparison) -> Figure:
 
 
 def compare_scene_figure(comparison: RunComparison) -> Figure:
-    """Draw both CoM paths in space, with the scene and supports of the first run ([Qiu2012]_ Fig. 7.17).
-
-    Raises:
-        FigureError: If a run has no CoM.
-    """
+    """Draw both CoM paths in space, with the scene and supports of the first run ([Qiu2012]_ Fig. 7.17)."""
     tracks, first = _tracks(comparison), comparison.first
     figure = new_figure(9.5, 8.0, "Centres of mass of two runs")
     axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)

@@ -29,7 +29,7 @@ from manikin.reports.figures.views import (
     finite_obstacles,
     panel_ticks,
 )
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 from manikin.scene import Scene
 
 MARGIN = 0.3
@@ -70,9 +70,6 @@ def contact_choice_figure(
         elevation_deg: Height of the eye above the horizon [deg].
         azimuth_deg: Direction of the eye about the vertical [deg].
         columns: Panels in a row; all when omitted.
-
-    Raises:
-        FigureError: If there is no panel.
     """
     need(panels, "a panel", "at least one body")
     wide = columns or len(panels)
@@ -227,9 +224,6 @@ def contacts_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a schedule; the CoM is drawn when there is one.
-
-    Raises:
-        FigureError: If there is no schedule, or it has more than :data:`MOST` phases.
     """
     schedule = need(record.schedule, "a contact schedule")
     need(len(schedule.sequence) <= MOST, f"at most {MOST} phases")

@@ -21,7 +21,7 @@ from manikin.reports.figures.style import (
     span_at_least,
 )
 from manikin.reports.figures.timeline import timeline
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 
 _AXIS_COLOURS = ("#0072B2", "#009E73", "#E69F00")
 
@@ -31,9 +31,6 @@ def tracking_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With both motions, and the body.
-
-    Raises:
-        FigureError: If one of them is missing.
     """
     planned = need(record.motions.get("planned"), "a planned motion")
     executed = need(record.motions.get("executed"), "an executed motion")
@@ -76,9 +73,6 @@ def flights_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a planned motion, the body and a schedule.
-
-    Raises:
-        FigureError: If one is missing, or nothing leaves its contact.
     """
     schedule = need(record.schedule, "a contact schedule")
     planned = need(record.motions.get("planned"), "a planned whole-body motion")
@@ -151,9 +145,6 @@ def effectors_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a motion and the body; the largest error is named when there are both motions.
-
-    Raises:
-        FigureError: If there is no whole-body motion.
     """
     paths = need(record.effector_paths, "a whole-body motion and the body")
     names = list(next(iter(paths.values())))

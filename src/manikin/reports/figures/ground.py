@@ -30,7 +30,7 @@ from manikin.reports.figures.style import (
 )
 from manikin.reports.figures.timeline import timeline
 from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, sections
-from manikin.runtime.palette import COLOURS, CYCLE, colours_of, readable
+from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
 from manikin.scene import HalfSpace, Plane, Scene
 from manikin.simulation import PushMap
 from manikin.simulation.push_map import told_apart
@@ -53,9 +53,6 @@ def zmp_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a schedule and a motion or a planned CoM.
-
-    Raises:
-        FigureError: If there is no phase in which the ZMP decides about balance.
     """
     schedule = need(record.schedule, "a contact schedule")
     paths = need(record.zmp, "a motion of the centre of mass")
@@ -161,9 +158,6 @@ def footprint_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a planned CoM, or at least one motion, and something to stand on.
-
-    Raises:
-        FigureError: If nothing moves, or all contacts are on walls.
     """
     tracks = need(record.tracks, "a motion of the centre of mass")
     contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
@@ -264,9 +258,6 @@ def push_map_figure(maps: Sequence[PushMap], soles: Sequence[FloatArray] = ()) -
     Args:
         maps: At least one with a known direction.
         soles: (k, 2) corners of each, from the centre of mass [m].
-
-    Raises:
-        FigureError: If there is nothing to draw.
     """
     if not any(np.any(np.isfinite(item.held)) for item in maps):
         raise FigureError("this figure needs an impulse that was held; valid: a map with one")

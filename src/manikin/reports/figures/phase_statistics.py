@@ -24,7 +24,7 @@ from manikin.reports.figures.style import (
     note,
     support_colour,
 )
-from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.runtime.display import COLOURS, colours_of, readable
 
 SHARE = 0.5
 """Share of the places inside an ellipse, for a normal distribution."""
@@ -38,9 +38,6 @@ def placements_figure(groups: Mapping[str, Sequence[SupportPlacement]]) -> Figur
 
     Args:
         groups: Placements by group, one panel each; the origin of the frame is the cross.
-
-    Raises:
-        FigureError: If there is no placement.
     """
     shown = need({name: result for name, result in groups.items() if result}, "a placement")
     everywhere = np.vstack([item.places for result in shown.values() for item in result])
@@ -99,9 +96,6 @@ def phase_durations_figure(sequences: Sequence[PhaseSequence], by: By = "number"
     Args:
         sequences: Recorded or published motions.
         by: What phases have in common that are averaged; ``number`` for motions that begin alike.
-
-    Raises:
-        FigureError: If there is no motion.
     """
     motions = need([item for item in sequences if item.phases], "a motion with phases")
     groups = by_group(motions)

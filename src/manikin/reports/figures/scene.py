@@ -30,7 +30,7 @@ from manikin.reports.figures.views import (
     finite_obstacles,
     panel_ticks,
 )
-from manikin.runtime.palette import COLOURS, colours_of, side_colour
+from manikin.runtime.display import COLOURS, colours_of, side_colour
 from manikin.scene import Box, Obstacle, Scene
 
 MOST = 9
@@ -48,9 +48,6 @@ def postures_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a whole-body motion and the body.
-
-    Raises:
-        FigureError: If one is missing.
     """
     motions = need(record.motions, "a whole-body motion")
     need(record.body, "a body")
@@ -159,17 +156,12 @@ MOST_TICKS = 9
 """Ticks of the longest axis; the others have fewer."""
 
 
-def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: float = -62.0) -> Figure:
+def scene_figure(record: RunRecord) -> Figure:
     """Draw the CoM's path, the obstacles, the supports and the body ([Qiu2012]_ Fig. 5.21, 7.7, 7.8).
 
     Args:
         record: With a planned CoM, or at least one motion; body, scene and schedule are drawn
             when they are there.
-        elevation_deg: Height of the eye above the horizon [deg].
-        azimuth_deg: Direction of the eye about the vertical [deg].
-
-    Raises:
-        FigureError: If there is nothing that moves.
     """
     name, track = list(need(record.tracks, "a motion of the centre of mass").items())[-1]
     motion = record.motions.get(name)
@@ -191,7 +183,7 @@ def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: fl
             *places.T, s=18, color=COLOURS["ink"], zorder=9, depthshade=False, label="at the key instants"
         )
     frame(axes, np.vstack(seen), corners)
-    axes.view_init(elevation_deg, azimuth_deg)
+    axes.view_init(14.0, -62.0)
     if figure_of is not None and motion is not None:
         _label_heads(axes, figure_of, motion, record.schedule)
     axes.legend(loc="upper right", fontsize=8, frameon=False)

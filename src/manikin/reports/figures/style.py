@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
-from matplotlib.transforms import Bbox, Transform
+from matplotlib.transforms import Bbox
 
 from manikin.errors import FigureError
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
-from manikin.runtime.palette import COLOURS, readable
+from manikin.runtime.display import COLOURS, readable
 
 _WIDTH = 0.64
 """Width of a character over the size of its font, of the widest digits."""
@@ -31,15 +31,10 @@ class Labels:
     The limits of the axes have to be final, for they say how far apart two places are drawn.
     """
 
-    def __init__(self, axes: Axes, transform: Transform | None = None) -> None:
-        """Begin without any text.
-
-        Args:
-            axes: To write on.
-            transform: From the places' coordinates to those of the display; of the data when omitted.
-        """
+    def __init__(self, axes: Axes) -> None:
+        """Begin without any text on axes; places are in the coordinates of their data."""
         axes.apply_aspect()
-        self._axes, self._transform = axes, transform or axes.transData
+        self._axes, self._transform = axes, axes.transData
         self._point = axes.figure.dpi / 72.0
         self._taken: list[Bbox] = []
 

@@ -32,7 +32,7 @@ from manikin.reports.figures.style import (
     support_colour,
     support_keys,
 )
-from manikin.runtime.palette import COLOURS, CYCLE, colours_of, readable
+from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
 
 AT_LIMIT = 1e-3
 """A duration this close to its bound is at it [s]."""
@@ -46,9 +46,6 @@ def timing_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a schedule; loaded contacts are drawn when there is an execution.
-
-    Raises:
-        FigureError: If there is no schedule.
     """
     schedule = need(record.schedule, "a contact schedule")
     phases = need(record.phases, "phases")
@@ -151,9 +148,6 @@ def margin_figure(record: RunRecord) -> Figure:
 
     Args:
         record: With a planned CoM, or at least one motion.
-
-    Raises:
-        FigureError: If it has neither.
     """
     curves = need(margin_curves(record), "a motion of the centre of mass")
     phases = need(record.phases, "phases")
@@ -313,9 +307,6 @@ def timeline(
         columns: Of strips and panels.
         strip: Height of the strip for each effector, relative to that of a panel.
         margins: Of :func:`manikin.reports.figures.style.new_grid`.
-
-    Raises:
-        FigureError: If the record has no phases.
     """
     phases = need(record.phases, "phases")
     heights = [strip * max(len(record.effectors), 2)] + [1.0] * panels
@@ -390,9 +381,6 @@ def ergonomics_figure(found: Ergonomics, title: str = "Ergonomics") -> Figure:
 
     Args:
         found: Of a motion of more than one frame.
-
-    Raises:
-        FigureError: If there is neither a score nor a torque to draw.
     """
     posture, strength = found.posture, found.strength
     rows = 2 * (posture is not None) + (strength is not None)

@@ -12,9 +12,9 @@ from matplotlib.patches import Rectangle
 
 from manikin.body import BodyModel, Shape, ShapeKind
 from manikin.contact import Contact, ContactSchedule, SolePart
-from manikin.numerics.polygon import convex_polygon
+from manikin.numerics.polytope import convex_polygon
 from manikin.numerics.spatial import FloatArray
-from manikin.runtime.palette import COLOURS, side_colour
+from manikin.runtime.display import COLOURS, side_colour
 from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 _LINE = 1e-4

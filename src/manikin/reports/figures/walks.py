@@ -14,7 +14,7 @@ from matplotlib.patches import Patch, Polygon
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.reports.figures.style import draw_heading, dress, legend_in_title, need, new_figure, new_grid
-from manikin.runtime.palette import COLOURS
+from manikin.runtime.display import COLOURS
 from manikin.walking import (
     HOLONOMIC,
     NONHOLONOMIC,
@@ -27,7 +27,7 @@ from manikin.walking import (
     floor_plan,
     segment_path,
 )
-from manikin.walking.segments.goal_categories import THESIS_RADIUS
+from manikin.walking.goal_categories import THESIS_RADIUS
 from manikin.walking.words import STRAIGHT, THESIS_WORDS, EqualPaths, WordPath, WordSlice
 
 EVERY = 0.5
@@ -45,9 +45,6 @@ def walk_paths_figure(record: RunRecord) -> Figure:
 
     Args:
         record: Of a run with a walk.
-
-    Raises:
-        FigureError: If there is no walk.
     """
     walks = need(dict(record.walks), "a way over the floor")
     figure = new_figure(8.6, 6.4, "Ways over the floor, from above")
@@ -125,9 +122,6 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
 
     Args:
         zones: By the title of their panel.
-
-    Raises:
-        FigureError: If no goal counts.
     """
     shown = {name: zone for name, zone in zones.items() if np.any(zone.considered)}
     need(shown, "a goal aside or ahead of a start that counts", "a zone")
@@ -171,9 +165,6 @@ def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figur
 
     Args:
         statistics: By category.
-
-    Raises:
-        FigureError: If there is no category.
     """
     need(statistics, "a walk of a category", "statistics")
     figure = new_figure(8.4, 5.2, "Holonomic ends of walks by category")
@@ -207,9 +198,6 @@ def walking_paths_figure(groups: Mapping[str, Sequence[WalkingPath]], title: str
 
     Args:
         groups: Paths by the title of their panel.
-
-    Raises:
-        FigureError: If there is no path.
     """
     shown = {name: paths for name, paths in groups.items() if paths}
     need(shown, "a walking path", "a group")
@@ -269,7 +257,6 @@ WORD_COLOURS = {
 """Blue begins with I, orange with D; two arcs are green and pink."""
 
 _OTHER = "#8A8A8A"
-_BESIDE_WORDS = 0.5
 
 
 def words_figure(slices: Sequence[WordSlice]) -> Figure:
@@ -278,9 +265,6 @@ def words_figure(slices: Sequence[WordSlice]) -> Figure:
     On the left, places are squares; black lines run between neighbours whose paths do not bend into each
     other. On the right are paths to the marked goals, farthest inside the places of each word; points on
     them are switching points.
-
-    Raises:
-        FigureError: If there is no slice.
     """
     need(slices, "a slice of words", "a partition")
     figure, grid = new_grid(
@@ -306,9 +290,6 @@ def equal_paths_figure(pairs: Sequence[EqualPaths]) -> Figure:
 
     Args:
         pairs: One row of the figure each.
-
-    Raises:
-        FigureError: If there is no pair.
     """
     need(pairs, "a pair of paths of equal cost", "a partition")
     figure, grid = new_grid(

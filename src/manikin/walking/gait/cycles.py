@@ -1,19 +1,28 @@
-"""Walking cycles in a recorded motion: when feet touch the floor, and from which toe-off to which to cut."""
+"""Walking cycles in a recorded motion: when feet touch the floor, and from which toe-off to which to cut.
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+Skeletons leave the tilt of the pelvis and the level of the feet open; both are settled in the same way for
+every cycle. The reference body is wider than some recorded people: limbs are spread until they are clear of
+it. Blends of several people need the habits of each taken out.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.kinematics.leg_kinematics import LegKinematics
-from manikin.numerics.signals import SHARES, low_passed
-from manikin.numerics.spatial import FloatArray
-from manikin.recordings.reconstruction.anatomy import SIDES
-from manikin.walking.gait.stance_foot import Sole, borders
+from manikin.numerics.signals import SHARES, fourier_basis, low_passed, shifted
+from manikin.numerics.spatial import FloatArray, quaternions, rotations
+from manikin.recordings.readers.marker_sets import SIDES
+from manikin.walking.gait.motion_library import ROOT, MotionLibrary
+from manikin.walking.gait.stance_foot import FootPlacement, Sole, borders
 
 SLOW, SLOW_SHARE = 0.3, 0.15
 """A point slower than this [m/s], or than this share of its fastest [-], may stand on the floor."""
@@ -145,3 +154,250 @@ def _without_short(values: NDArray[np.bool_], kind: bool, least: int) -> NDArray
         if values[first] == kind and last - first < least and first > 0 and last < len(values):
             kept[first:last] = not kind
     return kept
+
+
+INSTANTS = 24
+"""Instants of a cycle at which limbs may touch."""
+
+ARM_STEP, LEG_STEP = np.deg2rad(2.5), np.deg2rad(0.75)
+"""Step by which limbs are spread [rad]."""
+
+ARMS, LEGS = 3 * ARM_STEP, 2 * LEG_STEP
+"""Spread of every cycle, so that neighbours differ the less in it [rad]."""
+
+_ARMS, _LEGS = ("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot", "toes")
+
+
+def spread(body: BodyModel, coefficients: FloatArray) -> FloatArray:
+    """Coefficients with both arms, and both legs, abducted until they touch neither the body nor each other.
+
+    By equal angles on both sides and the same throughout the cycle: 7.5 to 20 degrees for arms, 1.5 to 5.25
+    for legs. Legs that cross in a turn may still touch.
+
+    Args:
+        body: The reference body.
+        coefficients: (2 k + 1, s) of one cycle.
+    """
+    coefficients = np.array(coefficients)
+    data, geometry = body.pinocchio.createData(), pin.GeometryData(body.geometry)
+    shoulders, hips = (
+        [len(ROOT) + body.joint_index(f"{side}_{name}_abduction") for side in SIDES]
+        for name in ("shoulder", "hip")
+    )
+    coefficients[0, shoulders] += ARMS
+    coefficients[0, hips] += LEGS
+    pairs = _pairs(body)
+    for _ in range(5):
+        touching = _touching(body, coefficients, data, geometry)
+        arms, legs = (bool(np.any(touching[chosen])) for chosen in pairs)
+        if not arms and not legs:
+            break
+        coefficients[0, shoulders] += ARM_STEP * arms
+        coefficients[0, hips] += LEG_STEP * legs
+    return coefficients
+
+
+def _pairs(body: BodyModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(pairs,) whether a pair of shapes has an arm, and whether it is one of legs."""
+    names = [shape.name.split("/")[0] for shape in body.geometry.geometryObjects]
+    both = [(names[pair.first], names[pair.second]) for pair in body.geometry.collisionPairs]
+    arms = np.array([any(name.endswith(_ARMS) for name in pair) for pair in both])
+    legs = np.array([all(name.endswith(_LEGS) for name in pair) for pair in both])
+    return arms, legs & ~arms
+
+
+def _touching(body: BodyModel, coefficients: FloatArray, data: Any, geometry: Any) -> NDArray[np.bool_]:
+    """(pairs,) whether they touch at any instant."""
+    signals, angles = _signals(body, coefficients, np.arange(INSTANTS) / INSTANTS)
+    turns = quaternions(signals[:, 5], signals[:, 4], signals[:, 3])
+    touching = np.zeros(len(body.geometry.collisionPairs), dtype=np.bool_)
+    for posture in np.hstack([np.zeros((INSTANTS, 3)), turns, angles]):
+        pin.computeCollisions(body.pinocchio, data, body.geometry, geometry, posture, False)
+        touching |= [result.isCollision() for result in geometry.collisionResults]
+    return touching
+
+
+def _signals(body: BodyModel, coefficients: FloatArray, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, s) signals of a cycle at phases, and (n, h) angles of the hinges within their ranges [rad]."""
+    signals = fourier_basis(phase, (len(coefficients) - 1) // 2) @ coefficients
+    return signals, np.clip(signals[:, len(ROOT) :], body.lower, body.upper)
+
+
+RUNNING, RUNNING_WIDTH = 2.05, 0.15
+"""Speed of the preferred transition of adults from walks to runs, and width of the change [m/s]."""
+
+DOUBT, TREND_DOUBT = 0.05, 0.01
+"""Squared differences [rad^2] over offsets [rad^2]: how readily offsets, and trends, are believed."""
+
+_FIRST = ROOT.index("roll")
+
+
+def as_one_person(
+    body: BodyModel, cycles: Sequence[MotionLibrary], persons: Sequence[str]
+) -> list[MotionLibrary]:
+    """Cycles with the mean postures of the person who has most of them, equal on both sides.
+
+    People hold arms, back and head in their own ways, and skeletons are fitted to them in different ways;
+    blends of neighbouring cycles of two people would change with the speed from one habit to another. The
+    mean angle of a hinge in a cycle is taken as a function of the velocity, the same for all, plus an offset
+    of the person. What is equal on both sides is an even function of lateral and angular
+    velocity, what is opposite an odd one; each is fitted by linear least squares. Only offsets are taken
+    out, and only of mean angles; the movement stays that of the person.
+
+    Args:
+        body: The reference body.
+        cycles: Libraries of one cycle each.
+        persons: Name of the person who made each.
+    """
+    everyone = sorted(set(persons))
+    main = Counter(persons).most_common(1)[0][0]
+    velocities = np.concatenate([cycle.velocities for cycle in cycles])
+    means = np.concatenate([cycle.coefficients[:, 0] for cycle in cycles])
+    reflected = np.concatenate([cycle.mirrored(body).coefficients[:, 0] for cycle in cycles])
+    even, odd = _trends(velocities)
+    equal = _offsets(even, persons, [name for name in everyone if name != main], 0.5 * (means + reflected))
+    opposite = _offsets(odd, persons, everyone, 0.5 * (means - reflected))
+    alike = []
+    for cycle, person in zip(cycles, persons, strict=True):
+        coefficients = np.array(cycle.coefficients)
+        offset = equal.get(person, 0.0) + opposite[person]
+        coefficients[:, 0, _FIRST:] -= offset[_FIRST:]
+        alike.append(replace(cycle, coefficients=coefficients))
+    return alike
+
+
+def _offsets(
+    trend: FloatArray, persons: Sequence[str], chosen: Sequence[str], means: FloatArray
+) -> dict[str, FloatArray]:
+    """(s,) offsets of the chosen persons from what the trend explains of (n, s) means."""
+    who = np.array([[float(person == name) for name in chosen] for person in persons])
+    table = np.hstack([trend, who.reshape(len(persons), len(chosen))])
+    doubt = np.full(table.shape[1], DOUBT)
+    doubt[: trend.shape[1]] = TREND_DOUBT
+    solution = np.linalg.solve(table.T @ table + np.diag(doubt), table.T @ means)
+    return dict(zip(chosen, solution[trend.shape[1] :], strict=True))
+
+
+def _trends(velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Even (n, 9) and odd (n, 3) functions of (n, 3) velocities."""
+    forward, left, angular = velocities.T
+    speed = np.hypot(forward, left)
+    running = 0.5 * (1.0 + np.tanh((speed - RUNNING) / (2.0 * RUNNING_WIDTH)))
+    even = np.column_stack([
+        np.ones_like(speed), forward, speed, forward**2, left**2, angular**2, np.abs(angular), np.abs(left),
+        running,
+    ])  # fmt: skip
+    return even, np.column_stack([left, angular, angular * speed])
+
+
+TILT, TILT_SHARE = np.deg2rad(10.0), 0.5
+"""Mean forward tilt of the pelvis under an upright trunk [rad], and its share of the trunk's lean."""
+
+MIDDLE = (0.3, 0.7)
+"""Part of a stance in which the sole lies flat."""
+
+MOST_LEVELLED = np.deg2rad(15.0)
+"""A sole with more pitch than this does not lie flat [rad]."""
+
+LIFTED = 0.02
+"""A sole whose lower end is higher than this has left the floor, or not yet landed [m]."""
+
+MOST_TRIMMED = 0.25
+"""Share of a stance by which either end is moved at most."""
+
+_HEIGHT = ROOT.index("height")
+
+
+def tilted(body: BodyModel, q: FloatArray, within: NDArray[np.bool_] | None = None) -> FloatArray:
+    """Postures with the mean pelvis tilt that goes with the trunk's lean; trunk and legs stay as they are.
+
+    Joint centres of a skeleton tell the pelvis' tilt loosely: recordings differ by 15 degrees. The first
+    hinges of hips and lumbar spine are parallel to the axis of the tilt and undo it.
+
+    Args:
+        body: A human.
+        q: (n, nq) postures.
+        within: (n,) postures whose mean counts; all if omitted.
+    """
+    pelvis = Rotation.from_quat(q[:, 3:7])
+    lumbar, thorax = (7 + body.joint_index(f"{name}_flexion") for name in ("lumbar", "thorax"))
+    counted = np.ones(len(q), dtype=np.bool_) if within is None else within
+    pitch = pelvis.as_euler("ZYX")[counted, 1].mean()
+    lean = pitch + (q[:, lumbar] + q[:, thorax])[counted].mean()
+    turn = TILT + TILT_SHARE * lean - pitch
+    tilted_q = q.copy()
+    tilted_q[:, 3:7] = (pelvis * Rotation.from_rotvec([0.0, turn, 0.0])).as_quat()
+    tilted_q[:, lumbar] -= turn
+    for side in SIDES:
+        tilted_q[:, 7 + body.joint_index(f"{side}_hip_flexion")] += turn
+    return tilted_q
+
+
+def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> FloatArray:
+    """Coefficients with soles that are flat in the middle of the stance and, in the median, on the floor.
+
+    Joint angles of a person with other proportions put the feet of the reference body a little higher or
+    lower, and at other angles; the means of ankle and height make up for it.
+
+    Args:
+        body: The reference body.
+        coefficients: (2 k + 1, s) of one cycle.
+        events: (3,) phases as of :class:`manikin.walking.gait.motion_library.MotionLibrary`.
+    """
+    level = np.array(coefficients)
+    landing, off, other = events
+    spans = ((landing, 1.0), (other, off))
+    for number, (first, last) in enumerate(spans):
+        middle = first + np.linspace(MIDDLE[0], MIDDLE[1], 16) * (last - first)
+        pitch = float(np.median(_feet(body, level, middle).pitch[number]))
+        slot = len(ROOT) + body.joint_index(f"{SIDES[number]}_ankle_dorsiflexion")
+        level[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
+    stances = [
+        _feet(body, level, np.linspace(first, last, 64)).clearance[number]
+        for number, (first, last) in enumerate(spans)
+    ]
+    level[0, _HEIGHT] -= np.median(np.concatenate(stances))
+    return level
+
+
+def on_the_floor(
+    body: BodyModel, coefficients: FloatArray, events: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Cycle and events whose stances begin and end with the sole on the floor.
+
+    The recorded toes leave the floor later than the ball of the foot, over which ours rolls.
+
+    Args:
+        body: The reference body.
+        coefficients: (2 k + 1, s) of one cycle, levelled.
+        events: (3,) phases.
+
+    Returns:
+        Coefficients that begin where the left sole leaves the floor, and (3,) phases.
+    """
+    landing, off, other = events
+    (left_on, left_off), (right_on, right_off) = (
+        _standing(_feet(body, coefficients, phase).clearance[number], phase)
+        for number, phase in enumerate(
+            np.linspace(first, last, 257) for first, last in ((landing, 1.0), (other, off))
+        )
+    )
+    earlier = 1.0 - left_off
+    return shifted(coefficients, -earlier), np.array([left_on, right_off, right_on]) + earlier
+
+
+def _standing(clearance: FloatArray, phase: FloatArray) -> tuple[float, float]:
+    """First and last phase of a stance with the sole on the floor."""
+    low, n = np.flatnonzero(clearance < LIFTED), len(phase)
+    most = int(MOST_TRIMMED * n)
+    first, last = (low[0], low[-1]) if low.size else (0, n - 1)
+    return float(phase[min(first, most)]), float(phase[max(last, n - 1 - most)])
+
+
+def _feet(body: BodyModel, coefficients: FloatArray, phase: FloatArray) -> FootPlacement:
+    """(2, n) feet of a cycle at phases, as if the walker were on the spot."""
+    signals, angles = _signals(body, coefficients, phase)
+    place = np.zeros((len(phase), 3))
+    place[:, 2] = signals[:, _HEIGHT]
+    pelvis = rotations(signals[:, 5], signals[:, 4], signals[:, 3])
+    return FootPlacement.of_foot(Sole.of_body(body), *LegKinematics(body).feet(pelvis, place, angles))

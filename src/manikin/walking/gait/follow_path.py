@@ -17,7 +17,7 @@ from manikin.body import BodyModel
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.recordings.reconstruction.anatomy import SIDES
+from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.blend import Blend, Gait, travelled
 from manikin.walking.gait.cycles import sole_points
 from manikin.walking.gait.motion_library import MotionLibrary, load_library, reference_body

@@ -17,8 +17,16 @@ from manikin.numerics.signals import fourier_coefficients, shifted
 from manikin.numerics.spatial import FloatArray
 from manikin.recordings import Recording, read_recording, reconstruct
 from manikin.walking.gait.blend import TURN_RADIUS, Blend, Gait, steady_motion, travelled
-from manikin.walking.gait.cycle_correction import as_one_person, levelled, on_the_floor, spread, tilted
-from manikin.walking.gait.cycles import CycleCut, cycle_cuts, foot_events
+from manikin.walking.gait.cycles import (
+    CycleCut,
+    as_one_person,
+    cycle_cuts,
+    foot_events,
+    levelled,
+    on_the_floor,
+    spread,
+    tilted,
+)
 from manikin.walking.gait.follow_path import stance_slides
 from manikin.walking.gait.motion_library import ROOT, STAND, MotionLibrary, leg_length, reference_body
 

@@ -17,7 +17,7 @@ from manikin.body import BodyModel
 from manikin.errors import BodyError
 from manikin.kinematics.leg_kinematics import HINGES, LegKinematics
 from manikin.numerics.spatial import FloatArray, dot, rotations
-from manikin.recordings.reconstruction.anatomy import SIDES
+from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.blend import GaitFrames
 
 

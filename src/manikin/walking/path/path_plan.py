@@ -8,8 +8,6 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,9 +17,17 @@ from scipy.sparse.csgraph import dijkstra
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, PlanarTransform, finite_number, frozen_array
 from manikin.numerics.spline import BSpline
-from manikin.runtime.parallel import side_by_side
-from manikin.walking.path.path_program import DEGREE, PathStructure
-from manikin.walking.path.path_solver import Guess, bent, cheapest, lacking, programme_of, sharpened, solve
+from manikin.walking.path.path_program import (
+    DEGREE,
+    Guess,
+    PathStructure,
+    bent,
+    cheapest,
+    lacking,
+    programme_of,
+    sharpened,
+    solve,
+)
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
 from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective
 from manikin.walking.path.walking_path import WalkingPath, WalkingTask
@@ -241,35 +247,6 @@ def walking_path(
     return sharpened(_around(task, free) if task.obstacles else free)
 
 
-def walking_paths(
-    start: ArrayLike,
-    goals: Sequence[ArrayLike],
-    objective: WalkObjective = PROSE_ORDER,
-    *,
-    workers: int = 1,
-    **options: Any,
-) -> list[WalkingPath]:
-    """Paths from one start to many goals, as :func:`walking_path` finds each.
-
-    Args:
-        start: (3,) x, y [m], heading [rad].
-        goals: (k, 3) x, y [m], heading [rad].
-        objective: Cost to be minimised.
-        workers: Number of processes. They are started afresh, which takes longer than 100 goals without
-            obstacles.
-        options: Further arguments of :func:`walking_path`.
-
-    Raises:
-        InputError: As :func:`walking_path`, before anything is computed where that is possible.
-    """
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise InputError(f"workers is {workers!r}; valid: an integer >= 1")
-    wanted = [frozen_array(goal, f"walking goal {i} [m, m, rad]", (3,)) for i, goal in enumerate(goals)]
-    work = partial(_path_to, start, objective, options)
-    paths = dict(side_by_side(work, wanted, workers, "walking paths"))
-    return [paths[number] for number in range(len(wanted))]
-
-
 def _check(task: WalkingTask) -> None:
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
     if not NEAREST <= distance <= FARTHEST:
@@ -378,9 +355,3 @@ def _detour_guesses(
     if any(item.moves for item in blocking):
         for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
             yield Guess(name, free.spline.control_points, factor * free.duration)
-
-
-def _path_to(
-    start: ArrayLike, objective: WalkObjective, options: dict[str, Any], goal: FloatArray
-) -> WalkingPath:
-    return walking_path(start, goal, objective, **options)

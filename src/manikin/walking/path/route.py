@@ -16,7 +16,7 @@ from manikin.walking.path.path_plan import NEAREST, walking_path
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
 from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective, to_body
 from manikin.walking.path.walking_path import SAMPLING, SampledWalk, WalkingPath, WalkingTask
-from manikin.walking.segments.segmentation import PathSegments, ShoulderPaths, segment_path
+from manikin.walking.segmentation import PathSegments, ShoulderPaths, segment_path
 
 SMALLEST = 1e-6
 """Least turn that counts as one [rad]."""

@@ -13,11 +13,17 @@ from manikin.walking.words.partition import (
     solve_slice,
     solve_slices,
 )
-from manikin.walking.words.word_path import STRAIGHT, THESIS_WORDS, WordPath
-from manikin.walking.words.word_solver import WordResiduals, residuals, word_path, word_paths
+from manikin.walking.words.word_solver import (
+    STRAIGHT,
+    THESIS_WORDS,
+    WordPath,
+    residuals,
+    word_path,
+    word_paths,
+)
 
 __all__ = [
     "HEADINGS", "STRAIGHT", "THESIS_GRID", "THESIS_WORDS", "EqualPaths", "WordGrid", "WordPath",
-    "WordResiduals", "WordSlice", "bent_to", "count_words", "equal_paths", "residuals", "shares",
-    "solve_slice", "solve_slices", "word_path", "word_paths",
+    "WordSlice", "bent_to", "count_words", "equal_paths", "residuals", "shares", "solve_slice",
+    "solve_slices", "word_path", "word_paths",
 ]  # fmt: skip

@@ -17,9 +17,18 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.parallel import side_by_side
 from manikin.walking.path.walking_model import START
-from manikin.walking.words.word_path import THESIS_WORDS, WordPath, words_of
 from manikin.walking.words.word_program import Goals, Minima, minimise, quadrature, squares
-from manikin.walking.words.word_solver import FARTHEST, NEAREST, WordResiduals, cheapest, guesses, residuals
+from manikin.walking.words.word_solver import (
+    FARTHEST,
+    NEAREST,
+    THESIS_WORDS,
+    WordPath,
+    WordResiduals,
+    cheapest,
+    guesses,
+    residuals,
+    words_of,
+)
 
 HEADINGS = tuple(range(0, 360, 10))
 """Final headings of the 36 slices [deg] ([Truong2010]_ 3.3)."""

@@ -10,7 +10,6 @@ are straight to the eye are told apart from flat diagonal steps.
 """
 
 import itertools
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,8 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.errors import InputError
 from manikin.numerics.signals import SHARES, low_passed
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.recordings.readers.marker_sets import SIDES, segment_joint
 from manikin.recordings.readers.skeleton_recording import Recording
-from manikin.recordings.reconstruction.anatomy import SIDES, segment_joint
 from manikin.walking.path.walking_path import SampledWalk
 
 BREADTH = 0.36
@@ -304,7 +303,7 @@ def segment_path(
     Args:
         paths: Both shoulders.
         rule: Thresholds of the segmentation.
-        online: Function 1 alone, as :class:`OnlineSegmentation` gives it frame by frame.
+        online: Function 1 alone, which knows a label half a step of the tangent after its frame.
     """
     if not online and rule.cutoff is not None:
         paths = paths.low_passed(rule.cutoff)
@@ -317,64 +316,6 @@ def segment_path(
     labels.setflags(write=False)
     angles.setflags(write=False)
     return PathSegments(paths, labels, angles, _segments(labels, paths.time))
-
-
-class OnlineSegmentation:
-    """Function 1 frame by frame: each label comes :attr:`delay` frames after its frame.
-
-    The labels are those of ``segment_path(..., online=True)``.
-
-    Args:
-        rate: Frames per second [Hz].
-        rule: Thresholds; ``cutoff``, ``noise`` and ``boundary`` need the future and are not used.
-    """
-
-    def __init__(self, rate: float, rule: SegmentationRule = THESIS_RULE) -> None:
-        self._rate = finite_number(rate, "on-line segmentation rate [Hz]", above=0.0)
-        self._rule = rule
-        self._frames: deque[FloatArray] = deque(maxlen=2 * self.delay + 1)
-
-    @property
-    def delay(self) -> int:
-        """Frames from a frame to its label."""
-        return self._rule.frames(self._rate)
-
-    def step(self, left: ArrayLike, right: ArrayLike) -> str | None:
-        """Take the next frame and label the one :attr:`delay` frames before it; None while there is none.
-
-        Args:
-            left: (2,) left shoulder [m].
-            right: (2,) right shoulder [m].
-
-        Raises:
-            InputError: If a shoulder is not two finite numbers, or the shoulders meet.
-        """
-        points = np.stack(
-            [frozen_array(p, f"{s} shoulder [m]", (2,)) for p, s in ((left, "left"), (right, "right"))]
-        )
-        if np.hypot(*(points[0] - points[1])) < LEAST_DISTANCE:
-            raise InputError(f"shoulders meet; valid: at least {LEAST_DISTANCE} m apart, seen from above")
-        self._frames.append(points)
-        now = len(self._frames) - 1 - self.delay
-        return self._label(now, len(self._frames) - 1) if now >= 0 else None
-
-    def finish(self) -> Iterator[str]:
-        """Labels of the last frames, whose tangents end at the last frame.
-
-        Raises:
-            InputError: If there were fewer than two frames.
-        """
-        last = len(self._frames) - 1
-        if last < 1:
-            raise InputError("on-line segmentation has fewer than 2 frames; valid: at least 2")
-        for now in range(max(0, last + 1 - self.delay), last + 1):
-            yield self._label(now, last)
-
-    def _label(self, now: int, after: int) -> str:
-        before = max(0, now - self.delay)
-        frames = self._frames
-        velocities = (frames[after] - frames[before]) * (self._rate / (after - before))
-        return str(_function_1(deviations(frames[now], velocities), velocities, self._rule))
 
 
 def _function_1(angles: FloatArray, velocities: FloatArray, rule: SegmentationRule) -> Labels:

@@ -11,7 +11,7 @@ from manikin.body import Configuration
 from manikin.contact.from_motion import LevelSupport, level_supports
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number
-from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
+from manikin.walking.footprints import FEET, Footprint, Footprints
 from manikin.walking.gait.follow_path import Walk
 from manikin.walking.path.walking_path import WalkingPath
 

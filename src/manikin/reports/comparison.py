@@ -10,7 +10,7 @@ from manikin.contact import Stance
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.comparison.alignment import (
+from manikin.reports.alignment import (
     PhasePair,
     PhaseTime,
     TimingRow,
@@ -248,7 +248,7 @@ class RunComparison(Displayed):
             "second": _run_block(self.second, self.names[1]),
             "matched_phases": sum(pair.matched for pair in self.pairs),
             "timing": [row.as_dict() for row in self.rows] or None,
-            "duration_difference_s": _duration_difference(self.first, self.second),
+            "duration_difference_s": _difference(*self.durations),
             "com": {
                 _key(stage): com_difference(self.rows, *shared[stage]) if stage in shared else None
                 for stage in STAGES
@@ -350,10 +350,6 @@ def _duration(record: RunRecord) -> float | None:
     if record.schedule is None:
         return None
     return float(record.schedule.instants[-1] - record.schedule.instants[0])
-
-
-def _duration_difference(first: RunRecord, second: RunRecord) -> float | None:
-    return _difference(_duration(first), _duration(second))
 
 
 def _words(stage: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from manikin.analysis.adaptation.contact_adaptation import (
+from manikin.analysis.contact_adaptation import (
     landing_flat,
     leaving_with_the_hinge,
     on_one_seat,
@@ -18,7 +18,7 @@ from manikin.analysis.adaptation.contact_adaptation import (
     within_toe_strength,
     without_remnants,
 )
-from manikin.analysis.adaptation.posture_adaptation import (
+from manikin.analysis.posture_adaptation import (
     AdaptedMotion,
     adapt_postures,
     rate_on_contacts,
@@ -120,7 +120,7 @@ HEIGHT_ROOM = 0.1
 
 
 def plan_recorded_com(
-    mass: float, recording: RecordedCom, velocity: FloatArray, method: Method, required_margin: float = 0.0
+    mass: float, recording: RecordedCom, velocity: FloatArray, method: Method
 ) -> CentroidalResult:
     """Plan the centre of mass.
 
@@ -128,33 +128,26 @@ def plan_recorded_com(
         mass: [kg].
         recording: Samples, key frames and stances.
         velocity: (2, 3) of the recorded centre of mass at both ends, kept by the timing-free method [m/s].
-        required_margin: To keep all along [N.m].
     """
     if method == "keyframes":
-        return plan_near_recorded_com(mass, recording, required_margin)
+        return plan_near_recorded_com(mass, recording)
     return plan_com(
         CentroidalProblem(
             mass, _free_durations(recording), recording.com[0], recording.com[-1],
-            start_velocity=velocity[0], goal_velocity=velocity[1], required_margin=required_margin,
+            start_velocity=velocity[0], goal_velocity=velocity[1],
             support_distance=farthest_support(recording), geometric=_recorded_heights(recording),
         )
     )  # fmt: skip
 
 
-def plan_near_recorded_com(
-    mass: float, recording: RecordedCom, required_margin: float = 0.0
-) -> NearKeyFramesResult:
+def plan_near_recorded_com(mass: float, recording: RecordedCom) -> NearKeyFramesResult:
     """Plan the centre of mass near the recorded one.
 
     Args:
         mass: [kg].
         recording: Samples, key frames and stances, and the rate of the angular momentum.
-        required_margin: To keep all along [N.m].
     """
-    asked = KeyframeProblem(
-        mass, recording, start_velocity=None, goal_velocity=None, required_margin=required_margin
-    )
-    return plan_com_near_key_frames(asked)
+    return plan_com_near_key_frames(KeyframeProblem(mass, recording, start_velocity=None, goal_velocity=None))
 
 
 def farthest_support(recording: RecordedCom) -> float:
@@ -290,7 +283,7 @@ class Replan:
 
 def adapt_recording(
     found: Reconstruction, supports: RecordedSupports, *, method: Method = "keyframes",
-    execute: bool = False, rolling: bool = True, required_margin: float = 0.0, friction: float = FRICTION,
+    execute: bool = False, rolling: bool = True, friction: float = FRICTION,
 ) -> Replan:  # fmt: skip
     """Re-plan a recorded motion on the stances it was recorded on, and execute it if asked to.
 
@@ -298,7 +291,6 @@ def adapt_recording(
         found: The postures, not yet smoothed.
         execute: Whether the recorded postures are adapted to the plan and executed.
         rolling: Whether a foot may stand on its toes alone; without, it stands on its whole sole.
-        required_margin: Of the planned point mass, to keep all along [N.m].
         friction: Coefficient of feet and seat.
 
     Raises:
@@ -317,8 +309,8 @@ def adapt_recording(
     velocity = np.gradient(recorded.com, recorded.time, axis=0, edge_order=2)[[0, -1]]
     scene = scene_under(stances, supports.surfaces[0] if supports.surfaces else 0.0)
     if method == "keyframes":
-        recording = _with_turning(found.body, scene, recording, (even.time, even.q), required_margin)
-    com = plan_recorded_com(found.body.mass, recording, velocity, method, required_margin)
+        recording = _with_turning(found.body, scene, recording, (even.time, even.q))
+    com = plan_recorded_com(found.body.mass, recording, velocity, method)
     result = Replan(method, found.body, scene, recording, recorded, com)
     return _executed(result, even) if execute and com.trajectory is not None else result
 
@@ -328,7 +320,6 @@ def _with_turning(
     scene: Scene,
     recording: RecordedCom,
     recorded: tuple[FloatArray, FloatArray],
-    margin: float,
 ) -> RecordedCom:
     """Recording with a rate of the angular momentum that the body can follow.
 
@@ -336,7 +327,7 @@ def _with_turning(
     the plan it leads to, for the fit compromises between both.
     """
     recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
-    com = plan_near_recorded_com(body.mass, recording, margin)
+    com = plan_near_recorded_com(body.mass, recording)
     if com.trajectory is None:
         return recording
     rate = rate_on_plan(body, scene, com.trajectory, recorded, recording)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.walking.path.walking_model import START
-from manikin.walking.segments.segmentation import (
+from manikin.walking.segmentation import (
     HOLONOMIC,
     NONHOLONOMIC,
     THESIS_RULE,

@@ -5,8 +5,13 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from manikin.reports.comparison.alignment import PhaseTime
-from manikin.reports.comparison.compare import RunComparison, com_difference, margin_difference, shared_tracks
+from manikin.reports.alignment import PhaseTime
+from manikin.reports.comparison import (
+    RunComparison,
+    com_difference,
+    margin_difference,
+    shared_tracks,
+)
 
 
 def report(comparison: RunComparison) -> Group:

@@ -1,1 +1,0 @@
-"""Where walks are holonomic and where not ([Truong2010]_ chapter 4)."""
