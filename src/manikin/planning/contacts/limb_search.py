@@ -52,6 +52,15 @@ FARTHEST = 0.5
 APART = 0.15
 """Distance between first contacts that are tried for a limb, by its reach; our choice."""
 
+REST = 0.06
+"""Distance to the edges of where it rests at which a trunk is thought, by the reach; our choice."""
+
+SHARES = np.linspace(0.0, 1.0, 9)
+"""Shares of the way of the trunk to the middle of the limbs that stay that are tried."""
+
+OVERREACH = 30.0
+"""Cost of a limb that is beyond its reach then by as much as that, in moves; our choice."""
+
 PROVEN = 0.8
 """Discount on a move that has a posture, so that ways with postures are gone on with [moves]; our choice."""
 
@@ -208,10 +217,12 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         ]
         self._free: dict[tuple[int, int], bool] = {}
         self._next: dict[State, list[tuple[State, float]]] = {}
+        self._later: dict[State, list[tuple[State, float]]] = {}
         self._ahead: dict[State, float] = {}
         self._stuck: set[tuple[State, int]] = set()
         self._dearer: dict[int, FloatArray] = {}  # (n, 2, 3) places of a limb and the root, by limb
         self._roots: dict[State, FloatArray] = {}
+        self._turns: dict[State, FloatArray] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
         self._state = Configuration(poser.body, start.q)
 
@@ -254,9 +265,14 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """(n, 3) places of a state [m]."""
         return np.array([places[row] for places, row in zip(self._places, state, strict=True)])
 
+    def _all_at(self, states: Sequence[State]) -> FloatArray:
+        """(k, n, 3) places of k states [m]."""
+        rows = np.array(states)
+        return np.stack([places[rows[:, k]] for k, places in enumerate(self._places)], axis=1)
+
     def _frames(self, states: Sequence[State]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Roots (k, 3) [m], headings and pitches (k,) [rad] that suit the contacts of k states best."""
-        places, share = np.array([self._at(state) for state in states]), self._shares(states)
+        places, share = self._all_at(states), self._shares(states)
         middle, mean = (share[..., None] * places).sum(axis=1), share @ self._wanted
         away = share[..., None] * (places - middle[:, None])
         if self.settings.turns:
@@ -274,14 +290,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     def _shares(self, states: Sequence[State]) -> FloatArray:
         """(k, n) share of each limb that is held in the limbs of a state that are."""
-        held = np.array(
-            [[self._held(j, row) for j, row in enumerate(state)] for state in states], dtype=float
-        )
+        begun = np.array([item.effector in self.start.contacts for item in self.holds])
+        held = ((np.array(states) > 0) | begun).astype(np.float64)
         return held / np.maximum(held.sum(axis=1, keepdims=True), 1.0)
 
     def _frame_costs(self, states: Sequence[State]) -> FloatArray:
         """Costs (k,) of how far limbs are from where they should be, infinite out of reach."""
-        places, held = np.array([self._at(state) for state in states]), self._shares(states) > 0.0
+        places, held = self._all_at(states), self._shares(states) > 0.0
         roots, yaw, pitch = self._frames(states)
         turn = rotations(yaw, pitch, np.zeros(len(yaw)))
         local = np.einsum("kji,knj->kni", turn, places - roots[:, None])
@@ -295,7 +310,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         n, stride = len(self.holds), self.settings.stride
         near = (away <= self.settings.goal_distance) & (off_heading <= self.settings.goal_turn)
         ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
-        for state, left, there, root in zip(states, ahead.tolist(), near.tolist(), roots, strict=True):
+        rows = zip(states, ahead.tolist(), near.tolist(), roots, turn, strict=True)
+        for state, left, there, root, frame in rows:
+            self._turns[state] = frame
             self._ahead.setdefault(state, 0.0 if there else left + 1e-6)
             self._roots[state] = root
         return cost
@@ -347,11 +364,15 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                     states.append((*state[:k], row + 1, *state[k + 1 :]))
                     steps.append(1.0 + 0.5 * (way / (2.0 * self.settings.stride)) ** 2)
         costs = self._frame_costs(states) if states else np.zeros(0)
-        self._next[state] = [
+        moves = [
             (after, step + cost)
             for after, step, cost in zip(states, steps, costs.tolist(), strict=True)
             if math.isfinite(cost)
         ]
+        # A limb that is still free comes first ([Tonneau2015]_ 7.2), as long as it finds a place.
+        first = [item for item in moves if self._fills(state, item[0])]
+        self._later[state] = [item for item in moves if not self._fills(state, item[0])] if first else []
+        self._next[state] = first or moves
         return self._next[state]
 
     def _tested(self, before: State, after: State) -> float:
@@ -359,25 +380,46 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         if (before, k) in self._stuck:
             return math.inf
-        key = k, after[k]
-        if key not in self._free:
-            self._free[key] = self.holds[k].is_free(after[k] - 1)
-        if not self._free[key]:
+        if not self._has_room(k, after[k]):
             return math.inf
         staying = [j for j in range(len(self.holds)) if j != k and self._held(j, before[j])]
         at = self._at(after)
+        cost = 0.0
         if not any(self._grasps[j] for j in staying):
-            roots = np.array([self._roots[before][:2], self._roots[after][:2]])
             hull = convex_polygon(at[staying, :2])
-            if float(np.min(signed_distance(roots, hull))) < -self.settings.sway * self.size:
-                return math.inf
+            for state in (before, after):
+                root = self._roots[state]
+                # On its way over the limbs that stay the trunk takes the others to the ends of their reach.
+                ways = root[:2] + SHARES[:, None] * (at[staying, :2].mean(axis=0) - root[:2])
+                rooms = signed_distance(ways, hull)
+                if rooms[0] < -self.settings.sway * self.size:
+                    return math.inf
+                shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
+                local = (self._at(state) - shifted) @ self._turns[state]
+                beyond = [
+                    -float(item.room(local[j]))
+                    for j, item in enumerate(self.holds)
+                    if self._held(j, state[j])
+                ]
+                cost += OVERREACH * max(0.0, *beyond) / self.size
         proven = self._postures.get((after, k, True))
-        cost = 0.0 if proven is None or proven.q is None else -PROVEN
+        if proven is not None and proven.q is not None:
+            cost = -PROVEN
         dearer = self._dearer.get(k)
         if dearer is None:
             return cost
         away = np.linalg.norm(dearer - np.concatenate([at[k], self._roots[after]]).reshape(2, 3), axis=2)
         return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+
+    def _has_room(self, k: int, row: int) -> bool:
+        if (k, row) not in self._free:
+            self._free[k, row] = self.holds[k].is_free(row - 1)
+        return self._free[k, row]
+
+    def _fills(self, before: State, after: State) -> bool:
+        """Whether a move gives a contact to a limb that has none."""
+        k = self._moved(before, after)
+        return not self._held(k, before[k]) and self._has_room(k, after[k])
 
     def _moved(self, before: State, after: State) -> int:
         return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)
@@ -388,7 +430,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     def _close(self, move: tuple[State, State]) -> None:
         before, after = move
         k = self._moved(before, after)
-        self._next[before] = [item for item in self._next.get(before, []) if item[0] != after]
+        left = [item for item in self._next.get(before, []) if item[0] != after]
+        self._next[before] = left or self._later.pop(before, [])
         place = np.array([[self._at(after)[k], self._roots[after]]])
         self._dearer[k] = np.vstack([self._dearer.get(k, np.zeros((0, 2, 3))), place])
 
