@@ -164,6 +164,8 @@ def test_a_quadruped_goes_up_a_stair(tmp_path):
     certificate = certify_plan(body, scene, result.plan, ContactModel.of_body(body.mass))
     assert certificate.changes == 1
     assert certificate.value("min_room_m") > 0.0
+    assert certificate.value("min_clearance_m") > 0.0  # of shanks from the step below their tips, too
+    assert certificate.value("max_torque_share") <= 1.0
     for contact in result.plan.stages[-1].contacts.values():
         assert contact.position[2] == pytest.approx(0.30)
 

@@ -47,7 +47,7 @@ INSET = 0.06
 """Distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice."""
 
 SPACING = 0.1
-"""Distance of neighbouring places of a limb, by its reach; our choice."""
+"""Distance of neighbouring places of a limb, by its reach, twice that of soles; our choice."""
 
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
@@ -127,12 +127,12 @@ class _Grid:
         self, points: FloatArray, turns: Sequence[FloatArray], kind: ContactKind
     ) -> tuple[FloatArray, list[FloatArray]]:
         """Places (m, 3) [m] with rotations (3, 3) of contacts of one shape: of hands along edges and bars."""
-        holds = kind is ContactKind.GRASP
+        holds, spacing = kind is ContactKind.GRASP, (1.0 + (kind is ContactKind.SOLE)) * self._spacing
         pairs = [pair for surface in self._surfaces for pair in self._along(surface)] if holds else [
             (place, upright)
             for surface in self._surfaces
             for upright in (onto_normal(turn, surface.normal) for turn in turns)
-            for place in self._on(surface, points @ upright.T)
+            for place in self._on(surface, points @ upright.T, spacing)
         ]  # fmt: skip
         for bar in self._scene.grasp_lines if holds else ():
             for share in np.linspace(0.0, 1.0, 1 + int(bar.length / self._spacing)):
@@ -158,14 +158,14 @@ class _Grid:
                 if room and self._inside(edge[None])[0]:
                     yield from ((edge - inset * out, turn) for inset in FINGERS)
 
-    def _on(self, surface: Surface, points: FloatArray) -> FloatArray:
+    def _on(self, surface: Surface, points: FloatArray, spacing: float) -> FloatArray:
         """(m, 3) places on one surface of what touches with points (c, 3) about it, in the world's axes."""
         low, high = self._box
         corners = np.clip(surface.polygon, low - 1.0, high + 1.0)
         middle, axes = 0.5 * (corners.min(axis=0) + corners.max(axis=0)), surface.rotation[:, :2]
         half = np.abs((corners - middle) @ axes).max(axis=0)
         # At least two steps each way on what is small.
-        gaps = np.minimum(self._spacing, 0.5 * half)
+        gaps = np.minimum(spacing, 0.5 * half)
         steps = [np.arange(-np.ceil(side / gap), np.ceil(side / gap) + 1) * gap
                  for side, gap in zip(half, gaps, strict=True)]  # fmt: skip
         grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 2)
