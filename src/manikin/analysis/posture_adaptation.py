@@ -208,7 +208,7 @@ class _Path:
             side /= np.linalg.norm(side, axis=1, keepdims=True)
             less = (1.0 - SIDEWAYS) * (1.0 - self.weight[rows]) / (1.0 - FLIGHT_POSITION)
             self.along[rows] -= less[:, None, None] * side[:, :, None] * side[:, None, :]
-        if self._grasps():
+        if all(contact.kind is ContactKind.GRASP for contact in self._contacts()):
             self.rotation_weight[rows] = GRASP_ROTATION_WEIGHT
 
     def _straightening(self, first: int, share: FloatArray, lasting: float) -> FloatArray:
@@ -249,9 +249,6 @@ class _Path:
         for phase in self.schedule.sequence:
             if self.name in phase.stance:
                 yield phase.stance[self.name]
-
-    def _grasps(self) -> bool:
-        return all(contact.kind is ContactKind.GRASP for contact in self._contacts())
 
 
 def _pitch(rotation: FloatArray) -> FloatArray:

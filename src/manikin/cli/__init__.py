@@ -23,6 +23,7 @@ from manikin.cli.console import (
     Interruption,
     JsonOption,
     complain,
+    flag,
     print_json,
 )
 from manikin.cli.ergonomics import ergonomics
@@ -74,8 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @app.callback(invoke_without_command=True)
 def _root(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    context: typer.Context, version: Annotated[bool, flag("--version", "Print the version.")] = False
 ) -> None:
     if version:
         typer.echo(f"manikin {__version__}")

@@ -17,9 +17,12 @@ from manikin.cli.console import (
     JsonOption,
     LoadHandOption,
     SexOption,
+    argument,
     bars,
     complain,
     directory_of,
+    flag,
+    option,
     print_json,
     print_table,
     refuse,
@@ -34,37 +37,30 @@ if TYPE_CHECKING:
 def analyze(
     context: typer.Context,
     sources: Annotated[
-        list[Path],
-        typer.Argument(metavar="FILE|DIR...", help="Recordings (.c3d .trc .bvh .amc), or folders of them."),
+        list[Path], argument("FILE|DIR...", "Recordings (.c3d .trc .bvh .amc), or folders of them.")
     ],
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Default: runs/analysis/NAME or runs/analysis; none with --json."),
+        Path | None, option("DIR", "Default: runs/analysis/NAME or runs/analysis; none with --json.")
     ] = None,
     frames: Annotated[
         tuple[int, int] | None,
-        typer.Option(metavar="FIRST STOP", help="Frames from FIRST up to, not with, STOP; counted from 0."),
+        option("FIRST STOP", "Frames from FIRST up to, not with, STOP; counted from 0."),
     ] = None,
     mass: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="Mass of the person. Default: the file's, or the plates'."),
+        float | None, option("KG", "Mass of the person. Default: the file's, or the plates'.")
     ] = None,
     sex: SexOption = "male",
-    friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
-    load: Annotated[
-        float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands, as a mass.")
-    ] = 0.0,
+    friction: Annotated[float, option("MU", "Of soles on the ground.")] = 0.8,
+    load: Annotated[float, option("KG", "Carried in the hands, as a mass.", "--load-kg")] = 0.0,
     load_hand: LoadHandOption = "both",
     as_recorded: Annotated[
-        bool,
-        typer.Option("--as-recorded", help="Look for no shifted motion to stand beside the recorded one."),
+        bool, flag("--as-recorded", "Look for no shifted motion to stand beside the recorded one.")
     ] = False,
     plan: Annotated[
-        str | None,
-        typer.Option(metavar="keyframes|timing-free", help="Re-plan the recording on its own stances."),
+        str | None, option("keyframes|timing-free", "Re-plan the recording on its own stances.")
     ] = None,
     execute: Annotated[
-        bool, typer.Option("--execute", help="With --plan: the whole body, executed in the physics engine.")
+        bool, flag("--execute", "With --plan: the whole body, executed in the physics engine.")
     ] = False,
     jobs: JobsOption = None,
     figures: FiguresOption = True,

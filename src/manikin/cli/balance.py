@@ -9,7 +9,10 @@ from manikin.cli.console import (
     DONE,
     FAILED,
     JsonOption,
+    argument,
+    flag,
     flattened,
+    option,
     print_json,
     print_table,
     stdout_kept_clean,
@@ -17,9 +20,9 @@ from manikin.cli.console import (
 
 
 def balance(
-    stance: Annotated[Path, typer.Argument(metavar="STANCE.yaml", help="Stance file.")],
+    stance: Annotated[Path, argument("STANCE.yaml", "Stance file.")],
     json: JsonOption = False,
-    polytope: Annotated[bool, typer.Option("--polytope", help="Add the rows H and h to the JSON.")] = False,
+    polytope: Annotated[bool, flag("--polytope", "Add the rows H and h to the JSON.")] = False,
 ) -> None:
     """Polytope and margins of one stance and centre-of-mass state."""
     from manikin.scenarios.stance_file import load_stance_file
@@ -34,35 +37,23 @@ def balance(
 
 
 def contact(
-    scenario: Annotated[
-        str, typer.Argument(metavar="NAME|FILE.yaml", help="Scenario: its body, scene and start.")
-    ],
-    limb: Annotated[str, typer.Option(metavar="L", help="Limb that shall make a contact.")],
-    task: Annotated[
-        tuple[float, float, float], typer.Option(metavar="X Y Z", help="Direction of the task in the world.")
-    ],
+    scenario: Annotated[str, argument("NAME|FILE.yaml", "Scenario: its body, scene and start.")],
+    limb: Annotated[str, option("L", "Limb that shall make a contact.")],
+    task: Annotated[tuple[float, float, float], option("X Y Z", "Direction of the task in the world.")],
     role: Annotated[
-        str,
-        typer.Option(
-            metavar="auto|body|object", help="Whether the limb moves the body along the task or an object."
-        ),
+        str, option("auto|body|object", "Whether the limb moves the body along the task or an object.")
     ] = "auto",
-    pull: Annotated[bool, typer.Option("--pull", help="Hold on and pull instead of pressing.")] = False,
+    pull: Annotated[bool, flag("--pull", "Hold on and pull instead of pressing.")] = False,
     kind: Annotated[
-        str | None,
-        typer.Option(metavar="sole|point|grasp", help="How it touches; default: the limb's own way."),
+        str | None, option("sole|point|grasp", "How it touches; default: the limb's own way.")
     ] = None,
-    heuristic: Annotated[
-        str, typer.Option(metavar="H", help="efort, distance, manipulability or random.")
-    ] = "efort",
-    samples: Annotated[
-        int, typer.Option(metavar="N", min=100, max=1_000_000, help="Samples of the limb.")
-    ] = 10_000,
-    seed: Annotated[int | None, typer.Option(metavar="N", min=0, help="Default: the scenario's.")] = None,
-    at: Annotated[tuple[float, float] | None, typer.Option(metavar="X Y", help="Where to stand [m].")] = None,
-    heading: Annotated[float | None, typer.Option(metavar="DEG", help="Where to face.")] = None,
-    posture: Annotated[str | None, typer.Option(metavar="P", help="Posture; default: the start's.")] = None,
-    figure: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the answer.")] = None,
+    heuristic: Annotated[str, option("H", "efort, distance, manipulability or random.")] = "efort",
+    samples: Annotated[int, option("N", "Samples of the limb.", min=100, max=1_000_000)] = 10_000,
+    seed: Annotated[int | None, option("N", "Default: the scenario's.", min=0)] = None,
+    at: Annotated[tuple[float, float] | None, option("X Y", "Where to stand [m].")] = None,
+    heading: Annotated[float | None, option("DEG", "Where to face.")] = None,
+    posture: Annotated[str | None, option("P", "Posture; default: the start's.")] = None,
+    figure: Annotated[Path | None, option("FILE.png", "Draw the answer.")] = None,
     json: JsonOption = False,
 ) -> int:
     """Find the contact of one limb that serves a task best."""

@@ -12,8 +12,11 @@ from manikin.cli.console import (
     JobsOption,
     JsonOption,
     OutOption,
+    argument,
     bars,
     directory_of,
+    flag,
+    option,
     print_json,
 )
 from manikin.errors import InputError
@@ -21,33 +24,25 @@ from manikin.errors import InputError
 
 def benchmark(
     context: typer.Context,
-    families: Annotated[
-        str, typer.Option(metavar="all|A,B", help="Families of scenes; --list shows them.")
-    ] = "all",
-    seeds: Annotated[int, typer.Option(metavar="N", min=1, max=100_000, help="Scenes of each.")] = 5,
-    first_seed: Annotated[int, typer.Option(metavar="N", min=0, help="Number of the first scene.")] = 0,
-    stage: Annotated[
-        str, typer.Option(metavar="contacts|all", help="Contacts alone, or whole runs.")
-    ] = "contacts",
+    families: Annotated[str, option("all|A,B", "Families of scenes; --list shows them.")] = "all",
+    seeds: Annotated[int, option("N", "Scenes of each.", min=1, max=100_000)] = 5,
+    first_seed: Annotated[int, option("N", "Number of the first scene.", min=0)] = 0,
+    stage: Annotated[str, option("contacts|all", "Contacts alone, or whole runs.")] = "contacts",
     jobs: JobsOption = None,
     time_limit: Annotated[
-        float, typer.Option(metavar="S", min=1.0, help="Processor time after which a task is ended [s].")
+        float, option("S", "Processor time after which a task is ended [s].", min=1.0)
     ] = 600.0,
     out: OutOption = None,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="Do tasks again that the directory has already.")
-    ] = False,
+    fresh: Annotated[bool, flag("--fresh", "Do tasks again that the directory has already.")] = False,
     write_scenes: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Only write the scenes as scenario files there.")
+        Path | None, option("DIR", "Only write the scenes as scenario files there.")
     ] = None,
-    list_families: Annotated[bool, typer.Option("--list", help="Only list the families.")] = False,
+    list_families: Annotated[bool, flag("--list", "Only list the families.")] = False,
     check: Annotated[
-        Path | None,
-        typer.Option(metavar="PLAN.json", help="Only check a contact plan, of whatever planner."),
+        Path | None, option("PLAN.json", "Only check a contact plan, of whatever planner.")
     ] = None,
     scenario: Annotated[
-        str | None,
-        typer.Argument(metavar="[SCENARIO]", help="With --check: what the plan is for; default: its own."),
+        str | None, argument("[SCENARIO]", "With --check: what the plan is for; default: its own.")
     ] = None,
     json: JsonOption = False,
 ) -> int:

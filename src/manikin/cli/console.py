@@ -104,21 +104,31 @@ class StageProgress:
 DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
 """Exit status of the commands."""
 
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
-OutOption = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Directory. Default: one in runs; none with --json.")
-]
+
+def option(metavar: str, text: str, *names: str, **limits: Any) -> Any:
+    """Option with a value: what stands for it, what the help says, its names, and ``min`` or ``max``."""
+    return typer.Option(*names, metavar=metavar, help=text, **limits)
+
+
+def flag(name: str, text: str) -> Any:
+    """Option without a value: its name, and what the help says."""
+    return typer.Option(name, help=text)
+
+
+def argument(metavar: str, text: str) -> Any:
+    """Argument: what stands for it, and what the help says."""
+    return typer.Argument(metavar=metavar, help=text)
+
+
+JsonOption = Annotated[bool, flag("--json", "Print one JSON object on standard output.")]
+OutOption = Annotated[Path | None, option("DIR", "Directory. Default: one in runs; none with --json.")]
 FiguresOption = Annotated[bool, typer.Option(help="Draw the figures into the directory.")]
-JobsOption = Annotated[
-    int | None, typer.Option(metavar="N", min=1, help="Processes side by side; default: one per core.")
-]
-SexOption = Annotated[str | None, typer.Option(metavar="male|female", help="Sex of the person.")]
+JobsOption = Annotated[int | None, option("N", "Processes side by side; default: one per core.", min=1)]
+SexOption = Annotated[str | None, option("male|female", "Sex of the person.")]
 LoadHandOption = Annotated[
-    str | None, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg. Default: both.")
+    str | None, option("left|right|both", "Hand that carries --load-kg. Default: both.")
 ]
-MotionArgument = Annotated[
-    Path, typer.Argument(metavar="DIR|FILE", help="Run directory or motion file (.h5).")
-]
+MotionArgument = Annotated[Path, argument("DIR|FILE", "Run directory or motion file (.h5).")]
 
 
 def directory_of(out: Path | None, name: str, *, json: bool) -> Path | None:

@@ -10,7 +10,9 @@ from manikin.cli.console import (
     JsonOption,
     LoadHandOption,
     MotionArgument,
+    flag,
     flattened,
+    option,
     print_json,
     print_table,
     stdout_kept_clean,
@@ -31,47 +33,30 @@ SHOWN = {
 
 def ergonomics(
     source: MotionArgument,
-    planned: Annotated[bool, typer.Option("--planned", help="The planned motion.")] = False,
+    planned: Annotated[bool, flag("--planned", "The planned motion.")] = False,
     executed: Annotated[
-        bool, typer.Option("--executed", help="The executed motion; the default if there is one.")
+        bool, flag("--executed", "The executed motion; the default if there is one.")
     ] = False,
     json: JsonOption = False,
-    csv: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write scores, angles and torque shares over time.")
-    ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw scores and torque shares as PNG.")
-    ] = None,
+    csv: Annotated[Path | None, option("FILE", "Write scores, angles and torque shares over time.")] = None,
+    figure: Annotated[Path | None, option("FILE", "Draw scores and torque shares as PNG.")] = None,
     load_kg: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="Load in the hands, as a mass. Default: that of the motion."),
+        float | None, option("KG", "Load in the hands, as a mass. Default: that of the motion.")
     ] = None,
     load_hand: LoadHandOption = "both",
-    load_pattern: Annotated[
-        str, typer.Option(metavar="intermittent|static|shock", help="How the load acts.")
-    ] = "intermittent",
-    coupling: Annotated[
-        str, typer.Option(metavar="good|fair|poor|unacceptable", help="Hold on the load, for REBA.")
-    ] = "good",
-    static: Annotated[
-        bool, typer.Option("--static", help="The posture is held for more than a minute.")
-    ] = False,
-    repeated: Annotated[
-        bool, typer.Option("--repeated", help="It is done more than four times a minute.")
-    ] = False,
-    rapid: Annotated[
-        bool, typer.Option("--rapid", help="Rapid large changes or an unstable base, for REBA.")
-    ] = False,
-    raised: Annotated[bool, typer.Option("--shoulder-raised", help="A shoulder is raised.")] = False,
+    load_pattern: Annotated[str, option("intermittent|static|shock", "How the load acts.")] = "intermittent",
+    coupling: Annotated[str, option("good|fair|poor|unacceptable", "Hold on the load, for REBA.")] = "good",
+    static: Annotated[bool, flag("--static", "The posture is held for more than a minute.")] = False,
+    repeated: Annotated[bool, flag("--repeated", "It is done more than four times a minute.")] = False,
+    rapid: Annotated[bool, flag("--rapid", "Rapid large changes or an unstable base, for REBA.")] = False,
+    raised: Annotated[bool, flag("--shoulder-raised", "A shoulder is raised.")] = False,
     supported: Annotated[
-        bool, typer.Option("--trunk-supported", help="The trunk of a seated person is well supported.")
+        bool, flag("--trunk-supported", "The trunk of a seated person is well supported.")
     ] = False,
     fraction: Annotated[
-        float, typer.Option(metavar="X", help="Share of the strength above which a joint counts as loaded.")
+        float, option("X", "Share of the strength above which a joint counts as loaded.")
     ] = 0.5,
-    neck: Annotated[
-        float, typer.Option("--neck-deg", metavar="DEG", help="Flexion of the neck when it is upright.")
-    ] = 0.0,
+    neck: Annotated[float, option("DEG", "Flexion of the neck when it is upright.", "--neck-deg")] = 0.0,
 ) -> int:
     """Judge a motion: RULA and REBA over time, torques against strength, effort, lowest margin."""
     if planned and executed:

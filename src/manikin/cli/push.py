@@ -16,6 +16,8 @@ from manikin.cli.console import (
     SexOption,
     bars,
     directory_of,
+    flag,
+    option,
     print_json,
     refuse,
     run_job,
@@ -66,60 +68,42 @@ SHOWN = (
 
 def push(
     context: typer.Context,
-    force: Annotated[float | None, typer.Option(metavar="N", help="Force [N].")] = None,
+    force: Annotated[float | None, option("N", "Force [N].")] = None,
     direction: Annotated[
-        float | None,
-        typer.Option(metavar="DEG", help="Of the force, counter-clockwise from ahead: 90 is to the left."),
+        float | None, option("DEG", "Of the force, counter-clockwise from ahead: 90 is to the left.")
     ] = None,
-    duration: Annotated[float, typer.Option(metavar="S", help="How long [s].")] = 0.1,
-    delay: Annotated[
-        float | None, typer.Option(metavar="S", help="Until the body reacts [s]. Default: 0.2.")
-    ] = None,
+    duration: Annotated[float, option("S", "How long [s].")] = 0.1,
+    delay: Annotated[float | None, option("S", "Until the body reacts [s]. Default: 0.2.")] = None,
     feet: Annotated[
-        str | None,
-        typer.Option(metavar="held|free", help="Welded to the ground, or in contact. Default: held."),
+        str | None, option("held|free", "Welded to the ground, or in contact. Default: held.")
     ] = None,
-    support: Annotated[
-        str | None, typer.Option(metavar="both|left|right", help="Feet to stand on. Default: both.")
-    ] = None,
+    support: Annotated[str | None, option("both|left|right", "Feet to stand on. Default: both.")] = None,
     feet_apart: Annotated[
-        float | None,
-        typer.Option(metavar="M", help="Between the middles of both soles [m]. Default: as the body stands."),
+        float | None, option("M", "Between the middles of both soles [m]. Default: as the body stands.")
     ] = None,
-    steps: Annotated[
-        int | None, typer.Option(metavar="0|1|2", help="Steps that free feet may take. Default: 0.")
-    ] = None,
+    steps: Annotated[int | None, option("0|1|2", "Steps that free feet may take. Default: 0.")] = None,
     ankle_stiffness: Annotated[
-        float | None,
-        typer.Option(metavar="X", help="Before the body reacts [m g h per radian]. Default: 0.64."),
+        float | None, option("X", "Before the body reacts [m g h per radian]. Default: 0.64.")
     ] = None,
     locked: Annotated[
-        list[str] | None, typer.Option(metavar="arms|hips", help="Joints that hold the posture; repeatable.")
+        list[str] | None, option("arms|hips", "Joints that hold the posture; repeatable.")
     ] = None,
     posture_control_only: Annotated[
-        bool, typer.Option("--posture-control-only", help="Leave the quadratic program out.")
+        bool, flag("--posture-control-only", "Leave the quadratic program out.")
     ] = False,
-    strength: Annotated[
-        float, typer.Option(metavar="X", help="Torque and speed limits relative to the body's.")
-    ] = 1.0,
-    body: Annotated[str, typer.Option(metavar="kudoh|human", help="Who is pushed.")] = "kudoh",
-    stature: Annotated[float | None, typer.Option(metavar="M", help="Of a human [m].")] = None,
-    mass: Annotated[float | None, typer.Option(metavar="KG", help="Of a human [kg].")] = None,
+    strength: Annotated[float, option("X", "Torque and speed limits relative to the body's.")] = 1.0,
+    body: Annotated[str, option("kudoh|human", "Who is pushed.")] = "kudoh",
+    stature: Annotated[float | None, option("M", "Of a human [m].")] = None,
+    mass: Annotated[float | None, option("KG", "Of a human [kg].")] = None,
     sex: SexOption = None,
-    map_: Annotated[
-        bool, typer.Option("--map", help="Search the largest impulse that is held, by direction.")
-    ] = False,
-    directions: Annotated[
-        int | None, typer.Option(metavar="N", help="With --map: number of directions. Default: 24.")
-    ] = None,
-    tolerance: Annotated[
-        float | None, typer.Option(metavar="N.S", help="With --map: of the impulse [N.s]. Default: 1.")
-    ] = None,
+    map_: Annotated[bool, flag("--map", "Search the largest impulse that is held, by direction.")] = False,
+    directions: Annotated[int | None, option("N", "With --map: number of directions. Default: 24.")] = None,
+    tolerance: Annotated[float | None, option("N.S", "With --map: of the impulse [N.s]. Default: 1.")] = None,
     compare: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="KEY=VALUE",
-            help="With --map: a further map that differs in this, such as locked=arms, support=left "
+        option(
+            "KEY=VALUE",
+            "With --map: a further map that differs in this, such as locked=arms, support=left "
             "or delay=0; repeatable.",
         ),
     ] = None,
@@ -161,8 +145,8 @@ def push(
     only_maps: dict[str, Any] = {
         "--directions": directions, "--tolerance": tolerance, "--compare": compare, "--jobs": jobs,
     }  # fmt: skip
-    for option, value in only_maps.items():
-        refuse(value is not None, option, "it is for --map")
+    for name, value in only_maps.items():
+        refuse(value is not None, name, "it is for --map")
     if force is None or direction is None:
         option = "--force" if force is None else "--direction"
         raise InputError(f"{option} is missing; valid: a number, or --map")

@@ -15,7 +15,9 @@ from manikin.cli.console import (
     LoadHandOption,
     OutOption,
     SexOption,
+    argument,
     directory_of,
+    option,
     print_json,
     refuse,
     run_job,
@@ -32,43 +34,33 @@ def run(
     context: typer.Context,
     scenario: Annotated[
         str,
-        typer.Argument(
-            metavar="NAME|FILE.yaml|all",
-            help="Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them.",
+        argument(
+            "NAME|FILE.yaml|all",
+            "Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them.",
         ),
     ],
     out: OutOption = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed; default: the scenario's.")] = None,
+    seed: Annotated[int | None, option("N", "Seed; default: the scenario's.")] = None,
     json: JsonOption = False,
-    stature: Annotated[
-        float | None, typer.Option(metavar="M", min=1.4, max=2.1, help="Other stature, 1.4 to 2.1 m.")
-    ] = None,
-    mass: Annotated[
-        float | None, typer.Option(metavar="KG", min=35.0, max=160.0, help="Other mass, 35 to 160 kg.")
-    ] = None,
+    stature: Annotated[float | None, option("M", "Other stature, 1.4 to 2.1 m.", min=1.4, max=2.1)] = None,
+    mass: Annotated[float | None, option("KG", "Other mass, 35 to 160 kg.", min=35.0, max=160.0)] = None,
     sex: SexOption = None,
-    age: Annotated[float | None, typer.Option(metavar="YEARS", help="Other age, 18 to 90 years.")] = None,
-    strength: Annotated[
-        float | None, typer.Option(metavar="X", help="Torque limits over those of a healthy adult.")
-    ] = None,
-    load_kg: Annotated[
-        float | None, typer.Option(metavar="KG", help="Load in the hands during the whole motion.")
-    ] = None,
+    age: Annotated[float | None, option("YEARS", "Other age, 18 to 90 years.")] = None,
+    strength: Annotated[float | None, option("X", "Torque limits over those of a healthy adult.")] = None,
+    load_kg: Annotated[float | None, option("KG", "Load in the hands during the whole motion.")] = None,
     load_hand: LoadHandOption = None,
-    variant: Annotated[
-        str | None, typer.Option(metavar="V", help="One of the scenario's variants; also NAME@V.")
-    ] = None,
+    variant: Annotated[str | None, option("V", "One of the scenario's variants; also NAME@V.")] = None,
     overrides: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "KEY=VALUE",
+            "Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable.",
             "--set",
-            metavar="KEY=VALUE",
-            help="Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable.",
         ),
     ] = None,
     moved: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(metavar="X Y YAW_DEG", help="Move the scenario's origin to X Y [m], turned [deg]."),
+        option("X Y YAW_DEG", "Move the scenario's origin to X Y [m], turned [deg]."),
     ] = None,
     figures: FiguresOption = True,
     jobs: JobsOption = None,

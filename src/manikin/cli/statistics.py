@@ -13,8 +13,11 @@ from manikin.cli.console import (
     Interruption,
     JsonOption,
     SexOption,
+    argument,
     bars,
     complain,
+    flag,
+    option,
     print_json,
     refuse,
 )
@@ -34,45 +37,32 @@ def statistics(
     context: typer.Context,
     files: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[GROUP=]FILE|DIR|PATTERN",
-            help="Recordings (.bvh .amc .c3d .trc); the group is the folder's name unless given.",
+        argument(
+            "[GROUP=]FILE|DIR|PATTERN",
+            "Recordings (.bvh .amc .c3d .trc); the group is the folder's name unless given.",
         ),
     ] = None,
     published: Annotated[
-        bool, typer.Option("--published", help="The motions under a beam of Qiu (2012) instead.")
+        bool, flag("--published", "The motions under a beam of Qiu (2012) instead.")
     ] = False,
-    bar: Annotated[
-        float | None, typer.Option(metavar="M", help="Height of a bar that is passed under [m].")
-    ] = None,
+    bar: Annotated[float | None, option("M", "Height of a bar that is passed under [m].")] = None,
     box: Annotated[
-        Box | None,
-        typer.Option(metavar="X0 X1 Y0 Y1 M", help="Place and height of the underside of a box [m]."),
+        Box | None, option("X0 X1 Y0 Y1 M", "Place and height of the underside of a box [m].")
     ] = None,
     limit: Annotated[
-        float | None,
-        typer.Option(metavar="M", help="Distance from the centre of mass to a support. Default: 1.08."),
+        float | None, option("M", "Distance from the centre of mass to a support. Default: 1.08.")
     ] = None,
-    effectors: Annotated[
-        str, typer.Option(metavar="all|feet", help="Whose supports tell phases and sequences.")
-    ] = "all",
-    phases: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Compare the first N phases of sequences only.")
-    ] = None,
+    effectors: Annotated[str, option("all|feet", "Whose supports tell phases and sequences.")] = "all",
+    phases: Annotated[int | None, option("N", "Compare the first N phases of sequences only.", min=1)] = None,
     start: Annotated[
-        str | None, typer.Option(metavar="KIND", help="Compare sequences from the first such phase on: DS.")
+        str | None, option("KIND", "Compare sequences from the first such phase on: DS.")
     ] = None,
     origin: Annotated[
-        str,
-        typer.Option(metavar="stance|lowest|highest", help="From where placements are seen: stance, or CoM."),
+        str, option("stance|lowest|highest", "From where placements are seen: stance, or CoM.")
     ] = "stance",
-    by: Annotated[
-        str, typer.Option(metavar="number|kind|effectors", help="What phases have in common.")
-    ] = "kind",
+    by: Annotated[str, option("number|kind|effectors", "What phases have in common.")] = "kind",
     sex: SexOption = "male",
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write statistics.json, phases.csv and figures there.")
-    ] = None,
+    out: Annotated[Path | None, option("DIR", "Write statistics.json, phases.csv and figures there.")] = None,
     json: JsonOption = False,
 ) -> int:
     """Phase durations, sequences, placements, centre of mass over sets of recordings."""

@@ -5,24 +5,32 @@ from typing import Annotated
 
 import typer
 
-from manikin.cli.console import JsonOption, MotionArgument, announce, bars, print_json, refuse
+from manikin.cli.console import (
+    JsonOption,
+    MotionArgument,
+    announce,
+    argument,
+    bars,
+    flag,
+    option,
+    print_json,
+    refuse,
+)
 
 
 def view(
     source: Annotated[
         str,
-        typer.Argument(
-            metavar="DIR|FILE",
-            help="Run directory or motion file (.h5); with --contacts a scenario's name or file.",
+        argument(
+            "DIR|FILE", "Run directory or motion file (.h5); with --contacts a scenario's name or file."
         ),
     ],
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 picks a free one.")] = 8080,
     contacts: Annotated[
-        bool, typer.Option("--contacts", help="Drag the body of a scenario and watch its contacts.")
+        bool, flag("--contacts", "Drag the body of a scenario and watch its contacts.")
     ] = False,
     samples: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=100, max=1_000_000, help="With --contacts: samples of each limb."),
+        int | None, option("N", "With --contacts: samples of each limb.", min=100, max=1_000_000)
     ] = None,
 ) -> None:
     """Show a motion in the browser, or the contacts of a body moved by hand; on this computer only."""
@@ -51,10 +59,10 @@ def view(
 
 def compare(
     context: typer.Context,
-    first: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
-    second: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory to compare with it.")],
+    first: Annotated[Path, argument("RUN", "Run directory.")],
+    second: Annotated[Path, argument("RUN", "Run directory to compare with it.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Draw figures of both and write comparison.json there.")
+        Path | None, option("DIR", "Draw figures of both and write comparison.json there.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
@@ -82,14 +90,10 @@ def compare(
 
 def export(
     source: MotionArgument,
-    format: Annotated[str, typer.Option("--format", metavar="bvh|csv", help="File format.")],
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: beside the motion.")] = None,
-    motion: Annotated[
-        str | None, typer.Option(metavar="planned|executed", help="Default: executed if there is one.")
-    ] = None,
-    rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Samples per second; default: 100 (bvh), all (csv).")
-    ] = None,
+    format: Annotated[str, option("bvh|csv", "File format.", "--format")],
+    out: Annotated[Path | None, option("FILE", "Default: beside the motion.")] = None,
+    motion: Annotated[str | None, option("planned|executed", "Default: executed if there is one.")] = None,
+    rate: Annotated[float | None, option("HZ", "Samples per second; default: 100 (bvh), all (csv).")] = None,
 ) -> None:
     """Write a motion for other programs."""
     from manikin.reports.export import check_format, export_motion

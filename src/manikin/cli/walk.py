@@ -15,8 +15,11 @@ from manikin.cli.console import (
     OutOption,
     SexOption,
     announce,
+    argument,
     bars,
     directory_of,
+    flag,
+    option,
     print_json,
     print_table,
     refuse,
@@ -36,37 +39,27 @@ Place = tuple[float, float, float]
 def walk(
     context: typer.Context,
     to: Annotated[
-        Place | None,
-        typer.Option(metavar="X Y HEADING_DEG", help="Goal [m, m, deg, counter-clockwise from x]."),
+        Place | None, option("X Y HEADING_DEG", "Goal [m, m, deg, counter-clockwise from x].")
     ] = None,
-    start: Annotated[Place, typer.Option("--from", metavar="X Y HEADING_DEG", help="Start [m, m, deg].")] = (
-        0.0,
-        0.0,
-        0.0,
-    ),
+    start: Annotated[Place, option("X Y HEADING_DEG", "Start [m, m, deg].", "--from")] = (0.0, 0.0, 0.0),
     scene: Annotated[
-        str | None,
-        typer.Option("--in", metavar="NAME|FILE.yaml", help="Scenario whose obstacles stand in the way."),
+        str | None, option("NAME|FILE.yaml", "Scenario whose obstacles stand in the way.", "--in")
     ] = None,
-    max_speed: Annotated[
-        float | None, typer.Option(metavar="M/S", help="Limit of the speed. Default: 1.6.")
-    ] = None,
+    max_speed: Annotated[float | None, option("M/S", "Limit of the speed. Default: 1.6.")] = None,
     weights: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Weights: prose or literal of the thesis, recorded or recorded-turns. Default: prose.",
+        option(
+            "NAME", "Weights: prose or literal of the thesis, recorded or recorded-turns. Default: prose."
         ),
     ] = None,
-    stature: Annotated[float, typer.Option(metavar="M", help="Stature [m].")] = 1.75,
-    mass: Annotated[float, typer.Option(metavar="KG", help="Mass [kg].")] = 70.0,
+    stature: Annotated[float, option("M", "Stature [m].")] = 1.75,
+    mass: Annotated[float, option("KG", "Mass [kg].")] = 70.0,
     sex: SexOption = "male",
     drive: Annotated[
-        bool, typer.Option("--drive", help="Steer a walker in the browser with keys and sliders instead.")
+        bool, flag("--drive", "Steer a walker in the browser with keys and sliders instead.")
     ] = False,
     port: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=0, max=65535, help="With --drive: port; 0 picks a free one."),
+        int | None, option("N", "With --drive: port; 0 picks a free one.", min=0, max=65535)
     ] = None,
     out: OutOption = None,
     figures: FiguresOption = True,
@@ -78,8 +71,8 @@ def walk(
         given: dict[str, Any] = {
             "--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out, "--json": json or None,
         }  # fmt: skip
-        for option, value in given.items():
-            refuse(value is not None, option, "it is for a walk to a place")
+        for name, value in given.items():
+            refuse(value is not None, name, "it is for a walk to a place")
         return _drive(body, start, scene, 8080 if port is None else port)
     refuse(port is not None, "--port", "it is for --drive")
     if to is None:
@@ -116,11 +109,11 @@ def words(
     context: typer.Context,
     out: OutOption = None,
     slices: Annotated[
-        str, typer.Option(metavar="DEG,DEG|all", help="Final headings, each a multiple of 10 from 0 to 350.")
+        str, option("DEG,DEG|all", "Final headings, each a multiple of 10 from 0 to 350.")
     ] = "all",
     jobs: JobsOption = None,
     figures: Annotated[
-        bool | None, typer.Option("--figures/--no-figures", help="Draw the figures into the directory.")
+        bool | None, flag("--figures/--no-figures", "Draw the figures into the directory.")
     ] = None,
     json: JsonOption = False,
 ) -> int:
@@ -188,10 +181,7 @@ def build(
     context: typer.Context,
     directory: Annotated[
         Path,
-        typer.Argument(
-            metavar="DIR",
-            help="Folder with clips_locomotion.csv and, in mocap, the BVH and AMC files it names.",
-        ),
+        argument("DIR", "Folder with clips_locomotion.csv and, in mocap, the BVH and AMC files it names."),
     ],
     out: Annotated[Path, typer.Option(help="File to write (.npz).")] = Path("walking_library.npz"),
     json: JsonOption = False,

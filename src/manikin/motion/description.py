@@ -173,7 +173,13 @@ def describe_schedule(schedule: ContactSchedule) -> Json:
                 "normal_force_cap": phase.stance.normal_force_cap,
                 "friction_model": phase.stance.friction_model,
                 "contacts": [_describe_contact(contact) for contact in phase.stance],
-                **({} if phase.load is None else {"load": _describe_load(phase.load)}),
+                **(
+                    {}
+                    if phase.load is None
+                    else {
+                        "load": {"masses_kg": dict(phase.load.masses), "offset": phase.load.offset.tolist()}
+                    }
+                ),
             }
             for phase in schedule.sequence
         ],
@@ -201,10 +207,6 @@ def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:
         for phase in description["phases"]
     ]
     return ContactSchedule(StanceSequence(phases), description["instants"])
-
-
-def _describe_load(load: CarriedLoad) -> Json:
-    return {"masses_kg": dict(load.masses), "offset": load.offset.tolist()}
 
 
 def _load_from(description: Mapping[str, Any]) -> CarriedLoad:

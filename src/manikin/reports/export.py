@@ -209,16 +209,12 @@ def _joint(segment: Segment, first_column: int) -> _BvhJoint:
     return _BvhJoint(segment, order + "".join(missing), columns, (*signs, *(1.0 for _ in missing)))
 
 
-def _children(body: BodyModel, name: str) -> list[Segment]:
-    return [segment for segment in body.segments if segment.parent == name]
-
-
 def _depth_first(body: BodyModel) -> list[Segment]:
     order, waiting = [], [body.segments[0]]
     while waiting:
         segment = waiting.pop(0)
         order.append(segment)
-        waiting = _children(body, segment.name) + waiting
+        waiting = [child for child in body.segments if child.parent == segment.name] + waiting
     return order
 
 

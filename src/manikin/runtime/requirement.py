@@ -121,24 +121,26 @@ class Worst:
     """Takes measurements of one quantity and keeps the worst one.
 
     Attributes:
-        key: Name of the quantity in results.
+        key: Name of the quantity in results; ends in its unit, ``_m``, ``_deg`` or ``_N``, if it has one.
         name: The quantity in words.
-        unit: Of the values.
-        sense: What a value has to be relative to the limit.
         limit: The value allowed.
         tolerance: Rounding up to which the limit counts as kept.
+        sense: What a value has to be relative to the limit; of a ``min_...`` always at least that.
         value: The worst value so far, or None.
         where: Where it was measured.
     """
 
     key: str
     name: str
-    unit: str
-    sense: Sense
     limit: float
     tolerance: float = 0.0
+    sense: Sense = "<="
     value: float | None = field(default=None, init=False)
     where: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        if self.key.startswith("min_"):
+            self.sense = ">="
 
     def take(self, value: float, where: str) -> None:
         """Take one measurement; a NaN is worse than any number."""
@@ -153,7 +155,8 @@ class Worst:
         """The requirement; None if nothing was measured."""
         if self.value is None:
             return None
+        ending = self.key.rpartition("_")[2]
+        unit = ending if ending in ("m", "deg", "N") else ""
         return Requirement(
-            self.key, self.name, self.unit, self.value, self.sense, self.limit, where=self.where,
-            tolerance=self.tolerance,
-        )  # fmt: skip
+            self.key, self.name, unit, self.value, self.sense, self.limit, None, self.where, self.tolerance
+        )

@@ -96,7 +96,8 @@ def _constraint(body: BodyModel, obstacle: Obstacle, soles: Sequence[Contact]) -
     if free >= stature + HEAD_CLEARANCE:
         return None
     fold = fold_under(body, free)
-    footprint = _upright_footprint(scale) if fold is None else fold.footprint
+    upright = 0.2 * scale * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    footprint = upright if fold is None else fold.footprint
     zone = Zone.below(outline, [_turned(footprint, yaw) for yaw in headings], ONSET * scale)
     top = level + 1.1 * float(standing.com[2])
     if fold is None:
@@ -132,11 +133,6 @@ def _outline(obstacle: Obstacle) -> FloatArray:
         return obstacle.to_world(obstacle.shape.vertices)[:, :2]
     (x0, y0, _), (x1, y1, _) = obstacle.bounds
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-
-
-def _upright_footprint(scale: float) -> FloatArray:
-    """Rectangle that an upright trunk covers."""
-    return 0.2 * scale * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
 
 def _turned(points: FloatArray, yaw: float) -> FloatArray:

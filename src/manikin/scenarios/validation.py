@@ -45,7 +45,8 @@ class Section(BaseModel):
     def _check_keys(cls, data: Any) -> Any:
         keys = cls._keys()
         if not isinstance(data, Mapping):
-            raise PydanticCustomError("section", "{rule}", {"rule": f"a mapping with {_listed(keys)}"})
+            rule = f"a mapping with the key{'s' if len(keys) > 1 else ''} {', '.join(keys)}"
+            raise PydanticCustomError("section", "{rule}", {"rule": rule})
         for key in data:
             if key not in keys:
                 raise PydanticCustomError("unknown_key", "{rule}", _unknown_key(key, keys))
@@ -66,10 +67,6 @@ def _unknown_key(key: Any, keys: Sequence[str]) -> dict[str, Any]:
         close = [known for known in keys if known.startswith(str(key)) or str(key).startswith(known)][:1]
     hint = f"did you mean {close[0]!r}? " if close else ""
     return {"key": str(key), "rule": f"{hint}valid: {', '.join(keys)}"}
-
-
-def _listed(keys: Sequence[str]) -> str:
-    return ("the keys " if len(keys) > 1 else "the key ") + ", ".join(keys)
 
 
 def _vector(length: int, meaning: str) -> Callable[[Any], Any]:

@@ -196,14 +196,10 @@ class _Check:
 
     def _order(self) -> list[Requirement | None]:
         """One contact is made or broken at each change, both hands at once for an act; one is there."""
-        most = Worst("max_changes", "contacts made and broken at one change", "", "<=", 1.0)
-        least = Worst("min_contacts", "contacts of a stage", "", ">=", 1.0)
+        most = Worst("max_changes", "contacts made and broken at one change", 1.0)
+        least = Worst("min_contacts", "contacts of a stage", 1.0)
         said = Worst(
-            "max_com_difference_m",
-            "difference between the centre of mass given and the posture's",
-            "m",
-            "<=",
-            1e-3,
+            "max_com_difference_m", "difference between the centre of mass given and the posture's", 1e-3
         )
         for number, (before, after) in enumerate(pairwise(self._plan.stages), start=1):
             kept = sum(before.contacts.get(name) is c for name, c in after.contacts.items())
@@ -228,9 +224,8 @@ class _Check:
     def _within_reach(self) -> Requirement | None:
         """Contacts that are held at once are no farther apart than the body's segments are long."""
         farthest = Worst(
-            "max_reach_share", "distance of two contacts over the longest way through the body", "", "<=",
-            1.0, 1e-6,
-        )  # fmt: skip
+            "max_reach_share", "distance of two contacts over the longest way through the body", 1.0, 1e-6
+        )
         for change in self._changes:
             for share, pair in self._shares(change):
                 farthest.take(share, pair)
@@ -243,28 +238,21 @@ class _Check:
                 bound = self._reach.between(first.effector, second.effector)
                 yield apart / max(bound, 1e-9), f"{first.effector} and {second.effector}, {change.where}"
 
-    def _within_lengths(self, change: _Change) -> bool:
-        return all(share <= 1.0 for share, _ in self._shares(change))
-
     def _reached(self) -> Requirement | None:
         """Where no posture is given, one is looked for; not where lengths say that there is none."""
-        missed = Worst("max_reach_gap_m", "miss of the nearest posture", "m", "<=", REACHED, 1e-9)
+        missed = Worst("max_reach_gap_m", "miss of the nearest posture", REACHED, 1e-9)
         search = PostureSearch(self._body)
         for change in self._changes:
-            if change.q is None and change.held and self._within_lengths(change):
+            if change.q is None and change.held and all(share <= 1.0 for share, _ in self._shares(change)):
                 same = {contact.effector: contact for contact in change.held}
                 if len(same) == len(change.held):
                     missed.take(search.gap(change.held, change.com), change.where)
         return missed.row
 
     def _balance(self) -> tuple[list[Requirement | None], float]:
-        off = Worst(
-            "max_balance_shift_m", "distance of the centre of mass from a place of rest", "m", "<=", BALANCE
-        )
-        lacking = Worst(
-            "max_dynamic_shortfall", "share of the weight missing on the way", "", "<=", SHORTFALL
-        )
-        effort = Worst("max_torque_share", "share of the strength that rest takes", "", "<=", 1.0, 1e-6)
+        off = Worst("max_balance_shift_m", "distance of the centre of mass from a place of rest", BALANCE)
+        lacking = Worst("max_dynamic_shortfall", "share of the weight missing on the way", SHORTFALL)
+        effort = Worst("max_torque_share", "share of the strength that rest takes", 1.0, 1e-6)
         room = np.inf
         for change in self._changes:
             if change.dynamic:
@@ -329,7 +317,7 @@ def task_rows(scenario: Scenario, plan: PlannedContacts) -> list[Requirement | N
     if task.act is None:
         return rows + _end_rows("goal", task.goal, dict(last.contacts), plan.goal)
     hands = sum("hand" in name for name in last.contacts)
-    row = Worst("goal_hands", f"hands on {task.act.on}", "", ">=", 1.0)
+    row = Worst("goal_hands", f"hands on {task.act.on}", 1.0, sense=">=")
     row.take(hands, "goal")
     return [*rows, row.row]
 
@@ -337,10 +325,10 @@ def task_rows(scenario: Scenario, plan: PlannedContacts) -> list[Requirement | N
 def _end_rows(
     end: str, state: StateSection, contacts: dict[str, Contact], q: FloatArray | None
 ) -> list[Requirement | None]:
-    place = Worst(f"{end}_distance_m", f"distance from the place of the {end}", "m", "<=", PLACE)
-    turn = Worst(f"{end}_turn_deg", f"angle from the heading of the {end}", "deg", "<=", TURN_DEG)
-    level = Worst(f"{end}_height_m", f"difference from the height of the {end}", "m", "<=", LEVEL)
-    seats = Worst(f"{end}_seats", f"seats of the {end}", "", ">=", 1.0)
+    place = Worst(f"{end}_distance_m", f"distance from the place of the {end}", PLACE)
+    turn = Worst(f"{end}_turn_deg", f"angle from the heading of the {end}", TURN_DEG)
+    level = Worst(f"{end}_height_m", f"difference from the height of the {end}", LEVEL)
+    seats = Worst(f"{end}_seats", f"seats of the {end}", 1.0, sense=">=")
     feet = {name: c for name, c in contacts.items() if name != "buttocks" and "hand" not in name} or contacts
     seat = contacts.get("buttocks") or contacts.get("pelvis")
     if state.posture == "seated":

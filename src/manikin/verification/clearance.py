@@ -92,7 +92,7 @@ class BodyShapes:
                 turns.append(carrier.rotation @ shape.rotation)
         count = len(self.shapes)
         sizes = np.array([_extent(shape) for shape in self.shapes]).reshape(count, 3)
-        radii = np.array([_radius(shape) for shape in self.shapes])
+        radii = np.array([0.0 if s.kind is ShapeKind.BOX else float(s.size[0]) for s in self.shapes])
         every = Placed(
             np.repeat(np.arange(len(postures)), count), np.tile(np.arange(count), len(postures)),
             np.array(places).reshape(-1, 3), np.array(turns).reshape(-1, 3, 3),
@@ -142,10 +142,6 @@ def _extent(shape: Shape) -> FloatArray:
     if shape.kind is ShapeKind.BOX:
         return np.array(shape.size)
     return np.array([0.0, 0.0, float(shape.size[1]) if shape.kind is ShapeKind.CAPSULE else 0.0])
-
-
-def _radius(shape: Shape) -> float:
-    return 0.0 if shape.kind is ShapeKind.BOX else float(shape.size[0])
 
 
 def _least_along(shapes: Placed, distance: Callable[[FloatArray], FloatArray]) -> FloatArray:

@@ -72,27 +72,15 @@ class HoldingRows:
     def __init__(self, body: BodyModel, solids: Sequence[Solid], kinematics: Kinematics) -> None:
         self._body, self._solids, self._kinematics = body, solids, kinematics
         self._error = Worst(
-            "max_contact_error_m", "distance of an effector from its contact", "m", "<=", CONTACT_ERROR, 1e-9
+            "max_contact_error_m", "distance of an effector from its contact", CONTACT_ERROR, 1e-9
         )
-        self._turn = Worst(
-            "max_contact_turn_deg", "angle of a sole from its contact", "deg", "<=", CONTACT_TURN_DEG, 1e-9
-        )
-        self._range = Worst(
-            "max_range_violation_deg", "joint range violation", "deg", "<=", 0.0, np.rad2deg(1e-6)
-        )
-        self._clearance = Worst("min_clearance_m", "clearance", "m", ">=", 0.0, ROUNDING)
-        self._sinking = Worst(
-            "min_touching_clearance_m", "clearance of what touches", "m", ">=", -SINKING, ROUNDING
-        )
-        self._flesh = Worst(
-            "min_flesh_clearance_m", "clearance of flesh that rests", "m", ">=", -FLESH, ROUNDING
-        )
-        self._grasped = Worst(
-            "min_grasp_clearance_m", "clearance of a hand that grasps", "m", ">=", -GRASPED, ROUNDING
-        )
-        self._self = Worst(
-            "min_self_clearance_m", "clearance of the body from itself", "m", ">=", 0.0, ROUNDING
-        )
+        self._turn = Worst("max_contact_turn_deg", "angle of a sole from its contact", CONTACT_TURN_DEG, 1e-9)
+        self._range = Worst("max_range_violation_deg", "joint range violation", 0.0, np.rad2deg(1e-6))
+        self._clearance = Worst("min_clearance_m", "clearance", 0.0, ROUNDING)
+        self._sinking = Worst("min_touching_clearance_m", "clearance of what touches", -SINKING, ROUNDING)
+        self._flesh = Worst("min_flesh_clearance_m", "clearance of flesh that rests", -FLESH, ROUNDING)
+        self._grasped = Worst("min_grasp_clearance_m", "clearance of a hand that grasps", -GRASPED, ROUNDING)
+        self._self = Worst("min_self_clearance_m", "clearance of the body from itself", 0.0, ROUNDING)
 
     @property
     def rows(self) -> list[Requirement | None]:

@@ -62,26 +62,19 @@ class ContactRows:
         self._touched: dict[int, frozenset[str]] = {}
         self._kept: list[Contact] = []
         share = 0.0 if rules.forefoot else LEAST_SHARE
-        self._angle = Worst(
-            "max_contact_angle_deg", "angle between contact and surface", "deg", "<=", ALIGNED_DEG, 1e-9
-        )
+        self._angle = Worst("max_contact_angle_deg", "angle between contact and surface", ALIGNED_DEG, 1e-9)
         self._point_angle = Worst(
-            "max_point_angle_deg", "angle between a point's normal and the surface", "deg", "<=",
-            POINT_ALIGNED_DEG, 1e-9,
-        )  # fmt: skip
+            "max_point_angle_deg", "angle between a point's normal and the surface", POINT_ALIGNED_DEG, 1e-9
+        )
         self._distance = Worst(
-            "max_contact_distance_m", "distance between contact and surface", "m", "<=", ON_SURFACE, 1e-9
+            "max_contact_distance_m", "distance between contact and surface", ON_SURFACE, 1e-9
         )
-        self._grasp = Worst(
-            "max_grasp_distance_m", "distance between palm and what it grasps", "m", "<=", GRASP_REACH
-        )
-        self._hidden = Worst("max_hidden_depth_m", "depth inside a solid", "m", "<=", HIDDEN, 1e-9)
-        self._share = Worst("min_sole_share", "part of the sole in contact", "", ">=", share, 1e-6)
-        self._beyond = Worst(
-            "max_beyond_sole_m", "distance of contact points beyond the sole", "m", "<=", 1e-3, 1e-9
-        )
-        self._friction = Worst("max_friction", "coefficient of friction", "", "<=", rules.friction, 1e-9)
-        self._force = Worst("max_grasp_force_N", "force limit of a grasp", "N", "<=", rules.grasp_force, 1e-9)
+        self._grasp = Worst("max_grasp_distance_m", "distance between palm and what it grasps", GRASP_REACH)
+        self._hidden = Worst("max_hidden_depth_m", "depth inside a solid", HIDDEN, 1e-9)
+        self._share = Worst("min_sole_share", "part of the sole in contact", share, 1e-6)
+        self._beyond = Worst("max_beyond_sole_m", "distance of contact points beyond the sole", 1e-3, 1e-9)
+        self._friction = Worst("max_friction", "coefficient of friction", rules.friction, 1e-9)
+        self._force = Worst("max_grasp_force_N", "force limit of a grasp", rules.grasp_force, 1e-9)
 
     def measure(self, contacts: Mapping[str, Contact], where: str) -> None:
         """Measure the contacts of a stage that were not yet.

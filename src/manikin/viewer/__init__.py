@@ -45,8 +45,7 @@ def serve_contacts(
     """Let the user drag a body through its scene and watch the contacts of its limbs, until Ctrl-C.
 
     Args:
-        live: The body, its scene and where it begins.
-        port, announce: As of :func:`serve`.
+        live: The body, its scene and where it begins; the others as of :func:`serve`.
 
     Raises:
         InputError: If the port is taken.
@@ -65,8 +64,7 @@ def serve_drive(
     """Let the user steer a walker with keys and sliders, in real time, until Ctrl-C.
 
     Args:
-        scene: Drawn around the walker, but not seen by it.
-        port, announce: As of :func:`serve`.
+        scene: Drawn around the walker, but not seen by it; ``port`` and ``announce`` as of :func:`serve`.
 
     Raises:
         InputError: If the port is taken.

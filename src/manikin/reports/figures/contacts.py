@@ -278,7 +278,7 @@ def _draw_phase(
     for near in (number - 1, number + 1):
         if 0 <= near < len(schedule.sequence):
             for contact in schedule.sequence[near].stance:
-                if not _held(contact, stance.contacts):
+                if not any(contact.same_place(other) for other in stance):
                     draw_contact(axes, contact, view, colours[contact.effector], held=False)
     for contact in stance:
         draw_contact(axes, contact, view, colours[contact.effector])
@@ -289,10 +289,6 @@ def _draw_phase(
         axes.plot(*view(track.position).T, color=COLOURS["soft"], linewidth=0.6, zorder=2.5)
         axes.plot(*path.T, color=COLOURS["ink"], linewidth=2.0, zorder=4)
         axes.plot(*path[-1], "o", color=COLOURS["ink"], markersize=3.5, zorder=5)
-
-
-def _held(contact: Contact, contacts: tuple[Contact, ...]) -> bool:
-    return any(contact.same_place(other) for other in contacts)
 
 
 def _title(schedule: ContactSchedule, number: int) -> str:
