@@ -244,8 +244,14 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         places = np.vstack([self._at((0,) * len(self.holds)), *shared.values()])
         tree = cKDTree(places)
         near = tree.query_ball_point(self.goal[:3], GOAL_REACH * self.size)
-        if not near:
-            return "the goal is walled off from the start: no limb has a place within reach of it"
+        # Hands alone carry nobody for long: what stands has to have places there.
+        standing = [item for k, item in enumerate(self.holds) if not self._grasps[k]] or self.holds
+        away = [
+            np.linalg.norm(item.positions - self.goal[:3], axis=1).min(initial=np.inf) for item in standing
+        ]
+        if min(away) > GOAL_REACH * self.size:
+            names = ", ".join(item.effector for item in standing)
+            return f"the goal is walled off from the start: none of {names} has a place within reach of it"
         pairs = tree.query_pairs(self.size, output_type="ndarray")
         graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(places),) * 2)
         part = connected_components(graph, directed=False)[1]
