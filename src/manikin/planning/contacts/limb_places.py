@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import Contact, ContactKind
@@ -141,7 +142,7 @@ class _Grid:
                     pairs.append((place, turns[0]))
         return np.array([place for place, _ in pairs]).reshape(-1, 3), [turn for _, turn in pairs]
 
-    def _inside(self, places: FloatArray) -> FloatArray:
+    def _inside(self, places: FloatArray) -> NDArray[np.bool_]:
         low, high = self._box
         return ((places >= low) & (places <= high)).all(axis=1)
 

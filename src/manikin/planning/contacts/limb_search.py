@@ -246,9 +246,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         near = tree.query_ball_point(self.goal[:3], GOAL_REACH * self.size)
         # Hands alone carry nobody for long: what stands has to have places there.
         standing = [item for k, item in enumerate(self.holds) if not self._grasps[k]] or self.holds
-        away = [
-            np.linalg.norm(item.positions - self.goal[:3], axis=1).min(initial=np.inf) for item in standing
-        ]
+        there = self.goal[:3]
+        away = [np.linalg.norm(item.positions - there, axis=1).min(initial=np.inf) for item in standing]
         if min(away) > GOAL_REACH * self.size:
             names = ", ".join(item.effector for item in standing)
             return f"the goal is walled off from the start: none of {names} has a place within reach of it"
