@@ -144,7 +144,7 @@ class _Grid:
 
     def _inside(self, places: FloatArray) -> NDArray[np.bool_]:
         low, high = self._box
-        return ((places >= low) & (places <= high)).all(axis=1)
+        return np.asarray(((places >= low) & (places <= high)).all(axis=1), dtype=np.bool_)
 
     def _along(self, surface: Surface) -> Iterator[tuple[FloatArray, FloatArray]]:
         """Places along the edges of a surface beyond which there is room, fingers pointing inward."""
