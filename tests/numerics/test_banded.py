@@ -67,3 +67,35 @@ def test_diagonal_terms_equal_full_ones():
         full.add(np.einsum("nd,de->nde", weight, np.eye(4)), gradient, order)
         diagonal.add_diagonal(weight, gradient, order)
     np.testing.assert_array_equal(diagonal.solve(1e-3), full.solve(1e-3))
+
+
+def test_constrained_step_is_that_of_the_dense_optimality_conditions():
+    """Residuals of some samples vanish; the step is the best of those for which they do (KKT system)."""
+    degree, knots, time, basis = _setup()
+    rng = np.random.default_rng(4)
+    d, n = 3, len(time)
+    wished, residual = rng.normal(size=(n, 4, d)), rng.normal(size=(n, 4))
+    held = np.zeros((n, 1), dtype=bool)
+    held[::8] = True  # Fewer constraints than control points.
+    jacobian, missing = held[:, :, None] * rng.normal(size=(n, 1, d)), held * rng.normal(size=(n, 1))
+    system = BlockBandedSystem(basis, d)
+    dense, right = 1e-2 * np.eye(basis.size * d), np.zeros(basis.size * d)
+    rows = []
+    for part, value in ((wished, residual), (jacobian, missing)):
+        transposed = part.transpose(0, 2, 1)
+        system.add(transposed @ part, (transposed @ value[:, :, None])[:, :, 0])
+        for k, row in enumerate(BSpline(knots, np.eye(basis.size), degree)(time)):
+            full = np.kron(row[None], part[k])
+            dense += full.T @ full
+            right -= full.T @ value[k]
+            if part is jacobian and held[k]:
+                rows.append((full, value[k]))
+    constraints, values = (np.concatenate(items) for items in zip(*rows, strict=True))
+    size = len(values)
+    kkt = np.block([[dense, constraints.T], [constraints, np.zeros((size, size))]])
+    expected = np.linalg.solve(kkt, np.concatenate([right, -values]))
+    step, multiplier = system.factorised(1e-2).constrained(
+        system.right, jacobian, missing, np.zeros((n, 1)), rounds=40
+    )
+    np.testing.assert_allclose(step.ravel(), expected[: basis.size * d], atol=1e-6)
+    np.testing.assert_allclose(multiplier[held], expected[basis.size * d :], atol=1e-5)

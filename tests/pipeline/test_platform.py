@@ -90,7 +90,10 @@ def test_the_motion_file_holds_both_motions(platform):
 @pytest.mark.slow
 @pytest.mark.parametrize("which", ["planned", "executed"])
 def test_the_lowest_margin_is_explained_as_in_the_summary(platform, which):
-    """Found again from the file, by the planned contacts and from the effectors alone (within 0.5 N.m)."""
+    """Found again from the file, by the planned contacts and from the effectors alone.
+
+    The execution's lowest margin has the same foot; over which of its edges it would tip may differ.
+    """
     content = read_motions(platform.directory / "motion.h5")
     motion = content.motions[which]
     stage = "wholebody" if which == "planned" else "execution"
@@ -98,7 +101,9 @@ def test_the_lowest_margin_is_explained_as_in_the_summary(platform, which):
         found = lowest_margin(content.body, motion, schedule)
         assert found.value == pytest.approx(platform.summary[stage]["min_margin"], abs=1e-9)
         assert found.reproduced
-        assert found.limiting.description == platform.summary["centroidal"]["limiting_contact"]
+        expected = platform.summary["centroidal"]["limiting_contact"]
+        told = found.limiting.description
+        assert told == expected if which == "planned" else told.split(":")[0] == expected.split(":")[0]
 
 
 @pytest.mark.slow

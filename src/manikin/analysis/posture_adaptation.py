@@ -272,6 +272,9 @@ def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
 KNOT_SPACING = 0.035
 """Largest distance of the spline's knots [s]."""
 
+FINE = 1
+"""How often the knots near the key instants are doubled: heels that rise there turn at up to 8 rad/s."""
+
 STEP = 1e-3
 """Distance of the finished motion's samples [s]."""
 
@@ -418,7 +421,7 @@ class _Task:
         clock: tuple[FloatArray, FloatArray],
     ) -> "_Task":
         job = FitJob(KNOT_SPACING)
-        time, _ = job.samples(job.knots(schedule))
+        time, _ = job.samples(job.knots(schedule, FINE))
         reference = _postures(recorded, np.interp(time, *clock))
         paths = effector_paths(body, schedule, time, reference)
         scale = _posture_scale(body, time)
@@ -437,7 +440,7 @@ class _Task:
         self, com: FloatArray, acceleration: FloatArray, turning: FloatArray, scales: FitScales
     ) -> ConfigurationSpline:
         """Fit to a centre of mass [m], its acceleration and a rate of angular momentum [N.m], (n, 3) each."""
-        return self.job.solve(_AdaptationGoal(self, com, acceleration, turning), scales)[1].spline
+        return self.job.solve(_AdaptationGoal(self, com, acceleration, turning), scales, FINE)[1].spline
 
 
 @dataclass(frozen=True, eq=False)
@@ -458,7 +461,7 @@ class _AdaptationGoal:
         """Residuals at the task's samples."""
         del scales
         task = self.task
-        start = spline_through(task.reference, basis, task.job.knots(task.schedule))
+        start = spline_through(task.reference, basis, task.job.knots(task.schedule, FINE))
         targets = FitTargets(
             time=time, effectors=task.paths.targets, com=self.com, com_weight=np.ones(len(time)),
             com_acceleration=self.acceleration, margin=np.zeros(len(time)), reference=task.reference,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.linalg import solveh_banded
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.linalg.blas import dsyrk
 from scipy.sparse import csr_matrix
 
@@ -42,6 +42,13 @@ class SampledBasis:
         columns = first[:, None] + np.arange(degree + 1)
         values = np.stack([identity(time, nu=order)[rows, columns] for order in range(3)])
         return cls(first, values, size)
+
+    @property
+    def starts(self) -> NDArray[np.bool_]:
+        """(n,) whether a sample is the first of its knot span, or the last of all."""
+        starts = np.diff(self.first, prepend=-1) > 0
+        starts[-1] = True
+        return starts
 
     def gather(self, per_sample: FloatArray) -> FloatArray:
         """(size,) sum of (n,) values per sample, shared out to the control points around them."""
@@ -111,14 +118,22 @@ class BlockBandedSystem:
 
     def solve(self, damping: float | FloatArray) -> FloatArray:
         """(size, d) step of every control point, with Levenberg damping: one number, or one per point."""
+        return self.factorised(damping).solve(self._right)
+
+    def factorised(self, damping: float | FloatArray) -> "FactorisedSystem":
+        """The system with Levenberg damping as of :meth:`solve`, to be solved for several right sides."""
         size, d = self._basis.size, self._dimension
         if self._memory is None:  # a step is often solved for again with more damping
             self._memory = self._assembled()
         band = self._memory.copy().reshape(size * d, -1).T
         band[0] += np.repeat(np.broadcast_to(damping, size), d)
-        return solveh_banded(
-            band, self._right.ravel(), overwrite_ab=True, lower=True, check_finite=False
-        ).reshape(size, d)
+        factor = cholesky_banded(band, overwrite_ab=True, lower=True, check_finite=False)
+        return FactorisedSystem(factor, self._basis, self._rows[0])
+
+    @property
+    def right(self) -> FloatArray:
+        """(size, d) right side."""
+        return self._right
 
     def _assembled(self) -> FloatArray:
         """The matrix in LAPACK's lower banded storage (bandwidth d + 1, size d), column by column, flat.
@@ -164,6 +179,75 @@ class BlockBandedSystem:
         n, width = values.shape
         rows = (first[:, None] + np.arange(width)).ravel()
         return csr_matrix((values.ravel(), (rows, np.repeat(np.arange(n), width))), shape=(size, n))
+
+
+VANISHED = 1e-3
+"""Share of linearised residuals at which they count as met."""
+
+UNANSWERED = 1e-9
+"""Share of a change of the multipliers that the residuals must answer with, or no step can meet them."""
+
+
+@dataclass(frozen=True, eq=False)
+class FactorisedSystem:
+    """Cholesky factor of normal equations, for steps that differ in their right side.
+
+    Attributes:
+        factor: In LAPACK's lower banded storage.
+    """
+
+    factor: FloatArray
+    basis: SampledBasis
+    rows: csr_matrix
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """(size, d) step for a right side of that shape."""
+        step = cho_solve_banded((self.factor, True), right.ravel(), check_finite=False)
+        return np.asarray(step, dtype=np.float64).reshape(right.shape)
+
+    def constrained(
+        self, right: FloatArray, jacobian: FloatArray, residual: FloatArray, multiplier: FloatArray,
+        rounds: int,
+    ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+        """Step for which some linearised residuals vanish, and the multipliers that hold them there.
+
+        Conjugate gradients on the multipliers; each round is one more solution with the same factor. The
+        residuals are among those whose squares the matrix has, so that few rounds do.
+
+        Args:
+            right: (size, d) right side, with ``multiplier`` added to the residuals.
+            jacobian: (n, m, d) derivatives of the residuals by the spline's values; zero where free.
+            residual: (n, m), zero where free.
+            multiplier: (n, m) from which the rounds begin.
+            rounds: Most further solutions; fewer where the residuals have vanished but for :data:`VANISHED`.
+        """
+        step = self.solve(right)
+        left = residual + self._along(jacobian, step)
+        direction, size = left, float(np.sum(left**2))
+        enough = VANISHED**2 * size
+        for _ in range(rounds):
+            if size <= enough:
+                break
+            change = self.solve(self.rows @ (direction[:, None, :] @ jacobian)[:, 0])
+            answer = self._along(jacobian, change)
+            curvature = float(np.sum(direction * answer))
+            if curvature <= UNANSWERED * float(np.sum(direction**2)):
+                break
+            length = size / curvature
+            step, multiplier = step - length * change, multiplier + length * direction
+            left = left - length * answer
+            before, size = size, float(np.sum(left**2))
+            direction = left + (size / before) * direction
+        return step, multiplier
+
+    def _along(self, jacobian: FloatArray, step: FloatArray) -> FloatArray:
+        """(n, m) change of residuals with a step."""
+        return (jacobian @ self.basis.evaluate(step)[:, :, None])[:, :, 0]
+
+    def smallest(self, jacobian: FloatArray, residual: FloatArray, rounds: int) -> FloatArray:
+        """Step for which linearised residuals vanish and nothing else counts; see :meth:`constrained`."""
+        right = -(self.rows @ (residual[:, None, :] @ jacobian)[:, 0])
+        return self.constrained(right, jacobian, residual, np.zeros_like(residual), rounds)[0]
 
 
 def _spans(first: NDArray[np.int64]) -> list[tuple[int, int, int]]:

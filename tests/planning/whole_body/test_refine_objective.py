@@ -24,8 +24,8 @@ from manikin.scene import Box, Obstacle, Proximity, Scene
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 LIMITS = {
-    "stages", "max_iterations", "decrease", "iterations_per_round", "multiplier_rounds", "tolerance",
-    "turn_tolerance", "joint_buffer", "safe_distance", "softness", "velocity_share", "margin",
+    "stages", "max_iterations", "decrease", "constrained_steps", "constrained_decrease", "multiplier_rounds",
+    "restoring_steps", "tolerance", "joint_buffer", "safe_distance", "softness", "velocity_share", "margin",
     "margin_softness", "touching", "knee_flexion",
 }  # fmt: skip
 OFF = {item.name: 1e9 for item in fields(RefineScales) if item.name not in LIMITS}

@@ -137,3 +137,14 @@ def test_toes_are_straight_while_their_sole_is_held_and_free_in_the_middle_of_a_
     share = flat_share(BODY, SCHEDULE, time)
     np.testing.assert_allclose(share[toe], [1.0, 1.0, 0.5, 0.0, 0.5, 1.0, 1.0, 1.0], atol=1e-12)
     np.testing.assert_array_equal(share[BODY.joint_index("left_toe_extension")], 1.0)
+
+
+def test_a_contact_counts_to_its_last_instant():
+    """A seat that is left for good holds until it is left: there is no flight that would say so."""
+    sitting = StanceSequence(
+        [Phase(Stance([LEFT, RIGHT, SEAT], 2000.0)), Phase(Stance([LEFT, RIGHT], 2000.0))]
+    )
+    schedule = ContactSchedule(sitting, [0.0, 1.0, 2.0])
+    target = effector_targets(schedule, (), np.array([0.9, 1.0, 1.1]))["buttocks"]
+    assert target.weight.tolist() == [1.0, 1.0, 0.0]
+    np.testing.assert_array_equal(target.position[1], SEAT.position)

@@ -4,6 +4,9 @@ All samples of the motion are solved together by damped Gauss-Newton over the co
 a clamped quintic spline.  Unlike a posture-by-posture solution ([Qiu2012]_ 6.2) the result is
 smooth by construction, and the rate of its centroidal momentum follows what the point-mass
 plan assumes, so that the whole body keeps the balance that was planned for its centre of mass.
+
+Contacts and a required centre of mass are constraints. Penalties show the way to them; then every step is
+the best one that meets their linearisation, and a last one restores what its curvature left.
 """
 
 from dataclasses import dataclass
@@ -22,8 +25,20 @@ DEGREE = 5
 LEAST_DAMPING = 1.0
 """Smallest Levenberg damping of a control point."""
 
+FIRST_DAMPING = 30.0
+"""The one that a fit begins with."""
+
 MOST_DAMPING = 1.0e6
 """Largest one."""
+
+RESTORING_DAMPING = 100.0
+"""Largest one of a step that only restores the contacts."""
+
+LENGTHS = 1.0, 0.5, 0.25
+"""Shares of a constrained step that are tried, until one makes the objective less."""
+
+REFUSED = 4
+"""Constrained steps in a row that make nothing better, after which no more are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +64,11 @@ class MotionFit:
         self._objective, self._knots, self._final = objective, knots, scales
         self._basis = objective.basis
         self._system = BlockBandedSystem(self._basis, objective.targets.reference.shape[1])
-        self._damping = np.ones(self._basis.size)
+        self._damping = np.full(self._basis.size, FIRST_DAMPING)
         self._multiplier = np.zeros((len(objective.targets.time), objective.task_rows))
-        self._unit = scales.position
-
-    def rescale(self, scales: MotionScales) -> None:
-        """Keep the forces of the multipliers at other scales, which loosen or tighten all tasks alike."""
-        self._multiplier = scales.position / self._unit * self._multiplier
-        self._unit = scales.position
 
     def solve(self, start: ConfigurationSpline) -> FitResult:
-        """Solve from ``start``: first with loose tasks, so that the posture stays natural, then exactly.
-
-        The last scales stay soft; the method of multipliers makes contacts and centre of mass
-        exact without the stiff valleys of a large penalty.
-        """
+        """Solve from ``start``: first with loose tasks, so that the posture stays natural, then exactly."""
         return self._solve(start, self._final, self._final.stages)
 
     def improve(self, start: ConfigurationSpline, scales: MotionScales) -> FitResult:
@@ -80,21 +85,70 @@ class MotionFit:
                 state = self._objective.linearise(points, scales, self._multiplier)
             points, state, taken = self._descend(points, state, scales, scales.max_iterations)
             iterations += taken
-        moved = True
-        for _ in range(final.multiplier_rounds):
-            if scales.are_met(state.support_error, state.support_turn, state.com_error):
-                break
-            if moved:  # At a point that no step has left, another push says nothing new.
-                self._update_multipliers(state)
-            before = state
-            points, state, taken = self._descend(points, state, scales, scales.iterations_per_round)
-            iterations, moved = iterations + taken, state is not before
-        return FitResult(ConfigurationSpline(self._knots, points, DEGREE), iterations)
+        points, state, taken = self._constrain(points, state, scales)
+        iterations += taken
+        points, taken = self._restore(points, state, scales)
+        return FitResult(ConfigurationSpline(self._knots, points, DEGREE), iterations + taken)
 
-    def _update_multipliers(self, state: FitLinearisation) -> None:
-        before = self._multiplier
-        self._multiplier = before + self._objective.exact_rows * state.task_residual
-        state.shift_tasks(before, self._multiplier)
+    def _constrain(
+        self, points: FloatArray, current: FitLinearisation, scales: MotionScales
+    ) -> tuple[FloatArray, FitLinearisation, int]:
+        """Steps that meet contacts and centre of mass: each is the best that meets their linearisation.
+
+        The multipliers that hold them come with the step, so that the augmented objective falls along it
+        and what is left of their errors is of second order in the step.
+        """
+        taken = refused = 0
+        while taken < scales.constrained_steps and refused < REFUSED:
+            taken += 1
+            current.assemble(self._system)
+            before = self._multiplier
+            step, after = self._system.factorised(self._damping).constrained(
+                self._system.right, *self._constraints(current), before, scales.multiplier_rounds
+            )
+            current.shift_tasks(before, after)
+            step = _within_reach(step)
+            for length in LENGTHS:
+                trial_points = points + length * step
+                trial = self._objective.linearise(trial_points, scales, after)
+                if trial.cost < current.cost:
+                    break
+            self._adapt_damping(current, trial)
+            if trial.cost >= current.cost:
+                current.shift_tasks(after, before)
+                refused += 1
+                continue
+            # The squared multipliers in the augmented objective say nothing of the motion.
+            decrease = (current.cost - trial.cost) / (current.cost - 0.5 * float(np.sum(after**2)))
+            points, current, self._multiplier, refused = trial_points, trial, after, 0
+            if decrease < scales.constrained_decrease:
+                break
+        return points, current, taken
+
+    def _restore(
+        self, points: FloatArray, current: FitLinearisation, scales: MotionScales
+    ) -> tuple[FloatArray, int]:
+        """The nearest motion that meets contacts and centre of mass: their errors fall quadratically."""
+        taken = 0
+        while taken < scales.restoring_steps and self._missed(current) > scales.tolerance:
+            taken += 1
+            current.assemble(self._system)
+            # A step this small needs little damping, which would keep it from the constraints.
+            factor = self._system.factorised(np.minimum(self._damping, RESTORING_DAMPING))
+            step = factor.smallest(*self._constraints(current), scales.multiplier_rounds)
+            trial = self._objective.linearise(points + _within_reach(step), scales, self._multiplier)
+            if self._missed(trial) >= self._missed(current):
+                break
+            points, current = points + _within_reach(step), trial
+        return points, taken
+
+    def _missed(self, state: FitLinearisation) -> float:
+        return float(np.abs(self._objective.exact_rows * state.task_residual).max(initial=0.0))
+
+    def _constraints(self, state: FitLinearisation) -> tuple[FloatArray, FloatArray]:
+        """Derivatives (n, m, nq) and residuals (n, m) of the tasks, zero for those that are only wished."""
+        held = self._objective.exact_rows
+        return held[:, :, None] * state.task_jacobian, held * state.task_residual
 
     def _descend(
         self, points: FloatArray, current: FitLinearisation, scales: MotionScales, most: int
@@ -109,8 +163,7 @@ class MotionFit:
             taken += 1
             current.assemble(self._system)
             step = self._system.solve(self._damping)
-            # A step of more than a radian leaves the region where the model holds.
-            trial_points = points + step * min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
+            trial_points = points + _within_reach(step)
             trial = self._objective.linearise(trial_points, scales, self._multiplier)
             self._adapt_damping(current, trial)
             if trial.cost < current.cost:
@@ -127,6 +180,11 @@ class MotionFit:
         else:
             factor = np.where(new > old, 8.0, 1.0)
         self._damping = np.clip(self._damping * factor, LEAST_DAMPING, MOST_DAMPING)
+
+
+def _within_reach(step: FloatArray) -> FloatArray:
+    """The step, shortened to a radian: a longer one leaves the region where the model holds."""
+    return step * min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
 
 
 def spline_through(configurations: FloatArray, basis: SampledBasis, knots: FloatArray) -> ConfigurationSpline:

@@ -124,7 +124,6 @@ class FitJob:
         patience: Relative decrease of the objective below which a repair stops.
         by_count: Whether the attempt that breaks the fewest requirements is the better one, of two alike the
             later, and is gone on from; else only a success replaces the first attempt.
-        rescaled: Whether multipliers keep their forces when a repair changes the scales.
         iterations: Gauss-Newton steps of all fits so far.
     """
 
@@ -134,7 +133,6 @@ class FitJob:
     penalties: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     patience: float = 0.0
     by_count: bool = False
-    rescaled: bool = False
     iterations: int = 0
 
     def knots(self, schedule: ContactSchedule, fine: int = 0) -> FloatArray:
@@ -174,19 +172,18 @@ class FitJob:
 
     def improve(self, last: FitAttempt[G], scales: MotionScales) -> FitAttempt[G]:
         """Go on with other scales on the same knots."""
-        if self.rescaled:
-            last.fit.rescale(scales)
         result = last.fit.improve(last.result.spline, scales)
         return self._measured(last.goal, scales, last.fine, True, last.fit, result)
 
     def repair(
-        self, first: FitAttempt[G], remedy: Callable[[int, FitAttempt[G]], FitAttempt[G]], most: int
+        self, first: FitAttempt[G], remedy: Callable[[int, FitAttempt[G]], FitAttempt[G] | None], most: int
     ) -> FitAttempt[G]:
         """Repeat a remedy until every requirement is kept.
 
         Args:
             first: The attempt that may break requirements.
-            remedy: Makes the next attempt from the number of remedies tried and the last attempt.
+            remedy: Makes the next attempt from the number of remedies tried and the last attempt; None where
+                nothing helps.
             most: Most remedies.
 
         Returns:
@@ -196,7 +193,10 @@ class FitJob:
         for number in range(most):
             if not last.broken:
                 break
-            last = remedy(number, last)
+            following = remedy(number, last)
+            if following is None:
+                break
+            last = following
             best = self.better(best, last)
             same = best.goal.schedule.sequence is last.goal.schedule.sequence
             if self.by_count and last.continued and best is not last and same:

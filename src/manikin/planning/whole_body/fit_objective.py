@@ -40,9 +40,6 @@ class FitLinearisation:
         task_residual: (n, m) scaled residuals of effectors and centre of mass.
         task_jacobian: (n, m, nq) their derivatives by the raw coordinates.
         momentum: Scaled residual (n, 6) of the momentum's rate with its derivatives.
-        support_error: Largest error of an effector in contact [m].
-        support_turn: Largest angle of one that must keep its orientation [rad].
-        com_error: Largest error of the centre of mass [m].
     """
 
     sample_cost: FloatArray
@@ -52,9 +49,6 @@ class FitLinearisation:
     task_residual: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     task_jacobian: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 0)))
     momentum: MomentumRate | None = None
-    support_error: float = 0.0
-    support_turn: float = 0.0
-    com_error: float = 0.0
 
     @property
     def cost(self) -> float:
@@ -127,8 +121,11 @@ class MotionObjective:
             self._reference_weight = np.atleast_2d(1.0 / targets.reference_scale)
         self.task_rows = 6 * len(targets.effectors) + 3
         held = [_held_rows(target) for target in targets.effectors.values()]
-        self.exact_rows = np.hstack([*held, np.repeat(targets.com_weight[:, None] >= 1.0, 3, axis=1)])
-        """(n, task_rows) whether a task has to be met exactly: contacts and centre of mass."""
+        exact = np.hstack([*held, np.repeat(targets.com_weight[:, None] >= 1.0, 3, axis=1)])
+        self.exact_rows = exact & basis.starts[:, None]
+        """(n, task_rows) whether a task is a constraint: contacts and centre of mass, at every knot.
+
+        A span adds one control point: more constrained samples ask for more than the spline can give."""
 
     def linearise(self, points: FloatArray, scales: MotionScales, shift: FloatArray) -> FitLinearisation:
         """Evaluate every term.
@@ -167,16 +164,9 @@ class MotionObjective:
             place = motion.frames[:, number]
             by_joints = self._sampler.frame_jacobian(motion, number)
             jacobian[:, rows], residual[:, rows] = _effector_rows(target, place, by_joints, scales)
-            error = np.linalg.norm(_missed(target, place), axis=1)
-            out.support_error = max(out.support_error, float(error[target.weight >= 1.0].max(initial=0.0)))
-            turn = np.linalg.norm(residual[:, rows][:, 3:], axis=1) * scales.rotation
-            out.support_turn = max(out.support_turn, float(turn[_held_rows(target)[:, 3]].max(initial=0.0)))
-        weight = self.targets.com_weight
-        error = motion.com - self.targets.com
-        scaled = self._com_weight(scales)
-        jacobian[:, -3:] = scaled[:, None, None] * motion.com_jacobian
-        residual[:, -3:] = scaled[:, None] * error
-        out.com_error = float(np.linalg.norm(error[weight >= 1.0], axis=1).max(initial=0.0))
+        weight = self._com_weight(scales)
+        jacobian[:, -3:] = weight[:, None, None] * motion.com_jacobian
+        residual[:, -3:] = weight[:, None] * (motion.com - self.targets.com)
         out.task_residual, out.task_jacobian = residual, to_raw(jacobian, motion.tangent)
         out.add(0, out.task_jacobian, residual + shift)
 
@@ -283,17 +273,12 @@ class MotionObjective:
     ) -> MomentumRate:
         """The momentum's rate with a row for each joint torque beyond the strength."""
         excess = excess_torque(self._body, motion.states, forces, scales.strength_share)
-        first, second, third = momentum.jacobians
-        by_posture = to_raw(excess.by_posture, motion.tangent) / scales.torque_share
-        by_acceleration = to_raw(excess.by_acceleration, motion.tangent) / scales.torque_share
-        return MomentumRate(
-            np.hstack([momentum.value, excess.value / scales.torque_share]),
-            (
-                np.concatenate([first, by_posture], axis=1),
-                np.concatenate([second, np.zeros_like(by_posture)], axis=1),
-                np.concatenate([third, by_acceleration], axis=1),
-            ),
+        rows = (to_raw(by, motion.tangent) / scales.torque_share for by in excess.by_state)
+        first, second, third = (
+            np.concatenate(pair, axis=1) for pair in zip(momentum.jacobians, rows, strict=True)
         )
+        value = np.hstack([momentum.value, excess.value / scales.torque_share])
+        return MomentumRate(value, (first, second, third))
 
 
 def _effector_rows(

@@ -28,11 +28,11 @@ class MotionScales:
         max_iterations: Upper bound of Gauss-Newton steps.
         decrease: Relative decrease of the objective below which the iteration stops.
         stages: Factors by which the tasks' scales are loosened, one solution after the other.
-        iterations_per_round: Steps between two updates of the multipliers.
-        multiplier_rounds: Most updates of the multipliers of contacts and centre of mass.
-        tolerance: Largest error of the contacts at convergence [m]; three times that for the
-            centre of mass.
-        turn_tolerance: Largest angle of a sole from its contact at convergence [rad].
+        constrained_steps: Upper bound of the steps that meet the contacts, after those.
+        constrained_decrease: Relative decrease of the objective below which they stop.
+        multiplier_rounds: Most updates of the multipliers of contacts and centre of mass in each of them.
+        restoring_steps: Upper bound of the steps that only restore the contacts, after those.
+        tolerance: Largest error of a constraint at convergence, in units of its own scale.
     """
 
     position: float = 1.0e-3
@@ -52,24 +52,11 @@ class MotionScales:
     max_iterations: int = 30
     decrease: float = 0.06
     stages: tuple[float, ...] = (3.0, 1.0, 0.3)
-    iterations_per_round: int = 3
-    multiplier_rounds: int = 12
-    tolerance: float = 5.0e-4
-    turn_tolerance: float = 3.5e-3
-
-    def are_met(self, support_error: float, support_turn: float, com_error: float) -> bool:
-        """Whether contacts and centre of mass are exact enough.
-
-        Args:
-            support_error: Of contacts [m].
-            support_turn: Of soles [rad].
-            com_error: Of the centre of mass [m].
-        """
-        return (
-            support_error < self.tolerance
-            and support_turn < self.turn_tolerance
-            and com_error < 3.0 * self.tolerance
-        )
+    constrained_steps: int = 40
+    constrained_decrease: float = 0.003
+    multiplier_rounds: int = 20
+    restoring_steps: int = 3
+    tolerance: float = 0.1
 
     def loosened(self, factor: float) -> Self:
         """Return the same scales with contacts ``factor`` times looser."""

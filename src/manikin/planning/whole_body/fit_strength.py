@@ -1,10 +1,10 @@
 """Joint torques beyond the strength as residuals of the whole-body fit, with their derivatives.
 
-The contact forces of an earlier motion are held where they act, and the torques that inverse
-dynamics then asks of the joints are differentiated by posture and acceleration
-(:func:`pinocchio.computeRNEADerivatives`). With the centre of mass and the momentum on their plan the forces
-of a single support hardly depend on the posture, so that a step along these derivatives is one of the true
-torques; in a double support the forces are shared anew after each fit.
+The torques that inverse dynamics asks of the joints with the contact forces of an earlier motion are
+differentiated by the state (:func:`pinocchio.computeRNEADerivatives`). What wrench the root then lacks is
+given by changes of those forces at the points of the contacts, least in the sum of squares, weighed by the
+load of each contact. A single support has one such change, so that a step along these derivatives shifts its
+centre of pressure as the true one does; between several supports the forces are shared anew after each fit.
 """
 
 from dataclasses import dataclass
@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.body.strength import with_masses
-from manikin.contact import ContactSchedule
+from manikin.contact import Contact, ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, skew
 
 MISSING = 1.0
 """Wrench that contact forces may leave unsupplied where they are held [N, N.m]."""
+
+LEAST_GIVE = 1e-10
+"""Eigenvalue of the contacts' compliance, relative to the largest, below which they give no wrench."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,7 @@ class HeldForces:
         known: (n,) whether the forces supply what the motion needs; not so where a contact made at speed
             still settles.
         wrench: (n, c, 6) force [N] and moment about the world origin [N.m], world axes.
+        sharing: (n, c, 6, 6) change of each of these wrenches for one that is missing.
         hinges: (k,) hinges whose torque counts: those that a force does not reach through toes.
         models: n models of the body, with what it carries then.
     """
@@ -41,6 +45,7 @@ class HeldForces:
     joints: tuple[int, ...]
     known: NDArray[np.bool_]
     wrench: FloatArray
+    sharing: FloatArray
     hinges: tuple[int, ...]
     models: tuple[pin.Model, ...]
 
@@ -56,10 +61,14 @@ class HeldForces:
         settling = np.any([schedule.settling(motion.time[rows], name) for name in names], axis=0)
         known = ~settling & (np.linalg.norm(motion.tau[rows, :6], axis=1) < MISSING)
         wrench = motion.contact_force[rows].copy()
-        for sample, phase in enumerate(phases):
-            for contact in schedule.sequence[int(phase)].stance:
-                part = wrench[sample, names.index(contact.effector)]
-                part[3:] += np.cross(contact.position, part[:3])
+        give = np.zeros((*wrench.shape, 6))
+        for number, phase in enumerate(schedule.sequence):
+            for contact in phase.stance:
+                part = phases == number, names.index(contact.effector)
+                wrench[*part, 3:] += np.cross(contact.position, wrench[*part, :3])
+                load = np.linalg.norm(wrench[*part, :3], axis=1)
+                give[part] = load[:, None, None] * compliance(contact)
+        sharing = give @ np.linalg.pinv(give.sum(axis=1), rcond=LEAST_GIVE, hermitian=True)[:, None]
         model: pin.Model = body.pinocchio
         joints = tuple(model.frames[body.effector_frame(name)].parentJoint for name in names)
         toes = [hanging_segment(body, body.effector(name).segment) for name in names]
@@ -73,9 +82,26 @@ class HeldForces:
             if load is not None and id(load) not in models:
                 models[id(load)] = with_masses(body, load.masses).pinocchio
         return cls(
-            joints, known, wrench, tuple(k for k in range(body.nv - 6) if k not in left_out),
+            joints, known, wrench, sharing, tuple(k for k in range(body.nv - 6) if k not in left_out),
             tuple(models[id(load)] for load in loads),
         )  # fmt: skip
+
+
+def compliance(contact: Contact) -> FloatArray:
+    """(6, 6) sum over a contact's points of the wrenches of unit forces there, about the world origin.
+
+    Times a wrench's multiplier it is the change of the contact's wrench that has the least squares of forces.
+    """
+    points = contact.points_in_world
+    moment = skew(points)
+    result = np.zeros((6, 6))
+    result[:3, :3] = len(points) * np.eye(3)
+    result[3:, :3] = moment.sum(axis=0)
+    result[:3, 3:] = result[3:, :3].T
+    result[3:, 3:] = (moment @ moment.transpose(0, 2, 1)).sum(axis=0)
+    if contact.max_force > 0.0:
+        result[3:, 3:] += (contact.max_moment / contact.max_force) ** 2 * np.eye(3)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,18 +111,16 @@ class ExcessTorque:
     Attributes:
         hinges: (k,) the hinges that have one at some sample.
         value: (n, k) excess of their shares, zero where there is none.
-        by_posture: (n, k, nv) its derivative by the tangent of the configuration.
-        by_acceleration: (n, k, nv) its derivative by the acceleration.
+        by_state: (n, k, nv) its derivatives by the tangent of the configuration, velocity and acceleration.
     """
 
     hinges: NDArray[np.int64]
     value: FloatArray
-    by_posture: FloatArray
-    by_acceleration: FloatArray
+    by_state: tuple[FloatArray, FloatArray, FloatArray]
 
 
 def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wanted: float) -> ExcessTorque:
-    """Shares of the strength that sampled states take beyond ``wanted`` while contact forces are held.
+    """Shares of the strength that sampled states take beyond ``wanted``, with forces near those held.
 
     Args:
         states: n states.
@@ -104,29 +128,33 @@ def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wante
     """
     data_of = {key: model.createData() for key, model in {id(each): each for each in held.models}.items()}
     n, hinges = len(states.q), np.array(held.hinges)
-    torque = np.empty((n, body.nv - 6))
+    torque, answer = np.empty((n, body.nv - 6)), np.empty((n, body.nv - 6, 6))
     external: list[pin.StdVec_Force] = []
     for s, model in enumerate(held.models):
         data = data_of[id(model)]
-        pin.forwardKinematics(model, data, states.q[s])
+        pin.computeJointJacobians(model, data, states.q[s])
         forces = pin.StdVec_Force()
         forces.extend([pin.Force.Zero() for _ in range(model.njoints)])
-        for joint, wrench in zip(held.joints, held.wrench[s], strict=True):
+        by_root = np.zeros((body.nv, 6))
+        for joint, wrench, sharing in zip(held.joints, held.wrench[s], held.sharing[s], strict=True):
             forces[joint] += data.oMi[joint].actInv(pin.Force(wrench))
+            by_root -= pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD).T @ sharing
         external.append(forces)
-        torque[s] = pin.rnea(model, data, states.q[s], states.v[s], states.a[s], forces)[6:]
+        answer[s] = by_root[6:] @ data.oMi[1].toDualActionMatrix()
+        required = pin.rnea(model, data, states.q[s], states.v[s], states.a[s], forces)
+        torque[s] = required[6:] + answer[s] @ required[:6]
     limit = np.where(torque > 0.0, body.torque_upper, body.torque_lower)
     excess = np.where(held.known[:, None], np.maximum(torque / limit - wanted, 0.0), 0.0)[:, hinges]
     active = np.flatnonzero(np.any(excess > 0.0, axis=0))
     value, rows = excess[:, active], hinges[active]
-    by_posture, by_acceleration = np.zeros((2, n, len(rows), body.nv))
+    by_state = np.zeros((3, n, len(rows), body.nv))
     for s in np.flatnonzero(np.any(value > 0.0, axis=1)):
         model = held.models[s]
-        by_q, _, by_a = pin.computeRNEADerivatives(
+        by_q, by_v, by_a = pin.computeRNEADerivatives(
             model, data_of[id(model)], states.q[s], states.v[s], states.a[s], external[s]
         )
         scale = (value[s] > 0.0) / limit[s, rows]
-        by_posture[s] = scale[:, None] * by_q[6 + rows]
         full = np.triu(by_a) + np.triu(by_a, 1).T
-        by_acceleration[s] = scale[:, None] * full[6 + rows]
-    return ExcessTorque(rows, value, by_posture, by_acceleration)
+        for out, by in zip(by_state, (by_q, by_v, full), strict=True):
+            out[s] = scale[:, None] * (by[6 + rows] + answer[s, rows] @ by[:6])
+    return ExcessTorque(rows, value, (by_state[0], by_state[1], by_state[2]))

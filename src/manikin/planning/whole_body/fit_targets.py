@@ -103,7 +103,8 @@ def effector_targets(
         settling = schedule.settling(time, name)
         for index, phase in enumerate(schedule.sequence):
             if name in phase.stance:
-                contact, rows = phase.stance[name], phases == index
+                # A contact holds to the end of its last instant, where the next phase may know nothing of it.
+                contact, rows = phase.stance[name], (phases == index) | (time == schedule.instants[index + 1])
                 target.put(rows, contact)
                 weight[rows] = np.where(settling[rows], ALMOST, 1.0)
                 if contact.kind is ContactKind.GRASP:

@@ -73,20 +73,20 @@ MISSED = 0.1
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
 
+MOMENTUM = frozenset({"max_missing_wrench"})
+"""Requirement that a rate of the momentum nearer to its plan keeps."""
+
 PENALTIES = MappingProxyType(
     {
-        "max_support_error_m": ("tolerance",),
-        "max_com_error_m": ("tolerance",),
         "max_meeting_error_m": ("position",),
         "min_clearance_m": ("clearance",),
         "max_joint_limit_violation_rad": ("joint_limit",),
         "max_velocity_share": ("joint_velocity",),
         "max_missing_wrench": ("force", "moment_share"),
-        "max_torque_share": ("force", "moment_share", "torque_share"),
+        "max_torque_share": ("torque_share",),
     }
 )
-"""Scales that decide each residual of the certificate.  Contacts and the centre of mass have multipliers,
-which are only updated until the tolerance is kept."""
+"""Scales that decide each residual of the certificate; contacts and centre of mass are constraints."""
 
 
 @dataclass(frozen=True)
@@ -353,17 +353,26 @@ class _Planner:
             first = first if led.is_caught else led
         return self.job.repair(first, self._remedy, REPAIRS)
 
-    def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal]:
-        """The next fit after one that breaks requirements."""
+    def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal] | None:
+        """The next fit after one that breaks requirements; None where contacts stay out of reach."""
         goal, broken = replace(last.goal, forces=None), last.broken
         if last.is_caught:  # Fits that follow may have the finer knots again.
             return replace(self.job.restart(replace(last, goal=goal)), fine=last.fine)
-        inexact, weak = number == 0 and bool(broken & INEXACT), "max_torque_share" in broken
+        if last.fine > 0 and broken & INEXACT:
+            return None
+        inexact, weak = bool(broken & INEXACT), "max_torque_share" in broken
+        if weak and self._settles(last.certificate["max_torque_share"].time_s or 0.0):
+            broken |= MOMENTUM
         scales = self.job.updated(last.scales, broken, narrow=number > 0)
         if inexact or weak:
             goal = replace(goal, forces=last.motion) if weak else goal
             return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
+
+    def _settles(self, time: float) -> bool:
+        """Whether a contact made at speed still settles: only the momentum then decides the torques."""
+        schedule, instant = self.trajectory.schedule, np.array([time])
+        return any(schedule.settling(instant, name)[0] for name in schedule.sequence.effectors)
 
     def guide(
         self,

@@ -78,8 +78,6 @@ _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
 
 PENALTIES = MappingProxyType(
     {
-        "max_support_error_m": ("tolerance", "position", "rotation"),
-        "max_support_turn_rad": ("turn_tolerance", "position", "rotation"),
         "min_clearance_m": ("clearance",),
         "max_penetration_m": ("clearance", "touching"),
         "max_joint_limit_violation_rad": ("joint_limit",),
@@ -89,7 +87,7 @@ PENALTIES = MappingProxyType(
         "max_torque_share": (),
     }
 )
-"""Scales that decide each residual of the certificate."""
+"""Scales that decide each residual of the certificate; contacts are constraints."""
 
 
 @dataclass(frozen=True)
@@ -242,7 +240,7 @@ class Refinement:
         self._job = FitJob(
             # Relative decrease of the objective below which a repair stops.
             settings.knot_spacing, settings.samples_per_span, penalties=PENALTIES, patience=0.004,
-            by_count=True, rescaled=True,
+            by_count=True,
         )  # fmt: skip
         self._choice = VariableChoice(
             # An effector this near its contact is meant to be there: exactness is for the repairs [m].
