@@ -21,6 +21,9 @@ from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray
 
+BEFORE_TIP = 1e-3
+"""Distance of a segment's shapes to its effector from which they end before it [m]."""
+
 
 def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
     """Last segment of a limb when it hangs on ``segment``, as toes on a foot, or None."""
@@ -48,6 +51,20 @@ def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
             return own, limb.segments[-2]
     hanging = hanging_segment(body, own)
     return (own,) if hanging is None else (own, hanging.name)
+
+
+def ends_before_tip(body: BodyModel, effector: str) -> bool:
+    """Whether a limb touches in a point at its end, and all shapes of its last segment end before that."""
+    frame = body.effector(effector)
+    shapes = body.segment(frame.segment).shapes
+    return (
+        any(
+            limb.effector == effector and limb.kind is ContactKind.POINT and not is_further(body, limb)
+            for limb in body.limbs
+        )
+        and bool(shapes)
+        and all(item.distance_to(frame.translation) > BEFORE_TIP for item in shapes)
+    )
 
 
 def hinge_line(body: BodyModel, effector: str) -> float | None:

@@ -75,6 +75,15 @@ class Shape:
         )
         object.__setattr__(self, "rotation", check_rotation(turn, f"{where} rotation", BodyError))
 
+    def distance_to(self, point: FloatArray) -> float:
+        """Distance of a point (3,) of the segment frame to the shape, 0 inside [m]."""
+        away = self.rotation.T @ (point - self.translation)
+        if self.kind is ShapeKind.BOX:
+            return float(np.linalg.norm(np.maximum(np.abs(away) - 0.5 * self.size, 0.0)))
+        if self.kind is ShapeKind.CAPSULE:
+            away[2] -= np.clip(away[2], -0.5 * self.size[1], 0.5 * self.size[1])
+        return max(0.0, float(np.linalg.norm(away)) - float(self.size[0]))
+
 
 @dataclass(frozen=True, eq=False)
 class Hinge:

@@ -8,6 +8,7 @@ from manikin.kinematics.posture_problem import (
     PostureProblem,
     Preferences,
     com_target,
+    pairs_beside,
     place_over_contacts,
     touching_pairs,
 )
@@ -16,5 +17,5 @@ from manikin.kinematics.posture_search import PostureResult, SolverSettings, gen
 __all__ = [
     "Aligner", "Alignment", "EffectorPlacements", "LimbKinematics", "Placement", "PointTargets",
     "PostureProblem", "PostureResult", "Preferences", "ReachVolume", "SolverSettings", "com_target",
-    "generate_posture", "place_over_contacts", "reach_volume", "touching_pairs",
+    "generate_posture", "pairs_beside", "place_over_contacts", "reach_volume", "touching_pairs",
 ]  # fmt: skip

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
-from manikin.body.limbs import end_segments, hanging_segment, hangs
+from manikin.body.limbs import end_segments, ends_before_tip, hanging_segment, hangs
 from manikin.body.model import BodyModel
 from manikin.body.natural_range import LearntJoint, learnt_joints
 from manikin.contact import Contact, ContactKind, SolePart
@@ -149,6 +149,7 @@ class PostureProblem:
         clearance: Distance to keep to obstacles [m].
         self_clearance: Distance to keep between body parts [m].
         ignore: Pairs (segment, obstacle) or (segment, segment) that may touch.
+        beside: Pairs (segment, obstacle) that may be as near as touching, but no nearer.
         range_margin: Angle to keep from the ends of the hinge ranges [rad].
         learnt_margin: Angle to keep to the surface of the learnt volumes of hips and shoulders, inside [rad];
             None where the ranges of their hinges are all that counts.
@@ -166,6 +167,7 @@ class PostureProblem:
     clearance: float = 0.02
     self_clearance: float = 0.005
     ignore: Ignored = NOTHING
+    beside: Ignored = NOTHING
     range_margin: float = 0.0
     learnt_margin: float | None = None
     reference: FloatArray | None = None
@@ -269,7 +271,10 @@ class PostureProblem:
         """The distances to keep, or None without a scene."""
         if self.proximity is None:
             return None
-        return ClearanceTerm(self.proximity, self.clearance, self.self_clearance, activation, self.ignore)
+        return ClearanceTerm(
+            self.proximity, self.clearance, self.self_clearance, activation, self.ignore - self.beside,
+            self.beside,
+        )  # fmt: skip
 
 
 def hinge_weights(body: BodyModel, preferences: Preferences) -> FloatArray:
@@ -292,6 +297,18 @@ def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]
             root = body.effector(effector).segment
             pairs.update((other.name, obstacle) for other in body.segments if other.parent == root)
     return frozenset(pairs)
+
+
+def pairs_beside(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
+    """Pairs of :func:`touching_pairs` that need not overlap: the segment's shapes end before its effector.
+
+    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere.
+    """
+    return frozenset(
+        (body.effector(effector).segment, obstacle)
+        for effector, obstacle in effector_obstacles
+        if ends_before_tip(body, effector)
+    )
 
 
 def com_target(

@@ -15,7 +15,7 @@ import pinocchio as pin
 from manikin.body.configuration import Configuration
 from manikin.body.model import BodyModel
 from manikin.numerics.spatial import FloatArray, skew
-from manikin.scene.distance import Ignored, Pair, Proximity
+from manikin.scene.distance import NOTHING, Ignored, Pair, Proximity, segment_of
 from manikin.scene.spheres import SphereProximity
 
 UP: FloatArray = np.array([0.0, 0.0, 1.0])
@@ -280,6 +280,10 @@ class Clearances(NamedTuple):
     pairs: tuple[Pair, ...]
 
 
+BESIDE = 5e-4
+"""Distance of what may be as near as touching; more than the solver's tolerance [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class ClearanceTerm:
     """No shape closer than a safety distance to an obstacle or to another part of the body.
@@ -290,6 +294,7 @@ class ClearanceTerm:
         self_safety: Distance to keep between body parts [m].
         activation: Pairs farther apart than the safety distance plus this are left out [m].
         ignore: Pairs of names that may touch.
+        beside: Pairs (segment, obstacle) that may be as near as touching.
     """
 
     proximity: Proximity | SphereProximity
@@ -297,12 +302,13 @@ class ClearanceTerm:
     self_safety: float
     activation: float
     ignore: Ignored
+    beside: Ignored = NOTHING
 
     def evaluate(self, configuration: Configuration) -> Clearances:
         """Distances beyond the safety distance of the pairs that are close."""
         reach = max(self.safety, self.self_safety) + self.activation
         close = self.proximity.evaluate(configuration.q, reach, self.ignore)
-        safety = np.array([self.self_safety if "/" in other else self.safety for _, other in close.pairs])
+        safety = np.array([self._safety(*pair) for pair in close.pairs])
         gradient = close.gradient.reshape(-1, configuration.body.nv)
         return Clearances(close.distance - safety, gradient, close.pairs)
 
@@ -310,6 +316,12 @@ class ClearanceTerm:
         """Say which pair is closest to or beyond its safety distance."""
         worst = int(np.argmin(residual))
         first, second = pairs[worst]
-        safety = self.self_safety if "/" in second else self.safety
+        safety = self._safety(first, second)
         distance = residual[worst] + safety
         return f"'{first}' and '{second}' are {distance:.4f} m apart; required {safety:.4f} m"
+
+    def _safety(self, shape: str, other: str) -> float:
+        """Distance that a pair has to keep [m]."""
+        if "/" in other:
+            return self.self_safety
+        return min(BESIDE, self.safety) if (segment_of(shape), other) in self.beside else self.safety

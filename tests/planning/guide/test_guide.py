@@ -6,7 +6,6 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from manikin.errors import InputError
 from manikin.planning.guide import NO_MARGINS, Condition, ReachabilityChecker, root_pose
 from manikin.planning.guide.guide import (
     GuideSettings,
@@ -14,7 +13,6 @@ from manikin.planning.guide.guide import (
     GuideWorld,
     offline_roadmap,
     plan_guide,
-    plan_guide_with_restarts,
 )
 from manikin.planning.guide.roadmap import RoadmapSettings, request
 from manikin.planning.guide.root_path import (
@@ -128,39 +126,6 @@ def test_same_seed_same_bits(open_world, found):
     again = plan_guide(open_world, GuideTask(START, GOAL), np.random.default_rng(0))
     assert np.array_equal(again.path.control_points, found.path.control_points)
     assert again.statistics == found.statistics
-
-
-def test_restarts_give_the_same_result_on_one_and_two_processes(open_world):
-    task = GuideTask(START, GOAL)
-    assert open_world.scene.nearest((0.0, 0.0, 5.0))[0] == "roof"  # leaves something in the scene
-    one, two = (plan_guide_with_restarts(open_world, task, 5, restarts=2, workers=n) for n in (1, 2))
-    assert one.succeeded
-    assert np.array_equal(one.path.control_points, two.path.control_points)
-    assert one.statistics == two.statistics
-
-
-def test_a_later_restart_may_win_from_another_process(bug):
-    """With so few samples that the first restart fails, the next success is found all the same."""
-    scarce = world_of(bug, 0.5, settings=GuideSettings(roadmap=RoadmapSettings(samples=10)))
-    task = GuideTask(START, GOAL)
-    seed, one = next(
-        (seed, result)
-        for seed in range(30)
-        if (result := plan_guide_with_restarts(scarce, task, seed, restarts=3, workers=1)).succeeded
-        and result.statistics.restart > 0
-    )
-    two = plan_guide_with_restarts(scarce, task, seed, restarts=3, workers=2)
-    assert np.array_equal(one.path.control_points, two.path.control_points)
-    assert one.statistics == two.statistics
-
-
-def test_restarts_that_all_fail_tell_why(bug):
-    tight = world_of(bug, settings=GuideSettings(roadmap=RoadmapSettings(samples=10, failures=10)))
-    result = plan_guide_with_restarts(tight, GuideTask(START, GOAL), 0, restarts=2, workers=1)
-    assert "walled off" in result.failure
-    assert result.statistics.restart == 1
-    with pytest.raises(InputError, match="restarts is 0"):
-        plan_guide_with_restarts(tight, GuideTask(START, GOAL), 0, restarts=0)
 
 
 @pytest.fixture(scope="module")

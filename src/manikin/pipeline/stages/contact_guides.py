@@ -1,6 +1,6 @@
 """Search for contacts along guides of the root ([Tonneau2015]_ chapter 6), and what it found.
 
-A guide is a way of the root from start to goal. One is followed after the other until there are contacts.
+A guide is a way of the root from start to goal; it leads a search of limbs round what is in the straight way.
 """
 
 import time as clock
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from manikin.numerics.spatial import FloatArray, PlanarTransform
-from manikin.planning.contacts import ContactPlan, Endpoints, Extension, GuideLine, Habit, Stage
-from manikin.planning.guide import GuideTask, GuideWorld, LocalPlanner, nearest_fit, plan_guide, relax
+from manikin.planning.contacts import ContactPlan, Endpoints, Habit, Stage
+from manikin.planning.guide import GuideTask, GuideWorld, LocalPlanner, ReachabilityChecker, plan_guide
 from manikin.scenarios import Scenario
 
 
@@ -30,45 +30,52 @@ def stage_at(endpoints: Endpoints, scenario: Scenario, end: str) -> Stage | str:
     return result.stage or f"the {end}: {result.failure}"
 
 
-GUIDE_POSES = 200
-"""Poses by which the contact planner knows a guide."""
-
-
 @dataclass(frozen=True, eq=False)
 class RootGuide:
-    """A guide of the root, or the reason why there is none.
+    """Whether a guide of the root is needed, and it.
 
     Attributes:
-        line: The way, or None.
+        places: (n, 3) of the root on the way [m]; None where the straight way is free, or no way was found.
         samples: Poses drawn in the search.
         wall_s: Wall time [s].
-        failure: None, or the reason in one line.
     """
 
-    line: GuideLine | None
+    places: FloatArray | None
     samples: int
     wall_s: float
-    failure: str | None = None
+
+
+SINKS = tuple(0.065 * np.arange(11))
+"""Depths by which the root at an end of a guide may sink [m]; our choice."""
+
+GUIDE_PLACES = 200
+"""Places by which the contact planner knows a guide."""
 
 
 def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) -> RootGuide:
-    """Find a guide between two poses of the root.
+    """Find a guide between two poses of the root, where the straight way is not free.
 
     Args:
         world: Scene, abstraction of the body, region and condition of the way.
-        ends: (2, 7) poses at start and goal; where they do not fit, the nearest that do are taken.
+        ends: (2, 7) poses at start and goal; a body may bend where the guide's stiff trunk has to sink, so
+            that the nearest below that fits is taken.
     """
     began = clock.perf_counter()
     checker = world.checker()
-    fits = [nearest_fit(pose, checker) for pose in ends]
+    fits = [_sunk(pose, checker) for pose in ends]
     ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
+    if any(fit is None for fit in fits) or LocalPlanner(checker, tuple(ends)).straight(*ends):
+        return RootGuide(None, 0, clock.perf_counter() - began)
     result = plan_guide(world, GuideTask(*ends), rng)
-    samples = result.statistics.samples
-    if result.path is None:
-        return RootGuide(None, samples, clock.perf_counter() - began, result.failure or "no guide")
-    poses = result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES))
-    line = GuideLine.through(relax(poses, LocalPlanner(checker, tuple(ends)), rng))
-    return RootGuide(line, samples, clock.perf_counter() - began)
+    path = result.path
+    places = None if path is None else path.poses(np.linspace(0.0, 1.0, GUIDE_PLACES))[:, :3]
+    return RootGuide(places, result.statistics.samples, clock.perf_counter() - began)
+
+
+def _sunk(pose: FloatArray, checker: ReachabilityChecker) -> FloatArray | None:
+    """The pose nearest below a (7,) one that satisfies the condition, or None."""
+    down = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    return next((low for depth in SINKS if checker.holds(low := pose - depth * down)), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +85,7 @@ class ContactSearch:
     Attributes:
         scenario: The scenario with supports; None without a plan, and where a file cannot list such contacts.
         plan: The contacts with their postures, or None.
-        guide: The root's way, or None.
+        guide: (n, 3) places of the root on a guide; None where the straight way is free [m].
         summary: The ``contacts`` block of the run's summary.
         failure: None, or the reason in one line.
         where: Stage of the search that failed.
@@ -88,7 +95,7 @@ class ContactSearch:
 
     scenario: Scenario | None
     plan: ContactPlan | None
-    guide: GuideLine | None
+    guide: FloatArray | None
     summary: Mapping[str, Any]
     failure: str | None = None
     where: str = ""
@@ -99,7 +106,7 @@ class ContactSearch:
         plan, transform = self.plan, transform_task_to_world
         return {
             **self.summary,
-            "guide": None if self.guide is None else transform.poses(self.guide.poses).tolist(),
+            "guide": None if self.guide is None else transform.points(self.guide).tolist(),
             "postures": None if plan is None else transform.poses(plan.postures).tolist(),
         }
 
@@ -109,57 +116,33 @@ class SearchTally:
 
     Attributes:
         summary: The ``contacts`` block of the run's summary so far.
+        guide: (n, 3) places of the root on its guide, if one is needed [m].
     """
 
     def __init__(self) -> None:
-        self._began = clock.perf_counter()
+        self._began, self.guide = clock.perf_counter(), None
         self.summary: dict[str, Any] = {
             "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
             "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,
         }  # fmt: skip
 
-    def along_guides(
-        self, attempts: int, lead: Callable[[], RootGuide], follow: Callable[[GuideLine, int], Extension]
-    ) -> ContactSearch:
-        """Follow one guide after the other until contacts are found.
-
-        Args:
-            attempts: Most guides.
-            lead: Finds a guide.
-            follow: Finds contacts along it; told how many guides there were before.
-
-        Returns:
-            The plan, without a scenario, or why there is none.
-        """
-        reason = ""
-        for number in range(attempts):
-            guide = lead()
-            self._count_guide(guide)
-            if guide.line is None:
-                return self.failed(guide.failure or "", "guide")
-            extension = follow(guide.line, number)
-            self.summary["postures"] += extension.searches
-            self.summary["backtracks"] += extension.backtracks
-            if extension.plan is not None:
-                return self.found(extension.plan, guide.line)
-            reason = extension.failure or ""
-        return self.failed(reason, "contacts")
-
-    def found(self, plan: ContactPlan, guide: GuideLine | None = None) -> ContactSearch:
+    def found(self, plan: ContactPlan) -> ContactSearch:
         """A search that found contacts."""
         self.summary.update(steps=plan.steps, phases=len(plan.stages))
-        return ContactSearch(None, plan, guide, self._done())
+        return ContactSearch(None, plan, self.guide, self._done())
 
     def failed(self, reason: str, where: str) -> ContactSearch:
         """A search that found none."""
-        return ContactSearch(None, None, None, self._done(), reason, where)
+        return ContactSearch(None, None, self.guide, self._done(), reason, where)
 
-    def _count_guide(self, guide: RootGuide) -> None:
-        self.summary["attempts"] += 1
+    def count_guide(self, guide: RootGuide) -> None:
+        """Take what a guide cost, and its length."""
+        self.guide = guide.places
         self.summary["guide_samples"] += guide.samples
-        if guide.line is not None:
-            self.summary["guide_length_m"] = guide.line.length
-            self.summary["guide_wall_s"] += guide.wall_s
+        self.summary["guide_wall_s"] += guide.wall_s
+        if guide.places is not None:
+            steps = np.linalg.norm(np.diff(guide.places, axis=0), axis=1)
+            self.summary["guide_length_m"] = float(steps.sum())
 
     def _done(self) -> dict[str, Any]:
         return self.summary | {"wall_s": clock.perf_counter() - self._began}

@@ -1,7 +1,7 @@
 """Contact stage: supports for a scenario that gives start and goal alone ([Tonneau2015]_ chapters 6 and 7).
 
 A body goes on its feet, and the hands join in where they are needed and where it ends with an act; a creature
-goes on all its limbs, and a climber's limbs follow a guide (algorithm 7).
+and a climber go on all their limbs, led round what is in their straight way by a guide of the root.
 """
 
 from collections.abc import Iterator
@@ -21,9 +21,8 @@ from manikin.planning.contacts import (
     ContactPlan,
     Endpoint,
     Endpoints,
-    ExtendSettings,
     Extension,
-    LimbPlaces,
+    LimbHolds,
     LimbSearch,
     LimbSettings,
     PostureFinder,
@@ -31,7 +30,6 @@ from manikin.planning.contacts import (
     Stage,
     WalkSearch,
     WalkSettings,
-    follow_guide,
     heading_of,
     limb_holds,
     sample_limbs,
@@ -39,7 +37,6 @@ from manikin.planning.contacts import (
     take_seat,
 )
 from manikin.planning.guide import (
-    Abstraction,
     Condition,
     GuideWorld,
     LimbRule,
@@ -199,78 +196,59 @@ class _LimbSearch(_ContactSearch):
         )
         self._poser = PostureFinder(body, scene, self._reference, settings.scaled(safe))
         self._samples = samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
-        self._places = LimbPlaces(
-            body, scene, self._limbs, self._kinds, contact_rules(scenario, body), self._reference, samples
-        )
-        volumes = [samples[limb.name].reach for limb in self._limbs]
-        self._abstraction: Abstraction = abstraction_of(body, volumes)
+        ends = [limb for limb in self._limbs if not is_further(body, limb)] or self._limbs
+        self._reach = float(np.mean([samples[limb.name].hull[1] for limb in ends]))
 
     def run(self) -> ContactSearch:
-        goal, starts = self._goal(), self._starts()
+        goal = self._goal()
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
-        first = next(starts)
-        if first.stage is None:
-            return self._tally.failed(first.failure or "", "start")
-        if self._body.stature is None:
+        result: ContactSearch | None = None
+        for first in islice(self._starts(goal), self._scenario.contacts.attempts):
+            if first.stage is None:
+                return result or self._tally.failed(first.failure or "", "start")
             self._search = self._searched(first.stage, goal)
-            return self._result(self._search.run())
-        # Another guide begins at another start, as long as there are some.
-        stages = [first.stage]
-        others = (item.stage for item in starts if item.stage is not None)
+            result = self._result(self._search.run())
+            if result.plan is not None:
+                break
+        return result or self._tally.failed("no start", "start")
 
-        def lead() -> RootGuide:
-            if self._tally.summary["attempts"] > 0:
-                stages.extend(islice(others, 1))
-            return self._guide(stages[-1].q[:7], goal)
-
-        settings = self._settings()
-        return self._tally.along_guides(
-            self._scenario.contacts.attempts,
-            lead,
-            lambda line, _: follow_guide(self._poser, self._places, line, stages[-1], settings),
-        )
+    def _holds(self, start: FloatArray, goal: FloatArray) -> list[LimbHolds]:
+        return limb_holds(
+            self._body, self._scene, self._limbs, self._kinds, contact_rules(self._scenario, self._body),
+            self._reference, self._samples, np.array([start, goal]), self._reach,
+        )  # fmt: skip
 
     def _searched(self, start: Stage, goal: FloatArray) -> LimbSearch:
-        holds = limb_holds(
-            self._body, self._scene, self._limbs, self._kinds, contact_rules(self._scenario, self._body),
-            self._reference, self._samples, np.array([start.q[:7], goal]),
-        )  # fmt: skip
-        return LimbSearch(self._poser, holds, start, goal, self._places.reach, self._limb_settings())
+        def lead() -> FloatArray | None:
+            guide = self._guide(start.q[:7], goal)
+            self._tally.count_guide(guide)
+            return guide.places
+
+        holds = self._holds(start.q[:7], goal)
+        return LimbSearch(self._poser, holds, start, goal, self._reach, self._settings(), lead)
 
     @property
     def _climbs(self) -> bool:
         return self._scenario.file.task.goal.posture == CLIMBING
 
-    def _settings(self) -> ExtendSettings:
+    def _settings(self) -> LimbSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
-        options, plain = self._scenario.contacts, ExtendSettings()
-        size, pace = self._size, float(np.sqrt(self._size))
-        return ExtendSettings(
-            stride=options.stride_m * size,
-            same_place=plain.same_place * size,
-            lift=plain.lift * max(size, SMALLEST),
-            swing_duration=plain.swing_duration * pace,
-            swing_speed=plain.swing_speed * pace,
-            shift_duration=plain.shift_duration * pace,
-            hinge_pace=plain.hinge_pace / pace,
-            goal_distance=plain.goal_distance * max(size, SMALLEST) if not self._climbs else NEAR_GOAL,
-        )
-
-    def _limb_settings(self) -> LimbSettings:
-        """The same of a creature."""
         plain, pace, safe = LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
-        return LimbSettings(
-            stride=STRIDE * self._places.reach,
+        if self._body.stature is not None:
+            plain = replace(plain, turns=False, around=1.5, beyond=0.1, comfort=10.0, sway=0.3)
+        return replace(
+            plain,
+            stride=STRIDE * self._reach,
             lift=plain.lift * safe,
             swing_duration=plain.swing_duration * pace,
             swing_speed=plain.swing_speed * pace,
             shift_duration=plain.shift_duration * pace,
             hinge_pace=plain.hinge_pace / pace,
-            goal_distance=plain.goal_distance * safe,
+            goal_distance=NEAR_GOAL if self._climbs else plain.goal_distance * safe,
         )
 
-    def _starts(self) -> Iterator[Endpoint]:
+    def _starts(self, goal: FloatArray) -> Iterator[Endpoint]:
         """Postures at the start, the best first, or the reason why there is none."""
         state = self._scenario.file.task.start
         if self._body.stature is not None and state.posture != CLIMBING:
@@ -279,7 +257,8 @@ class _LimbSearch(_ContactSearch):
             return
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
         q = self._standing(at, yaw, state.height_m)
-        for result in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
+        holds = self._holds(q[:7], goal)
+        for result in starts_on_limbs(self._poser, holds, q, self._settings().shift_duration):
             where = f"the start: no posture at {at.round(3).tolist()} m: "
             yield result if result.stage is not None else Endpoint(None, f"{where}{result.failure}")
 
@@ -308,7 +287,9 @@ class _LimbSearch(_ContactSearch):
 
     def _guide(self, start: FloatArray, goal: FloatArray) -> RootGuide:
         ends = np.array([start, goal])
-        world = GuideWorld(self._scene, self._abstraction, self._region(ends), self._condition())
+        volumes = [self._samples[limb.name].reach for limb in self._limbs]
+        abstraction = abstraction_of(self._body, volumes)
+        world = GuideWorld(self._scene, abstraction, self._region(ends), self._condition())
         return guide_root(world, ends, self._rng)
 
     def _region(self, ends: FloatArray) -> SamplingRegion:

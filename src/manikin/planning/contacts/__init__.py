@@ -9,7 +9,6 @@ from manikin.planning.contacts.contact_plan import (
     Stage,
     certify_plan,
 )
-from manikin.planning.contacts.depth_first import GuideLine
 from manikin.planning.contacts.efort import (
     Task,
     efort,
@@ -19,7 +18,6 @@ from manikin.planning.contacts.efort import (
     velocity_ellipsoid,
 )
 from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
-from manikin.planning.contacts.follow_guide import ExtendSettings, follow_guide
 from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import (
     ContactGenerator,
@@ -42,7 +40,7 @@ from manikin.planning.contacts.heuristics import (
     duration,
 )
 from manikin.planning.contacts.limb_collisions import LimbCollisions
-from manikin.planning.contacts.limb_places import LimbPlaces, limb_holds
+from manikin.planning.contacts.limb_places import limb_holds
 from manikin.planning.contacts.limb_search import LimbHolds, LimbSearch, LimbSettings
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
@@ -52,13 +50,12 @@ from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
 __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
-    "ContactPlan", "ContactRules", "Duration", "Efort", "Endpoint", "Endpoints", "ExtendSettings",
-    "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "GuideLine", "Habit", "Heuristic",
-    "Hindrance", "LimbCollisions", "LimbHolds", "LimbPlaces", "LimbSamples", "LimbSearch", "LimbSettings",
-    "Manipulability", "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation",
-    "Stage", "StrongEfort", "SurfaceTable", "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures",
-    "WalkSearch", "WalkSettings", "WeightedSum", "certify_plan", "duration", "efort", "find_candidates",
-    "follow_guide", "force_ellipsoid", "force_transmission_ratio", "heading_of", "leave_seat", "limb_holds",
-    "manipulability", "mirrored", "pulling_efort", "sample_limb", "sample_limbs", "starts_on_limbs",
-    "take_seat", "velocity_ellipsoid",
+    "ContactPlan", "ContactRules", "Duration", "Efort", "Endpoint", "Endpoints", "Extension", "Footholds",
+    "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance", "LimbCollisions",
+    "LimbHolds", "LimbSamples", "LimbSearch", "LimbSettings", "Manipulability", "PlanCertificate",
+    "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage", "StrongEfort", "SurfaceTable",
+    "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures", "WalkSearch", "WalkSettings", "WeightedSum",
+    "certify_plan", "duration", "efort", "find_candidates", "force_ellipsoid", "force_transmission_ratio",
+    "heading_of", "leave_seat", "limb_holds", "manipulability", "mirrored", "pulling_efort", "sample_limb",
+    "sample_limbs", "starts_on_limbs", "take_seat", "velocity_ellipsoid",
 ]  # fmt: skip

@@ -103,14 +103,12 @@ class Extension:
     Attributes:
         searches: Postures that were looked for.
         backtracks: Ways of which a posture was missing, or changes taken back.
-        reached: Share of a guide that the farthest attempt got to.
     """
 
     plan: ContactPlan | None
     searches: int
     backtracks: int
     failure: str | None = None
-    reached: float = 1.0
 
     @property
     def succeeded(self) -> bool:

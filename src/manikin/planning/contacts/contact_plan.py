@@ -27,7 +27,7 @@ from manikin.contact import (
     sole,
 )
 from manikin.errors import ContactError
-from manikin.kinematics import touching_pairs
+from manikin.kinematics import pairs_beside, touching_pairs
 from manikin.numerics.spatial import FloatArray, frozen_array, skew
 from manikin.planning.contacts.transition import Momentum
 from manikin.runtime.requirement import Requirement, RequirementTable, Sense
@@ -320,7 +320,7 @@ def _measured(
             turn = max(turn, float(np.linalg.norm(pin.log3(off))))
         error = max(error, moved)
     touched = [(contact.effector, name) for contact in item.held for name in scene.touched_obstacles(contact)]
-    near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
+    near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched) - pairs_beside(body, touched))
     pair = f", {' and '.join(near.pairs[int(np.argmin(near.distance))])}" if len(near.distance) else ""
     beyond = np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)
     stance, moving = Stance(item.carrying, model=model), item.momentum

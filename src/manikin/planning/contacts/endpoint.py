@@ -1,11 +1,10 @@
 """Where a task starts or ends: postures on contacts, from a place, a heading and a habit.
 
-A start may also be on any limbs, each near where a posture has it (:func:`starts_on_limbs`), and a start that
-holds on by more than feet is left for the feet first (:func:`stand_up`).
+A start may also be on any limbs, each near where a posture has it (:func:`starts_on_limbs`).
 """
 
 import heapq
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import islice
@@ -17,8 +16,8 @@ from manikin.contact import Contact, FrictionModel
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.footholds import Footholds
-from manikin.planning.contacts.generator import GeneratedContact
-from manikin.planning.contacts.limb_places import LimbPlaces, stature_of
+from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.contacts.limb_search import LimbHolds
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.seat import FEET, Sitter, Sitting, hand_supports, leave_seat
 from manikin.scene import Scene, Surface
@@ -220,7 +219,7 @@ def _height_at(surface: Surface, at: FloatArray) -> float | None:
     return height if float(surface.outside(point)[0]) <= 1e-9 else None
 
 
-PLACES = 4
+PLACES = 6
 """Places of each limb among which a start is sought."""
 
 TRIES = 40
@@ -228,35 +227,33 @@ TRIES = 40
 
 
 def starts_on_limbs(
-    poser: PostureFinder, places: LimbPlaces, q: FloatArray, duration: float
+    poser: PostureFinder, holds: Sequence[LimbHolds], q: FloatArray, duration: float
 ) -> Iterator[Endpoint]:
     """Starts near a posture that touches nothing, the best contacts first; one failure where there is none.
 
     Args:
+        holds: Places of each limb.
         q: (nq,) where the body should be, each limb where it should be relative to the root.
         duration: Shortest time for which the contacts are held [s].
     """
-    offered = {name: _losses(places.find(name, q, q[:7], UP, PLACES)) for name in places.limbs}
+    offered = {item.effector: item.nearest(q[:7], PLACES) for item in holds}
     offered = {name: items for name, items in offered.items() if items}
     if not offered:
         yield Endpoint(None, "no limb has a contact")
         return
-    reason, any_start = "", False
+    reason, any_start, state = "", False, Configuration(poser.body, q)
     for contacts in islice(best_first(offered), TRIES):
-        posed = poser.pose(contacts, contacts, q, q[:7])
+        near = q
+        for item in holds:
+            if item.effector in contacts:
+                near = item.stretched(near, q[:7], contacts[item.effector], state)
+        posed = poser.pose(contacts, contacts, near, q[:7])
         reason = reason or posed.reason
         if posed.q is not None:
             any_start = True
             yield Endpoint(Stage.of(poser.body, contacts, posed.q, duration))
     if not any_start:
         yield Endpoint(None, reason)
-
-
-def _losses(answers: list[GeneratedContact]) -> list[tuple[float, Contact]]:
-    """Contacts of one limb with what each is worse than the best, by the scores of the generator."""
-    places = [(item.score, item.contact) for item in answers if item.contact is not None]
-    best = max((score for score, _ in places), default=0.0)
-    return sorted(((best - score, contact) for score, contact in places), key=lambda item: item[0])
 
 
 def best_first(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[dict[str, Contact]]:
@@ -273,20 +270,3 @@ def best_first(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[d
                 known.add(after)
                 cost = sum(item[number][0] for item, number in zip(items, after, strict=True))
                 heapq.heappush(open_, (cost, after))
-
-
-def stand_up(
-    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray
-) -> tuple[Stage, ...] | str:
-    """The start on feet; its other contacts are left first, see :func:`leave_seat`.
-
-    Args:
-        start: Contacts and posture at the start.
-        feet: Effectors to stand on.
-        upright: (7,) pose of the root that has risen.
-
-    Returns:
-        The stages up to standing on feet alone, or why a posture is missing.
-    """
-    leaving = leave_seat(poser, start, feet, upright)
-    return leaving.stages if leaving.failure is None else leaving.failure

@@ -198,27 +198,10 @@ class ContactGenerator:
             return [reached]
         answers: list[GeneratedContact] = []
         for task in tasks:
-            answers += self._answers(reached, task, heuristic or Efort(), usable)
+            answers.append(self._answer(reached, task, heuristic or Efort(), usable))
             if answers[-1].found:
                 break
         return answers
-
-    def request_several(
-        self, q: ArrayLike, limb: str, task: Task, heuristic: Heuristic | None = None, *,
-        kind: ContactKind | None = None, most: int = 1, apart: float = 0.05,
-    ) -> list[GeneratedContact]:  # fmt: skip
-        """Find the best contacts of one limb in different places, best first; one answer where there is none.
-
-        The other arguments and errors are those of :meth:`request`.
-
-        Args:
-            most: Largest number of contacts.
-            apart: Distance between two of them [m].
-        """
-        reached = self._within_reach(q, limb, kind)
-        if isinstance(reached, GeneratedContact):
-            return [reached]
-        return self._answers(reached, task, heuristic or Efort(), None, most, apart)
 
     def _within_reach(
         self, q: ArrayLike, limb: str, kind: ContactKind | None
@@ -237,10 +220,9 @@ class ContactGenerator:
         sole = footprint(self.body, tools.limb, touch, self.rules)
         return _WithinReach(tools, situation, near, touch, sole)
 
-    def _answers(
-        self, reached: "_WithinReach", task: Task, heuristic: Heuristic, usable: UsableEfort | None,
-        most: int = 1, apart: float = 0.0,
-    ) -> list[GeneratedContact]:  # fmt: skip
+    def _answer(
+        self, reached: "_WithinReach", task: Task, heuristic: Heuristic, usable: UsableEfort | None
+    ) -> GeneratedContact:
         """Steps 2 to 4 for one task; surfaces that face another way are not looked at."""
         tools, numbers = reached.tools, reached.surfaces
         situation = replace(reached.situation, reaction=task.reaction_on(tools.limb.name))
@@ -249,7 +231,7 @@ class ContactGenerator:
             numbers = numbers[usable.signed(most_efort) >= usable.least]
         candidates = self._samples_in_contact(reached, numbers)
         if not len(candidates):
-            return [self._none_lies(reached, situation, usable)]
+            return self._none_lies(reached, situation, usable)
         if usable is None:
             scores, rows = heuristic.score(situation, candidates), np.arange(len(candidates))
         else:
@@ -258,8 +240,8 @@ class ContactGenerator:
             rows = np.flatnonzero(values >= usable.least)
             scores = values if heuristic == order else heuristic.score(situation, candidates)
         if not len(rows):
-            return [self._none_lies(reached, situation, usable)]
-        return self._choose(reached, situation, candidates, scores, rows, usable, most, apart)
+            return self._none_lies(reached, situation, usable)
+        return self._choose(reached, situation, candidates, scores, rows, usable)
 
     def _samples_in_contact(self, reached: "_WithinReach", numbers: NDArray[np.int64]) -> Candidates:
         """Step 2: samples on some of the surfaces within reach."""
@@ -298,11 +280,10 @@ class ContactGenerator:
 
     def _choose(
         self, reached: "_WithinReach", situation: Situation, candidates: Candidates, scores: FloatArray,
-        rows: NDArray[np.int64], usable: UsableEfort | None, most: int, apart: float,
-    ) -> list[GeneratedContact]:  # fmt: skip
+        rows: NDArray[np.int64], usable: UsableEfort | None,
+    ) -> GeneratedContact:  # fmt: skip
         """Steps 3 and 4: of some rows best first, the first that can be aligned, are usable and free."""
         tools, kind = reached.tools, reached.kind
-        answers: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()
         flat = kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
@@ -315,9 +296,6 @@ class ContactGenerator:
             if tried == self.settings.tries:
                 break
             point = candidates.points[row]
-            places = (item.contact.position for item in answers if item.contact is not None)
-            if any(np.linalg.norm(point - place) < apart for place in places):
-                continue
             tried += 1
             aligned = tools.aligner.align(*goal, allowed)
             if not aligned.lies(allowed, gap):
@@ -343,14 +321,12 @@ class ContactGenerator:
             contact = make_contact(
                 self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
             )
-            answers.append(GeneratedContact(
+            return GeneratedContact(
                 tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacles,
                 float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
                 efort=alpha,
-            ))  # fmt: skip
-            if len(answers) == most:
-                break
-        return answers or [_none_fits(tools.limb.name, faults, len(candidates), usable)]
+            )  # fmt: skip
+        return _none_fits(tools.limb.name, faults, len(candidates), usable)
 
     def _worth_trying(
         self,

@@ -1,4 +1,4 @@
-"""Contacts of the limbs of a creature from start to goal: a best-first search over sets of contacts.
+"""Contacts of any limbs from start to goal: a best-first search over sets of contacts.
 
 A state is the set of contacts that are held; a move breaks one of them and makes one of the same limb
 elsewhere.  Of each state the pose of the root is known that suits its contacts best; reach of every limb from
@@ -17,17 +17,22 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from manikin.contact import Contact, ContactKind
-from manikin.kinematics import Placement, ReachVolume
+from manikin.balance.criteria import static_torque_share
+from manikin.body import Configuration
+from manikin.body.limbs import limb_placement, limb_slots
+from manikin.contact import Contact, ContactKind, Stance
+from manikin.kinematics import Placement
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
 from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
+from manikin.planning.contacts.samples import LimbSamples
 
 GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))
 """Factors on the estimate, tried in turn, each with the states that may be expanded with it; our choice."""
@@ -41,14 +46,32 @@ STEEPEST_TRUNK = 0.5
 LEVELLED = 0.8
 """Share of the slope of its contacts to which a trunk pitches; our choice."""
 
-AROUND = 0.45
-"""Distance from where a limb should be up to which places are tried [strides]; our choice."""
+FARTHEST = 0.5
+"""Distance of a first contact to where its limb should be at most, by the limb's reach; our choice."""
 
-COMFORT = 2.0
-"""Cost of a limb that is as far from where it should be as it reaches, in moves; our choice."""
+APART = 0.15
+"""Distance between first contacts that are tried for a limb, by its reach; our choice."""
 
-SWAY = 0.12
-"""Distance of the root from the polygon of the contacts that stay at most, by the reach; our choice."""
+REST = 0.06
+"""Distance to the edges of where it rests at which a trunk is thought, by the reach; our choice."""
+
+SHARES = np.linspace(0.0, 1.0, 9)
+"""Shares of the way of the trunk to the middle of the limbs that stay that are tried."""
+
+OVERREACH = 30.0
+"""Cost of a limb that is beyond its reach then by as much as that, in moves; our choice."""
+
+PROVEN = 0.8
+"""Discount on a move that has a posture, so that ways with postures are gone on with [moves]; our choice."""
+
+LOOSE = 1.0
+"""Cost of a limb without a contact, in moves; our choice."""
+
+HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
+"""Turn of a hand whose fingers hook round an edge, from one that lies flat on it."""
+
+TURN = 0.2
+"""Distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice."""
 
 State = tuple[int, ...]
 """Place of each limb, by its row among those of the limb; the first is that of the start."""
@@ -56,10 +79,14 @@ State = tuple[int, ...]
 
 @dataclass(frozen=True)
 class LimbSettings:
-    """How limbs are moved; the values are our choice.
+    """How limbs are moved, of a body whose limbs reach 1 m; the values are our choice.
 
     Attributes:
         stride: Way of a limb that costs least [m].
+        around: Distance from where a limb should be up to which places are tried [strides].
+        beyond: How far limbs are beyond their reach from a stiff trunk at most, by that reach.
+        comfort: Cost of a limb that is as far from where it should be as it reaches, in moves.
+        sway: Distance of the root from the polygon of the contacts that stay at most, by that reach.
         searches: Most postures that are looked for.
         lift: How far a limb in flight keeps from the line between its contacts [m].
         swing_duration: Shortest flight of a limb [s].
@@ -68,9 +95,15 @@ class LimbSettings:
         hinge_pace: Mean speed of the hinge that turns most [rad/s].
         goal_distance: Distance of the root from its goal at which it is reached [m].
         goal_turn: Angle between the root's heading and the goal's at which it is reached [rad].
+        turns: Whether the root's heading follows the contacts; it goes from that of the start to the goal's
+            otherwise, as that of a climber does, whose trunk is pitched by no slope either.
     """
 
     stride: float = 0.4
+    around: float = 0.45
+    beyond: float = 0.0
+    comfort: float = 2.0
+    sway: float = 0.12
     searches: int = 900
     lift: float = 0.08
     swing_duration: float = 0.7
@@ -79,6 +112,7 @@ class LimbSettings:
     hinge_pace: float = HINGE_PACE
     goal_distance: float = 0.08
     goal_turn: float = math.radians(12.0)
+    turns: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,27 +120,61 @@ class LimbHolds:
     """Places for one limb.
 
     Attributes:
-        effector: Of the limb.
         positions: (m, 3) [m].
         contact: Makes the contact of a row.
         is_free: Whether there is room for the limb's end at a row.
-        reach: Of the limb.
+        samples: Of the limb.
         root_to_segment: Rotation (3, 3) and place (3,) of the segment that carries it, from the root.
         wanted: (3,) where the limb should be from the root [m].
     """
 
-    effector: str
     positions: FloatArray
     contact: Callable[[int], Contact]
     is_free: Callable[[int], bool]
-    reach: ReachVolume
+    samples: LimbSamples
     root_to_segment: tuple[FloatArray, FloatArray]
     wanted: FloatArray
+
+    @property
+    def effector(self) -> str:
+        """Effector of the limb."""
+        return self.samples.limb.effector
+
+    def stretched(
+        self, q: FloatArray, root: FloatArray, contact: Contact, state: Configuration
+    ) -> FloatArray:
+        """(nq,) posture with its root at a (7,) pose and the limb as in the sample nearest to a contact."""
+        limb, guess = self.samples.limb, np.concatenate([root, q[7:]])
+        rotation, origin = limb_placement(state.update(guess), limb)
+        off = np.linalg.norm(self.samples.positions - (contact.position - origin) @ rotation, axis=1)
+        frame = rotation.T @ contact.rotation_contact_to_world
+        if contact.kind is ContactKind.GRASP:
+            frame = frame @ HOOKED
+        off -= TURN * (self.samples.upward @ frame[:, 2])
+        if contact.kind is not ContactKind.POINT:
+            off -= TURN * (self.samples.rotations[:, :, 0] @ frame[:, 0])
+        row = int(np.argmin(off))
+        guess[limb_slots(state.body, limb)] = self.samples.angles[row]
+        return guess
+
+    def nearest(self, root: FloatArray, most: int) -> list[tuple[float, Contact]]:
+        """Free places near where the limb should be of a (7,) pose of the root, with their distances [m]."""
+        if not len(self.positions):
+            return []
+        away = np.linalg.norm(self.positions - pin.XYZQUATToSE3(root).act(self.wanted), axis=1)
+        near, size = list[int](), self.samples.hull[1]
+        for row in np.argsort(away, kind="stable").tolist():
+            apart = np.linalg.norm(self.positions[near] - self.positions[row], axis=1)
+            if len(near) == most or away[row] > FARTHEST * size:
+                break
+            if apart.min(initial=np.inf) >= APART * size and self.is_free(row):
+                near.append(row)
+        return [(float(away[row]), replace(self.contact(row), oriented=False)) for row in near]
 
     def room(self, places: FloatArray) -> FloatArray:
         """(k,) distance of places (k, 3) seen from the root to the end of the reach [m]; negative outside."""
         turn, at = self.root_to_segment
-        return self.reach.residual((places - at) @ turn)
+        return self.samples.reach.residual((places - at) @ turn)
 
 
 class LimbSearch(PosedSearch[State, tuple[State, State]]):
@@ -114,7 +182,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     def __init__(
         self, poser: PostureFinder, holds: Sequence[LimbHolds], start: Stage, goal: FloatArray, size: float,
-        settings: LimbSettings | None = None,
+        settings: LimbSettings | None = None, lead: Callable[[], FloatArray | None] | None = None,
     ) -> None:  # fmt: skip
         """Prepare a search.
 
@@ -125,12 +193,15 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             goal: (7,) pose of the root at the goal.
             size: Mean distance that the limbs reach [m].
             settings: Paces and bounds.
+            lead: Finds places (n, 3) of the root on a guide to the goal, None where the straight way is free
+                [m]; asked when a chain of places leads there. The straight way when omitted.
         """
-        self.settings = settings or LimbSettings()
+        self.settings, self._lead = settings or LimbSettings(), lead
         super().__init__(poser, self.settings.searches)
         self.holds, self.start, self.goal, self.size = holds, start, goal, size
         root = start.q[:7]
-        self._yaw, turn = heading_of(goal), rotation_from_yaw(heading_of(root))
+        self._yaws = heading_of(root), heading_of(goal)
+        turn = rotation_from_yaw(self._yaws[0])
         first = [
             start.contacts[item.effector].position
             if item.effector in start.contacts else root[:3] + turn @ item.wanted
@@ -140,22 +211,31 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._trees = [cKDTree(item.positions) if len(item.positions) else None for item in holds]
         self._wanted = np.array([item.wanted for item in holds])
         self._contacts: dict[tuple[int, int], Contact] = {}
+        self._grasps = [
+            bool(len(item.positions)) and self._contact(k, 1).kind is ContactKind.GRASP
+            for k, item in enumerate(holds)
+        ]
         self._free: dict[tuple[int, int], bool] = {}
         self._next: dict[State, list[tuple[State, float]]] = {}
+        self._later: dict[State, list[tuple[State, float]]] = {}
         self._ahead: dict[State, float] = {}
         self._stuck: set[tuple[State, int]] = set()
         self._dearer: dict[int, FloatArray] = {}  # (n, 2, 3) places of a limb and the root, by limb
         self._roots: dict[State, FloatArray] = {}
+        self._turns: dict[State, FloatArray] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
+        self._state = Configuration(poser.body, start.q)
 
     def _best(self) -> list[State] | str:
         first = (0,) * len(self.holds)
+        if self._walled_off:
+            return self._walled_off
         self._frame_costs([first])
         graph = Graph(
             lambda state: self._ahead[state], self._followers, self._tested,
             lambda state: self._ahead[state] <= 0.0,
         )  # fmt: skip
-        return self._walled_off or graph.best([first], GREED)[0] or "no contacts lead to the goal"
+        return graph.best([first], GREED)[0] or "no contacts lead to the goal"
 
     @cached_property
     def _walled_off(self) -> str:
@@ -164,8 +244,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         places = np.vstack([self._at((0,) * len(self.holds)), *shared.values()])
         tree = cKDTree(places)
         near = tree.query_ball_point(self.goal[:3], GOAL_REACH * self.size)
-        if not near:
-            return "the goal is walled off from the start: no limb has a place within reach of it"
+        # Hands alone carry nobody for long: what stands has to have places there.
+        standing = [item for k, item in enumerate(self.holds) if not self._grasps[k]] or self.holds
+        there = self.goal[:3]
+        away = [np.linalg.norm(item.positions - there, axis=1).min(initial=np.inf) for item in standing]
+        if min(away) > GOAL_REACH * self.size:
+            names = ", ".join(item.effector for item in standing)
+            return f"the goal is walled off from the start: none of {names} has a place within reach of it"
         pairs = tree.query_pairs(self.size, output_type="ndarray")
         graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(places),) * 2)
         part = connected_components(graph, directed=False)[1]
@@ -174,6 +259,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         return f"the goal is walled off from the start: a gap is wider than {self.size:.2f} m"
 
     def _farthest(self) -> str:
+        if not self._ahead:
+            return ""
         left, whole = min(self._ahead.values()), self._ahead[(0,) * len(self.holds)]
         return f" beyond {100.0 * (1.0 - min(1.0, left / max(whole, 1e-9))):.0f} % of the way"
 
@@ -183,45 +270,82 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """(n, 3) places of a state [m]."""
         return np.array([places[row] for places, row in zip(self._places, state, strict=True)])
 
-    def _frames(self, places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Roots (k, 3) [m], headings and pitches (k,) [rad] that suit places (k, n, 3) of the limbs best."""
-        middle, mean = places.mean(axis=1), self._wanted.mean(axis=0)
-        away, flat = places - middle[:, None], self._wanted - mean
-        sine = (flat[:, 0] * away[..., 1] - flat[:, 1] * away[..., 0]).sum(axis=1)
-        cosine = (flat[:, 0] * away[..., 0] + flat[:, 1] * away[..., 1]).sum(axis=1)
-        yaw = np.arctan2(sine, cosine)
-        along = np.cos(yaw)[:, None] * away[..., 0] + np.sin(yaw)[:, None] * away[..., 1]
-        slope = (along * away[..., 2]).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-9)
-        pitch = np.clip(-LEVELLED * np.arctan(slope), -STEEPEST_TRUNK, STEEPEST_TRUNK)
-        return middle - rotations(yaw, pitch, np.zeros(len(places))) @ mean, yaw, pitch
+    def _all_at(self, states: Sequence[State]) -> FloatArray:
+        """(k, n, 3) places of k states [m]."""
+        rows = np.array(states)
+        return np.stack([places[rows[:, k]] for k, places in enumerate(self._places)], axis=1)
+
+    def _frames(self, states: Sequence[State]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Roots (k, 3) [m], headings and pitches (k,) [rad] that suit the contacts of k states best."""
+        places, share = self._all_at(states), self._shares(states)
+        middle, mean = (share[..., None] * places).sum(axis=1), share @ self._wanted
+        away = share[..., None] * (places - middle[:, None])
+        if self.settings.turns:
+            flat = self._wanted - mean[:, None]
+            sine = (flat[..., 0] * away[..., 1] - flat[..., 1] * away[..., 0]).sum(axis=1)
+            cosine = (flat[..., 0] * away[..., 0] + flat[..., 1] * away[..., 1]).sum(axis=1)
+            yaw = np.arctan2(sine, cosine)
+            along = np.cos(yaw)[:, None] * away[..., 0] + np.sin(yaw)[:, None] * away[..., 1]
+            slope = (along * away[..., 2]).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-9)
+            pitch = np.clip(-LEVELLED * np.arctan(slope), -STEEPEST_TRUNK, STEEPEST_TRUNK)
+        else:
+            yaw, pitch = np.full(len(places), self._yaws[1]), np.zeros(len(places))
+        turned = rotations(yaw, pitch, np.zeros(len(places))) @ mean[..., None]
+        return middle - turned[..., 0], yaw, pitch
+
+    def _shares(self, states: Sequence[State]) -> FloatArray:
+        """(k, n) share of each limb that is held in the limbs of a state that are."""
+        begun = np.array([item.effector in self.start.contacts for item in self.holds])
+        held = ((np.array(states) > 0) | begun).astype(np.float64)
+        return held / np.maximum(held.sum(axis=1, keepdims=True), 1.0)
 
     def _frame_costs(self, states: Sequence[State]) -> FloatArray:
         """Costs (k,) of how far limbs are from where they should be, infinite out of reach."""
-        places = np.array([self._at(state) for state in states])
-        roots, yaw, pitch = self._frames(places)
+        places, held = self._all_at(states), self._shares(states) > 0.0
+        roots, yaw, pitch = self._frames(states)
         turn = rotations(yaw, pitch, np.zeros(len(yaw)))
         local = np.einsum("kji,knj->kni", turn, places - roots[:, None])
-        off = np.linalg.norm(local - self._wanted, axis=2) / self.size
-        cost = (COMFORT * off**2).sum(axis=1)
+        off = held * np.linalg.norm(local - self._wanted, axis=2) / self.size
+        cost = (self.settings.comfort * off**2 + LOOSE * ~held).sum(axis=1)
         for k, item in enumerate(self.holds):
-            cost[item.room(local[:, k]) < 0.0] = np.inf
-        away = np.linalg.norm(roots - self.goal[:3], axis=1)
-        off_heading = np.abs(np.mod(yaw - self._yaw + math.pi, 2.0 * math.pi) - math.pi)
+            beyond = np.where(held[:, k], -item.room(local[:, k]) / self.size, 0.0)
+            cost += np.where(beyond > self.settings.beyond, np.inf, 4.0 * np.maximum(beyond, 0.0))
+        away, off_way = np.linalg.norm(roots - self.goal[:3], axis=1), self._ahead_of(roots)[0]
+        off_heading = np.abs(np.mod(yaw - self._yaws[1] + math.pi, 2.0 * math.pi) - math.pi)
         n, stride = len(self.holds), self.settings.stride
         near = (away <= self.settings.goal_distance) & (off_heading <= self.settings.goal_turn)
-        ahead = n * (away + 0.6 * self.size * off_heading) / stride
-        for state, left, there, root in zip(states, ahead.tolist(), near.tolist(), roots, strict=True):
+        ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
+        rows = zip(states, ahead.tolist(), near.tolist(), roots, turn, strict=True)
+        for state, left, there, root, frame in rows:
+            self._turns[state] = frame
             self._ahead.setdefault(state, 0.0 if there else left + 1e-6)
             self._roots[state] = root
         return cost
+
+    @cached_property
+    def _way(self) -> tuple[FloatArray, FloatArray]:
+        """Places (n, 3) of the root on the way to the goal, and what is left of it from each (n,) [m]."""
+        lead = None if self._lead is None else self._lead()
+        places = self.goal[None, :3] if lead is None else np.vstack([lead, self.goal[:3]])
+        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        return places, np.append(np.cumsum(steps[::-1])[::-1], 0.0)
+
+    def _ahead_of(self, roots: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Length (k,) of the way from roots (k, 3) to the goal, and places (k, 3) a stride on [m]."""
+        places, left = self._way
+        off = np.linalg.norm(roots[:, None] - places, axis=2)
+        near = np.argmin(off, axis=1)
+        then = np.argmax(left <= left[near, None] - self.settings.stride, axis=1)
+        then = np.where(left[near] <= self.settings.stride, len(places) - 1, then)
+        return off[np.arange(len(roots)), near] + left[near], places[then]
 
     def _followers(self, state: State) -> list[tuple[State, float]]:
         """States after one move, with what it costs."""
         if state in self._next:
             return self._next[state]
-        root, yaw, pitch = (value[0] for value in self._frames(self._at(state)[None]))
+        root, yaw, pitch = (value[0] for value in self._frames([state]))
         turn = rotations(yaw, pitch, np.array(0.0))
-        away = self.goal[:3] - root
+        away = self._ahead_of(root[None])[1][0] - root
         onward = min(1.0, 0.5 * self.settings.stride / max(float(np.linalg.norm(away)), 1e-9)) * away
         states: list[State] = []
         steps: list[float] = []
@@ -232,20 +356,28 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             # From behind where it should be to ahead of it.
             rows = set[int]()
             for ahead in (0.0, 1.0, 2.0):
-                place = wanted + ahead * onward
-                rows |= set(tree.query_ball_point(place, AROUND * self.settings.stride))
-            rows |= set(tree.query(wanted + onward, k=min(3, tree.n))[1].ravel().tolist())
+                rows |= set(
+                    tree.query_ball_point(
+                        wanted + ahead * onward, self.settings.around * self.settings.stride
+                    )
+                )
+            if not rows or not any(self._grasps):
+                rows |= set(tree.query(wanted + onward, k=min(3, tree.n))[1].ravel().tolist())
             for row in sorted(rows):
                 way = float(np.linalg.norm(self._places[k][row + 1] - here))
                 if row + 1 != state[k] and way > 0.15 * self.settings.stride:
                     states.append((*state[:k], row + 1, *state[k + 1 :]))
                     steps.append(1.0 + 0.5 * (way / (2.0 * self.settings.stride)) ** 2)
         costs = self._frame_costs(states) if states else np.zeros(0)
-        self._next[state] = [
+        moves = [
             (after, step + cost)
             for after, step, cost in zip(states, steps, costs.tolist(), strict=True)
             if math.isfinite(cost)
         ]
+        # A limb that is still free comes first ([Tonneau2015]_ 7.2), as long as it finds a place.
+        first = [item for item in moves if self._fills(state, item[0])]
+        self._later[state] = [item for item in moves if not self._fills(state, item[0])] if first else []
+        self._next[state] = first or moves
         return self._next[state]
 
     def _tested(self, before: State, after: State) -> float:
@@ -253,22 +385,46 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         if (before, k) in self._stuck:
             return math.inf
-        key = k, after[k]
-        if key not in self._free:
-            self._free[key] = self.holds[k].is_free(after[k] - 1)
-        if not self._free[key]:
+        if not self._has_room(k, after[k]):
             return math.inf
         staying = [j for j in range(len(self.holds)) if j != k and self._held(j, before[j])]
         at = self._at(after)
-        roots = np.array([self._roots[before][:2], self._roots[after][:2]])
-        hull = convex_polygon(at[staying, :2])
-        if float(np.min(signed_distance(roots, hull))) < -SWAY * self.size:
-            return math.inf
+        cost = 0.0
+        if not any(self._grasps[j] for j in staying):
+            hull = convex_polygon(at[staying, :2])
+            for state in (before, after):
+                root = self._roots[state]
+                # On its way over the limbs that stay the trunk takes the others to the ends of their reach.
+                ways = root[:2] + SHARES[:, None] * (at[staying, :2].mean(axis=0) - root[:2])
+                rooms = signed_distance(ways, hull)
+                if rooms[0] < -self.settings.sway * self.size:
+                    return math.inf
+                shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
+                local = (self._at(state) - shifted) @ self._turns[state]
+                beyond = [
+                    -float(item.room(local[j]))
+                    for j, item in enumerate(self.holds)
+                    if self._held(j, state[j])
+                ]
+                cost += OVERREACH * max(0.0, *beyond) / self.size
+        proven = self._postures.get((after, k, True))
+        if proven is not None and proven.q is not None:
+            cost = -PROVEN
         dearer = self._dearer.get(k)
         if dearer is None:
-            return 0.0
+            return cost
         away = np.linalg.norm(dearer - np.concatenate([at[k], self._roots[after]]).reshape(2, 3), axis=2)
-        return 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+        return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+
+    def _has_room(self, k: int, row: int) -> bool:
+        if (k, row) not in self._free:
+            self._free[k, row] = self.holds[k].is_free(row - 1)
+        return self._free[k, row]
+
+    def _fills(self, before: State, after: State) -> bool:
+        """Whether a move gives a contact to a limb that has none."""
+        k = self._moved(before, after)
+        return not self._held(k, before[k]) and self._has_room(k, after[k])
 
     def _moved(self, before: State, after: State) -> int:
         return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)
@@ -279,7 +435,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     def _close(self, move: tuple[State, State]) -> None:
         before, after = move
         k = self._moved(before, after)
-        self._next[before] = [item for item in self._next.get(before, []) if item[0] != after]
+        left = [item for item in self._next.get(before, []) if item[0] != after]
+        self._next[before] = left or self._later.pop(before, [])
         place = np.array([[self._at(after)[k], self._roots[after]]])
         self._dearer[k] = np.vstack([self._dearer.get(k, np.zeros((0, 2, 3))), place])
 
@@ -300,7 +457,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     def _guide(self, state: State) -> FloatArray:
         """(7,) pose of the root that suits a state."""
-        root, yaw, pitch = (value[0] for value in self._frames(self._at(state)[None]))
+        root, yaw, pitch = (value[0] for value in self._frames([state]))
         return np.concatenate([root, quaternions(yaw, pitch, np.array(0.0))])
 
     def _planned(self, way: list[State]) -> ContactPlan | None:
@@ -314,7 +471,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             if lifted.q is None:
                 self._stuck.add((before, k))
                 return self._refused(before, after, f"{name} cannot leave its contact: {lifted.reason}")
-            landing = self._posed(landed, staying, self._guide(after), lifted.q, (after, k, True))
+            there = self._guide(after)
+            reaching = self.holds[k].stretched(lifted.q, there, landed[name], self._state)
+            landing = self._posed(landed, staying, there, reaching, (after, k, True))
             if landing.q is None:
                 return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
             old = held.get(name)
@@ -383,7 +542,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 name: Placement(None, contact.rotation_contact_to_world, 0.05)
                 for name, contact in held.items() if contact.kind is ContactKind.POINT
             }  # fmt: skip
-            self._postures[key] = self.poser.pose(
-                held, carrying, start, guide, placements={**upright, **(wishes or {})}
-            )
+            posed = self.poser.pose(held, carrying, start, guide, placements={**upright, **(wishes or {})})
+            if posed.q is not None:
+                share = static_torque_share(self.poser.body, posed.q, Stance(list(carrying.values())))
+                if share > 1.0:
+                    why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
+                    posed = Posed(None, why)
+            self._postures[key] = posed
         return self._postures[key]

@@ -8,13 +8,14 @@ import pinocchio as pin
 
 from manikin.balance.criteria import StaticRegion
 from manikin.body import BodyModel, Configuration, with_root
-from manikin.contact import Contact, ContactModel, FrictionModel, Stance
+from manikin.contact import Contact, ContactKind, ContactModel, FrictionModel, Stance
 from manikin.kinematics import (
     Placement,
     PostureProblem,
     Preferences,
     SolverSettings,
     generate_posture,
+    pairs_beside,
     touching_pairs,
 )
 from manikin.numerics.spatial import FloatArray
@@ -143,7 +144,8 @@ class PostureFinder:
         problem = PostureProblem(
             self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
-            self_clearance=settings.clearance, ignore=self._touching(held),
+            self_clearance=settings.clearance, ignore=touching_pairs(self.body, self._touched_by(held)),
+            beside=self._beside(held),
             range_margin=settings.range_margin, learnt_margin=settings.learnt_margin,
             reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
@@ -176,12 +178,21 @@ class PostureFinder:
         wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
         return {self._root: wish}
 
-    def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
+    def _touched_by(self, held: Mapping[str, Contact]) -> list[tuple[str, str]]:
+        """Effectors with what each touches."""
         for contact in held.values():
             if contact not in self._touched:
                 self._touched[contact] = self.scene.touched_obstacles(contact)
-        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
-        return touching_pairs(self.body, touched)
+        return [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
+
+    def _beside(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
+        """Pairs that may be as near as touching: shanks on their tips, and forearms at what hands hold."""
+        wrists = {
+            (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)
+            for name, item in held.items() if item.kind is ContactKind.GRASP
+            for obstacle in self._touched[item]
+        }  # fmt: skip
+        return pairs_beside(self.body, self._touched_by(held)) | wrists
 
     def _region(self, carrying: Mapping[str, Contact]) -> StaticRegion:
         """Where the body may rest; asked again and again for the same contacts."""

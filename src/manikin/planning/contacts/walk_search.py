@@ -22,12 +22,13 @@ from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage
-from manikin.planning.contacts.endpoint import FEET, stand_up
+from manikin.planning.contacts.endpoint import FEET
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
+from manikin.planning.contacts.seat import leave_seat
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.scene import Scene
 
@@ -185,11 +186,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     def _best(self) -> list[int] | str:
         if not self._risen:
             upright = self._room.guide(0, *self._holds(self.start))
-            risen = stand_up(self.poser, self.start, frozenset(FEET), upright)
-            if isinstance(risen, str):
-                self.reasons[risen] += 1
+            leaving = leave_seat(self.poser, self.start, frozenset(FEET), upright)
+            if leaving.failure is not None:
+                self.reasons[leaving.failure] += 1
                 return f"cannot leave {', '.join(sorted(set(self.start.contacts) - set(FEET)))}"
-            self._risen = risen
+            self._risen = leaving.stages
         way = self.search.best()
         if way is not None:
             return way

@@ -2,7 +2,6 @@
 
 from manikin.planning.guide.abstraction import Abstraction, LimbReach, TrunkShape, abstraction_of
 from manikin.planning.guide.checker import NO_MARGINS, Margins, ReachabilityChecker
-from manikin.planning.guide.comfort import ComfortSettings, nearest_fit, relax
 from manikin.planning.guide.condition import Condition, LimbRule, UsableSurface
 from manikin.planning.guide.guide import (
     GuideResult,
@@ -11,7 +10,6 @@ from manikin.planning.guide.guide import (
     GuideWorld,
     offline_roadmap,
     plan_guide,
-    plan_guide_with_restarts,
 )
 from manikin.planning.guide.roadmap import Roadmap, RoadmapSettings, Route, request
 from manikin.planning.guide.root_path import RootLimits, RootPath, ShortcutSettings
@@ -20,9 +18,9 @@ from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, Samplin
 from manikin.planning.guide.steering import LocalPlanner
 
 __all__ = [
-    "NO_MARGINS", "Abstraction", "ComfortSettings", "Condition", "GuideResult", "GuideSettings", "GuideTask",
-    "GuideWorld", "LimbReach", "LimbRule", "LocalPlanner", "Margins", "PoseSampler", "ReachabilityChecker",
-    "Roadmap", "RoadmapSettings", "RootLimits", "RootPath", "Route", "SamplerSettings", "SamplingRegion",
-    "ShortcutSettings", "TrunkShape", "UsableSurface", "abstraction_of", "nearest_fit", "offline_roadmap",
-    "plan_guide", "plan_guide_with_restarts", "relax", "request", "root_pose",
+    "NO_MARGINS", "Abstraction", "Condition", "GuideResult", "GuideSettings", "GuideTask", "GuideWorld",
+    "LimbReach", "LimbRule", "LocalPlanner", "Margins", "PoseSampler", "ReachabilityChecker", "Roadmap",
+    "RoadmapSettings", "RootLimits", "RootPath", "Route", "SamplerSettings", "SamplingRegion",
+    "ShortcutSettings", "TrunkShape", "UsableSurface", "abstraction_of", "offline_roadmap", "plan_guide",
+    "request", "root_pose",
 ]  # fmt: skip

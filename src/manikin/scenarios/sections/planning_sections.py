@@ -94,7 +94,7 @@ class ContactsSection(Section):
         "volumes learnt from recorded motion as well",
     )
     attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = preset(
-        3, "contact plans, or guides of a body on any limbs, that are tried before giving up"
+        3, "contact plans, or starts of a body on any limbs, that are tried before giving up"
     )
 
 
