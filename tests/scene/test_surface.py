@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from manikin.contact import sole
+from manikin.errors import ContactError
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, load_mesh
 from manikin.scene.surface import faces_of
@@ -53,6 +55,25 @@ def test_cylinder_caps_planes_and_half_spaces_face_the_right_way():
     assert np.allclose(front.normal, -back.normal)
     assert np.allclose(front.polygon[:, 0], 2.0)
     assert faces_of(Obstacle("bar", Capsule(0.02, 1.0))) == ()
+
+
+def test_a_sole_lies_across_a_level_round_bar_and_on_no_steep_one():
+    """1.5 mm below the top of a rod of 32 mm it is 13.5 mm wide; that is no surface for anything else."""
+    level, steep = rotation_from_rpy(0.5 * np.pi, 0.0, 0.4), rotation_from_rpy(0.0, 0.3, 0.0)
+    rung = Obstacle("rung", Cylinder(0.016, 0.4), level, (0.0, 0.0, 0.3))
+    scene = Scene([rung, Obstacle("stile", Cylinder(0.02, 3.0), steep, (1.0, 0.0, 1.0))])
+    (top,) = scene.bar_tops
+    assert np.isclose(top.area, 0.4 * 2.0 * np.sqrt(0.016**2 - 0.0145**2))
+    assert np.allclose(top.polygon[:, 2], 0.316)
+    for half, touched in ((0.006, ("rung",)), (0.02, None)):
+        part = [[half, 0.05], [-half, 0.05], [-half, -0.05], [half, -0.05]]
+        foot = sole("left_foot", (0.0, 0.0, 0.316), 0.4, length=0.28, width=0.12, polygon=part, friction=0.7)
+        if touched is None:
+            with pytest.raises(ContactError):
+                scene.touched_obstacles(foot)
+        else:
+            assert scene.touched_obstacles(foot) == touched
+    assert not any("rung" in item.obstacles for item in scene.surfaces_facing((0.0, 0.0, 1.0), 0.1))
 
 
 def test_distance_in_space_combines_height_and_overhang():

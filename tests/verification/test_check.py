@@ -12,7 +12,7 @@ from manikin.body import Configuration
 from manikin.contact import point, sole
 from manikin.errors import ContactError, ScenarioError
 from manikin.numerics.spatial import rotation_from_rpy
-from manikin.scene.obstacle import Box, Obstacle
+from manikin.scene.obstacle import Box, Cylinder, Obstacle
 from manikin.verification import check_contact_plan, load_contact_plan, parse_contact_plan
 from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest
 from manikin.verification.solids import Solid
@@ -279,6 +279,24 @@ def test_a_sole_may_bridge_a_gap_that_leaves_enough_of_it(rising):
         found = {row.key: row for row in rows.rows if row is not None}
         assert found["max_contact_distance_m"].held
         assert found["min_sole_share"].held == held
+
+
+@pytest.mark.parametrize("shape", [Cylinder(0.016, 0.4), Box([0.08, 0.025, 0.4])])
+@pytest.mark.parametrize(("x", "side", "broken"), [
+    (0.02, 0.06, set()), (0.02, 0.03, {"min_rung_share"}), (0.11, 0.06, {"min_sole_share"}),
+])  # fmt: skip
+def test_a_climber_stands_on_a_rung_by_the_middle_of_the_sole(rising, shape, x, side, broken):
+    """With most of its width, and neither by heel nor toes; who walks does not stand on a rung at all."""
+    lying = rotation_from_rpy(-0.5 * np.pi, 0.0, 0.0)
+    half, top = (0.006, 0.016) if isinstance(shape, Cylinder) else (0.04, 0.0125)
+    half = min(half, 0.14 - x)
+    rung = Solid(Obstacle("rung", shape, lying, [x, 0.0, -top]))
+    part = [[x + half, side], [x - half, side], [x - half, -side], [x + half, -side]]
+    foot = sole("left_foot", [0.0, 0.0, 0.0], length=0.28, width=0.12, polygon=part, friction=0.7)
+    for rungs, wanted in ((True, broken), (False, {"min_sole_share"})):
+        rows = ContactRows(rising[0].build_body(), [rung], Rules(0.7, 400.0, rungs=rungs))
+        rows.measure({"left_foot": foot}, "stages[0]")
+        assert {row.key for row in rows.rows if row is not None and not row.held} == wanted
 
 
 # --- balance ------------------------------------------------------------------------------------------------

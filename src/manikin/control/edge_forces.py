@@ -13,6 +13,9 @@ from manikin.control.dynamics import DynamicsState
 from manikin.numerics.polytope import chord, inset_polygon
 from manikin.numerics.spatial import FloatArray, skew
 
+NARROW = 0.25
+"""Largest distance kept from the edge of what touches, by its smaller extent; a rod has 14 mm of a sole."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactGeometry:
@@ -64,7 +67,8 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
         return ContactGeometry(contact.effector, ((effector.segment, on_segment(contact.points)),))
     line = 0.0 if toes is None else float((effector.rotation.T @ (toes.origin - effector.translation))[0])
     if contact.hangs_over:
-        heel, tips = _parts(inset_polygon(contact.outline, inset), np.inf if toes is None else line)
+        kept = min(inset, NARROW * min(contact.length, contact.width))
+        heel, tips = _parts(inset_polygon(contact.outline, kept), np.inf if toes is None else line)
         patches = [(effector.segment, on_segment(heel))] if len(heel) else []
         if toes is not None and len(tips):
             patches.append((toes.name, on_segment(tips) - toes.origin))

@@ -111,11 +111,12 @@ def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
     Args:
         body: Its body; one without soles has no front of them.
     """
-    options, patch = values.contacts, None
-    if options.forefoot_m is not None and body.sole_length and body.sole_width:
+    options, patch, end = values.contacts, None, None
+    if body.sole_length and body.sole_width and body.stature is not None:
         end = _toe_hinge(body) - HINGE_ROOM
-        patch = (end - options.forefoot_m, end, PATCH_WIDTH * body.sole_width)
-    return ContactRules(friction_of(values), options.grasp_force_N, 0.0, patch)
+        if options.forefoot_m is not None:
+            patch = (end - options.forefoot_m, end, PATCH_WIDTH * body.sole_width)
+    return ContactRules(friction_of(values), options.grasp_force_N, 0.0, patch, end)
 
 
 def friction_of(values: ScenarioValues) -> float:

@@ -8,11 +8,11 @@ from manikin.scene.mesh import Mesh, load_mesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Sphere
 from manikin.scene.scene import Scene
 from manikin.scene.spheres import SphereProximity
-from manikin.scene.surface import Surface
+from manikin.scene.surface import GraspLine, Surface
 
 __all__ = [
-    "Box", "Capsule", "Cylinder", "FootingTable", "HalfSpace", "Mesh", "Obstacle", "Places", "Plane",
-    "Proximity", "Scene", "Sphere", "SphereProximity", "Surface", "cover", "load_mesh", "segment_of",
+    "Box", "Capsule", "Cylinder", "FootingTable", "GraspLine", "HalfSpace", "Mesh", "Obstacle", "Places",
+    "Plane", "Proximity", "Scene", "Sphere", "SphereProximity", "Surface", "cover", "load_mesh", "segment_of",
 ]  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from manikin.scene.collision import Meter, collision_parts, part_meter
 from manikin.scene.footing import FootingTable
 from manikin.scene.merging import COPLANAR, merged_surfaces
 from manikin.scene.obstacle import HalfSpace, Obstacle
-from manikin.scene.surface import GraspLine, Surface, grasp_lines, grasp_strips, palm_places
+from manikin.scene.surface import GraspLine, Surface, bar_tops, grasp_lines, grasp_strips, palm_places
 
 FLOOR = "floor"
 """Name of the floor obstacle."""
@@ -92,6 +92,11 @@ class Scene(Displayed):
     def grasp_lines(self) -> tuple[GraspLine, ...]:
         """Pieces of rails, rungs and other bars that a hand can close round, in order."""
         return grasp_lines(self.obstacles, self._distances)
+
+    @cached_property
+    def bar_tops(self) -> tuple[Surface, ...]:
+        """Strips along the tops of level round bars, on which only soles lie; no :attr:`surfaces`."""
+        return bar_tops(self.obstacles)
 
     @cached_property
     def holds(self) -> tuple[Surface, ...]:
@@ -218,7 +223,8 @@ class Scene(Displayed):
     def _aligned(self, contact: Contact, limit: float) -> list[Surface]:
         if contact.kind is ContactKind.GRASP:
             return list(self.surfaces)
-        return [surface for surface in self.surfaces if surface.normal @ contact.normal >= limit]
+        tops = self.bar_tops if contact.kind is ContactKind.SOLE else ()
+        return [item for item in (*self.surfaces, *tops) if item.normal @ contact.normal >= limit]
 
     def _off_surface(self, contact: Contact, aligned: list[Surface], tolerance: float) -> str:
         where = f"contact '{contact.effector}' at {np.round(contact.position, 4).tolist()} m"

@@ -318,6 +318,29 @@ def grasp_strips(lines: Sequence[GraspLine], obstacles: Sequence[Obstacle]) -> t
     return tuple(strip for line in lines if line.round for strip in line.strips(axes[line.obstacle]))
 
 
+SOLE_YIELD = 0.0015
+"""Depth by which a sole yields to a round bar that it stands on [m]; our choice."""
+LEVEL_BAR = float(np.sin(np.deg2rad(5.0)))
+"""Rise of the axis of a bar that counts as level, over its length."""
+
+
+def bar_tops(obstacles: Sequence[Obstacle]) -> tuple[Surface, ...]:
+    """Strips along the tops of level round bars, on which only a sole that yields a little can lie."""
+    found: list[Surface] = []
+    for item in obstacles:
+        shape, axis = item.shape, item.rotation[:, 2]
+        if not isinstance(shape, (Cylinder, Capsule)) or abs(axis[2]) > LEVEL_BAR:
+            continue
+        up = np.array([0.0, 0.0, 1.0]) - axis[2] * axis
+        up /= np.linalg.norm(up)
+        half = float(np.sqrt(SOLE_YIELD * (2.0 * shape.radius - SOLE_YIELD)))
+        along, across = 0.5 * shape.length * axis, half * np.cross(up, axis)
+        ring = np.array([along + across, across - along, -along - across, along - across])
+        polygon = frozen_array(item.translation + shape.radius * up + ring, "polygon", (4, 3))
+        found.append(Surface((item.name,), polygon, frozen_array(up, "normal", (3,))))
+    return tuple(found)
+
+
 def palm_places(lines: Sequence[GraspLine], numbers: NDArray[np.int64], points: FloatArray) -> FloatArray:
     """(n, 3) middles of palms' grips on the axes of round bars, nearest to points over their strips [m].
 

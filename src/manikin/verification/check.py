@@ -180,7 +180,11 @@ class _Check:
 
     def _contacts(self) -> ContactRows:
         values = self._scenario.contacts
-        rules = Rules(friction_of(self._scenario), values.grasp_force_N, values.forefoot_m is not None)
+        ends = self._scenario.file.task.start, self._scenario.file.task.goal
+        rules = Rules(
+            friction_of(self._scenario), values.grasp_force_N, values.forefoot_m is not None,
+            any(end.posture == "climbing" for end in ends),
+        )  # fmt: skip
         rows = ContactRows(self._body, self._solids, rules)
         for number, stage in enumerate(self._plan.stages):
             rows.measure(stage.contacts, f"stages[{number}]")

@@ -20,6 +20,9 @@ from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, 
 NORMAL_LIMIT = 1e-4
 """Difference of distances up to which triangles are equally near [m]."""
 
+LYING = float(np.sin(np.deg2rad(5.0)))
+"""Largest cosine of the angle between the axis of a round bar and the normal of what stands on it."""
+
 _CHUNK = 400_000
 """Pairs that are measured at once."""
 
@@ -268,13 +271,22 @@ class Solid:
                 # Of triangles that are equally near, as along a shared edge, the one that faces best.
                 close = table <= table.min(axis=1, keepdims=True) + NORMAL_LIMIT
                 yield table.min(axis=1), np.where(close, facing, -1.0).max(axis=1)
-        elif isinstance(shape, (Box, Cylinder)):
+        elif isinstance(shape, (Box, Cylinder, Capsule)):
+            if not isinstance(shape, Box) and abs(float(place.rotation[:, 2] @ normal)) <= LYING:
+                yield np.abs(self.distance(points)), self._outward(points) @ normal
             local = (points - place.translation) @ place.rotation
-            for axis in range(3) if isinstance(shape, Box) else (2,):
+            flat = (0, 1, 2) if isinstance(shape, Box) else (2,) if isinstance(shape, Cylinder) else ()
+            for axis in flat:
                 for sign in (1.0, -1.0):
                     facing = sign * float(place.rotation[:, axis] @ normal)
                     if facing >= least:
                         yield _to_face(shape, local, axis, sign), facing * every
+
+    def _outward(self, points: FloatArray) -> FloatArray:
+        """(n, 3) directions from the axis of a cylinder or capsule to points (n, 3)."""
+        axis, away = self.obstacle.rotation[:, 2], points - self.obstacle.translation
+        out = away - (away @ axis)[:, None] * axis
+        return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
 
 
 def _half_size(shape: Box | Sphere | Cylinder | Capsule) -> FloatArray:

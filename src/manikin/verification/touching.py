@@ -25,6 +25,12 @@ POINT_ALIGNED_DEG = 10.0
 LEAST_SHARE = 0.6
 """Least part of a sole that has to touch."""
 
+LEAST_ACROSS = 0.7
+"""Least part of a sole's width that has to touch where it stands on a rung."""
+
+MIDDLE = 0.25
+"""Largest distance of a rung from the middle of the sole on it, by the sole's length."""
+
 HIDDEN = 2e-3
 """Depth in a solid up to which what lies above a contact counts as free [m]."""
 
@@ -47,11 +53,13 @@ class Rules:
         friction: Coulomb coefficient of soles and points.
         grasp_force: Largest force of a grasp along each axis [N].
         forefoot: Whether the front of a sole alone may touch, as a climber's does.
+        rungs: Whether a sole may stand on a rung: by the middle of its length, with most of its width.
     """
 
     friction: float
     grasp_force: float
     forefoot: bool = False
+    rungs: bool = False
 
 
 class ContactRows:
@@ -72,6 +80,7 @@ class ContactRows:
         self._grasp = Worst("max_grasp_distance_m", "distance between palm and what it grasps", GRASP_REACH)
         self._hidden = Worst("max_hidden_depth_m", "depth inside a solid", HIDDEN, 1e-9)
         self._share = Worst("min_sole_share", "part of the sole in contact", share, 1e-6)
+        self._across = Worst("min_rung_share", "part of the sole's width on a rung", LEAST_ACROSS, 1e-6)
         self._beyond = Worst("max_beyond_sole_m", "distance of contact points beyond the sole", 1e-3, 1e-9)
         self._friction = Worst("max_friction", "coefficient of friction", rules.friction, 1e-9)
         self._force = Worst("max_grasp_force_N", "force limit of a grasp", rules.grasp_force, 1e-9)
@@ -96,7 +105,7 @@ class ContactRows:
         """The requirements, those whose failure explains others first."""
         quantities = (
             self._angle, self._point_angle, self._distance, self._grasp, self._hidden, self._beyond,
-            self._share, self._friction, self._force,
+            self._share, self._across, self._friction, self._force,
         )  # fmt: skip
         return [item.row for item in quantities]
 
@@ -136,7 +145,13 @@ class ContactRows:
         lying = float(weight @ (best[: len(samples)] <= ON_SURFACE) / weight.sum())
         size = nominal_size(self._body, contact.effector)
         if size is not None:
-            self._share.take(lying * area(hull) / (size[0] * size[1]), where)
+            share, carried = lying * area(hull) / (size[0] * size[1]), best <= ON_SURFACE
+            on = np.vstack([local, contact.points])[carried]
+            middle = 0.5 * (on.min(axis=0) + on.max(axis=0)) if len(on) else np.full(3, np.inf)
+            if self._rules.rungs and share < LEAST_SHARE and abs(middle[0]) <= MIDDLE * size[0]:
+                self._across.take(float(np.ptp(on[:, 1])) / size[1], where)
+            else:
+                self._share.take(share, where)
         return frozenset(touched)
 
     def _at_points(self, contact: Contact, where: str) -> frozenset[str]:

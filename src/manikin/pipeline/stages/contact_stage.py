@@ -176,6 +176,9 @@ STEEPEST = float(np.deg2rad(50.0))
 LEAN = 0.35
 """Largest lean of the root in any direction [rad]; our choice."""
 
+RETREATS = (0.25, 0.45)
+"""Distances from a climber's best place before its holds at which it is tried as well, by the reach."""
+
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
@@ -207,10 +210,12 @@ class _LimbSearch(_ContactSearch):
         for first in islice(self._starts(goal), self._scenario.contacts.attempts):
             if first.stage is None:
                 return result or self._tally.failed(first.failure or "", "start")
-            self._search = self._searched(first.stage, goal)
-            result = self._result(self._search.run())
-            if result.plan is not None:
-                break
+            # Who holds on goes straight first, as a guide's stiff trunk has no room before holds.
+            for guided in (True,) if self._body.stature is None else (False, True):
+                self._search = self._searched(first.stage, goal, guided=guided)
+                result = self._result(self._search.run())
+                if result.plan is not None:
+                    return result
         return result or self._tally.failed("no start", "start")
 
     def _holds(self, start: FloatArray, goal: FloatArray) -> list[LimbHolds]:
@@ -219,39 +224,48 @@ class _LimbSearch(_ContactSearch):
             self._reference, self._samples, np.array([start, goal]), self._reach,
         )  # fmt: skip
 
-    def _searched(self, start: Stage, goal: FloatArray) -> LimbSearch:
+    def _searched(self, start: Stage, goal: FloatArray, *, guided: bool) -> LimbSearch:
         def lead() -> FloatArray | None:
             guide = self._guide(start.q[:7], goal)
             self._tally.count_guide(guide)
             return guide.places
 
         holds = self._holds(start.q[:7], goal)
-        return LimbSearch(self._poser, holds, start, goal, self._reach, self._settings(), lead)
+        led = lead if guided else None
+        return LimbSearch(self._poser, holds, start, goal, self._reach, self._settings(), led)
 
     @property
     def _climbs(self) -> bool:
         return self._scenario.file.task.goal.posture == CLIMBING
 
+    @property
+    def _hangs(self) -> bool:
+        """Whether a person starts on holds."""
+        return self._body.stature is not None and self._scenario.file.task.start.posture == CLIMBING
+
     def _settings(self) -> LimbSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
         plain, pace, safe = LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
         if self._body.stature is not None:
-            plain = replace(plain, turns=False, around=1.5, beyond=0.1, comfort=10.0, sway=0.3)
+            plain = replace(
+                plain, turns=False, around=1.5, beyond=0.1, comfort=10.0, sway=0.3, retreats=RETREATS
+            )
         return replace(
             plain,
             stride=STRIDE * self._reach,
+            lets_go=self._body.stature is not None and not self._climbs,
             lift=plain.lift * safe,
             swing_duration=plain.swing_duration * pace,
             swing_speed=plain.swing_speed * pace,
             shift_duration=plain.shift_duration * pace,
             hinge_pace=plain.hinge_pace / pace,
-            goal_distance=NEAR_GOAL if self._climbs else plain.goal_distance * safe,
+            goal_distance=NEAR_GOAL if self._climbs or self._hangs else plain.goal_distance * safe,
         )
 
     def _starts(self, goal: FloatArray) -> Iterator[Endpoint]:
         """Postures at the start, the best first, or the reason why there is none."""
         state = self._scenario.file.task.start
-        if self._body.stature is not None and state.posture != CLIMBING:
+        if self._body.stature is not None and not self._hangs:
             result = stage_at(self._endpoints(), self._scenario, "start")
             yield Endpoint(None, result) if isinstance(result, str) else Endpoint(result)
             return

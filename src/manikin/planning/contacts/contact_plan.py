@@ -46,12 +46,15 @@ class ContactRules:
         grasp_moment: Largest moment of a grasp along each world axis [N.m].
         patch: Part of a foot's sole that has to touch, as its start and end along the sole's x axis and its
             width [m]; the whole sole when None. A climber stands on the front of the feet.
+        stiff: Place on the sole's x axis up to which a foot does not bend, and may stand on a rung [m]; None
+            where it stands on none.
     """
 
     friction: float = 0.7
     grasp_force: float = 400.0
     grasp_moment: float = 10.0
     patch: tuple[float, float, float] | None = None
+    stiff: float | None = None
 
 
 def footprint(

@@ -1,6 +1,7 @@
-"""Places on which limbs can make contacts: what is level, edges of it and bars for hands."""
+"""Places on which limbs can make contacts: what is level, rungs, edges and bars for hands."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -10,12 +11,12 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import Contact, ContactKind
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw
 from manikin.planning.contacts.best_first import heading_of
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
 from manikin.planning.contacts.limb_search import LimbHolds
 from manikin.planning.contacts.samples import LimbSamples
-from manikin.scene import Scene, Surface
+from manikin.scene import GraspLine, Scene, Surface
 
 
 def stature_of(body: BodyModel) -> float:
@@ -48,7 +49,25 @@ INSET = 0.06
 """Distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice."""
 
 SPACING = 0.1
-"""Distance of neighbouring places of a limb, by its reach, twice that of soles; our choice."""
+"""Distance of neighbouring places of a limb, by its reach, twice that of soles and on bars; our choice."""
+
+FAR_EDGE = 0.7
+"""Cosine of the angle between the heading and the way out over an edge that is left out; our choice."""
+
+RUNG_TURN = float(np.deg2rad(30.0))
+"""Largest angle between the heading of a foot and the way across its rung; our choice [rad]."""
+
+RUNG_SIDE = 0.025
+"""Distance of a sole to the ends of its rung, where the stiles are [m]; our choice."""
+
+RUNG_APART = 0.025
+"""Distance on the sole between two places of a rung below it [m]; our choice."""
+
+STEEP_BAR = 0.85
+"""Rise of a bar over its length from which on a hand takes it from the side; our choice."""
+
+RUNG_SPACING = 0.045
+"""Distance of neighbouring places of a foot along a rung [m]; our choice."""
 
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
@@ -75,7 +94,7 @@ def limb_holds(
     ]
     grid = _Grid(scene, surfaces, (low, high), SPACING * size)
     heading = heading_of(ends[1])
-    known: dict[tuple[object, ...], tuple[FloatArray, list[FloatArray]]] = {}
+    known: dict[tuple[object, ...], list[_Place]] = {}
     found: list[LimbHolds] = []
     for limb in limbs:
         kind, item = kinds[limb.name], samples[limb.name]
@@ -86,11 +105,14 @@ def limb_holds(
         points = _sole(body, limb, rules) if sole else INSET * size * _SQUARE
         key = kind, points.tobytes(), outward
         if key not in known:
-            known[key] = grid.places(points, [rotation_from_yaw(heading + turn) for turn in outward], kind)
-        places, turns = known[key]
+            frames = [rotation_from_yaw(heading + turn) for turn in outward]
+            stiff = rules.stiff if sole and rules.patch is None else None
+            known[key] = grid.places(points, frames, kind, stiff)
+        places = known[key]
+        positions = np.array([place.position for place in places]).reshape(-1, 3)
         found.append(LimbHolds(
-            places, partial(_contact_at, body, limb, kind, rules, places, turns),
-            partial(_has_room, scene, size, places, turns), item, (there.rotation, there.translation), wanted,
+            positions, partial(_contact_at, body, limb, kind, rules, places),
+            partial(_has_room, scene, size, places), item, (there.rotation, there.translation), wanted,
         ))  # fmt: skip
     return found
 
@@ -104,16 +126,29 @@ def _sole(body: BodyModel, limb: Limb, rules: ContactRules) -> FloatArray:
     return np.column_stack([np.where(points[:, 0] > points[:, 0].mean(), toes, points[:, 0]), points[:, 1:]])
 
 
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where an effector may touch: (3,) place [m], (3, 3) rotation, (k, 3) points on a rung [m] or None."""
+
+    position: FloatArray
+    rotation: FloatArray
+    points: FloatArray | None = None
+
+
 def _contact_at(
-    body: BodyModel, limb: Limb, kind: ContactKind, rules: ContactRules, places: FloatArray,
-    turns: Sequence[FloatArray], row: int,
-) -> Contact:  # fmt: skip
-    return make_contact(body, limb, kind, places[row], turns[row], rules)
+    body: BodyModel, limb: Limb, kind: ContactKind, rules: ContactRules, places: Sequence[_Place], row: int
+) -> Contact:
+    place = places[row]
+    made = make_contact(body, limb, kind, place.position, place.rotation, rules)
+    if place.points is None:
+        return made
+    return replace(made, points=frozen_array(place.points, "what of a sole is on a rung [m]", (4, 3)))
 
 
-def _has_room(scene: Scene, size: float, places: FloatArray, turns: Sequence[FloatArray], row: int) -> bool:
+def _has_room(scene: Scene, size: float, places: Sequence[_Place], row: int) -> bool:
     """Whether a ball just above a place is free."""
-    return scene.nearest(places[row] + 0.06 * size * turns[row][:, 2])[1] > 0.035 * size
+    above = places[row].position + 0.06 * size * places[row].rotation[:, 2]
+    return scene.nearest(above)[1] > 0.035 * size
 
 
 class _Grid:
@@ -125,39 +160,96 @@ class _Grid:
         self._scene, self._surfaces, self._box, self._spacing = scene, surfaces, box, spacing
 
     def places(
-        self, points: FloatArray, turns: Sequence[FloatArray], kind: ContactKind
-    ) -> tuple[FloatArray, list[FloatArray]]:
-        """Places (m, 3) [m] with rotations (3, 3) of contacts of one shape: of hands along edges and bars."""
-        holds, spacing = kind is ContactKind.GRASP, (1.0 + (kind is ContactKind.SOLE)) * self._spacing
-        pairs = [pair for surface in self._surfaces for pair in self._along(surface)] if holds else [
-            (place, upright)
-            for surface in self._surfaces
-            for upright in (onto_normal(turn, surface.normal) for turn in turns)
-            for place in self._on(surface, points @ upright.T, spacing)
-        ]  # fmt: skip
-        for bar in self._scene.grasp_lines if holds else ():
-            for share in np.linspace(0.0, 1.0, 1 + int(bar.length / self._spacing)):
-                place = (1.0 - share) * bar.start + share * bar.end + [0.0, 0.0, bar.radius]
+        self, points: FloatArray, turns: Sequence[FloatArray], kind: ContactKind, stiff: float | None
+    ) -> list[_Place]:
+        """Places of contacts of one shape: of hands along edges and bars, of feet on rungs as well.
+
+        Args:
+            stiff: Place on the sole's x axis up to which a foot may stand on a rung [m]; None for on none.
+        """
+        if kind is ContactKind.GRASP:
+            along = [place for surface in self._surfaces for place in self._along(surface, turns[0][:, 0])]
+            return along + [place for bar in self._scene.grasp_lines for place in self._around(bar, turns[0])]
+        spacing, found = (1.0 + (kind is ContactKind.SOLE)) * self._spacing, list[_Place]()
+        for surface in self._surfaces:
+            whole = [
+                _Place(place, upright)
+                for upright in (onto_normal(turn, surface.normal) for turn in turns)
+                for place in self._on(surface, points @ upright.T, spacing)
+            ]
+            found += whole or ([] if stiff is None else self._across(surface, points, turns[0], stiff))
+        for top in self._scene.bar_tops if stiff is not None else ():
+            found += self._across(top, points, turns[0], stiff or 0.0)
+        return found
+
+    def _around(self, bar: GraspLine, turn: FloatArray) -> Iterator[_Place]:
+        """Places of a hand along a bar: on top of it, or on the body's side of one that is steep."""
+        axis = bar.end - bar.start
+        axis = axis / max(float(np.linalg.norm(axis)), 1e-9)
+        steep = abs(float(axis[2])) >= STEEP_BAR
+        out = -turn[:, 0] if steep else turn[:, 2]
+        out = out - (out @ axis) * axis
+        out = out / np.linalg.norm(out)
+        up = axis * np.sign(axis[2])
+        frame = np.column_stack([up, np.cross(out, up), out]) if steep else turn
+        for share in np.linspace(0.0, 1.0, 1 + int(0.5 * bar.length / self._spacing)):
+            place = (1.0 - share) * bar.start + share * bar.end + bar.radius * out
+            if self._inside(place[None])[0]:
+                yield _Place(place, frame)
+
+    def _across(
+        self, surface: Surface, points: FloatArray, turn: FloatArray, stiff: float
+    ) -> Iterator[_Place]:
+        """Places of a foot across a rung, which all of the sole's width and no bending part of it is on.
+
+        Args:
+            points: (c, 3) corners of the sole [m].
+            turn: (3, 3) rotation of a foot that goes straight on.
+        """
+        ring = surface.polygon
+        if len(ring) != 4:
+            return
+        sides = np.roll(ring, -1, axis=0) - ring
+        lengths = np.linalg.norm(sides, axis=1)
+        along = sides[int(np.argmax(lengths))] / max(float(lengths.max()), 1e-9)
+        ahead = np.cross(along, surface.normal)
+        ahead = ahead * np.sign(ahead @ turn[:, 0])
+        frame = np.column_stack([ahead, np.cross(surface.normal, ahead), surface.normal])
+        across, room = float(lengths.min()), 0.5 * (float(lengths.max()) - np.ptp(points[:, 1])) - RUNG_SIDE
+        heel = float(points[:, 0].min())
+        if ahead @ turn[:, 0] < np.cos(RUNG_TURN) or room < 0.0 or across > stiff - heel:
+            return
+        half, side = 0.5 * across, 0.5 * float(np.ptp(points[:, 1]))
+        front = stiff - half
+        for middle in (front, 0.0) if front > RUNG_APART else (front,):
+            on = np.array([middle, 0.0, 0.0]) + np.array([half, side, 0.0]) * _SQUARE
+            for share in np.linspace(-1.0, 1.0, 2 * max(1, int(room / RUNG_SPACING)) + 1):
+                place = surface.centre - middle * ahead + share * room * frame[:, 1]
                 if self._inside(place[None])[0]:
-                    pairs.append((place, turns[0]))
-        return np.array([place for place, _ in pairs]).reshape(-1, 3), [turn for _, turn in pairs]
+                    yield _Place(place, frame, on)
 
     def _inside(self, places: FloatArray) -> NDArray[np.bool_]:
         low, high = self._box
         return np.asarray(((places >= low) & (places <= high)).all(axis=1), dtype=np.bool_)
 
-    def _along(self, surface: Surface) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Places along the edges of a surface beyond which there is room, fingers pointing inward."""
+    def _along(self, surface: Surface, ahead: FloatArray) -> Iterator[_Place]:
+        """Places along the edges of a surface beyond which there is room, fingers pointing inward.
+
+        Args:
+            ahead: (3,) heading of the body, to which no fingers point back.
+        """
         for start, end in zip(*surface.edges, strict=True):
             length = float(np.linalg.norm(end - start))
             along = (end - start) / max(length, 1e-9)
             out = np.cross(along, surface.normal)
+            if out @ ahead > FAR_EDGE:
+                continue
             turn = np.column_stack([-out, np.cross(surface.normal, -out), surface.normal])
             for share in np.linspace(0.0, 1.0, 2 + int(length / self._spacing))[1:-1]:
                 edge = (1.0 - share) * start + share * end
                 room = self._scene.nearest(edge + BEYOND * out)[1] > 0.5 * BEYOND
                 if room and self._inside(edge[None])[0]:
-                    yield from ((edge - inset * out, turn) for inset in FINGERS)
+                    yield from (_Place(edge - inset * out, turn) for inset in FINGERS)
 
     def _on(self, surface: Surface, points: FloatArray, spacing: float) -> FloatArray:
         """(m, 3) places on one surface of what touches with points (c, 3) about it, in the world's axes."""

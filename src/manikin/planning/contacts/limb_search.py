@@ -11,7 +11,7 @@ A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -70,11 +70,20 @@ LOOSE = 1.0
 HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
 """Turn of a hand whose fingers hook round an edge, from one that lies flat on it."""
 
+SOLES_APART = 0.02
+"""Least distance of two soles side by side; our choice [m]."""
+
+SOLE_ABOVE = 0.1
+"""Distance of two soles of which one may be above the other; our choice [m]."""
+
 TURN = 0.2
 """Distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice."""
 
+FREE = -1
+"""Row of a hand that has let go."""
+
 State = tuple[int, ...]
-"""Place of each limb, by its row among those of the limb; the first is that of the start."""
+"""Place of each limb, by its row among those of the limb; the first is that of the start, if it has one."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +106,8 @@ class LimbSettings:
         goal_turn: Angle between the root's heading and the goal's at which it is reached [rad].
         turns: Whether the root's heading follows the contacts; it goes from that of the start to the goal's
             otherwise, as that of a climber does, whose trunk is pitched by no slope either.
+        retreats: Distances behind where the root should be from which postures are tried too, by that reach.
+        lets_go: Whether hands may let go, as those of one who stands at the goal.
     """
 
     stride: float = 0.4
@@ -113,6 +124,8 @@ class LimbSettings:
     goal_distance: float = 0.08
     goal_turn: float = math.radians(12.0)
     turns: bool = True
+    lets_go: bool = False
+    retreats: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +220,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             if item.effector in start.contacts else root[:3] + turn @ item.wanted
             for item in holds
         ]  # fmt: skip
-        self._places = [np.vstack([at, item.positions]) for at, item in zip(first, holds, strict=True)]
+        # The last one is that of a hand that has let go, which counts nowhere.
+        self._places = [np.vstack([at, item.positions, at]) for at, item in zip(first, holds, strict=True)]
         self._trees = [cKDTree(item.positions) if len(item.positions) else None for item in holds]
         self._wanted = np.array([item.wanted for item in holds])
         self._contacts: dict[tuple[int, int], Contact] = {}
@@ -296,7 +310,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     def _shares(self, states: Sequence[State]) -> FloatArray:
         """(k, n) share of each limb that is held in the limbs of a state that are."""
         begun = np.array([item.effector in self.start.contacts for item in self.holds])
-        held = ((np.array(states) > 0) | begun).astype(np.float64)
+        rows = np.array(states)
+        held = ((rows > 0) | (begun & (rows == 0))).astype(np.float64)
         return held / np.maximum(held.sum(axis=1, keepdims=True), 1.0)
 
     def _frame_costs(self, states: Sequence[State]) -> FloatArray:
@@ -312,8 +327,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             cost += np.where(beyond > self.settings.beyond, np.inf, 4.0 * np.maximum(beyond, 0.0))
         away, off_way = np.linalg.norm(roots - self.goal[:3], axis=1), self._ahead_of(roots)[0]
         off_heading = np.abs(np.mod(yaw - self._yaws[1] + math.pi, 2.0 * math.pi) - math.pi)
-        n, stride = len(self.holds), self.settings.stride
-        near = (away <= self.settings.goal_distance) & (off_heading <= self.settings.goal_turn)
+        n, stride, slack = len(self.holds), self.settings.stride, self.settings.goal_distance
+        near = (away <= slack) & (off_heading <= self.settings.goal_turn)
+        # From the goal every limb of a climber, whose trunk does not pitch, reaches its place.
+        there = (places - self.goal[:3]) @ rotation_from_yaw(self._yaws[1])
+        for k, item in enumerate(self.holds if not self.settings.turns else ()):
+            beyond = -item.room(there[:, k]) - slack
+            near &= ~held[:, k] | (beyond <= self.settings.beyond * self.size)
         ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
         rows = zip(states, ahead.tolist(), near.tolist(), roots, turn, strict=True)
         for state, left, there, root, frame in rows:
@@ -350,8 +370,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         states: list[State] = []
         steps: list[float] = []
         for k, tree in enumerate(self._trees):
-            if tree is None or (state, k) in self._stuck:
+            if tree is None or (state, k) in self._stuck or state[k] == FREE:
                 continue
+            if self.settings.lets_go and self._grasps[k] and self._held(k, state[k]):
+                states.append((*state[:k], FREE, *state[k + 1 :]))
+                steps.append(1.0)
             here, wanted = self._places[k][state[k]], root + turn @ self._wanted[k]
             # From behind where it should be to ahead of it.
             rows = set[int]()
@@ -385,7 +408,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         if (before, k) in self._stuck:
             return math.inf
-        if not self._has_room(k, after[k]):
+        if after[k] != FREE and not (self._has_room(k, after[k]) and self._beside(k, after)):
             return math.inf
         staying = [j for j in range(len(self.holds)) if j != k and self._held(j, before[j])]
         at = self._at(after)
@@ -421,16 +444,30 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             self._free[k, row] = self.holds[k].is_free(row - 1)
         return self._free[k, row]
 
+    def _beside(self, k: int, state: State) -> bool:
+        """Whether a sole lies beside the others, or above or below them."""
+        body, mine = self.poser.body, self._contact(k, state[k])
+        if mine.kind is not ContactKind.SOLE or not body.sole_length or not body.sole_width:
+            return True
+        for j, row in enumerate(state):
+            other = self._contact(j, row) if j != k and self._held(j, row) else mine
+            if other is mine or other.kind is not ContactKind.SOLE:
+                continue
+            off = np.abs((other.position - mine.position) @ mine.rotation_contact_to_world)
+            if (off < [body.sole_length, body.sole_width + SOLES_APART, SOLE_ABOVE]).all():
+                return False
+        return True
+
     def _fills(self, before: State, after: State) -> bool:
         """Whether a move gives a contact to a limb that has none."""
         k = self._moved(before, after)
-        return not self._held(k, before[k]) and self._has_room(k, after[k])
+        return after[k] != FREE and not self._held(k, before[k]) and self._has_room(k, after[k])
 
     def _moved(self, before: State, after: State) -> int:
         return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)
 
     def _held(self, k: int, row: int) -> bool:
-        return row > 0 or self.holds[k].effector in self.start.contacts
+        return row > 0 or (row == 0 and self.holds[k].effector in self.start.contacts)
 
     def _close(self, move: tuple[State, State]) -> None:
         before, after = move
@@ -467,13 +504,18 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             k = self._moved(before, after)
             name, held, landed = self.holds[k].effector, self._contacts_of(before), self._contacts_of(after)
             staying = {other: contact for other, contact in held.items() if other != name}
-            lifted = self._posed(held, staying, self._guide(before), stages[-1].q, (before, k, False))
+            lifted = self._posed(
+                held, staying, self._guesses(self._guide(before), stages[-1].q), (before, k, False)
+            )
             if lifted.q is None:
                 self._stuck.add((before, k))
                 return self._refused(before, after, f"{name} cannot leave its contact: {lifted.reason}")
-            there = self._guide(after)
-            reaching = self.holds[k].stretched(lifted.q, there, landed[name], self._state)
-            landing = self._posed(landed, staying, there, reaching, (after, k, True))
+            if after[k] == FREE:
+                stages.append(Stage.of(body, staying, lifted.q, self.settings.shift_duration))
+                self._moves.append((before, after))
+                continue
+            guesses = self._guesses(self._guide(after), lifted.q, (self.holds[k], landed[name]))
+            landing = self._posed(landed, staying, guesses, (after, k, True))
             if landing.q is None:
                 return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
             old = held.get(name)
@@ -501,6 +543,26 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             return None
         return ContactPlan.of(body, stages, end.q, self.settings.hinge_pace)
 
+    def _guesses(
+        self, guide: FloatArray, q: FloatArray, landing: tuple[LimbHolds, Contact] | None = None
+    ) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Poses (7,) of the root, with postures (nq,): as it should be, as it is, and farther back.
+
+        Farther from what a climber holds on to, knees that bend have room before them.
+
+        Args:
+            landing: A limb that reaches for a contact from there.
+        """
+        back, roots = pin.XYZQUATToSE3(guide).rotation[:, 0], [guide]
+        if self.settings.retreats:
+            roots.append(q[:7])
+        roots += [
+            np.concatenate([guide[:3] - away * self.size * back, guide[3:7]])
+            for away in self.settings.retreats
+        ]
+        for root in roots:
+            yield root, q if landing is None else landing[0].stretched(q, root, landing[1], self._state)
+
     def _refused(self, before: State, after: State, reason: str) -> None:
         self.reasons[reason] += 1
         self._close((before, after))
@@ -517,7 +579,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         )
         for number, place in enumerate(self._off_the_line(middle, before, after, start[:3])):
             wish = {before.effector: Placement(place, None, None, 0.5 / self.settings.lift**2)}
-            posed = self._posed(staying, staying, start[:7], start, (*move, number), wish)
+            posed = self._posed(staying, staying, self._guesses(start[:7], start), (*move, number), wish)
             if posed.q is not None:
                 return posed.q
         return None
@@ -533,16 +595,27 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             yield middle + self.settings.lift * out / max(float(np.linalg.norm(out)), 1e-9)
 
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], guide: FloatArray,
-        start: FloatArray, key: tuple[object, ...], wishes: Mapping[str, Placement] | None = None,
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact],
+        guesses: Iterable[tuple[FloatArray, FloatArray]], key: tuple[object, ...],
+        wishes: Mapping[str, Placement] | None = None,
     ) -> Posed:  # fmt: skip
-        """A posture whose points stand upright on their surfaces, as far as they can; looked for once."""
+        """A posture whose points stand upright on their surfaces, as far as they can; looked for once.
+
+        Args:
+            guesses: Poses (7,) of the root to be near, each with a posture (nq,) to begin with.
+        """
         if key not in self._postures:
             upright = {
                 name: Placement(None, contact.rotation_contact_to_world, 0.05)
                 for name, contact in held.items() if contact.kind is ContactKind.POINT
             }  # fmt: skip
-            posed = self.poser.pose(held, carrying, start, guide, placements={**upright, **(wishes or {})})
+            posed = Posed(None)
+            for guide, start in guesses:
+                posed = self.poser.pose(
+                    held, carrying, start, guide, placements={**upright, **(wishes or {})}
+                )
+                if posed.q is not None:
+                    break
             if posed.q is not None:
                 share = static_torque_share(self.poser.body, posed.q, Stance(list(carrying.values())))
                 if share > 1.0:
