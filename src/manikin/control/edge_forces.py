@@ -13,8 +13,8 @@ from manikin.control.dynamics import DynamicsState
 from manikin.numerics.polytope import chord, inset_polygon
 from manikin.numerics.spatial import FloatArray, skew
 
-NARROW = 0.25
-"""Largest distance kept from the edge of what touches, by its smaller extent; a rod has 14 mm of a sole."""
+ROUND = 0.02
+"""Length of what of a sole touches up to which it carries at a line: that of a rod is 14 mm [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +67,11 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
         return ContactGeometry(contact.effector, ((effector.segment, on_segment(contact.points)),))
     line = 0.0 if toes is None else float((effector.rotation.T @ (toes.origin - effector.translation))[0])
     if contact.hangs_over:
-        kept = min(inset, NARROW * min(contact.length, contact.width))
-        heel, tips = _parts(inset_polygon(contact.outline, kept), np.inf if toes is None else line)
+        polygon = inset_polygon(contact.outline, inset)
+        if contact.length <= ROUND:  # on a rod: a line, about which the foot could turn
+            middle, side = contact.centre, 0.5 * contact.width - inset
+            polygon = np.array([[middle[0], middle[1] + side], [middle[0], middle[1] - side]])
+        heel, tips = _parts(polygon, np.inf if toes is None else line)
         patches = [(effector.segment, on_segment(heel))] if len(heel) else []
         if toes is not None and len(tips):
             patches.append((toes.name, on_segment(tips) - toes.origin))

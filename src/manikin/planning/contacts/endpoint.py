@@ -17,7 +17,7 @@ from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.limb_places import stature_of
-from manikin.planning.contacts.limb_search import LimbHolds
+from manikin.planning.contacts.limb_search import LimbHolds, within_strength
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.seat import FEET, Sitter, Sitting, hand_supports, leave_seat
 from manikin.scene import Scene, Surface
@@ -247,7 +247,7 @@ def starts_on_limbs(
         for item in holds:
             if item.effector in contacts:
                 near = item.stretched(near, q[:7], contacts[item.effector], state)
-        posed = poser.pose(contacts, contacts, near, q[:7])
+        posed = within_strength(poser.body, poser.pose(contacts, contacts, near, q[:7]), contacts)
         reason = reason or posed.reason
         if posed.q is not None:
             any_start = True

@@ -51,6 +51,9 @@ INSET = 0.06
 SPACING = 0.1
 """Distance of neighbouring places of a limb, by its reach, twice that of soles and on bars; our choice."""
 
+PALM_DEPTH = 0.1
+"""Depth behind an edge that a palm needs; a hand does not close round a narrow board; our choice [m]."""
+
 FAR_EDGE = 0.7
 """Cosine of the angle between the heading and the way out over an edge that is left out; our choice."""
 
@@ -242,13 +245,14 @@ class _Grid:
             length = float(np.linalg.norm(end - start))
             along = (end - start) / max(length, 1e-9)
             out = np.cross(along, surface.normal)
-            if out @ ahead > FAR_EDGE:
+            deep = float(np.max((surface.polygon - start) @ -out))
+            if out @ ahead > FAR_EDGE or deep < PALM_DEPTH:
                 continue
             turn = np.column_stack([-out, np.cross(surface.normal, -out), surface.normal])
-            for share in np.linspace(0.0, 1.0, 2 + int(length / self._spacing))[1:-1]:
-                edge = (1.0 - share) * start + share * end
-                room = self._scene.nearest(edge + BEYOND * out)[1] > 0.5 * BEYOND
-                if room and self._inside(edge[None])[0]:
+            shares = np.linspace(0.0, 1.0, 2 + int(length / self._spacing))[1:-1, None]
+            edges = (1.0 - shares) * start + shares * end
+            for edge in edges[self._inside(edges)]:
+                if self._scene.nearest(edge + BEYOND * out)[1] > 0.5 * BEYOND:
                     yield from (_Place(edge - inset * out, turn) for inset in FINGERS)
 
     def _on(self, surface: Surface, points: FloatArray, spacing: float) -> FloatArray:
@@ -265,6 +269,6 @@ class _Grid:
         middle = middle - ((middle - surface.polygon[0]) @ surface.normal) * surface.normal
         places = middle + grid @ axes.T - points.mean(axis=0)
         places = places[self._inside(places)]
-        outside = surface.outside((places[:, None] + points).reshape(-1, 3)).reshape(len(places), -1)
+        outside = surface.outside((places[:, None] + points).reshape(-1, 3)).reshape(len(places), len(points))
         on = (outside <= 0.0).all(axis=1)
         return places[on]

@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from manikin.balance.criteria import static_torque_share
-from manikin.body import Configuration
+from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import limb_placement, limb_slots
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.kinematics import Placement
@@ -190,6 +190,16 @@ class LimbHolds:
         return self.samples.reach.residual((places - at) @ turn)
 
 
+def within_strength(body: BodyModel, posed: Posed, carrying: Mapping[str, Contact]) -> Posed:
+    """The posture, or that resting on some contacts in it asks for more than the strength."""
+    if posed.q is None:
+        return posed
+    share = static_torque_share(body, posed.q, Stance(list(carrying.values())))
+    if share <= 1.0:
+        return posed
+    return Posed(None, f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength")
+
+
 class LimbSearch(PosedSearch[State, tuple[State, State]]):
     """Search for the contacts of any limbs, which can be asked again with more moves closed."""
 
@@ -327,13 +337,12 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             cost += np.where(beyond > self.settings.beyond, np.inf, 4.0 * np.maximum(beyond, 0.0))
         away, off_way = np.linalg.norm(roots - self.goal[:3], axis=1), self._ahead_of(roots)[0]
         off_heading = np.abs(np.mod(yaw - self._yaws[1] + math.pi, 2.0 * math.pi) - math.pi)
-        n, stride, slack = len(self.holds), self.settings.stride, self.settings.goal_distance
-        near = (away <= slack) & (off_heading <= self.settings.goal_turn)
+        n, stride = len(self.holds), self.settings.stride
+        near = (away <= self.settings.goal_distance) & (off_heading <= self.settings.goal_turn)
         # From the goal every limb of a climber, whose trunk does not pitch, reaches its place.
         there = (places - self.goal[:3]) @ rotation_from_yaw(self._yaws[1])
         for k, item in enumerate(self.holds if not self.settings.turns else ()):
-            beyond = -item.room(there[:, k]) - slack
-            near &= ~held[:, k] | (beyond <= self.settings.beyond * self.size)
+            near &= ~held[:, k] | (-item.room(there[:, k]) <= self.settings.beyond * self.size)
         ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
         rows = zip(states, ahead.tolist(), near.tolist(), roots, turn, strict=True)
         for state, left, there, root, frame in rows:
@@ -445,7 +454,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         return self._free[k, row]
 
     def _beside(self, k: int, state: State) -> bool:
-        """Whether a sole lies beside the others, or above or below them."""
+        """Whether a sole lies beside the others, or above or below them, and on its own side of them."""
         body, mine = self.poser.body, self._contact(k, state[k])
         if mine.kind is not ContactKind.SOLE or not body.sole_length or not body.sole_width:
             return True
@@ -454,7 +463,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             if other is mine or other.kind is not ContactKind.SOLE:
                 continue
             off = np.abs((other.position - mine.position) @ mine.rotation_contact_to_world)
-            if (off < [body.sole_length, body.sole_width + SOLES_APART, SOLE_ABOVE]).all():
+            side = (other.position - mine.position) @ rotation_from_yaw(self._yaws[1])[:, 1]
+            if (
+                side * (self._wanted[j, 1] - self._wanted[k, 1]) < 0.0
+                or (off < [body.sole_length, body.sole_width + SOLES_APART, SOLE_ABOVE]).all()
+            ):
                 return False
         return True
 
@@ -535,6 +548,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             self._moves.append((before, after))
         contacts = stages[-1].contacts
         end = self.poser.pose(contacts, contacts, stages[-1].q, self.goal)
+        end = within_strength(body, end, contacts)
         if end.q is None or np.linalg.norm(end.q[:3] - self.goal[:3]) > self.settings.goal_distance:
             self._ahead[way[-1]] = 1e-3
             self.reasons[f"at the goal: {end.reason or 'the root stays away from it'}"] += 1
@@ -616,10 +630,5 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 )
                 if posed.q is not None:
                     break
-            if posed.q is not None:
-                share = static_torque_share(self.poser.body, posed.q, Stance(list(carrying.values())))
-                if share > 1.0:
-                    why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
-                    posed = Posed(None, why)
-            self._postures[key] = posed
+            self._postures[key] = within_strength(self.poser.body, posed, carrying)
         return self._postures[key]
