@@ -210,8 +210,8 @@ class _LimbSearch(_ContactSearch):
         for first in islice(self._starts(goal), self._scenario.contacts.attempts):
             if first.stage is None:
                 return result or self._tally.failed(first.failure or "", "start")
-            # Who holds on goes straight first, as a guide's stiff trunk has no room before holds.
-            for guided in (True,) if self._body.stature is None else (False, True):
+            # Who climbs a ladder goes straight first: a guide's stiff trunk has no room before it.
+            for guided in (False, True) if self._on_rungs else (True,):
                 self._search = self._searched(first.stage, goal, guided=guided)
                 result = self._result(self._search.run())
                 if result.plan is not None:
@@ -243,13 +243,18 @@ class _LimbSearch(_ContactSearch):
         """Whether a person starts on holds."""
         return self._body.stature is not None and self._scenario.file.task.start.posture == CLIMBING
 
+    @property
+    def _on_rungs(self) -> bool:
+        """Whether whole soles of a person carry, or what of them is on rungs; not their front alone."""
+        return self._body.stature is not None and self._scenario.contacts.forefoot_m is None
+
     def _settings(self) -> LimbSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
         plain, pace, safe = LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
         if self._body.stature is not None:
-            plain = replace(
-                plain, turns=False, around=1.5, beyond=0.1, comfort=10.0, sway=0.3, retreats=RETREATS
-            )
+            plain = replace(plain, turns=False, around=1.5, beyond=0.1, comfort=10.0, sway=0.3)
+        if self._on_rungs:
+            plain = replace(plain, retreats=RETREATS)
         return replace(
             plain,
             stride=STRIDE * self._reach,

@@ -49,7 +49,7 @@ INSET = 0.06
 """Distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice."""
 
 SPACING = 0.1
-"""Distance of neighbouring places of a limb, by its reach, twice that of soles and on bars; our choice."""
+"""Distance of neighbouring places of a limb, by its reach, twice that of soles; our choice."""
 
 PALM_DEPTH = 0.1
 """Depth behind an edge that a palm needs; a hand does not close round a narrow board; our choice [m]."""
@@ -195,7 +195,7 @@ class _Grid:
         out = out / np.linalg.norm(out)
         up = axis * np.sign(axis[2])
         frame = np.column_stack([up, np.cross(out, up), out]) if steep else turn
-        for share in np.linspace(0.0, 1.0, 1 + int(0.5 * bar.length / self._spacing)):
+        for share in np.linspace(0.0, 1.0, 1 + int(bar.length / self._spacing)):
             place = (1.0 - share) * bar.start + share * bar.end + bar.radius * out
             if self._inside(place[None])[0]:
                 yield _Place(place, frame)

@@ -106,7 +106,8 @@ class LimbSettings:
         goal_turn: Angle between the root's heading and the goal's at which it is reached [rad].
         turns: Whether the root's heading follows the contacts; it goes from that of the start to the goal's
             otherwise, as that of a climber does, whose trunk is pitched by no slope either.
-        retreats: Distances behind where the root should be from which postures are tried too, by that reach.
+        retreats: Distances behind where the root should be from which postures are tried too, by that reach;
+            for who climbs on whole soles, which also keep apart and on their own sides then.
         lets_go: Whether hands may let go, as those of one who stands at the goal.
     """
 
@@ -339,9 +340,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         off_heading = np.abs(np.mod(yaw - self._yaws[1] + math.pi, 2.0 * math.pi) - math.pi)
         n, stride = len(self.holds), self.settings.stride
         near = (away <= self.settings.goal_distance) & (off_heading <= self.settings.goal_turn)
-        # From the goal every limb of a climber, whose trunk does not pitch, reaches its place.
+        # From the goal every limb of who climbs on rungs, whose trunk does not pitch, reaches its place.
         there = (places - self.goal[:3]) @ rotation_from_yaw(self._yaws[1])
-        for k, item in enumerate(self.holds if not self.settings.turns else ()):
+        for k, item in enumerate(self.holds if self.settings.retreats else ()):
             near &= ~held[:, k] | (-item.room(there[:, k]) <= self.settings.beyond * self.size)
         ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
         rows = zip(states, ahead.tolist(), near.tolist(), roots, turn, strict=True)
@@ -456,7 +457,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     def _beside(self, k: int, state: State) -> bool:
         """Whether a sole lies beside the others, or above or below them, and on its own side of them."""
         body, mine = self.poser.body, self._contact(k, state[k])
-        if mine.kind is not ContactKind.SOLE or not body.sole_length or not body.sole_width:
+        whole = self.settings.retreats and mine.kind is ContactKind.SOLE
+        if not whole or not body.sole_length or not body.sole_width:
             return True
         for j, row in enumerate(state):
             other = self._contact(j, row) if j != k and self._held(j, row) else mine
