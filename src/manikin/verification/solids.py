@@ -274,9 +274,10 @@ class Solid:
         elif isinstance(shape, (Box, Cylinder, Capsule)):
             if not isinstance(shape, Box) and abs(float(place.rotation[:, 2] @ normal)) <= LYING:
                 yield np.abs(self.distance(points)), self._outward(points) @ normal
+            if isinstance(shape, Capsule):
+                return
             local = (points - place.translation) @ place.rotation
-            flat = (0, 1, 2) if isinstance(shape, Box) else (2,) if isinstance(shape, Cylinder) else ()
-            for axis in flat:
+            for axis in range(3) if isinstance(shape, Box) else (2,):
                 for sign in (1.0, -1.0):
                     facing = sign * float(place.rotation[:, axis] @ normal)
                     if facing >= least:

@@ -193,7 +193,7 @@ class _Grid:
         out = -turn[:, 0] if steep else turn[:, 2]
         out = out - (out @ axis) * axis
         out = out / np.linalg.norm(out)
-        up = axis * np.sign(axis[2])
+        up = axis if axis[2] > 0.0 else -axis
         frame = np.column_stack([up, np.cross(out, up), out]) if steep else turn
         for share in np.linspace(0.0, 1.0, 1 + int(bar.length / self._spacing)):
             place = (1.0 - share) * bar.start + share * bar.end + bar.radius * out
