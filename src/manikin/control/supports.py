@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from manikin.contact import Contact, ContactSchedule, SolePart
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.control.settings import SupportSettings
 from manikin.numerics.spatial import FloatArray
 
@@ -228,8 +228,12 @@ class SupportSwitch:
         return SupportState(name, SupportMode.SWING, None, lift=lift, lift_rate=rate)
 
     def _hover(self, interval: SupportInterval) -> float:
-        """Height at which a support is waited for [m]; one made at speed has to press in time."""
-        return 0.0 if interval.contact.settle > 0.0 else self._settings.hover
+        """Height at which a support is waited for [m]; one made at speed has to press in time.
+
+        A tip has no edge that would touch before the rest of it.
+        """
+        waits = interval.contact.settle == 0.0 and interval.contact.kind is not ContactKind.POINT
+        return self._settings.hover if waits else 0.0
 
     def _fades(self, interval: SupportInterval, time: float) -> tuple[tuple[SolePart, float], ...]:
         """Load moves gradually to points that begin to touch, and off those that cease to."""

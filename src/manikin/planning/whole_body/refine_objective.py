@@ -113,6 +113,23 @@ def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
+SWITCHING = 0.06
+"""Time after a touch-down and before a lift-off in which balance is wanted without that contact [s]: it may
+be late, and the controller takes the load off before."""
+
+
+def _relied_on(schedule: ContactSchedule) -> list[tuple[float, float]]:
+    """First and last time [s] at which the stance of each phase has to do, at most half of its neighbours."""
+    held = [set(phase.stance.effectors) for phase in schedule.sequence]
+    early, late = schedule.instants[:-1].copy(), schedule.instants[1:].copy()
+    for number, (before, after) in enumerate(itertools.pairwise(held)):
+        if before < after:
+            late[number] += min(SWITCHING, 0.5 * schedule.durations[number + 1])
+        if after < before:
+            early[number + 1] -= min(SWITCHING, 0.5 * schedule.durations[number])
+    return list(zip(early.tolist(), late.tolist(), strict=True))
+
+
 def _centres_of_mass(body: BodyModel, q: FloatArray) -> FloatArray:
     """(n, 3) of configurations (n, nq) [m]."""
     data = body.pinocchio.createData()
@@ -145,9 +162,7 @@ class RefineObjective(MotionObjective):
         # At a key instant the stances on both sides of it have to do.
         self._stances = [
             (rows, RefinedForces(phase.stance, self._names), room, com[rows].mean(axis=0))
-            for phase, room, (start, end) in zip(
-                schedule.sequence, rooms, itertools.pairwise(schedule.instants), strict=True
-            )
+            for phase, room, (start, end) in zip(schedule.sequence, rooms, _relied_on(schedule), strict=True)
             for rows in (np.flatnonzero((time >= start) & (time <= end)),)
         ]
         self._load = targets.load
