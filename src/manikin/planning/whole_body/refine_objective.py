@@ -114,18 +114,20 @@ def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
 
 
 SWITCHING = 0.06
-"""Time after a touch-down and before a lift-off in which balance is wanted without that contact [s]: it may
-be late, and the controller takes the load off before."""
+"""Time after a touch-down and before a lift-off in which what stands on tips alone has to be in balance
+without that contact [s]: the tip may be late, and the controller takes the load off before."""
 
 
 def _relied_on(schedule: ContactSchedule) -> list[tuple[float, float]]:
     """First and last time [s] at which the stance of each phase has to do, at most half of its neighbours."""
-    held = [set(phase.stance.effectors) for phase in schedule.sequence]
+    stances = [phase.stance for phase in schedule.sequence]
     early, late = schedule.instants[:-1].copy(), schedule.instants[1:].copy()
-    for number, (before, after) in enumerate(itertools.pairwise(held)):
-        if before < after:
+    for number, (before, after) in enumerate(itertools.pairwise(stances)):
+        if any(item.kind is not ContactKind.POINT for item in (*before, *after)):
+            continue
+        if set(before.effectors) < set(after.effectors):
             late[number] += min(SWITCHING, 0.5 * schedule.durations[number + 1])
-        if after < before:
+        if set(after.effectors) < set(before.effectors):
             early[number + 1] -= min(SWITCHING, 0.5 * schedule.durations[number])
     return list(zip(early.tolist(), late.tolist(), strict=True))
 
