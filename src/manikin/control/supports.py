@@ -21,7 +21,7 @@ EARLY_SHARE = 0.15
 LONG_FLIGHT = 1.0
 """Flights longer than this come down, and rise, slowly [s]."""
 
-TIP_HOVER = 0.5
+TIP_HOVER = 0.25
 """Share of the height at which soles are waited for at which tips are."""
 
 TIP_RELEASE = 0.008

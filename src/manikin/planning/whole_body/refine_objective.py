@@ -41,7 +41,7 @@ from manikin.planning.whole_body.refine_physics import MarginCost, RefinedForces
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint
 
-KNEE = "knee_flexion"
+KNEES = "knee_flexion", "_knee"
 """End of the names of knee joints."""
 
 
@@ -168,7 +168,7 @@ class RefineObjective(MotionObjective):
             for rows in (np.flatnonzero((time >= start) & (time <= end)),)
         ]
         self._load = targets.load
-        self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEE)]
+        self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEES)]
         model = body.pinocchio
         moves = moves_by_joint(model)
         self._chains = {
