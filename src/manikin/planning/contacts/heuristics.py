@@ -21,8 +21,9 @@ from manikin.planning.contacts.samples import LimbSamples
 
 
 def cached_score(
-    candidates: Candidates, spacing: float, value: Callable[[int], float], asked: NDArray[np.bool_] | None = None
-) -> FloatArray:
+    candidates: Candidates, spacing: float, value: Callable[[int], float],
+    asked: NDArray[np.bool_] | None = None,
+) -> FloatArray:  # fmt: skip
     """(n,) scores that hardly change within a small place: one for each surface and cell of a grid.
 
     Args:
@@ -34,7 +35,9 @@ def cached_score(
     keys = np.column_stack([candidates.surfaces, np.round(candidates.points / spacing)])
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
-    wanted = np.ones(len(first), dtype=bool) if asked is None else np.isin(np.arange(len(first)), group[asked])
+    wanted = np.ones(len(first), dtype=bool)
+    if asked is not None:
+        wanted = np.isin(np.arange(len(first)), group[asked])
     values = np.array([value(int(row)) if w else 0.0 for row, w in zip(first, wanted, strict=True)])
     return values[group]
 
