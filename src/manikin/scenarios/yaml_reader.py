@@ -128,7 +128,8 @@ def _check_depth(text: str, source: str) -> None:
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > MAX_DEPTH:
-                place = f"{source}:{event.start_mark.line + 1}"
+                mark = event.start_mark
+                place = source if mark is None else f"{source}:{mark.line + 1}"
                 raise ScenarioError(f"{place}: is nested too deeply; valid: at most {MAX_DEPTH} levels")
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
