@@ -9,6 +9,7 @@ import pytest
 
 import manikin
 from manikin.contact import ContactModel
+from manikin.motion.file import read_motions
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.planning.contacts import certify_plan
 from manikin.scenarios import list_scenarios, list_variants, load_scenario
@@ -60,6 +61,30 @@ def test_every_scenario_ends_as_its_file_says(name):
     if result.execution is not None:
         assert not result.execution.fell
         assert result.execution.min_margin > 0.0
+
+
+def test_getting_into_a_car_is_planned_and_executed_to_the_last_column(tmp_path):
+    result = manikin.run("car-ingress", out=tmp_path / "run")
+    summary = result.summary
+    assert summary["proved"], summary["failure"]
+    assert summary["wholebody"]["max_torque_share"] <= 1.0  # of the mean man, the impact on the seat included
+    # Qiu (2012), 7.2.2 and Table 7.6.
+    assert summary["centroidal"]["min_margin"] >= 18.7
+    assert summary["centroidal"]["duration_s"] <= 4.56
+    execution = summary["execution"]
+    assert not execution["fell"]
+    assert execution["min_margin"] > 0.0
+    assert execution["max_penetration_m"] < 0.01
+    assert result.execution.touches == ()
+    schedule = read_motions(result.directory / "motion.h5").schedule
+    assert len(schedule.sequence) == 12
+    last = schedule.sequence[11].stance
+    assert set(last.effectors) == {"left_foot", "right_foot", "left_hand", "right_hand", "buttocks"}
+    # The seat carries most of the weight at the end, the hands hardly any.
+    names = list(result.executed.contact_names)
+    force = result.executed.contact_force[-1, :, 2]
+    assert force[names.index("buttocks")] > 0.5 * 79.0 * 9.81
+    assert np.abs(force[[names.index("left_hand"), names.index("right_hand")]]).max() < 150.0
 
 
 @pytest.mark.parametrize("name", [name for name in EVERY if name in LOWEST_COM or name.endswith("@S2")])

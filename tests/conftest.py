@@ -135,9 +135,14 @@ class Runs:
                 self.read[key] = pickle.loads(result.read_bytes())
         return self.read[key]
 
+    @staticmethod
+    def shorter_by(name):
+        """Overrides for the shorter way through a scenario, if there is one."""
+        return SHORTER.get(name, ())
+
     def shorter(self, name, **given):
-        """Result of a run on the shorter way through a scenario, if there is one."""
-        return self(name, overrides=SHORTER.get(name, ()), **given)
+        """Result of a run on that way."""
+        return self(name, overrides=self.shorter_by(name), **given)
 
     def _made(self, name, variant, overrides, seed, body, moved, place):
         from manikin.pipeline.runner import run

@@ -136,18 +136,6 @@ def test_an_executed_run_is_a_recording_for_the_keyframe_method(platform, tmp_pa
 
 
 @pytest.mark.slow
-def test_a_planned_only_job_is_planned_and_not_proved(platform):
-    """The same plan, bit for bit, without its execution."""
-    result = run("platform", overrides=["execution=none"])
-    assert (result.verdict, result.succeeded) == ("planned", True)
-    assert (result.summary["planned"], result.summary["proved"]) == (True, False)
-    assert result.summary["execution"] is None
-    assert result.executed is None
-    assert np.array_equal(result.planned.q, platform.planned.q)
-    assert {row["stage"] for row in result.summary["requirements"]} == {"centroidal", "wholebody"}
-
-
-@pytest.mark.slow
 def test_an_execution_that_misses_its_requirement_is_a_failure(platform):
     requirements = ExecutionRequirements(margin=1e6)
     (broken,) = [row for row in requirements.table(platform.execution) if not row.held]

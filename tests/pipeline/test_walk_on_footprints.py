@@ -48,10 +48,9 @@ def test_footprints_lead_from_start_to_goal(variant, way):
 @pytest.mark.slow
 def test_the_walk_to_the_platform_goes_on_without_a_seam(runs):
     """No planned sample is farther from the one before than its velocities and accelerations explain."""
-    result = runs.shorter("walk-and-platform")
+    result = runs("walk-and-platform", overrides=(*runs.shorter_by("walk-and-platform"), "execution=none"))
     assert result.succeeded
     assert result.planned is not None
-    assert not result.summary["execution"]["fell"]
     motion, body = result.planned, on_footprints("walk-and-platform").body
     step = np.diff(motion.time)[:, None]
     moved = np.array([

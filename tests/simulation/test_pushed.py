@@ -109,12 +109,6 @@ def test_too_strong_a_push_is_a_failure(stepping):
     assert result.push.max_deviation_m > 0.05
 
 
-def test_the_same_push_gives_the_same_bits(stepping, waiting):
-    again = pushed(stepping, 20.0, 180.0, 0.3)
-    np.testing.assert_array_equal(again.motion.q, waiting.motion.q)
-    assert again.push == waiting.push
-
-
 def test_the_direction_is_counted_from_where_the_body_faces(stepping):
     np.testing.assert_allclose(
         push_on_the_way(stepping.motion, 50.0, 90.0, 0.0, 0.1).force, [0.0, 50.0, 0.0], atol=1e-9

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -338,6 +339,10 @@ def _level(contacts: Mapping[str, ContactSection]) -> float:
     return float(np.mean(feet or [c.position[2] for c in contacts.values()]))
 
 
+_same_human = lru_cache(maxsize=32)(human)
+"""One body for equal values, so that what is kept by the body (folds, reach) serves every scenario of it."""
+
+
 def build_body(values: ScenarioValues) -> BodyModel:
     """Build the body; its soles have the size that the supports give.
 
@@ -355,7 +360,7 @@ def build_body(values: ScenarioValues) -> BodyModel:
     data, sole = values.file.body, values.sole
     length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
     try:
-        body = human(
+        body = _same_human(
             data.stature_m, data.mass_kg, data.sex, age=data.age, strength=data.strength,
             sole_length=length, sole_width=width,
         )  # fmt: skip

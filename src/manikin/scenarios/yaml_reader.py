@@ -28,8 +28,22 @@ KeyPath = tuple[str | int, ...]
 _REPLACED = tuple(f":{kind}" for kind in ("int", "float", "bool", "timestamp"))
 
 
-class _Loader(yaml.SafeLoader):
-    """Safe loader with YAML 1.2's floats and booleans."""
+MAX_DEPTH = 100
+"""Most mappings and lists inside each other; scenarios have fewer than ten."""
+
+_FastestLoader: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(_FastestLoader):
+    """Safe loader with YAML 1.2's floats and booleans, in C where PyYAML has it."""
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except (ValueError, TypeError, LookupError, AttributeError):
+            kind = str(node.tag).rpartition(":")[2]
+            problem = f"{str(node.value)[:40]!r} is no {kind}"
+            raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from None
 
 
 _Loader.yaml_implicit_resolvers = {
@@ -87,6 +101,7 @@ def parse_value(text: str, source: str) -> Any:
 def _parse(text: str, source: str, valid: str) -> tuple[Any, dict[KeyPath, int]]:
     lines: dict[KeyPath, int] = {}
     try:
+        _check_depth(text, source)
         loader = _Loader(text)
         try:
             node = loader.get_single_node()
@@ -103,9 +118,21 @@ def _parse(text: str, source: str, valid: str) -> tuple[Any, dict[KeyPath, int]]
     except (yaml.YAMLError, ValueError, TypeError) as error:
         problem = " ".join(str(error).split())[:120]
         raise ScenarioError(f"{source}: is not valid YAML ({problem}); valid: {valid}") from None
-    except RecursionError:
-        raise ScenarioError(f"{source}: is nested too deeply; valid: a few levels") from None
     return data, lines
+
+
+def _check_depth(text: str, source: str) -> None:
+    # The events come one by one; the C composer ends the process where it recurses too deeply.
+    depth = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > MAX_DEPTH:
+                mark = event.start_mark
+                place = source if mark is None else f"{source}:{mark.line + 1}"
+                raise ScenarioError(f"{place}: is nested too deeply; valid: at most {MAX_DEPTH} levels")
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
 
 
 def _read_text(path: Path) -> str:

@@ -230,6 +230,8 @@ def _same_place(first: Contact, second: Contact) -> bool:
                   for c in (first, second))  # fmt: skip
     if np.abs(np.concatenate([one[:, 2], other[:, 2]])).max() > TOUCHING:
         return False
+    if len(one) == len(other) and np.square(one - other).sum(axis=1).max() <= TOUCHING**2:
+        return True  # point by point, as from one sample to the next
     missing = np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1)
     if missing.max() > TOUCHING:
         return False

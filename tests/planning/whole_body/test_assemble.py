@@ -172,9 +172,10 @@ def with_value(certificate, key, value, time):
     return replace(certificate, rows=tuple(rows))
 
 
-def blocked(attempt, name, value):
-    """The attempt as if it broke one requirement, at 0.6 s."""
-    return replace(attempt, certificate=with_value(attempt.certificate, name, value, 0.6))
+def blocked(attempt, name, value, nearest="thorax/chest"):
+    """The attempt as if it broke one requirement, at 0.6 s, with a shape that is nearest to a wall."""
+    certificate = replace(with_value(attempt.certificate, name, value, 0.6), closest_pair=(nearest, "wall"))
+    return replace(attempt, certificate=certificate)
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +189,7 @@ def step_attempt(person, flat_ground, step_com):
 def test_where_straight_toes_are_in_the_way_they_may_bend(
     step_motion, step_attempt, person, flat_ground, step_com, monkeypatch
 ):
-    """What is too near something with straight toes, the arms close or not, is fitted without them.
+    """Toes that are too near something while they are straight are fitted without that.
 
     The other requirements are kept with and without; the fit that counts differs in the toes.
     """
@@ -197,12 +198,12 @@ def test_where_straight_toes_are_in_the_way_they_may_bend(
     def nothing_with_straight_toes(planner, swings, manner, progress, straight_toes=True):
         straight.append(straight_toes)
         if straight_toes:
-            return blocked(step_attempt, "min_clearance_m", -0.004)
+            return blocked(step_attempt, "min_clearance_m", -0.004, "left_toes/sole")
         return attempt(planner, swings, manner, progress, straight_toes)
 
     monkeypatch.setattr(MODULE._Planner, "_attempt", nothing_with_straight_toes)
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
-    assert straight == [True, True, False]
+    assert straight == [True, False]
     assert result.succeeded, result.failure
     toes = [7 + k for k, name in enumerate(person.joint_names) if name.endswith("toe_extension")]
     held, loose = (np.abs(motion.q[:, toes]).max() for motion in (step_motion.motion, result.motion))
@@ -210,24 +211,40 @@ def test_where_straight_toes_are_in_the_way_they_may_bend(
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "tried"),
-    [("max_support_error_m", 0.01, [True, True]), ("min_clearance_m", -0.004, [True, True, False])],
+    ("name", "value", "nearest", "tried"),
+    [
+        ("max_support_error_m", 0.01, "left_toes/sole", [("ready", True)]),
+        ("min_clearance_m", -0.004, "thorax/chest", [("ready", True)]),
+        ("min_clearance_m", -0.004, "left_forearm/arm", [("ready", True), ("close", True)]),
+        ("min_clearance_m", -0.004, "left_toes/sole", [("ready", True), ("ready", False)]),
+    ],
 )
-def test_toes_stay_straight_where_something_else_breaks(
-    name, value, tried, step_attempt, person, flat_ground, step_com, monkeypatch
+def test_what_is_too_near_decides_what_is_tried(
+    name, value, nearest, tried, step_attempt, person, flat_ground, step_com, monkeypatch
 ):
-    """A contact that is missed has nothing to do with toes; they are loosened for clearance alone."""
-    straight = []
+    """Arms are kept close where an arm is too near, toes may bend where they are; a contact needs neither."""
+    found = []
 
-    def misses(*_, straight_toes=True):
-        straight.append(straight_toes)
-        return blocked(step_attempt, name, value)
+    def misses(_planner, _swings, manner, _progress, straight_toes=True):
+        found.append((manner.name, straight_toes))
+        return blocked(step_attempt, name, value, nearest)
 
     monkeypatch.setattr(MODULE._Planner, "_attempt", misses)
     monkeypatch.setattr(MODULE._Planner, "_search_again", lambda *_: None)
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
-    assert straight == tried
+    assert found == tried
     assert not result.succeeded
+
+
+@pytest.mark.parametrize(("shares", "tried"), [((1.2, 1.1, 1.05, 1.02), 3), ((1.2, 1.3), 1), ((12.0,), 0)])
+def test_repairs_end_where_they_make_nothing_better(step_attempt, shares, tried):
+    """A repair follows only one that helped; the attempt that misses least is the result."""
+    attempts = [blocked(step_attempt, "max_torque_share", share) for share in shares]
+    left = iter(attempts[1:])
+    job = FitJob(0.05, gives_up=True)
+    best = job.repair(attempts[0], lambda *_: next(left), 3)
+    assert len(attempts) - 1 - len(list(left)) == tried
+    assert best.certificate.value("max_torque_share") == min(shares)
 
 
 @pytest.mark.slow

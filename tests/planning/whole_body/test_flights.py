@@ -58,3 +58,10 @@ def test_a_trailing_foot_points_its_toes_down_and_a_leading_one_does_not(planner
     starts = [planner.schedule.swing_interval(swing)[0] for swing in (first, trailing)]
     assert planner._pitch(first, starts[0]) == pytest.approx(0.0)
     assert 0.2 < planner._pitch(trailing, starts[1]) <= 0.9
+
+
+def test_a_foot_does_not_pass_round_the_far_side_of_the_one_that_stands(planner):
+    """Legs that did would cross. The last step of the platform ends before the foot that stands."""
+    for swing in planner.flights()[:2]:
+        sides = {np.sign(lateral) for lateral in planner._laterals(swing)}
+        assert sides == ({0.0, 1.0} if swing.effector == "left_foot" else {0.0, -1.0})

@@ -20,18 +20,26 @@ from manikin.planning.contacts.efort import efort
 from manikin.planning.contacts.samples import LimbSamples
 
 
-def cached_score(candidates: Candidates, spacing: float, value: Callable[[int], float]) -> FloatArray:
+def cached_score(
+    candidates: Candidates, spacing: float, value: Callable[[int], float],
+    asked: NDArray[np.bool_] | None = None,
+) -> FloatArray:  # fmt: skip
     """(n,) scores that hardly change within a small place: one for each surface and cell of a grid.
 
     Args:
         candidates: n of them.
         spacing: Size of the cells [m].
         value: Score of a candidate by its row, asked of the first one in each cell.
+        asked: (n,) candidates whose score matters, all when omitted; 0 in cells that have none.
     """
     keys = np.column_stack([candidates.surfaces, np.round(candidates.points / spacing)])
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    values = np.array([value(int(row)) for row in first], dtype=np.float64)
-    return values[group.ravel()]
+    group = group.ravel()
+    wanted = np.ones(len(first), dtype=bool)
+    if asked is not None:
+        wanted = np.isin(np.arange(len(first)), group[asked])
+    values = np.array([value(int(row)) if w else 0.0 for row, w in zip(first, wanted, strict=True)])
+    return values[group]
 
 
 def contact_at(

@@ -271,7 +271,7 @@ class _BraceSearch:
         first = self._generator.request(q, LEGS[0], task, order)
         if first.contact is None or first.q is None:
             return q, self._no_foot(first)
-        balance = Footing(loads, first.contact, self._settings.margin, rules=self._rules)
+        balance = Footing(loads, first.contact, natural, self._settings.margin, rules=self._rules)
         order = WeightedSum([(1.0, heuristic), (BALANCED, natural), (BALANCED, balance)])
         second = self._generator.request(first.q, LEGS[1], task, order)
         if second.contact is None or second.q is None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from manikin.balance import pseudo_wrench, stability_margins, wrench_polytopes
+from manikin.balance import pseudo_wrench, stability_margins, support_plane, wrench_polytopes
 from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about
 from manikin.planning.contacts import Candidates, ContactRules, Situation
@@ -26,15 +26,32 @@ class Loads:
     friction_model: FrictionModel = "outer"
 
     def margins(self, feet: list[Contact], places: FloatArray) -> FloatArray:
-        """(n,) least margin about the CoM of all loads at each place (n, 3) of it [N.m]."""
+        """(n,) least margin about the CoM of all loads at each place (n, 3) of it [N.m].
+
+        It is minus infinity where feet in one plane slide or the ZMP leaves them.
+        """
+        margins = np.full(len(places), -np.inf)
         if any(self._slides(feet, load) for load in self.wrenches):
-            return np.full(len(places), -np.inf)
-        model = ContactModel.of_body(self.mass, self.friction_model)
-        (polytope,) = wrench_polytopes([Stance(feet, model=model)])
-        weight = pseudo_wrench(self.mass, places, np.zeros(3))
-        needed = [wrench_about(weight - load, polytope.reference) for load in self.wrenches]
-        margins = [stability_margins(polytope, wrench, places).wrench_about_com for wrench in needed]
-        return np.min(margins, axis=0)
+            return margins
+        stance = Stance(feet, model=ContactModel.of_body(self.mass, self.friction_model))
+        needed = pseudo_wrench(self.mass, places, np.zeros(3)) - self.wrenches[:, None]
+        plane = support_plane(stance)
+        possible = np.ones(len(places), dtype=bool)
+        if plane is not None:
+            possible = (plane.zmp_distance(needed) >= 0.0).all(axis=0)
+        if not possible.any():
+            return margins
+        (polytope,) = wrench_polytopes([stance])
+        margins[possible] = np.min(
+            [
+                stability_margins(
+                    polytope, wrench_about(wrench[possible], polytope.reference), places[possible]
+                ).wrench_about_com
+                for wrench in needed
+            ],
+            axis=0,
+        )
+        return margins
 
     def _slides(self, feet: list[Contact], load: FloatArray) -> bool:
         """Whether feet on parallel surfaces slide under a load, wherever the centre of mass is."""
@@ -111,7 +128,7 @@ class Mirrored:
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """Balance of two feet under every load ([Tonneau2015]_ 7.5-7.6 with a force on the hands): 1 or 0.
+    """Balance of two natural feet under every load ([Tonneau2015]_ 7.5-7.6, forces on the hands): 1 or 0.
 
     The centre of mass may be moved within ``reach`` of where the body has it. Candidates within
     ``spacing`` on one surface share one answer.
@@ -119,6 +136,7 @@ class Footing:
     Attributes:
         loads: What the feet stand against.
         other: Contact of the other foot.
+        natural: Places that this foot may have; others count as 0.
         margin: Least margin that counts as balance [N.m].
         reach: (2,) how far the centre of mass may be moved [m].
         spacing: Largest distance of candidates that share an answer [m].
@@ -126,6 +144,7 @@ class Footing:
 
     loads: Loads
     other: Contact
+    natural: Natural
     margin: float
     reach: tuple[float, float] = (0.12, 0.08)
     spacing: float = 0.1
@@ -133,7 +152,11 @@ class Footing:
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`manikin.planning.contacts.Heuristic`."""
-        return cached_score(candidates, self.spacing, lambda row: self._stands(situation, candidates, row))
+        asked = self.natural.score(situation, candidates) > 0.0
+        score = cached_score(
+            candidates, self.spacing, lambda row: self._stands(situation, candidates, row), asked
+        )
+        return score * asked
 
     def _stands(self, situation: Situation, candidates: Candidates, row: int) -> bool:
         contact = contact_at(situation, candidates, row, situation.limb.kind, self.rules)

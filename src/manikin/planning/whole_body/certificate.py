@@ -258,7 +258,11 @@ def _certificate(
     worst["min_clearance_m"] = float(closest.distance), float(motion.time[closest.sample])
     share = body.torque_share(motion.tau[:, 6:])
     tightest = body.joint_names[int(np.argmax(share.max(axis=0)))]
-    where = {"min_clearance_m": " and ".join(pair), "max_torque_share": tightest}
+    beyond = np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper).max(axis=0, initial=0.0)
+    where = {
+        "min_clearance_m": " and ".join(pair), "max_torque_share": tightest,
+        "max_joint_limit_violation_rad": body.joint_names[int(np.argmax(beyond))] if len(beyond) else "",
+    }  # fmt: skip
     rows = tuple(
         Requirement(
             key, name, unit, worst[key][0], sense, getattr(requirements, field) if field else np.inf,

@@ -5,8 +5,9 @@ recording are three goals of the same job; each gives its objective, and the fir
 """
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -20,6 +21,7 @@ from manikin.planning.whole_body.certificate import MotionCertificate
 from manikin.planning.whole_body.fit import DEGREE, FitResult, MotionFit, spline_through
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import MotionScales
+from manikin.scene.distance import segment_of
 
 CAUGHT = -0.02
 """Below this clearance a part of the body is caught on the wrong side of another, and no small step leads
@@ -27,6 +29,20 @@ out: the fit begins again from its first guess, with more weight on clearance [m
 
 CLEARANCE = frozenset({"min_clearance_m"})
 """Key of the clearance in a certificate."""
+
+UNITS = MappingProxyType(
+    {"min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0}
+)
+"""Size at which a broken requirement counts as one, where that is not its limit."""
+
+MOST_EXCESS = 10.0
+"""Excess of a fit of which no repair is tried: its contacts, or their times, are not the body's."""
+
+MUCH_EXCESS = 4.0
+"""Excess above which a repair has to help a lot."""
+
+A_LOT = 0.6
+"""Share of the excess that it may leave then."""
 
 STRONGER = 0.5
 """Factor of the scales of what was missed."""
@@ -108,6 +124,17 @@ class FitAttempt(Generic[G]):
         return self.certificate.broken
 
     @property
+    def excess(self) -> float:
+        """Sum of how far requirements are broken, each in units of its limit or of :data:`UNITS`."""
+        rows = [row for row in self.certificate if row.key in self.broken]
+        return sum(abs(row.measured - row.limit) / UNITS.get(row.key, max(row.limit, 1e-9)) for row in rows)
+
+    def is_too_near(self, segments: Collection[str]) -> bool:
+        """Whether the clearance that is missed is one of these segments'."""
+        near = {segment_of(shape) for shape in self.certificate.closest_pair}
+        return bool(self.broken & CLEARANCE) and not near.isdisjoint(segments)
+
+    @property
     def is_caught(self) -> bool:
         """Whether a part of the body is on the wrong side of another or of an obstacle."""
         return self.certificate.value("min_clearance_m") < CAUGHT
@@ -122,8 +149,9 @@ class FitJob:
         sudden: Whether knots lie closer around touch-downs at speed.
         penalties: Names of the scales that decide each residual, by the residual's key.
         patience: Relative decrease of the objective below which a repair stops.
+        gives_up: Whether a repair that hardly helps is the last one.
         by_count: Whether the attempt that breaks the fewest requirements is the better one, of two alike the
-            later, and is gone on from; else only a success replaces the first attempt.
+            later, and is gone on from; else the one that misses least.
         iterations: Gauss-Newton steps of all fits so far.
     """
 
@@ -132,6 +160,7 @@ class FitJob:
     sudden: bool = False
     penalties: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     patience: float = 0.0
+    gives_up: bool = False
     by_count: bool = False
     iterations: int = 0
 
@@ -191,13 +220,16 @@ class FitJob:
         """
         best = last = first
         for number in range(most):
-            if not last.broken:
+            if not last.broken or (self.gives_up and last.excess > MOST_EXCESS):
                 break
             following = remedy(number, last)
             if following is None:
                 break
+            hopeless = self.gives_up and _hopeless(last.excess, following.excess)
             last = following
             best = self.better(best, last)
+            if hopeless:
+                break
             same = best.goal.schedule.sequence is last.goal.schedule.sequence
             if self.by_count and last.continued and best is not last and same:
                 last = replace(best, scales=last.scales, fine=last.fine)
@@ -207,7 +239,7 @@ class FitJob:
         """The better of two attempts, see :attr:`by_count`."""
         if self.by_count:
             return first if len(first.broken) < len(second.broken) else second
-        return second if first.broken and not second.broken else first
+        return second if second.excess < first.excess else first
 
     def updated(self, scales: S, broken: frozenset[str], narrow: bool = False) -> S:
         """Scales at which broken requirements weigh more.
@@ -229,6 +261,11 @@ class FitJob:
     ) -> FitAttempt[G]:
         self.iterations += result.iterations
         return FitAttempt(goal, scales, fine, continued, fit, result, *goal.measure(result.spline))
+
+
+def _hopeless(before: float, after: float) -> bool:
+    """Whether a repair changed the excess so little, or made it worse, that another one is in vain."""
+    return after > (A_LOT if after > MUCH_EXCESS else 1.0) * before
 
 
 def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:

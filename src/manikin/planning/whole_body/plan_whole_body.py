@@ -16,6 +16,7 @@ import numpy as np
 from manikin.balance import WrenchPolytope, motion_margin, pseudo_wrench, wrench_polytopes
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
+from manikin.body.limbs import end_segments, hanging_segment
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline, align_quaternions
@@ -28,7 +29,7 @@ from manikin.planning.whole_body.certificate import (
     WholeBodyRequirements,
     certify,
 )
-from manikin.planning.whole_body.fit_job import CLEARANCE, FitAttempt, FitJob, Progress, no_progress
+from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_strength import HeldForces
@@ -66,9 +67,6 @@ FIRST_DECREASE = 0.02
 
 LATER_DECREASE = 0.005
 """Relative decrease below which a later repair, or a fit that begins again, stops."""
-
-MISSED = 0.1
-"""Share of a guide's postures that may be missed without another search with restarts."""
 
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
@@ -162,9 +160,9 @@ def plan_whole_body(
 
     Returns:
         The motion with its certificate. When the motion breaks a requirement, the fit goes on with more
-        weight on it; when it still does, the arms are kept close to the body; when that does not help
-        either, the flight in which it does is searched again with the Bi-RRT before the result is
-        called a failure.
+        weight on it as long as that helps; where an arm is then too near to something, the arms are kept
+        close to the body; where the limb in flight is, its flight is searched again with the Bi-RRT before
+        the result is called a failure.
     """
     began = clock.perf_counter()
     known = led = None
@@ -279,7 +277,7 @@ class _Planner:
         )  # fmt: skip
         self.job = FitJob(
             settings.knot_spacing, settings.samples_per_span, sudden=True, penalties=PENALTIES,
-            patience=LATER_DECREASE,
+            patience=LATER_DECREASE, gives_up=True,
         )  # fmt: skip
         self._guides: dict[tuple[tuple[PlannedSwing, ...], PostureStyle, Guide | None, bool], Guide] = {}
 
@@ -288,9 +286,9 @@ class _Planner:
         progress(0.2)
         manner = self.settings.manner
         best = self._attempt(swings, manner, progress)
-        if best.broken and manner is READY:  # Raised arms may have to pass through a thigh.
+        if manner is READY and best.is_too_near(self._arms):  # Raised arms may have to pass through a thigh.
             best = self.job.better(best, self._attempt(swings, CLOSE, progress))
-        if best.broken & CLEARANCE:  # Straight toes may be in the way of a flight.
+        if best.is_too_near(self._toes):  # Straight toes may be in the way of a flight.
             best = self.job.better(best, self._attempt(swings, manner, progress, straight_toes=False))
         searched = self._search_again(swings, best)
         if searched is not None:
@@ -305,15 +303,14 @@ class _Planner:
     def _search_again(
         self, swings: tuple[PlannedSwing, ...], best: FitAttempt[_Goal]
     ) -> tuple[PlannedSwing, ...] | None:
-        """Replace the smooth swing in whose flight a requirement breaks, when there is one."""
-        broken = best.certificate.first_broken
-        if broken is None:
-            return None
+        """Replace a smooth swing whose limb comes too near to something, when there is one."""
+        time = best.certificate["min_clearance_m"].time_s or 0.0
         for index, item in enumerate(swings):
             start, end = item.interval
-            # A requirement that breaks this close to a flight is put down to it [s].
-            near = start - 0.05 <= (broken.time_s or 0.0) <= end + 0.05
-            if item.method == "smooth" and item.failure is None and item.roll is None and near:
+            smooth = item.method == "smooth" and item.failure is None and item.roll is None
+            # A clearance that is missed this close to a flight is put down to it [s].
+            near = start - 0.05 <= time <= end + 0.05
+            if smooth and near and best.is_too_near(_limb_of(self.body, item.swing.effector)):
                 # Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it.
                 other = self.flights.search(item.swing, item, iterations=600)
                 if other.method != item.method:
@@ -329,28 +326,27 @@ class _Planner:
     ) -> FitAttempt[_Goal]:
         """Fit a motion to the swings; where it misses a little, fit on with more weight on that.
 
-        The first fit is led by the manner, or by the key postures where that one is caught and theirs is not.
-        The fit has the last word on a guide: only where it is caught, a guide that missed many postures is
-        sought again with restarts.
+        The first fit is led by the manner, or by the key postures where that one is caught. The fit has the
+        last word on a guide: only where all are caught, one that missed many postures is sought again with
+        restarts.
         """
         share = manner.moment_factor * self.settings.fit.moment_share
         scales = replace(self.settings.fit, moment_share=share)
 
-        def led_by(known: Guide | None, restarts: bool = False) -> FitAttempt[_Goal]:
-            guide = self.guide(swings, manner, known, restarts)
+        first: FitAttempt[_Goal] | None = None
+        ways = (self.known,) if self.waypoints is None else (self.known, self.waypoints)
+        for known, restarts in ((way, again) for again in (False, True) for way in ways):
+            if restarts and not self.guide(swings, manner, known).misses_many:
+                continue
+            goal = _Goal(self, swings, self.guide(swings, manner, known, restarts), manner, straight_toes)
             progress(0.4)
-            attempt = self.job.attempt(_Goal(self, swings, guide, manner, straight_toes), scales)
+            attempt = self.job.attempt(goal, scales)
             progress(0.8)
-            missed = len(guide.failures) > MISSED * len(guide.time)
-            if missed and not restarts and attempt.is_caught:
-                again = led_by(known, restarts=True)
-                return attempt if again.is_caught else again
-            return attempt
-
-        first = led_by(self.known)
-        if self.waypoints is not None and first.is_caught:
-            led = led_by(self.waypoints)
-            first = first if led.is_caught else led
+            if not attempt.is_caught:
+                first = attempt
+                break
+            first = first or attempt
+        assert first is not None  # the first way is always tried
         return self.job.repair(first, self._remedy, REPAIRS)
 
     def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal] | None:
@@ -402,6 +398,18 @@ class _Planner:
         return reference_motion(self.body, self.trajectory, time, manner) if known is None else known.at(time)
 
     @cached_property
+    def _arms(self) -> frozenset[str]:
+        """Names of the arms' segments."""
+        hands = (name for name in self.body.effectors if "hand" in name)
+        return frozenset[str]().union(*(_limb_of(self.body, name) for name in hands))
+
+    @cached_property
+    def _toes(self) -> frozenset[str]:
+        """Names of the segments that hang on the end of a limb."""
+        found = (hanging_segment(self.body, self.body.effector(name).segment) for name in self.body.effectors)
+        return frozenset(segment.name for segment in found if segment is not None)
+
+    @cached_property
     def polytopes(self) -> list[WrenchPolytope]:
         """Wrench polytope of each phase, about the middle of its contacts."""
         return list(wrench_polytopes([phase.stance for phase in self.trajectory.schedule.sequence]))
@@ -414,3 +422,10 @@ class _Planner:
             wrench = self.trajectory.pseudo_wrench(time)
         stances = [phase.stance for phase in schedule.sequence]
         return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=self.polytopes).margin
+
+
+def _limb_of(body: BodyModel, effector: str) -> frozenset[str]:
+    """Names of the segments of the limb that ends in an effector, with what hangs on it."""
+    return frozenset(end_segments(body, effector)).union(
+        *(limb.segments for limb in body.limbs if limb.effector == effector)
+    )

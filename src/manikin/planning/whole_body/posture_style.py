@@ -26,6 +26,9 @@ from manikin.planning.whole_body.fit_targets import EffectorTarget, settled_shar
 from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.scene import Proximity
 
+MISSED = 0.1
+"""Share of a guide's postures that may be missed without another search with restarts."""
+
 
 @dataclass(frozen=True, eq=False)
 class GuideFailure:
@@ -52,6 +55,11 @@ class Guide:
     time: FloatArray
     configurations: FloatArray
     failures: tuple[GuideFailure, ...]
+
+    @property
+    def misses_many(self) -> bool:
+        """Whether so many postures could not be found that they may be worth a search with restarts."""
+        return len(self.failures) > MISSED * len(self.time)
 
     def at(self, time: FloatArray) -> FloatArray:
         """(n, nq) linear interpolation; quaternions are normalised."""

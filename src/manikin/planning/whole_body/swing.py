@@ -119,7 +119,7 @@ def plan_swing(
     start: Pose, goal: Pose, start_time: float, end_time: float, clearance: Clearance, *,
     limits: SwingLimits | None = None, start_normal: ArrayLike = (0.0, 0.0, 1.0),
     end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, refine: int = 20, controls: int = 20,
-    heights: Sequence[float] = HEIGHTS,
+    heights: Sequence[float] = HEIGHTS, laterals: Sequence[float] = LATERALS,
 ) -> SwingPlan:  # fmt: skip
     """Find a smooth flight from ``start`` to ``goal`` that keeps clear.
 
@@ -132,6 +132,7 @@ def plan_swing(
         pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
         refine: Largest number of iterations of the optimisation; 0 tries the family only.
         heights: Apex heights above the higher end that are tried [m].
+        laterals: Lateral offsets of the apex that are tried, to the left of the travel [m].
 
     Returns:
         A plan that says whether it succeeded and, if not, what its best attempt breaks.
@@ -151,7 +152,7 @@ def plan_swing(
             start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
             start_normal=normals[0], end_normal=normals[1], pitch=pitch, controls=controls,
         )
-        for height, lateral, apex in _choices(heights)
+        for height, lateral, apex in _choices(heights, laterals)
     )  # fmt: skip
     best, best_check, tried = _first_clear(family, clearance, limits)
     return SwingPlan(*_refine(best, best_check, clearance, limits, normals, refine), tried)
@@ -238,10 +239,10 @@ class _Slack:
         return self._clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
 
 
-def _choices(heights: Sequence[float]) -> list[tuple[float, float, float]]:
+def _choices(heights: Sequence[float], laterals: Sequence[float]) -> list[tuple[float, float, float]]:
     """Heights, lateral offsets and apexes of the family, from the least to the most effort."""
     return sorted(
-        itertools.product(heights, LATERALS, APEXES),
+        itertools.product(heights, laterals, APEXES),
         key=lambda choice: choice[0] + 0.5 * abs(choice[1]) + 0.2 * abs(choice[2] - 0.5),
     )
 

@@ -23,7 +23,7 @@ from manikin.planning.whole_body.birrt import Feasible, FlightLimits
 from manikin.planning.whole_body.fit_scales import RefineScales
 from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
 from manikin.planning.whole_body.refine_input import KeyPath
-from manikin.planning.whole_body.swing import HEIGHTS, SwingLimits, plan_swing
+from manikin.planning.whole_body.swing import HEIGHTS, LATERALS, SwingLimits, plan_swing
 from manikin.planning.whole_body.swing_curve import SwingCurve
 from manikin.planning.whole_body.swing_path import EffectorClearance, Pose
 from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing
@@ -139,6 +139,15 @@ REACHING_TIME = 0.7
 """A free hand begins to reach for its grasp this long before [s], and is put away as slowly."""
 
 
+PASSED = 0.1
+"""Flights shorter than this along the level pass by nothing [m]."""
+
+IN_LINE = 0.06
+"""What stands this near to the straight way may be passed on either side [m]."""
+
+LEVEL = 0.6
+"""Standing limbs this much higher or lower than a lift-off are not passed by [m]."""
+
 ROLLING_HEIGHTS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, *HEIGHTS[1:])
 """Apex heights of the point about which a rolling foot tilts: the ankle is lifted by the tilt already [m]."""
 
@@ -202,6 +211,7 @@ class FlightPlanner:
         plan = plan_swing(
             Pose.of(swing.start), Pose.of(swing.end), start, end, self._clearance(swing), limits=self._limits,
             start_normal=swing.start.normal, end_normal=swing.end.normal, pitch=self._pitch(swing, start),
+            laterals=self._laterals(swing),
         )  # fmt: skip
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
         return smooth if plan.succeeded else self.search(swing, smooth)
@@ -257,6 +267,7 @@ class FlightPlanner:
         plan = plan_swing(
             *roll.pivots, start, end, clearance, limits=limits,
             start_normal=swing.start.normal, end_normal=swing.end.normal, heights=ROLLING_HEIGHTS,
+            laterals=self._laterals(swing),
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "smooth", plan.failure, roll)
 
@@ -283,6 +294,24 @@ class FlightPlanner:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
             return PlannedSwing(swing, fallback.curve, fallback.method, reason)
         return PlannedSwing(swing, found.curve, "bi-rrt")
+
+    def _laterals(self, swing: Swing) -> tuple[float, ...]:
+        """Offsets with which the limb does not pass round the far side of one that stands beside its way."""
+        assert swing.start is not None
+        assert swing.end is not None
+        along = (swing.end.position - swing.start.position)[:2]
+        length = float(np.linalg.norm(along))
+        if length < PASSED:
+            return LATERALS
+        along, most, least = along / length, np.inf, -np.inf
+        for contact in standing_during(self.schedule, swing):
+            away = contact.position - swing.start.position
+            far, left = float(along @ away[:2]), float(along[0] * away[1] - along[1] * away[0])
+            beside = 0.0 < far < length and abs(left) > IN_LINE and abs(away[2]) < LEVEL
+            if beside and hangs(self._body, contact.effector):
+                most = min(most, left) if left > 0.0 else most
+                least = max(least, left) if left < 0.0 else least
+        return tuple(lateral for lateral in LATERALS if lateral == 0.0 or least < 2.0 * lateral < most)
 
     def _pitch(self, swing: Swing, lift_off: float) -> float:
         """Turn the toes down where the foot is left far behind: a level foot has no posture there [rad]."""
