@@ -27,3 +27,16 @@ def test_it_stands_on_four_points_with_normals_up(length, mass):
 def test_sizes_that_are_not_positive_are_refused():
     with pytest.raises(BodyError, match="quadruped length"):
         quadruped(0.0)
+
+
+def test_it_touches_with_its_tips():
+    """Where a foot's shapes meet level ground is within 3 mm of its tip, up to a lean of 45 deg."""
+    body = quadruped(0.8, 32.0)
+    for limb in body.limbs:
+        tip = body.effector(limb.effector)
+        for lean in np.deg2rad([0.0, 38.0, 45.0]):
+            up = np.array([np.sin(lean), 0.0, np.cos(lean)])  # of the ground, seen from the foot
+            for shape in body.segment(tip.segment).shapes:
+                end = shape.translation - 0.5 * shape.size[1] * np.array([0.0, 0.0, 1.0]) - shape.size[0] * up
+                assert np.linalg.norm(end - tip.translation) < 0.003
+                assert abs((end - tip.translation) @ up) < 0.001

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, roll_feet
+from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, point, roll_feet
 from manikin.control import SupportMode, SupportSettings
 from manikin.control.supports import EARLY_SHARE, LONG_FLIGHT, SupportSwitch, support_intervals
 
@@ -165,3 +165,17 @@ def test_a_support_made_at_speed_is_not_waited_for_above_it(stepping, contacts):
     assert np.all(right(switch, LAND - 0.005, False).lift == 0.0)
     landing = right(switch, LAND, False)
     assert (landing.mode, landing.press, landing.settling) == (SupportMode.LANDING, 0.0, True)
+
+
+def test_a_tip_that_bounces_off_is_landed_anew_at_once():
+    """Within two control periods; a foot counts as touching for its release time."""
+    tips = [
+        point(name, [x, 0.0, 0.0], friction=0.7) for name, x in (("left_foot", 0.2), ("right_foot", -0.2))
+    ]
+    both = Phase(Stance(tips))
+    schedule = ContactSchedule(StanceSequence([both, Phase(Stance(tips[:1])), both]), [0.0, LIFT, LAND, END])
+    switch = SupportSwitch(schedule, SupportSettings())
+    right(switch, LAND - 0.2, False)
+    assert right(switch, LAND, True).mode is SupportMode.STANCE
+    assert right(switch, LAND + 0.005, False).mode is SupportMode.STANCE
+    assert right(switch, LAND + 0.01, False).mode is SupportMode.LANDING

@@ -8,7 +8,8 @@ strengths are our own choice.
 :func:`quadruped`: trunk, head and four legs of three hinges, as dogs and walking robots have them.
 Proportions, ranges, speeds and strengths are our own choice, near those of walking robots that climb stairs:
 legs as long as three quarters of the trunk, knees behind the feet as elbows are, torques of up to a third of
-weight times length.
+weight times length.  Shanks end in thin feet: a body is planned to touch with its tips, and touches with its
+shapes, which have to be near them at any lean.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,9 +22,6 @@ from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKi
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, finite_number
-
-_TIP_FREE = 0.4
-"""Distance of the last part's shape to the tip in radii, so that it may lean by 45 degrees."""
 
 _SPEED = 12.0
 _TO_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -44,6 +42,7 @@ class _LegPlan:
         parts: Length, radius and mass of each part, from the hip to the tip.
         hinges: Of each part: name, axis of the left leg, range [deg], strength [weight times length].
         standing_deg: Angles of each pair in standing [deg].
+        tip_free: Distance of the last part's shape to the tip in radii.
     """
 
     hips: Mapping[str, float]
@@ -52,6 +51,7 @@ class _LegPlan:
     parts: Mapping[str, tuple[float, float, float]]
     hinges: Mapping[str, Sequence[_HingeEntry]]
     standing_deg: Mapping[str, Mapping[str, float]]
+    tip_free: float
 
     def direction(self, sign: float) -> FloatArray:
         """(3,) unit vector along a leg in the zero posture: to its side, or down."""
@@ -76,20 +76,23 @@ _INSECT = _LegPlan(
         pair: {"sweep": -forward, "lift": 25.0, "knee": 105.0, "ankle": 10.0}
         for pair, forward in (("front", 40.0), ("middle", 0.0), ("rear", -40.0))
     },
+    tip_free=0.4,  # it may lean by 45 degrees
 )
 _QUADRUPED = _LegPlan(
     {"front": 0.38, "rear": -0.38},
     0.15,
     2,
-    {"thigh": (0.37, 0.050, 0.040), "shank": (0.37, 0.032, 0.015)},
+    {"thigh": (0.37, 0.050, 0.040), "shank": (0.333, 0.032, 0.0145), "foot": (0.037, 0.003, 0.0005)},
     {
         "thigh": (
             ("roll", (1.0, 0.0, 0.0), -45.0, 45.0, 0.3),
             ("pitch", (0.0, 1.0, 0.0), -50.0, 130.0, 0.35),
         ),
         "shank": (("knee", (0.0, -1.0, 0.0), 5.0, 155.0, 0.35),),
+        "foot": (),
     },
     {pair: {"pitch": 38.0, "knee": 76.0} for pair in ("front", "rear")},
+    tip_free=0.2,
 )
 _INSECT_RADIUS, _QUADRUPED_RADIUS = 0.11, 0.12
 _HEAD_SHARE, _HEAD_RADIUS, _HEAD_AT = 0.06, 0.10, (0.54, 0.0, 0.10)
@@ -121,9 +124,9 @@ def quadruped(length: float = 0.8, mass: float = 32.0) -> BodyModel:
     """Make a quadruped of a trunk length [m] > 0 and a mass [kg] > 0 with four legs of three hinges each.
 
     Segment frames are parallel to the world in the zero posture, in which all legs hang straight down. A hip
-    rolls the leg outward and pitches it backward; a knee bends the shank forward. Effectors
-    ``left_front_tip`` ... ``right_rear_tip`` are the ends of the shanks, their z axes up in the standing
-    posture; limbs are ``left_front_leg`` ... ``right_rear_leg``, and touch in points.
+    rolls the leg outward and pitches it backward; a knee bends the shank, with the foot on it, forward.
+    Effectors ``left_front_tip`` ... ``right_rear_tip`` are the ends of the feet, their z axes up in the
+    standing posture; limbs are ``left_front_leg`` ... ``right_rear_leg``, and touch in points.
     """
     length, mass = _size("quadruped", length, mass)
     own = mass * (1.0 - _HEAD_SHARE - 4.0 * sum(share for *_, share in _QUADRUPED.parts.values()))
@@ -177,7 +180,7 @@ def _leg(plan: _LegPlan, leg: str, pair: str, sign: float, length: float, mass: 
     direction, parts = plan.direction(sign), []
     for part, (share, thick, mass_share) in plan.parts.items():
         reach, radius, part_mass = direction * (share * length), thick * length, mass_share * mass
-        span = share * length - radius * (1.0 + (_TIP_FREE if part == list(plan.parts)[-1] else 0.0))
+        span = share * length - radius * (1.0 + (plan.tip_free if part == list(plan.parts)[-1] else 0.0))
         turn = _TO_Y if plan.axis == 1 else None
         shape = Shape(part, ShapeKind.CAPSULE, (radius, span), direction * (0.5 * span), turn)
         hinges = _mirrored_hinges(leg, sign, 9.81 * mass * length, plan.hinges[part])

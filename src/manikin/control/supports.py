@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from manikin.contact import Contact, ContactSchedule, SolePart
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.control.settings import SupportSettings
 from manikin.numerics.spatial import FloatArray
 
@@ -20,6 +20,12 @@ EARLY_SHARE = 0.15
 
 LONG_FLIGHT = 1.0
 """Flights longer than this come down, and rise, slowly [s]."""
+
+TIP_HOVER = 0.25
+"""Share of the height at which soles are waited for at which tips are."""
+
+TIP_RELEASE = 0.008
+"""Time for which a tip that does not touch counts as touching [s]."""
 
 _LIFTING_SHARE = 0.6
 """Share of the early window in which the hovering height is reached."""
@@ -196,7 +202,10 @@ class SupportSwitch:
             return SupportState(name, SupportMode.SWING, None, follow=self._follow(name, time))
         planned = time >= interval.start - 1e-9
         settling = interval.contact.settle > 0.0 and time < interval.start + interval.contact.settle
-        self._remember_touch(memory, time, planned if touching is None else touching)
+        # What stands on three tips cannot count on a fourth that has bounced off.
+        tip = interval.contact.kind is ContactKind.POINT
+        release = TIP_RELEASE if tip else self._settings.release_time
+        self._remember_touch(memory, time, planned if touching is None else touching, release)
         if memory.landed is not None:
             since = time - max(memory.landed, interval.start)
             # A seat takes the weight as soon as it is touched.
@@ -228,8 +237,13 @@ class SupportSwitch:
         return SupportState(name, SupportMode.SWING, None, lift=lift, lift_rate=rate)
 
     def _hover(self, interval: SupportInterval) -> float:
-        """Height at which a support is waited for [m]; one made at speed has to press in time."""
-        return 0.0 if interval.contact.settle > 0.0 else self._settings.hover
+        """Height at which a support is waited for [m]; one made at speed has to press in time.
+
+        A tip has no edge that would touch before the rest of it.
+        """
+        if interval.contact.settle > 0.0:
+            return 0.0
+        return (TIP_HOVER if interval.contact.kind is ContactKind.POINT else 1.0) * self._settings.hover
 
     def _fades(self, interval: SupportInterval, time: float) -> tuple[tuple[SolePart, float], ...]:
         """Load moves gradually to points that begin to touch, and off those that cease to."""
@@ -255,10 +269,10 @@ class SupportSwitch:
                 return number, interval
         return -1, None
 
-    def _remember_touch(self, memory: _Memory, time: float, felt: bool) -> None:
+    def _remember_touch(self, memory: _Memory, time: float, felt: bool, release: float) -> None:
         if felt:
             memory.touched = time
             if memory.landed is None:
                 memory.landed = time
-        elif memory.landed is not None and time - memory.touched > self._settings.release_time + 1e-9:
+        elif memory.landed is not None and time - memory.touched > release + 1e-9:
             memory.landed = None

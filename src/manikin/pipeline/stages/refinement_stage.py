@@ -66,6 +66,7 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
         report: Takes the ``wholebody`` block.
         keyed: Contacts with a posture at each change.
     """
+    report.progress("wholebody", 0.0)
     body, scene, padded = context.body, context.scene, context.padded
     keyed = keyed.at_pace(context.scenario.file.wholebody.pace).with_lifted_feet(body, scene, padded)
     options = context.scenario.file.wholebody

@@ -224,6 +224,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._roots: dict[State, FloatArray] = {}
         self._turns: dict[State, FloatArray] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
+        self._beyond: dict[tuple[State, State], float] = {}
         self._state = Configuration(poser.body, start.q)
 
     def _best(self) -> list[State] | str:
@@ -385,36 +386,42 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         if (before, k) in self._stuck:
             return math.inf
+        if (before, after) not in self._beyond:
+            self._beyond[before, after] = self._overreached(before, after, k)
+        cost = self._beyond[before, after]
+        proven = self._postures.get((after, k, True))
+        if proven is not None and proven.q is not None and math.isfinite(cost):
+            cost = -PROVEN
+        dearer = self._dearer.get(k)
+        if dearer is None or math.isinf(cost):
+            return cost
+        place = np.concatenate([self._places[k][after[k]], self._roots[after]]).reshape(2, 3)
+        away = np.linalg.norm(dearer - place, axis=2)
+        return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+
+    def _overreached(self, before: State, after: State, k: int) -> float:
+        """What a move of limb k costs whose limbs come to the ends of their reach; infinite without room."""
         if not self._has_room(k, after[k]):
             return math.inf
         staying = [j for j in range(len(self.holds)) if j != k and self._held(j, before[j])]
-        at = self._at(after)
-        cost = 0.0
-        if not any(self._grasps[j] for j in staying):
-            hull = convex_polygon(at[staying, :2])
-            for state in (before, after):
-                root = self._roots[state]
-                # On its way over the limbs that stay the trunk takes the others to the ends of their reach.
-                ways = root[:2] + SHARES[:, None] * (at[staying, :2].mean(axis=0) - root[:2])
-                rooms = signed_distance(ways, hull)
-                if rooms[0] < -self.settings.sway * self.size:
-                    return math.inf
-                shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
-                local = (self._at(state) - shifted) @ self._turns[state]
-                beyond = [
-                    -float(item.room(local[j]))
-                    for j, item in enumerate(self.holds)
-                    if self._held(j, state[j])
-                ]
-                cost += OVERREACH * max(0.0, *beyond) / self.size
-        proven = self._postures.get((after, k, True))
-        if proven is not None and proven.q is not None:
-            cost = -PROVEN
-        dearer = self._dearer.get(k)
-        if dearer is None:
-            return cost
-        away = np.linalg.norm(dearer - np.concatenate([at[k], self._roots[after]]).reshape(2, 3), axis=2)
-        return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+        if any(self._grasps[j] for j in staying):
+            return 0.0
+        cost, at = 0.0, self._at(after)
+        hull = convex_polygon(at[staying, :2])
+        for state in (before, after):
+            root = self._roots[state]
+            # On its way over the limbs that stay the trunk takes the others to the ends of their reach.
+            ways = root[:2] + SHARES[:, None] * (at[staying, :2].mean(axis=0) - root[:2])
+            rooms = signed_distance(ways, hull)
+            if rooms[0] < -self.settings.sway * self.size:
+                return math.inf
+            shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
+            local = (self._at(state) - shifted) @ self._turns[state]
+            beyond = [
+                -float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])
+            ]
+            cost += OVERREACH * max(0.0, *beyond) / self.size
+        return cost
 
     def _has_room(self, k: int, row: int) -> bool:
         if (k, row) not in self._free:

@@ -347,6 +347,8 @@ class _Planner:
                 break
             first = first or attempt
         assert first is not None  # the first way is always tried
+        if straight_toes and first.is_too_near(self._toes):  # They may bend: no repair does as much.
+            return first
         return self.job.repair(first, self._remedy, REPAIRS)
 
     def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal] | None:

@@ -41,7 +41,7 @@ from manikin.planning.whole_body.refine_physics import MarginCost, RefinedForces
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint
 
-KNEE = "knee_flexion"
+KNEES = "knee_flexion", "_knee"
 """End of the names of knee joints."""
 
 
@@ -113,6 +113,25 @@ def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
+SWITCHING = 0.06
+"""Time after a touch-down and before a lift-off in which what stands on tips alone has to be in balance
+without that contact [s]: the tip may be late, and the controller takes the load off before."""
+
+
+def _relied_on(schedule: ContactSchedule) -> list[tuple[float, float]]:
+    """First and last time [s] at which the stance of each phase has to do, at most half of its neighbours."""
+    stances = [phase.stance for phase in schedule.sequence]
+    early, late = schedule.instants[:-1].copy(), schedule.instants[1:].copy()
+    for number, (before, after) in enumerate(itertools.pairwise(stances)):
+        if any(item.kind is not ContactKind.POINT for item in (*before, *after)):
+            continue
+        if set(before.effectors) < set(after.effectors):
+            late[number] += min(SWITCHING, 0.5 * schedule.durations[number + 1])
+        if set(after.effectors) < set(before.effectors):
+            early[number + 1] -= min(SWITCHING, 0.5 * schedule.durations[number])
+    return list(zip(early.tolist(), late.tolist(), strict=True))
+
+
 def _centres_of_mass(body: BodyModel, q: FloatArray) -> FloatArray:
     """(n, 3) of configurations (n, nq) [m]."""
     data = body.pinocchio.createData()
@@ -145,13 +164,11 @@ class RefineObjective(MotionObjective):
         # At a key instant the stances on both sides of it have to do.
         self._stances = [
             (rows, RefinedForces(phase.stance, self._names), room, com[rows].mean(axis=0))
-            for phase, room, (start, end) in zip(
-                schedule.sequence, rooms, itertools.pairwise(schedule.instants), strict=True
-            )
+            for phase, room, (start, end) in zip(schedule.sequence, rooms, _relied_on(schedule), strict=True)
             for rows in (np.flatnonzero((time >= start) & (time <= end)),)
         ]
         self._load = targets.load
-        self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEE)]
+        self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEES)]
         model = body.pinocchio
         moves = moves_by_joint(model)
         self._chains = {
