@@ -72,6 +72,16 @@ class ComRegion:
         ends = np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)) @ self.normals.T
         return replace(self, offsets=np.maximum(self.offsets, ends.max(axis=0, initial=-np.inf) + ROOM))
 
+    @property
+    def top(self) -> float:
+        """Greatest height in the region [m]; infinite without a face above."""
+        return float(self.offsets[self.normals[:, 2] > 1.0 - 1e-9].min(initial=np.inf))
+
+    def above(self, height: float) -> "ComRegion":
+        """The part of the region at least at a height [m]."""
+        below = self.normals[:, 2] < -1.0 + 1e-9
+        return replace(self, offsets=np.where(below, np.minimum(self.offsets, -height), self.offsets))
+
     def violation(self, points: ArrayLike) -> FloatArray:
         """(...) largest distance of (..., 3) points beyond a face [m]; negative is room."""
         places = np.asarray(points, dtype=np.float64)

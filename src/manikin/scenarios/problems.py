@@ -213,11 +213,19 @@ def _scaled(com: FloatArray, content: MotionFile, stature: float, level: Support
     return np.column_stack([com[:, :2], base + stature / recorded * (com[:, 2] - base)])
 
 
-def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
+BEND = 0.12
+"""How far below its greatest height the CoM is kept where nothing asks for more, over its standing height."""
+
+
+def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> CentroidalProblem:
     """Build the problem of the timing-free planner, with every height scaled to the body.
 
     The phases at the end in which the body sits are left out: there the centre of mass is
     not what keeps the balance ([Qiu2012]_ 7.2.2).
+
+    Args:
+        upright: Whether a person whose file bounds the CoM by nothing bends no more than supports and
+            overhead obstacles ask for: a low CoM has larger margins, on legs that cannot hold it.
 
     Raises:
         ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
@@ -227,6 +235,8 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
     velocity = (0.0, 0.0, 0.0) if seat is None else values.file.task.goal.velocity_m_s
     given: dict[str, Any] = {"degree": options.degree, "samples": options.samples}
     sequence = _standing(values, planning=True)
+    bends = upright and not values.file.com_constraints and values.file.body.model == "human"
+    geometric = _height_constraints(values, automatic=bends)
     with values.refusing(("planning",)):
         return CentroidalProblem(
             values.moved_mass,
@@ -239,8 +249,8 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
             margin_space=options.margin_space,
             required_margin=values.required_margin,
             support_distance=values.max_support_distance,
-            regions=_regions(values, sequence),
-            geometric=_height_constraints(values),
+            regions=_regions(values, sequence, geometric if bends else None),
+            geometric=geometric,
             key_planes=_key_planes(values),
             max_duration=options.max_duration_s,
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
@@ -286,8 +296,13 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
     return tuple(planes)
 
 
-def _regions(values: ScenarioValues, sequence: StanceSequence) -> tuple[ComRegion | None, ...]:
+def _regions(
+    values: ScenarioValues, sequence: StanceSequence, ceilings: Sequence[GeometricConstraint] | None
+) -> tuple[ComRegion | None, ...]:
     """Where the body's postures have the CoM in each phase, with the places that the file gives.
+
+    With ``ceilings`` they are cut :data:`BEND` below the least height that a phase, those beside it and the
+    ceilings over it allow.
 
     At those, and on stances on which sampling finds no posture, the full search for key postures judges.
     A largest distance from the supports that the file gives takes the place of all regions.
@@ -298,20 +313,30 @@ def _regions(values: ScenarioValues, sequence: StanceSequence) -> tuple[ComRegio
     reach, phases = ComReach.of(body), values.explicit_supports().phases
     near = [None if phase.com_near is None else np.array(phase.com_near) for phase in phases]
     known = [values.start_com, *near[1 : len(sequence)], values.goal_com]
-    regions: list[ComRegion | None] = []
+    found = [reach.region(phase.stance.contacts) for phase in sequence]
+    tops = [region.top for region in found]
     for number, phase in enumerate(sequence):
-        region = reach.region(phase.stance.contacts)
+        middle = np.append(np.mean([contact.position[:2] for contact in phase.stance], axis=0), 0.0)
+        for ceiling in ceilings or ():
+            if not ceiling.impassable:
+                tops[number] = min(tops[number], -float(ceiling.violation(middle)))
+    bend = BEND * float(Configuration(body, body.standing_posture()).com[2])
+    regions: list[ComRegion | None] = []
+    for number, region in enumerate(found):
+        if ceilings is not None:
+            region = region.above(min(tops[max(0, number - 1) : number + 2]) - bend)
         places = [place for place in known[number : number + 2] if place is not None]
         regions.append(None if region.empty else region.including(places))
     return tuple(regions)
 
 
-def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ...]:
+def _height_constraints(values: ScenarioValues, *, automatic: bool) -> tuple[GeometricConstraint, ...]:
     band, entry = values.height_band, values.constraint("overhead")
     result = () if band is None else height_band(band.lower, band.upper)
-    if entry is None or entry.overhead is None:
+    wanted = "automatic" if automatic else None if entry is None else entry.overhead
+    if wanted is None:
         return result
-    names = None if entry.overhead == "automatic" else tuple(entry.overhead)
+    names = None if wanted == "automatic" else tuple(wanted)
     overhead = overhead_constraints(
         build_body(values), build_scene(values), _standing(values), (values.start_com, values.goal_com), names
     )

@@ -205,11 +205,11 @@ class Scenario(Displayed, ScenarioValues):
 
         return stance_sequence(self, planning=planning)
 
-    def build_centroidal_problem(self) -> CentroidalProblem:
+    def build_centroidal_problem(self, *, upright: bool = True) -> CentroidalProblem:
         """Build the problem of the centre-of-mass planner, see :mod:`manikin.scenarios.problems`."""
         from manikin.scenarios.problems import centroidal_problem
 
-        return centroidal_problem(self)
+        return centroidal_problem(self, upright=upright)
 
     def build_keyframe_problem(self) -> KeyframeProblem | None:
         """Build the problem of the keyframe-based planner, see :mod:`manikin.scenarios.problems`.

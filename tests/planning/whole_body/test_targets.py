@@ -5,6 +5,8 @@ import pytest
 
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
+from manikin.planning.whole_body.fit_objective import LEAST_ROLL, _effector_rows
+from manikin.planning.whole_body.fit_scales import FitScales
 from manikin.planning.whole_body.fit_targets import (
     FLIGHT_POSITION_WEIGHT,
     FLIGHT_ROTATION_WEIGHT,
@@ -13,6 +15,7 @@ from manikin.planning.whole_body.fit_targets import (
     ROTATION_RAMP,
     STRAIGHT,
     STRAIGHTENING,
+    EffectorTarget,
     effector_targets,
     flat_share,
     ignored_pairs,
@@ -148,3 +151,20 @@ def test_a_contact_counts_to_its_last_instant():
     target = effector_targets(schedule, (), np.array([0.9, 1.0, 1.1]))["buttocks"]
     assert target.weight.tolist() == [1.0, 1.0, 0.0]
     np.testing.assert_array_equal(target.position[1], SEAT.position)
+
+
+def test_a_seat_rolls_forward_freely_and_never_back():
+    """The certificate counts a turn back from where a rolling contact lies; the fit has to see it."""
+    pitch = np.array([-0.01, 0.0, 0.3])
+    target = EffectorTarget.free(3)
+    target.pivot[:] = 0.07, 0.0, 0.05
+    target.weight[:] = 1.0
+    place = np.tile(np.eye(4), (3, 1, 1))
+    place[:, 0, 0] = place[:, 2, 2] = np.cos(pitch)
+    place[:, 0, 2], place[:, 2, 0] = np.sin(pitch), -np.sin(pitch)
+    turn_rate = np.tile(np.eye(6), (3, 1, 1))
+    jacobian, residual = _effector_rows(target, place, turn_rate, FitScales())
+    np.testing.assert_allclose(
+        FitScales().rotation * residual[:, 4], [-0.01 - LEAST_ROLL, -LEAST_ROLL, 0.0], atol=1e-12
+    )
+    np.testing.assert_allclose(FitScales().rotation * jacobian[:, 4, 4], [1.0, 1.0, 0.0], atol=1e-9)

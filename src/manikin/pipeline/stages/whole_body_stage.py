@@ -180,8 +180,13 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
     """
     report.progress("centroidal", 0.0)
     problem = context.posed_problem()
-    recorded = isinstance(problem, KeyframeProblem)
-    result = plan_com_through_key_frames(problem) if recorded else plan_com(problem)
+    if isinstance(problem, KeyframeProblem):
+        result = plan_com_through_key_frames(problem)
+    else:
+        result = plan_com(problem)
+        if result.failure is not None and problem.regions:  # the task may need a deeper bend
+            bent = plan_com(context.scenario.build_centroidal_problem(upright=False))
+            result = bent if bent.failure is None else result
     report_centre_of_mass(report, result, centroidal_summary(result))
     if result.failure is not None:
         failure = result.failure

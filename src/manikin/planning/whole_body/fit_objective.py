@@ -24,6 +24,9 @@ from manikin.scene import Proximity
 from manikin.scene.distance import ProximitySamples
 from manikin.scene.distance_bounds import KnownDistances
 
+LEAST_ROLL = 2.0e-3
+"""Angle below which a contact that rolls is pushed forward [rad]."""
+
 _RADIAL_SCALE = 0.05
 """Deviation of a raw quaternion's length from one that costs one unit."""
 
@@ -305,11 +308,13 @@ def _effector_rows(
     by_turn = rotation_vector_jacobian(turn) @ relative.transpose(0, 2, 1)
     jacobian[:, 3:] = weight[:, None, None] * by_turn @ by_joints[:, 3:]
     residual[:, 3:] = weight[:, None] * turn
-    if rolls.any():  # only turns about the other two axes of the contact count
+    if rolls.any():  # what rolls may turn about y, but not back from where it lies
         own = frame.transpose(0, 2, 1)[rolls]
         jacobian[rolls, 3:] = own @ jacobian[rolls, 3:]
         residual[rolls, 3:] = (own @ residual[rolls, 3:, None])[:, :, 0]
-        jacobian[rolls, 4], residual[rolls, 4] = 0.0, 0.0
+        back = np.minimum(residual[rolls, 4] - weight[rolls] * LEAST_ROLL, 0.0)
+        jacobian[rolls, 4] *= (back < 0.0)[:, None]
+        residual[rolls, 4] = back
     return jacobian, residual
 
 
