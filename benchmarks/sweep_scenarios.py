@@ -153,7 +153,8 @@ def test_other_bodies_do_the_same(name, stature, mass, sex):
 
 
 @pytest.mark.parametrize(
-    "name", ["crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found", "climb"]
+    "name",
+    ["crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found", "climb", "climb-wall"],
 )
 @pytest.mark.parametrize("seed", range(20))
 def test_contacts_are_found_with_every_seed(name, seed):

@@ -66,6 +66,9 @@ RUNG_SIDE = 0.025
 RUNG_APART = 0.025
 """Distance on the sole between two places of a rung below it [m]; our choice."""
 
+PALM_ROOM = 0.01
+"""Distance of a palm's middle from the bar that its fingers close round [m]."""
+
 STEEP_BAR = 0.85
 """Rise of a bar over its length from which on a hand takes it from the side; our choice."""
 
@@ -196,7 +199,7 @@ class _Grid:
         up = axis if axis[2] > 0.0 else -axis
         frame = np.column_stack([up, np.cross(out, up), out]) if steep else turn
         for share in np.linspace(0.0, 1.0, 1 + int(bar.length / self._spacing)):
-            place = (1.0 - share) * bar.start + share * bar.end + bar.radius * out
+            place = (1.0 - share) * bar.start + share * bar.end + (bar.radius + PALM_ROOM) * out
             if self._inside(place[None])[0]:
                 yield _Place(place, frame)
 
