@@ -161,19 +161,14 @@ def test_a_run_does_not_end_at_rest_before_the_push_is_over():
     assert 1.1 - 1e-6 <= found.trace.motion.time[-1] < 1.6
 
 
-def test_the_result_does_not_depend_on_the_number_of_jobs():
-    """Of a body that never reacts: its trials are short, and its borders depend on all of the simulation."""
-    searches = [DirectionSearch(NEVER_REACTS, direction, 500.0) for direction in (0.0, 120.0)]
-    here, beside = (dict(search_directions(searches, jobs=jobs)) for jobs in (1, 2))
-    assert here == beside
-    assert all(found.beyond < 500.0 for found in here.values())
-
-
-def test_processes_end_when_nobody_waits_for_them():
+def test_processes_find_the_same_and_end_when_nobody_waits_for_them():
+    """Of a body that never reacts: its trials are short, and its border depends on all of the simulation."""
     before = set(multiprocessing.active_children())
     searches = [DirectionSearch(NEVER_REACTS, direction, 500.0) for direction in (0.0, 120.0, 240.0)]
     with closing(search_directions(searches, jobs=2)) as found:
-        next(found)
+        number, beside = next(found)
+    assert beside == searches[number].run()
+    assert beside.beyond < 500.0
     # Not joined: the pool's own thread joins them, and one of two that join at a time misses the end.
     started, waited = set(multiprocessing.active_children()) - before, 0.0
     while any(process.is_alive() for process in started) and waited < 60.0:
