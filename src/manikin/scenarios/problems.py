@@ -235,8 +235,8 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
     velocity = (0.0, 0.0, 0.0) if seat is None else values.file.task.goal.velocity_m_s
     given: dict[str, Any] = {"degree": options.degree, "samples": options.samples}
     sequence = _standing(values, planning=True)
-    bends = upright and not values.file.com_constraints and values.file.body.model == "human"
-    geometric = _height_constraints(values, automatic=bends)
+    upright = upright and values.keeps_upright
+    geometric = _height_constraints(values, automatic=upright)
     with values.refusing(("planning",)):
         return CentroidalProblem(
             values.moved_mass,
@@ -249,7 +249,7 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
             margin_space=options.margin_space,
             required_margin=values.required_margin,
             support_distance=values.max_support_distance,
-            regions=_regions(values, sequence, geometric if bends else None),
+            regions=_regions(values, sequence, geometric if upright else None),
             geometric=geometric,
             key_planes=_key_planes(values),
             max_duration=options.max_duration_s,

@@ -92,6 +92,11 @@ class ScenarioValues:
         return self.file.body.model == "point_mass"
 
     @property
+    def keeps_upright(self) -> bool:
+        """Whether the body is a person whose file leaves the centre of mass free."""
+        return self.file.body.model == "human" and not self.file.com_constraints
+
+    @property
     def contact_model(self) -> ContactModel:
         """Friction model of the file and the default cap of the body, for every stance of every stage."""
         return ContactModel.of_body(self.moved_mass, self.planning.friction_model)

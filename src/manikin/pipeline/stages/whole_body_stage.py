@@ -184,9 +184,8 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
         result = plan_com_through_key_frames(problem)
     else:
         result = plan_com(problem)
-        if result.failure is not None and problem.regions:  # the task may need a deeper bend
-            bent = plan_com(context.scenario.build_centroidal_problem(upright=False))
-            result = bent if bent.failure is None else result
+        if result.failure is not None and context.scenario.keeps_upright:  # the task may need a deeper bend
+            result = plan_com(context.scenario.build_centroidal_problem(upright=False))
     report_centre_of_mass(report, result, centroidal_summary(result))
     if result.failure is not None:
         failure = result.failure
