@@ -237,18 +237,14 @@ def _alike(
 def load_shares(schedule: ContactSchedule, time: FloatArray, names: tuple[str, ...]) -> FloatArray:
     """(n, c) readiness of each contact to carry load, ramping from 0.05 to 1 at its ends."""
     shares = np.ones((len(time), len(names)))
-    held = np.array([[name in phase.stance for name in names] for phase in schedule.sequence])
-    for column in range(len(names)):
-        for phase in range(1, len(held)):
-            instant = schedule.instants[phase]
-            if held[phase, column] and not held[phase - 1, column]:
-                after = time >= instant
-                settles = schedule.sequence[phase].stance[names[column]].settle > 0.0
-                ramp = _SUDDEN_RAMP if settles else _RAMP
-                shares[after, column] = np.minimum(shares[after, column], (time[after] - instant) / ramp)
-            if held[phase - 1, column] and not held[phase, column]:
-                before = time < instant
-                shares[before, column] = np.minimum(shares[before, column], (instant - time[before]) / _RAMP)
+    for swing in schedule.sequence.swings():
+        own, (lift_off, landing) = shares[:, names.index(swing.effector)], schedule.swing_interval(swing)
+        if swing.start is not None:
+            before = time < lift_off
+            own[before] = np.minimum(own[before], (lift_off - time[before]) / _RAMP)
+        if swing.end is not None:
+            after, ramp = time >= landing, _SUDDEN_RAMP if swing.end.settle > 0.0 else _RAMP
+            own[after] = np.minimum(own[after], (time[after] - landing) / ramp)
     return np.clip(shares, 0.05, 1.0)
 
 

@@ -265,19 +265,14 @@ def pseudo_wrench(
     return np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
 
 
-def wrench_polytope(
-    stance: Stance, *, friction_model: FrictionModel | None = None, reference: ArrayLike = (0.0, 0.0, 0.0)
-) -> WrenchPolytope:
+def wrench_polytope(stance: Stance, *, reference: ArrayLike = (0.0, 0.0, 0.0)) -> WrenchPolytope:
     """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
 
-    Without any contact (flight) it is the single point 0. A ``friction_model`` replaces that of the stance;
-    ``reference`` (3,) is the point of the moments [m].
+    Without any contact (flight) it is the single point 0; ``reference`` (3,) is the point of the moments [m].
 
     Raises:
         ContactError: If the normal force of a contact is bounded by no cap.
     """
-    if friction_model is not None:
-        stance = stance.with_friction_model(friction_model)
     origin = frozen_array(reference, "reference [m]", (3,), ContactError)
     local = _middle(stance) if len(stance) else origin
     caps, total = _caps(stance)

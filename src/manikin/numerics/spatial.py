@@ -313,11 +313,7 @@ def rotation_vector_jacobian(vectors: FloatArray) -> FloatArray:
 
 def matrix(rows: list[list[FloatArray]]) -> FloatArray:
     """(..., 3, 3) of nine (...) entries."""
-    result = np.empty((*rows[0][0].shape, 3, 3))
-    for i, row in enumerate(rows):
-        for j, entry in enumerate(row):
-            result[..., i, j] = entry
-    return result
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def rotations(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatArray:
