@@ -163,7 +163,9 @@ class Proximity(BodyPairs):
         self._reader = PlacementReader(self._geometry_data.oMg)
         self._count = len(self._shapes.geometryObjects)
         parts = tuple(part for obstacle in scene for part in collision_parts(obstacle))
-        first, second = _pair_table(self._count, len(parts), self_pairs(body) if self_collision else [])
+        outer = [(shape, self._count + part) for part in range(len(parts)) for shape in range(self._count)]
+        inner = self_pairs(body) if self_collision else []
+        first, second = np.array(outer + inner, dtype=np.int64).reshape(-1, 2).T
         self._bounds = PairBounds(self._shapes, parts, first, second)
         self._meters = _meters(self._shapes, parts, first, second)
         names = [item.name for item in self._shapes.geometryObjects] + [part.obstacle for part in parts]
@@ -399,13 +401,6 @@ def considered(pairs: Sequence[Pair], ignore: Ignored) -> NDArray[np.bool_]:
         return any((a, b) in ignore or (b, a) in ignore for a in first for b in second)
 
     return np.array([not is_ignored(pair) for pair in pairs], dtype=bool)
-
-
-def _pair_table(shapes: int, parts: int, inner: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    """First and second index of every pair: parts first, numbered behind the shapes."""
-    both = [(shape, shapes + part) for part in range(parts) for shape in range(shapes)] + inner
-    table = np.array(both, dtype=np.int64).reshape(-1, 2)
-    return table[:, 0], table[:, 1]
 
 
 def _meters(

@@ -17,6 +17,7 @@ from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray, dot
 from manikin.scene.collision import CollisionPart, local_box, shape_of
 from manikin.scene.covering import cover
+from manikin.scene.mesh import IntArray
 
 _PARALLEL = 1e-12
 """Squared sine of the angle below which two axes count as parallel."""
@@ -68,11 +69,7 @@ class PairBounds:
     """
 
     def __init__(
-        self,
-        shapes: pin.GeometryModel,
-        parts: Sequence[CollisionPart],
-        first: NDArray[np.int64],
-        second: NDArray[np.int64],
+        self, shapes: pin.GeometryModel, parts: Sequence[CollisionPart], first: IntArray, second: IntArray
     ) -> None:
         objects = list(shapes.geometryObjects)
         self._count = len(objects)

@@ -79,7 +79,12 @@ class Mesh:
         points, triangles, dropped = _cleaned(points, triangles)
         if not len(triangles):
             raise SceneError(f"mesh {source!r} has no triangle with an area; valid: at least one")
-        _check_extent(points, source)
+        extent = float(np.ptp(points, axis=0).max())
+        if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
+            raise SceneError(
+                f"mesh {source!r} extends over {extent:.4g} m, which suggests a mistaken unit; valid: "
+                f"{SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m, so set unit ({', '.join(UNITS)}) or scale"
+            )
         if convex != "no":
             points, triangles = _hulls(points, triangles, convex, source)
         if len(triangles) > max_faces:
@@ -222,15 +227,6 @@ def _cleaned(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntAr
     clean = faces[good][np.sort(kept)]
     used, renumbered = np.unique(clean, return_inverse=True)
     return merged[used], renumbered.reshape(-1, 3).astype(np.int64), len(triangles) - len(clean)
-
-
-def _check_extent(points: FloatArray, source: str) -> None:
-    extent = float(np.ptp(points, axis=0).max())
-    if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
-        raise SceneError(
-            f"mesh {source!r} extends over {extent:.4g} m, which suggests a mistaken unit; "
-            f"valid: {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m, so set unit ({', '.join(UNITS)}) or scale"
-        )
 
 
 def _connected(vertices: FloatArray, faces: IntArray) -> list[IntArray]:
