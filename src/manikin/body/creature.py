@@ -9,7 +9,7 @@ one segment with several hinges.
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -130,15 +130,8 @@ def _without_empty_root(robot: Urdf, where: str) -> Urdf:
     return robot
 
 
-@dataclass(frozen=True, eq=False)
-class _Member:
-    """A link as part of a segment.
-
-    Attributes:
-        segment: Name of the segment.
-        rotation: (3, 3) from the link's axes to the root's, in the zero posture.
-        place: (3,) of its origin in the root's frame [m].
-    """
+class _Member(NamedTuple):
+    """A link's segment, its rotation (3, 3) and place (3,) [m] in the root's frame, in the zero posture."""
 
     segment: str
     rotation: FloatArray

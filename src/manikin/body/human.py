@@ -32,9 +32,9 @@ from manikin.body.human_parts import (
 )
 from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
-from manikin.body.strength import DEFAULT_AGE, HANDS, carrying, check_strength, hinge_strength
+from manikin.body.strength import AGE_RANGE, DEFAULT_AGE, HANDS, carrying, hinge_strength
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, skew
+from manikin.numerics.spatial import FloatArray, finite_number, skew
 
 _SOFT_PAIRS = (
     # One short link apart: the shapes overlap in ordinary postures.
@@ -111,7 +111,8 @@ def human(
         BodyError: If a value is out of its range.
     """
     size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths)
-    check_strength(age, strength)
+    finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
+    finite_number(strength, "strength", above=0.0, error=BodyError)
     builder = _HumanBuilder(size, off_axis_masses, age, strength)
     return BodyModel(
         name="human",

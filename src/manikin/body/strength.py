@@ -233,12 +233,6 @@ def hinge_strength(
     return against.torque(mass, stature, sex, age), along.torque(mass, stature, sex, age)
 
 
-def check_strength(age: float, strength: float) -> None:
-    """Raise a BodyError for an age [years] or a multiple of the strength out of its range."""
-    finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
-    finite_number(strength, "strength", above=0.0, error=BodyError)
-
-
 HANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"left": ("left_hand",), "right": ("right_hand",), "both": ("left_hand", "right_hand")}
 )

@@ -22,6 +22,7 @@ from manikin.kinematics.posture_terms import (
     Linearised,
     PositionTerm,
     ReferenceTerm,
+    Requirement,
     RotationTerm,
     Term,
     UprightTerm,
@@ -196,9 +197,9 @@ class PostureProblem:
         if self.learnt_margin is not None:
             finite_number(self.learnt_margin, "posture learnt_margin [rad]", at_least=0.0)
 
-    def requirements(self) -> tuple[Term, ...]:
+    def requirements(self) -> tuple[Requirement, ...]:
         """Terms that must be zero."""
-        terms: list[Term] = []
+        terms: list[Requirement] = []
         for contact in self.contacts:
             if contact.part is not SolePart.FULL:
                 terms.append(self._edge(contact))
