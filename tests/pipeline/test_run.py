@@ -11,7 +11,7 @@ from manikin.scenarios import load_scenario
 
 
 def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
-    text = load_scenario("platform").to_yaml().replace("min_margin: 16.7", "min_margin: 75.0")
+    text = load_scenario("platform").to_yaml().replace("min_margin: 16.7", "min_margin: 120.0")
     file = tmp_path / "greedy.yaml"
     file.write_text(text)
     result = run(file, out=tmp_path / "out")

@@ -9,7 +9,7 @@ from manikin.errors import ScenarioError
 from manikin.motion.dynamics import centroidal_motion
 from manikin.motion.file import read_motions
 from manikin.pipeline.runner import run
-from manikin.pipeline.stages.context import RunContext
+from manikin.pipeline.stages import walking_stage
 from manikin.pipeline.stages.walking_stage import plan_walks, walked_motion
 from manikin.scenarios import load_scenario
 from manikin.walking import Walker, walk_along
@@ -19,23 +19,36 @@ WALKING = ("goal-left", "goal-right", "corridor", "catch", "narrow")
 
 
 @pytest.fixture(scope="module")
-def ran(runs):
-    """Results of the scenarios and their directories."""
-    return lambda name: (runs(name), runs(name).directory)
-
-
-@pytest.fixture(scope="module")
-def planned():
-    """Contexts and ways of the scenarios, each planned once."""
+def walked(tmp_path_factory):
+    """Result, context and routes of a scenario, each run once."""
     found = {}
 
     def once(name):
         if name not in found:
-            context = RunContext.of(load_scenario(name))
-            found[name] = context, plan_walks(context)
+            routes = []
+
+            def noted(context, *places):
+                routes[:] = context, plan_walks(context, *places)
+                return routes[1]
+
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(walking_stage, "plan_walks", noted)
+                found[name] = run(name, out=tmp_path_factory.mktemp(name)), *routes
         return found[name]
 
     return once
+
+
+@pytest.fixture(scope="module")
+def ran(walked):
+    """Results of the scenarios and their directories."""
+    return lambda name: (walked(name)[0], walked(name)[0].directory)
+
+
+@pytest.fixture(scope="module")
+def planned(walked):
+    """Contexts and routes of the scenarios."""
+    return lambda name: walked(name)[1:]
 
 
 def moving(block):

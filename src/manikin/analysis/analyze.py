@@ -64,9 +64,8 @@ def walked_segments(found: Reconstruction) -> PathSegments | None:
     height = places[:, :2, 2].mean(axis=1) - places[:, 2, 2]
     if np.any(height < UPRIGHT * float(standing[:2, 2].mean() - standing[2, 2])):
         return None
-    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0])
     try:
-        return segment_path(ShoulderPaths(places[:, 0, :2], places[:, 1, :2], rate))
+        return segment_path(ShoulderPaths(places[:, 0, :2], places[:, 1, :2], found.rate))
     except InputError:  # the shoulders are above each other
         return None
 

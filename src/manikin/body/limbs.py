@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.body.configuration import Configuration
 from manikin.body.human import FRONT_OF_KNEE, SEAT_LENGTH, SEAT_WIDTH, SKIN
-from manikin.body.model import BodyModel
+from manikin.body.model import BodyModel, look_up
 from manikin.body.segments import Effector, Hinge, Limb, Segment, ShapeKind
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
@@ -91,15 +91,11 @@ def carrying_segment(body: BodyModel, effector: str, point: FloatArray) -> str:
     return hanging.name if hanging is not None and line is not None and point[0] > line else own
 
 
-_OTHER = {"left_": "right_", "right_": "left_"}
-
-
 def mirrored_name(name: str) -> str:
     """Name of the same part on the other side; one in the middle keeps its name."""
-    for prefix, other in _OTHER.items():
-        if name.startswith(prefix):
-            return other + name[len(prefix) :]
-    return name
+    side, _, part = name.partition("_")
+    other = {"left": "right", "right": "left"}.get(side)
+    return name if other is None else f"{other}_{part}"
 
 
 def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
@@ -231,10 +227,7 @@ def limb_named(body: BodyModel, name: str) -> Limb:
     Raises:
         BodyError: If there is none.
     """
-    for limb in body.limbs:
-        if limb.name == name:
-            return limb
-    raise BodyError(f"no limb {name!r}; valid: {', '.join(limb.name for limb in body.limbs) or 'none'}")
+    return look_up({limb.name: limb for limb in body.limbs}, name, "limb")
 
 
 def parent_segment(body: BodyModel, limb: Limb) -> str:
@@ -284,7 +277,7 @@ def limb_placement(state: Configuration, limb: Limb) -> tuple[FloatArray, FloatA
     return rotation, state.point(parent, limb_origin(state.body, limb))
 
 
-def are_mirrored(body: BodyModel, first: Limb, second: Limb, tolerance: float = 1e-12) -> bool:
+def are_mirrored(body: BodyModel, first: Limb, second: Limb) -> bool:
     """Whether equal angles of two limbs are postures reflected in the sagittal plane.
 
     Both must hang on the same segment and have reflected origins, axes and effectors and equal
@@ -297,18 +290,20 @@ def are_mirrored(body: BodyModel, first: Limb, second: Limb, tolerance: float = 
     end, other = body.effector(first.effector), body.effector(second.effector)
     reflected = np.outer(REFLECTION, REFLECTION) * end.rotation
     return (
-        all(_segments_mirrored(body.segment(a), body.segment(b), tolerance) for a, b in pairs)
-        and np.allclose(REFLECTION * end.translation, other.translation, rtol=0.0, atol=tolerance)
-        and np.allclose(reflected, other.rotation, rtol=0.0, atol=tolerance)
+        all(_segments_mirrored(body.segment(a), body.segment(b)) for a, b in pairs)
+        and _close(REFLECTION * end.translation, other.translation)
+        and _close(reflected, other.rotation)
     )
 
 
-def _segments_mirrored(first: Segment, second: Segment, tolerance: float) -> bool:
+def _segments_mirrored(first: Segment, second: Segment) -> bool:
     if len(first.hinges) != len(second.hinges):
         return False
-    close = np.allclose(REFLECTION * first.origin, second.origin, rtol=0.0, atol=tolerance)
-    return close and all(
-        np.allclose(-REFLECTION * a.axis, b.axis, rtol=0.0, atol=tolerance)
-        and (a.lower, a.upper) == (b.lower, b.upper)
+    return _close(REFLECTION * first.origin, second.origin) and all(
+        _close(-REFLECTION * a.axis, b.axis) and (a.lower, a.upper) == (b.lower, b.upper)
         for a, b in zip(first.hinges, second.hinges, strict=True)
     )
+
+
+def _close(first: FloatArray, second: FloatArray) -> bool:
+    return np.allclose(first, second, rtol=0.0, atol=1e-12)

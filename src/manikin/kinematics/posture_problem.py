@@ -15,7 +15,6 @@ from manikin.body.natural_range import LearntJoint, learnt_joints
 from manikin.contact import Contact, ContactKind, SolePart
 from manikin.errors import BodyError, InputError
 from manikin.kinematics.posture_terms import (
-    UP,
     ClearanceTerm,
     ComTerm,
     EdgeTerm,
@@ -258,9 +257,7 @@ class PostureProblem:
             sides = ("left_upper_arm", "right_upper_arm")
             tilts = {"pelvis": weights.pelvis, "thorax": weights.trunk, "head": weights.head}
             tilts.update(dict.fromkeys(sides, weights.arms))
-            wishes += [
-                (np.full(3, weight), UprightTerm(name, UP)) for name, weight in tilts.items() if name in names
-            ]
+            wishes += [(np.full(3, w), UprightTerm(name)) for name, w in tilts.items() if name in names]
         return tuple(wishes)
 
     def limits(self) -> LimitTerm:

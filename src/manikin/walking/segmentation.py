@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.errors import InputError
 from manikin.numerics.signals import SHARES, low_passed
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.recordings.readers.marker_sets import SIDES, segment_joint
+from manikin.recordings.readers.marker_sets import SIDES, joint_of
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.walking.path.walking_path import SampledWalk
 
@@ -74,9 +74,7 @@ class ShoulderPaths:
         Raises:
             InputError: If the recording has no such joints, or fewer than three frames.
         """
-        left, right = (
-            recording.positions[:, segment_joint(recording, f"{side}_upper_arm"), :2] for side in SIDES
-        )
+        left, right = (recording.positions[:, joint_of(recording, f"{side}_upper_arm"), :2] for side in SIDES)
         return cls(left, right, recording.rate)
 
     @classmethod
