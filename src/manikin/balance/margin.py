@@ -72,7 +72,6 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
     leads back to the flat takes the place of its pairs of rows.
 
     Args:
-        W: Wrench polytope.
         wrench: (..., 6) about ``W.reference``, of a point mass or a whole body.
         com: (..., 3) in the world [m].
 
@@ -166,7 +165,6 @@ class BalanceReport(Displayed):
     """Balance of one stance and CoM state.
 
     Attributes:
-        W: The wrench polytope.
         wrench: (6,) pseudo-wrench about ``W.reference`` [N, N.m].
         balanced: Whether the wrench is in W_p (to a rounding of 1e-9 of its size).
         margin: Ms3 about the CoM, alpha = 1 m: the same wherever the scene stands [N.m].

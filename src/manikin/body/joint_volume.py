@@ -144,10 +144,6 @@ class JointVolume:
         along = np.where(over == 0.0, slope / self.step, 0.0)
         return along - over / np.maximum(beyond, _ROUNDING)[..., None]
 
-    def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:
-        """(...) whether (..., 3) angles are inside or on the surface."""
-        return self.distance(angles) >= 0.0
-
     def _on_grid(self, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Points of the grid in steps, and the distance [rad] from the angles to them."""
         q = np.asarray(angles, dtype=np.float64)

@@ -264,16 +264,7 @@ def carrying(body: BodyModel, mass: float, hand: str = "both") -> BodyModel:
 
 
 def hand_masses(body: BodyModel, mass: float, hand: str = "both") -> dict[str, float]:
-    """What each hand of a body carries of a load [kg], by the name of its effector.
-
-    Args:
-        body: Who carries it.
-        mass: Of the load [kg]; of 0 nothing.
-        hand: ``"left"``, ``"right"`` or ``"both"``.
-
-    Raises:
-        BodyError: If the mass is negative, the hand is not known, or the body has no such hand.
-    """
+    """What each hand of a body carries of a load [kg], by the name of its effector; see :func:`carrying`."""
     finite_number(mass, "load [kg]", at_least=0.0, error=BodyError)
     if hand not in HANDS:
         raise BodyError(f"hand of the load is {hand!r}; valid: {', '.join(HANDS)}")

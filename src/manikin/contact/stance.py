@@ -23,6 +23,7 @@ from manikin.contact.contact import (
     sole_part,
 )
 from manikin.errors import ContactError
+from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 
@@ -223,19 +224,11 @@ class StanceSequence(Displayed):
         return tuple(sorted(swings, key=lambda swing: (swing.first_phase, swing.effector)))
 
     def _swings_of(self, effector: str) -> Iterator[Swing]:
-        held = [effector in phase.stance for phase in self.phases]
-        index = 0
-        while index < len(held):
-            if held[index]:
-                index += 1
-                continue
-            last = index
-            while last + 1 < len(held) and not held[last + 1]:
-                last += 1
-            start = self.phases[index - 1].stance[effector] if index > 0 else None
-            end = self.phases[last + 1].stance[effector] if last + 1 < len(held) else None
-            yield Swing(effector, index, last, start, end)
-            index = last + 1
+        free = np.array([effector not in phase.stance for phase in self.phases])
+        for first, stop in mask_runs(free):
+            start = self.phases[first - 1].stance[effector] if first > 0 else None
+            end = self.phases[stop].stance[effector] if stop < len(free) else None
+            yield Swing(effector, first, stop - 1, start, end)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,7 +15,6 @@ from manikin.body.natural_range import LearntJoint, learnt_joints
 from manikin.contact import Contact, ContactKind, SolePart
 from manikin.errors import BodyError, InputError
 from manikin.kinematics.posture_terms import (
-    UP,
     ClearanceTerm,
     ComTerm,
     EdgeTerm,
@@ -258,9 +257,7 @@ class PostureProblem:
             sides = ("left_upper_arm", "right_upper_arm")
             tilts = {"pelvis": weights.pelvis, "thorax": weights.trunk, "head": weights.head}
             tilts.update(dict.fromkeys(sides, weights.arms))
-            wishes += [
-                (np.full(3, weight), UprightTerm(name, UP)) for name, weight in tilts.items() if name in names
-            ]
+            wishes += [(np.full(3, w), UprightTerm(name)) for name, w in tilts.items() if name in names]
         return tuple(wishes)
 
     def limits(self) -> LimitTerm:
@@ -302,13 +299,14 @@ def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]
 def pairs_beside(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
     """Pairs of :func:`touching_pairs` that need not overlap: the segment's shapes end before its effector.
 
-    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere.
+    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere;
+    thigh and shank of a person who kneels neither.
     """
     return frozenset(
-        (body.effector(effector).segment, obstacle)
-        for effector, obstacle in effector_obstacles
-        if ends_before_tip(body, effector)
-    )
+        (segment, obstacle)
+        for effector, obstacle in effector_obstacles if ends_before_tip(body, effector)
+        for segment in end_segments(body, effector)
+    )  # fmt: skip
 
 
 def com_target(

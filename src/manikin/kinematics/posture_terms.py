@@ -5,7 +5,7 @@ Each term takes a :class:`~manikin.body.configuration.Configuration` and gives a
 for a tangent vector ``v`` of Pinocchio's ``integrate``.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -171,24 +171,15 @@ class UprightTerm:
 
     For small tilts it is as long as the tilt; unlike the sine it grows up to the opposite
     direction, so that a raised arm is drawn down.
-
-    Attributes:
-        segment: Name of the segment.
-        axis: (3,) unit axis of the segment that is to point along ``direction``.
-        direction: (3,) unit direction in the world.
     """
 
     segment: str
-    axis: FloatArray = field(default_factory=lambda: UP)
-    direction: FloatArray = field(default_factory=lambda: UP)
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """See :class:`Term`."""
         rotation, _ = configuration.segment_placement(self.segment)
-        axis = rotation @ self.axis
-        return Linearised(
-            axis - self.direction, -skew(axis) @ configuration.segment_jacobian(self.segment)[3:]
-        )
+        axis = rotation @ UP
+        return Linearised(axis - UP, -skew(axis) @ configuration.segment_jacobian(self.segment)[3:])
 
     def describe(self, residual: FloatArray) -> str:
         """See :class:`Term`."""
@@ -266,20 +257,6 @@ class LimitTerm:
         return f"hinge '{self.body.joint_names[worst]}' is {-residual[worst]:.4f} rad beyond its range"
 
 
-class Clearances(NamedTuple):
-    """Distances beyond the safety distance, with their gradients.
-
-    Attributes:
-        residual: (k,) distance minus the safety distance [m]; negative is too close.
-        jacobian: (k, nv).
-        pairs: The shapes of each row.
-    """
-
-    residual: FloatArray
-    jacobian: FloatArray
-    pairs: tuple[Pair, ...]
-
-
 BESIDE = 5e-4
 """Distance of what may be as near as touching; more than the solver's tolerance [m]."""
 
@@ -304,13 +281,13 @@ class ClearanceTerm:
     ignore: Ignored
     beside: Ignored = NOTHING
 
-    def evaluate(self, configuration: Configuration) -> Clearances:
-        """Distances beyond the safety distance of the pairs that are close."""
+    def evaluate(self, configuration: Configuration) -> tuple[Linearised, tuple[Pair, ...]]:
+        """Distances beyond the safety distance [m] of the pairs of shapes that are close."""
         reach = max(self.safety, self.self_safety) + self.activation
         close = self.proximity.evaluate(configuration.q, reach, self.ignore)
         safety = np.array([self._safety(*pair) for pair in close.pairs])
         gradient = close.gradient.reshape(-1, configuration.body.nv)
-        return Clearances(close.distance - safety, gradient, close.pairs)
+        return Linearised(close.distance - safety, gradient), close.pairs
 
     def describe(self, residual: FloatArray, pairs: tuple[Pair, ...]) -> str:
         """Say which pair is closest to or beyond its safety distance."""

@@ -92,18 +92,17 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     with_contacts = context if context.scenario.file.supports is not None else plan_contacts(context, report)
     if with_contacts is None:
         return RunResult.of(report)
-    if context.scenario.refines:
-        return _refined(with_contacts, report, requirements)
-    if context.scenario.is_point_mass:
+    if context.scenario.is_point_mass and not context.scenario.refines:
         return _moved_point_mass(with_contacts, report)
-    result, schedule = _followed(with_contacts, report, requirements)
+    planned = _refined if context.scenario.refines else _followed
+    result, schedule = planned(with_contacts, report, requirements)
     for _ in range(1, context.scenario.contacts.attempts):
         phase = failed_phase(report.failure, schedule)
         again = None if phase is None else plan_contacts_again(with_contacts, report, phase)
         if again is None:
             break
         with_contacts = again
-        result, schedule = _followed(with_contacts, report, requirements)
+        result, schedule = planned(with_contacts, report, requirements)
     return result()
 
 
@@ -150,8 +149,14 @@ def failed_phase(failure: StageFailure | None, schedule: ContactSchedule | None)
     return None if schedule is None else int(schedule.phase_at(failure.time_s))
 
 
-def _refined(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
-    """Key postures of the contact plan, or of the centre of mass on given supports, then the refinement."""
+def _refined(
+    context: RunContext, report: Report, requirements: ExecutionRequirements
+) -> tuple[Callable[[], RunResult], ContactSchedule | None]:
+    """Key postures of the contact plan, or of the centre of mass on given supports, then the refinement.
+
+    Returns:
+        As :func:`_followed`.
+    """
     centroidal, keyed = None, None
     if context.plan is not None:
         keyed = KeyedContacts.of_plan(context.plan, context.scenario.contact_model)
@@ -161,9 +166,10 @@ def _refined(context: RunContext, report: Report, requirements: ExecutionRequire
         if plan.trajectory is not None and plan.postures is not None:
             keyed = KeyedContacts.of_postures(plan.trajectory.schedule, plan.postures)
     if keyed is None:
-        return RunResult.of(report, centroidal)
+        return partial(RunResult.of, report, centroidal), None
     refined, execution = refine_contacts(context, report, keyed), None
     if refined.succeeded and context.scenario.execution_required:
         planned = PlannedMotion(refined.schedule, refined.motion)
         execution = execute_motion(context, report, planned, requirements)
-    return RunResult.of(report, centroidal, refined, execution)
+        report.judge()
+    return partial(RunResult.of, report, centroidal, refined, execution), refined.schedule

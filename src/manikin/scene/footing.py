@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.contact.contact import MOST_CORNERS
-from manikin.numerics.polytope import convex_polygon, fewer_corners
+from manikin.numerics.polytope import convex_polygon, fewer_corners, walls
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.scene.surface import Surface
 
@@ -236,9 +236,7 @@ class _Sole:
         hull = convex_polygon(corners)
         angle = np.arctan2(hull[:, 1], hull[:, 0])
         hull, angle = np.roll(hull, -int(np.argmin(angle)), axis=0), np.sort(angle)
-        edge = np.roll(hull, -1, axis=0) - hull
-        self._walls = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
-        self._offsets = np.einsum("ei,ei->e", self._walls, hull)
+        self._walls, self._offsets = walls(hull)
         self.radius = float(np.linalg.norm(hull, axis=1).max())
         doubled = hull[:, 0] * np.roll(hull[:, 1], -1) - hull[:, 1] * np.roll(hull[:, 0], -1)
         self.area = float(0.5 * doubled.sum())

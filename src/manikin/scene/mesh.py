@@ -67,9 +67,6 @@ class Mesh:
         """Check and clean a mesh.
 
         Args:
-            vertices: (n, 3) [m].
-            faces: (m, 3) vertex indices.
-            source: Name for messages.
             convex: ``"hull"`` replaces the mesh by its convex hull, ``"parts"`` each
                 connected piece by its own hull; both are larger than the mesh, hence safe.
             max_faces: More triangles than this (after hulls) are refused.
@@ -128,7 +125,6 @@ def load_mesh(
     up: str | None = None,
     scale: float = 1.0,
     convex: Convexity = "no",
-    max_faces: int = MAX_FACES,
 ) -> Mesh:
     """Read an STL, OBJ, PLY or DAE file into metres.
 
@@ -140,7 +136,6 @@ def load_mesh(
             turned so that it is z. When omitted, a DAE file's own, and z otherwise.
         scale: Further factor on every coordinate, > 0.
         convex: As for :class:`Mesh`.
-        max_faces: As for :class:`Mesh`.
 
     Raises:
         SceneError: If the file is missing, of another format, unreadable, or no usable mesh.
@@ -160,7 +155,7 @@ def load_mesh(
     own_up, own_metres = _collada_asset(file) if extension == "dae" else ("z", 1.0)
     metres = own_metres if unit is None else UNITS[unit]
     vertices = np.asarray(loaded.vertices, dtype=np.float64) @ _UP_TO_Z[up or own_up].T
-    return Mesh(vertices * (metres * factor), loaded.faces, str(file), convex=convex, max_faces=max_faces)
+    return Mesh(vertices * (metres * factor), loaded.faces, str(file), convex=convex)
 
 
 def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:

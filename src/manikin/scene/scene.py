@@ -171,8 +171,7 @@ class Scene(Displayed):
     def nearest(self, point: ArrayLike) -> tuple[str, float]:
         """Name of the obstacle nearest to a (3,) world point, and its signed distance [m].
 
-        Raises:
-            SceneError: If the scene is empty.
+        SceneError if the scene is empty.
         """
         if not self.obstacles:
             raise SceneError("scene is empty, so nothing is nearest; valid: at least one obstacle")
@@ -204,7 +203,7 @@ class Scene(Displayed):
         """Signed distance [m] of a (3,) world point to each obstacle, and its name; the nearest first."""
         place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
         distances = [
-            (min(meter(place, other)[0] for meter, other in meters), name)
+            (min(meter(place, other, np.inf)[0] for meter, other in meters), name)
             for name, meters in self._point_meters.items()
         ]
         return sorted(distances, key=lambda item: item[0])

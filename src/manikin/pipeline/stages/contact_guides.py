@@ -69,7 +69,7 @@ def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) ->
     result = plan_guide(world, GuideTask(*ends), rng)
     path = result.path
     places = None if path is None else path.poses(np.linspace(0.0, 1.0, GUIDE_PLACES))[:, :3]
-    return RootGuide(places, result.statistics.samples, clock.perf_counter() - began)
+    return RootGuide(places, result.samples, clock.perf_counter() - began)
 
 
 def _sunk(pose: FloatArray, checker: ReachabilityChecker) -> FloatArray | None:

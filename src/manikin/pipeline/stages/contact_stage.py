@@ -19,6 +19,7 @@ from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.execution_stage import act_of
 from manikin.planning.contacts import (
     ContactPlan,
+    CrawlSearch,
     Endpoint,
     Endpoints,
     Extension,
@@ -112,8 +113,19 @@ class _FootSearch(_ContactSearch):
             if before.stage is None:
                 return self._tally.failed(f"the goal: {before.failure}", "goal")
             goal = before.stage
-        self._search = self._searched(start, goal)
-        return self._result(self._search.run())
+        walk = self._search = self._searched(start, goal)
+        found = walk.run()
+        if found.plan is None and walk.search.walled_off() is not None:
+            self._search, crawl = None, self._crawl(walk, start, goal)
+            found = replace(crawl, failure=f"{found.failure}; {crawl.failure}")
+        return self._result(found)
+
+    def _crawl(self, walk: WalkSearch, start: Stage, goal: Stage) -> Extension:
+        """The way on hands and knees below what is too low to walk under."""
+        return CrawlSearch(
+            walk.poser, self._places, start, goal, self._scenario.contacts.friction,
+            lambda first, last: self._searched(first, last).run(), walk.settings,
+        ).run()  # fmt: skip
 
     def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
         whole = self._acting(plan) if self._seat is None else self._sitting(plan, self._seat)

@@ -46,7 +46,9 @@ class SoleSection(Section):
 class ContactSection(Section):
     """One contact; what it leaves out comes from the section around it."""
 
-    kind: Literal["sole", "point", "grasp"] | None = optional("default: sole for a foot, grasp for a hand")
+    kind: Literal["sole", "point", "grasp"] | None = optional(
+        "default: sole for a foot, grasp for a hand, point for a fist or a knee"
+    )
     position: Annotated[Vector3, FrameMoves.POINT] = required(
         "of the contact (centre of a sole) in the world [m]"
     )
@@ -90,7 +92,8 @@ class ContactSection(Section):
 
     def kind_for(self, effector: str) -> str:
         """Kind of the contact when ``effector`` makes it."""
-        return self.kind or ("grasp" if "hand" in effector else "sole")
+        usual = {"hand": "grasp", "fist": "point", "knee": "point"}
+        return self.kind or usual.get(effector.rpartition("_")[2], "sole")
 
     def check_for(self, effector: str, path: str = "") -> None:
         """Refuse keys that the contact's kind does not have.
@@ -107,7 +110,10 @@ class ContactSection(Section):
             raise refuse(f"{path}max_force_N", "is missing; valid: a number > 0 [N] for a grasp")
 
 
-EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand", "buttocks")
+EFFECTORS = (
+    "left_foot", "right_foot", "left_hand", "right_hand", "left_fist", "right_fist", "left_knee",
+    "right_knee", "buttocks",
+)  # fmt: skip
 """Effectors of a human that a phase may put in contact, in the order of the contact tables."""
 
 MASSLESS_FEET = ("left_front_foot", "right_front_foot", "left_hind_foot", "right_hind_foot")
@@ -135,6 +141,10 @@ class PhaseSection(Section):
     right_foot: ContactEntry | None = optional("contact of the right foot, or 'same'")
     left_hand: ContactEntry | None = optional("contact of the left hand, or 'same'")
     right_hand: ContactEntry | None = optional("contact of the right hand, or 'same'")
+    left_fist: ContactEntry | None = optional("contact of the end of the left hand, or 'same'")
+    right_fist: ContactEntry | None = optional("contact of the end of the right hand, or 'same'")
+    left_knee: ContactEntry | None = optional("contact of the left knee, or 'same'")
+    right_knee: ContactEntry | None = optional("contact of the right knee, or 'same'")
     left_front_foot: ContactEntry | None = optional(_MASSLESS)
     right_front_foot: ContactEntry | None = optional(_MASSLESS)
     left_hind_foot: ContactEntry | None = optional(_MASSLESS)
