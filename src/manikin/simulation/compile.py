@@ -319,7 +319,8 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
         parent = spec.worldbody if segment.parent is None else made[segment.parent]
         item = parent.add_body(name=segment.name, pos=segment.origin)
         made[segment.name] = item
-        _set_inertia(item, segment)
+        item.explicitinertial, item.mass, item.ipos = True, segment.mass, segment.com
+        item.fullinertia = segment.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         if segment.parent is None:
             item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
         for hinge in segment.hinges:
@@ -351,11 +352,6 @@ def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
         "priority": 1,
         "solimp": [*SOFT_IMPEDANCE, 0.5, 2.0],
     }
-
-
-def _set_inertia(item: Any, segment: Segment) -> None:
-    item.explicitinertial, item.mass, item.ipos = True, segment.mass, segment.com
-    item.fullinertia = segment.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
 def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions) -> None:
