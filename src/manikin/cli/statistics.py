@@ -144,11 +144,7 @@ def _settings(
     bar: float | None, box: Box | None, limit: float | None, effectors: str, phases: int | None,
     start: str | None, origin: "From",
 ) -> "StatisticsSettings":  # fmt: skip
-    """Settings of the statistics.
-
-    Raises:
-        InputError: If a number does not fit, or both a bar and a box are given.
-    """
+    """Settings of the statistics; a bar and a box exclude each other."""
     from manikin.numerics.spatial import finite_number
     from manikin.recordings.statistics.clip_statistics import StatisticsSettings
     from manikin.recordings.statistics.passages import LIMIT, Overhead

@@ -115,14 +115,7 @@ Curves = Mapping[str, tuple[FloatArray, str]]
 
 @dataclass(frozen=True)
 class _Band:
-    """Curves over time on a common scale.
-
-    Attributes:
-        title: What they are, with the unit.
-        curves: Values (n,) and colour by name; the first is drawn last.
-        low: Lower end of the scale.
-        high: Upper end.
-    """
+    """Curves over time on a scale from ``low`` to ``high``: values (n,) and colour by name."""
 
     title: str
     curves: Curves
@@ -245,11 +238,7 @@ def _supports(sheet: SvgDrawing, clock: _Clock, analysis: Analysis, top: float) 
 
 
 class _Postures:
-    """Postures from the right side of where the person goes, or looks at first.
-
-    Attributes:
-        height: That they need [px].
-    """
+    """Postures from the right side of where the person goes, or looks at first; ``height`` is in pixels."""
 
     def __init__(self, analysis: Analysis) -> None:
         frames = np.unique((np.arange(0.5, POSTURES) / POSTURES * len(analysis.time)).astype(np.int64))

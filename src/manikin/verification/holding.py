@@ -83,12 +83,8 @@ class HoldingRows:
 
     @property
     def rows(self) -> list[Requirement | None]:
-        """The requirements."""
-        quantities = (
-            self._error, self._turn, self._range, self._clearance, self._sinking, self._flesh, self._grasped,
-            self._self,
-        )  # fmt: skip
-        return [item.row for item in quantities]
+        """The requirements in the order of their attributes."""
+        return [item.row for item in vars(self).values() if isinstance(item, Worst)]
 
     def measure(self, postures: Sequence[HeldPosture], touched: Mapping[int, frozenset[str]]) -> None:
         """Measure postures; ``touched`` names the obstacles on which each contact lies, by its id."""

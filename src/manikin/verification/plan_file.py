@@ -194,13 +194,12 @@ class PlannedContacts:
         for number, stage in enumerate(self.stages):
             for key in ("posture", "com", "com_velocity", "via"):
                 _check_finite(getattr(stage, key), f"stages[{number}].{key}")
+            contacts = dict(stage.contacts)
             for name, contact in stage.contacts.items():
                 for values in (contact.position, contact.rotation_contact_to_world, contact.points):
                     _check_finite(values, f"stages[{number}].contacts.{name}")
-            contacts = {
-                name: kept[name] if name in kept and _is_kept(contact, kept[name]) else contact
-                for name, contact in stage.contacts.items()
-            }
+                if name in kept and _is_kept(contact, kept[name]):
+                    contacts[name] = kept[name]
             kept = contacts
             stages.append(replace(stage, contacts=MappingProxyType(contacts)))
         object.__setattr__(self, "stages", tuple(stages))

@@ -76,9 +76,9 @@ class ContactRows:
         self._distance = Worst("max_contact_distance_m", f"distance {between}", ON_SURFACE, 1e-9)
         self._grasp = Worst("max_grasp_distance_m", "distance between palm and what it grasps", GRASP_REACH)
         self._hidden = Worst("max_hidden_depth_m", "depth inside a solid", HIDDEN, 1e-9)
+        self._beyond = Worst("max_beyond_sole_m", "distance of contact points beyond the sole", 1e-3, 1e-9)
         self._share = Worst("min_sole_share", "part of the sole in contact", share, 1e-6)
         self._across = Worst("min_rung_share", "part of the sole's width on a rung", LEAST_ACROSS, 1e-6)
-        self._beyond = Worst("max_beyond_sole_m", "distance of contact points beyond the sole", 1e-3, 1e-9)
         self._friction = Worst("max_friction", "coefficient of friction", rules.friction, 1e-9)
         self._force = Worst("max_grasp_force_N", "force limit of a grasp", rules.grasp_force, 1e-9)
 
@@ -95,12 +95,8 @@ class ContactRows:
 
     @property
     def rows(self) -> list[Requirement | None]:
-        """The requirements, those whose failure explains others first."""
-        quantities = (
-            self._angle, self._point_angle, self._distance, self._grasp, self._hidden, self._beyond,
-            self._share, self._across, self._friction, self._force,
-        )  # fmt: skip
-        return [item.row for item in quantities]
+        """The requirements in the order of their attributes: those whose failure explains others first."""
+        return [item.row for item in vars(self).values() if isinstance(item, Worst)]
 
     def _measured(self, contact: Contact, where: str) -> frozenset[str]:
         if contact.kind is ContactKind.GRASP:

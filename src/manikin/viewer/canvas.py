@@ -29,10 +29,7 @@ class Page(ABC):
     """
 
     def __init__(self, port: int, frame_rate: float) -> None:
-        """Start the server.
-
-        Args:
-            frame_rate: Largest number of pictures per second.
+        """Start the server, which makes at most ``frame_rate`` pictures per second.
 
         Raises:
             InputError: If the port is taken.
@@ -145,12 +142,7 @@ class BodyShapes:
     def __init__(
         self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7, root: str = "/body"
     ) -> None:
-        """Draw the body; what is inside it stays visible.
-
-        Args:
-            opacity: In [0, 1].
-            root: Name of the body on the page.
-        """
+        """Draw the body, called ``root`` on the page, with an opacity in [0, 1]."""
         self._body = body
         self.data = body.pinocchio.createData()
         self.frames: dict[str, viser.FrameHandle] = {}

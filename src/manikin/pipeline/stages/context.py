@@ -235,12 +235,9 @@ class Report:
     def __init__(
         self, context: RunContext, out: str | Path | None, progress: Progress | None, began: float
     ) -> None:
-        """Open the run directory.
+        """Open the run directory ``out``; nothing is written when None.
 
-        Args:
-            context: What is run.
-            out: Run directory; nothing is written when None.
-            began: Reading of ``time.perf_counter`` when the run began [s].
+        ``began`` is the reading of ``time.perf_counter`` when the run began [s].
 
         Raises:
             MotionFileError: If the directory cannot be made, or holds something that is not a run.
