@@ -224,8 +224,10 @@ class ViewerSession(Page):
             force = motion.contact_force[index, number, :3]
             drawn = bool(np.linalg.norm(force) >= SMALLEST_FORCE) and self._forces.value
             if drawn:
-                start = self._shapes.data.oMf[self._body.effector_frame(name)].translation
-                start = self._feet[name][index] if name in self._feet else start
+                if name in self._feet:
+                    start = self._feet[name][index]
+                else:
+                    start = self._shapes.data.oMf[self._body.effector_frame(name)].translation
                 self._arrows[name].points = np.array([[start, start + METRES_PER_NEWTON * force]])
             self._arrows[name].visible = drawn
 
