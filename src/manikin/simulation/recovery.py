@@ -132,14 +132,10 @@ def judge(
     """Outcome of a push.
 
     Args:
-        controller: Controller of the body.
-        trace: Every control step.
-        pushes: Pushes that disturbed it.
         feet: How its feet were on the ground.
         fallen: Why the run was ended before its time; empty when it was not.
         touches: Unplanned touches; those of the body with itself, as hand and thigh, are no support.
         wall: Wall time [s].
-        steps: Steps that were taken.
         refused: Why a step that was needed was not taken.
     """
     motion, standing = trace.motion, controller.standing

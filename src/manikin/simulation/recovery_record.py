@@ -84,12 +84,9 @@ class RecoveryRecorder:
         self, time: float, output: RecoveryOutput, sensed: Sensed, wrench: FloatArray, carried: CarriedPoints,
         *, held: bool = False,
     ) -> None:  # fmt: skip
-        """Add a step.
+        """Add a step that begins at a time [s], with what is sensed in the first engine step after it.
 
         Args:
-            time: Beginning of the step [s].
-            output: Decision of the controller then.
-            sensed: Measurements of the first engine step after it.
             wrench: (6,) mean force and moment of the ground about the world's origin.
             carried: Contact points of the scene that carried that wrench.
             held: Whether the feet are welded to the ground, which is no touch.

@@ -78,7 +78,6 @@ class World:
         self.penetration, self.padding_compression = 0.0, 0.0
         self._total, self._steps = np.zeros(6), 0
         self._carried: list[tuple[NDArray, ...]] = []
-        self._elliptic = self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
         self._is_segment = np.array([segment for _, segment in self._owners], dtype=bool)
 
     # --- state -----------------------------------------------------------------------------
@@ -231,9 +230,7 @@ class World:
     def _normal_forces(self) -> FloatArray:
         """(ncon,) normal force of each contact of the last step [N]."""
         address = self._data.contact.efc_address
-        if self._elliptic:
-            return np.where(address >= 0, self._data.efc_force[np.maximum(address, 0)], 0.0)
-        return self._contact_forces()[:, 0]
+        return np.where(address >= 0, self._data.efc_force[np.maximum(address, 0)], 0.0)
 
     def _contact_forces(self) -> FloatArray:
         """(ncon, 6) force and torque of each contact of the last step in its frame [N, N.m]."""

@@ -52,7 +52,7 @@ EASE = 0.9
 ROOM = 0.72
 """Height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]."""
 
-GAITS = ((0.42, 0.70), (0.28, 0.70), (0.28, 0.80), (0.28, 0.60))
+GAITS = ((0.42, 0.60), (0.42, 0.70), (0.28, 0.52), (0.28, 0.70))
 """Strides and distances of hands before knees that are tried, of a body of 1.75 m [m]."""
 
 KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
@@ -81,10 +81,10 @@ INSET = 0.03
 LIFT = 0.05
 """Height of a limb in flight [m]."""
 
-LEVEL = {"knee": 0.3, "fist": 3.0}
+LEVEL = {"knee": 0.3, "fist": 6.0}
 """Weights with which shanks are level and hands upright [1/rad^2]."""
 
-TILT = 0.22
+TILT = 0.19
 """Sine of the largest angle of a hand on its fist: its edge is not pressed into the ground."""
 
 TURNING = 1.2
