@@ -87,7 +87,7 @@ def test_every_walk_is_walked(ran, name):
 def test_everybody_keeps_room_on_the_common_clock(planned, name):
     """Measured every millisecond and until all have come, between all who walk and what stands there."""
     context, plan = planned(name)
-    room = context.scenario.walking.room_m
+    room = context.scenario.file.walking.room_m
     end = max(route.duration for route in (plan.route, *plan.others.values()))
     time = np.arange(0.0, end, 1e-3)
     standing = len(plan.obstacles) - len(plan.others)

@@ -13,7 +13,7 @@ from manikin.kinematics import PointTargets
 from manikin.numerics.spatial import GRAVITY
 from manikin.recordings import ForcePlate, Reconstruction, read_recording, reconstruct
 from manikin.recordings.supports.body_supports import RecordedSupports, Support, SupportPhase
-from manikin.recordings.supports.support_levels import Sole
+from manikin.recordings.supports.support_levels import RecordedSole
 from manikin.recordings.supports.supports import plate_loads, supports_of, supports_of_points, timing_errors
 
 STAND, SWING = 0.5, 0.45
@@ -197,7 +197,7 @@ def test_the_slowest_point_of_a_sole_is_nearest_to_what_it_turns_about(share, sl
     # At 1 rad/s, about a point on the sole or one sole's length, 0.25 m, before its toes.
     time = np.arange(200) / 100.0
     along = np.stack([np.cos(time), np.zeros(200), -np.sin(time)], axis=1) * np.linalg.norm(TOES)
-    sole = Sole.of([way * along for way in (-share, 1.0 - share)], 100.0)
+    sole = RecordedSole.of([way * along for way in (-share, 1.0 - share)], 100.0)
     assert sole.speed[50:150] == pytest.approx(slowest, abs=1e-3)
 
 

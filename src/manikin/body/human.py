@@ -57,6 +57,12 @@ BUTTOCK_RADIUS = 0.027
 SEAT_WIDTH = 0.14
 """Distance between the two lines that press on a seat, as a share of the stature."""
 
+FRONT_OF_KNEE = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+"""Rotation from the knee's effector to the lower leg."""
+
+SKIN = 0.005
+"""Distance of the effectors of knees and fists to the shapes behind them, which need not be level [m]."""
+
 _STANDING_DEG = MappingProxyType(
     {"hip_flexion": 2.0, "knee_flexion": 10.0, "ankle_dorsiflexion": 8.0, "elbow_flexion": 15.0}
 )
@@ -83,6 +89,8 @@ def human(
     Effectors: ``left_foot``, ``right_foot`` (sole centre, x to the toes, z up),
     ``left_hand``, ``right_hand`` (palm centre, x along the fingers, z out of the back of the
     hand: parallel to the world when the palm lies on a table, fingers forward),
+    ``left_fist``, ``right_fist`` (end of the hand, z to the wrist),
+    ``left_knee``, ``right_knee`` (before the thigh's round end, z through the joint, backwards),
     ``head`` (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on
     a seat, axes as the pelvis).
 
@@ -234,7 +242,16 @@ class _HumanBuilder:
             effectors.append(Effector(f"{side}_foot", f"{side}_foot", sole))
             palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
             effectors.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
+            fist = np.array([0.0, 0.0, -size.length("hand") - SKIN])
+            effectors.append(Effector(f"{side}_fist", f"{side}_hand", fist))
+            knee = np.array([self._leg_radii[0] + SKIN, 0.0, 0.0])
+            effectors.append(Effector(f"{side}_knee", f"{side}_leg", knee, FRONT_OF_KNEE))
         return effectors
+
+    @property
+    def _leg_radii(self) -> tuple[float, float]:
+        """Radii of thigh and shank [m]."""
+        return 0.038 * self.stature * self.girth, 0.029 * self.stature * self.girth
 
     def _strength(self, hinge: str) -> tuple[float, float]:
         size = self.size
@@ -344,7 +361,7 @@ class _HumanBuilder:
 
     def _leg(self, side: str) -> list[Segment]:
         size = self.size
-        thigh_radius, shank_radius = (share * self.stature * self.girth for share in (0.038, 0.029))
+        thigh_radius, shank_radius = self._leg_radii
         sign = 1.0 if side == "left" else -1.0
         thigh, shank = size.length("thigh"), size.length("shank")
         hip = (0.0, 0.5 * sign * size.hip_distance, 0.0)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.body.configuration import Configuration
-from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.body.human import FRONT_OF_KNEE, SEAT_LENGTH, SEAT_WIDTH, SKIN
 from manikin.body.model import BodyModel, look_up
 from manikin.body.segments import Effector, Hinge, Limb, Segment, ShapeKind
 from manikin.contact import ContactKind
@@ -45,26 +45,33 @@ def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
 
     They are its own and the one hanging on it; of a knee or an elbow both that meet in the joint.
     """
-    own = body.effector(effector).segment
-    for limb in body.limbs:
-        if limb.effector == effector and len(limb.segments) > 1 and is_further(body, limb):
-            return own, limb.segments[-2]
+    own, parent = body.effector(effector).segment, _meeting(body, effector)
+    if parent is not None:
+        return own, parent
     hanging = hanging_segment(body, own)
     return (own,) if hanging is None else (own, hanging.name)
 
 
-def ends_before_tip(body: BodyModel, effector: str) -> bool:
-    """Whether a limb touches in a point at its end, and all shapes of its last segment end before that."""
+def _meeting(body: BodyModel, effector: str) -> str | None:
+    """Segment that meets that of an effector in the joint with which it touches, or None."""
     frame = body.effector(effector)
-    shapes = body.segment(frame.segment).shapes
-    return (
-        any(
-            limb.effector == effector and limb.kind is ContactKind.POINT and not is_further(body, limb)
-            for limb in body.limbs
-        )
-        and bool(shapes)
-        and all(item.distance_to(frame.translation) > BEFORE_TIP for item in shapes)
-    )
+    own = body.segment(frame.segment)
+    shapes = () if own.parent is None else body.segment(own.parent).shapes
+    near = (shape.distance_to(own.origin + frame.translation) for shape in shapes)
+    return own.parent if any(distance < SKIN + BEFORE_TIP for distance in near) else None
+
+
+def ends_before_tip(body: BodyModel, effector: str) -> bool:
+    """Whether an effector touches in a point, and all shapes with which it does end before that."""
+    frame, meeting = body.effector(effector), _meeting(body, effector)
+    kinds = {limb.kind for limb in body.limbs if limb.effector == effector}
+    if not (kinds == {ContactKind.POINT} or (meeting is not None and not kinds)):
+        return False
+    own = [shape.distance_to(frame.translation) for shape in body.segment(frame.segment).shapes]
+    if meeting is not None:
+        place = body.segment(frame.segment).origin + frame.translation
+        own += [shape.distance_to(place) for shape in body.segment(meeting).shapes]
+    return bool(own) and min(own) > BEFORE_TIP
 
 
 def hinge_line(body: BodyModel, effector: str) -> float | None:
@@ -130,7 +137,6 @@ def mirrored(body: BodyModel, q: ArrayLike) -> FloatArray:
     return reflected
 
 
-_BACKWARD = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 _FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 _JOINTS = (
     # Contact, the segments of the limb, where the contact is seen from the joint.
@@ -163,7 +169,7 @@ def with_further_contacts(body: BodyModel, kinds: Collection[str] = FURTHER) -> 
         for side, other in (("left", "right"), ("right", "left")):
             chain = tuple(f"{side}_{part}" for part in parts)
             name = f"{side}_{joint}"
-            effectors[name] = _effector(body, name, chain, ahead)
+            effectors.setdefault(name, _effector(body, name, chain, ahead))
             limbs.append(Limb(name, name, chain, ContactKind.POINT, f"{other}_{joint}"))
     if "pelvis" in kinds:
         limbs.append(_pelvis(body))
@@ -189,7 +195,7 @@ def _effector(body: BodyModel, name: str, chain: tuple[str, ...], ahead: float) 
     radii = [float(shape.size[0]) for shape in shapes if shape.kind is ShapeKind.CAPSULE]
     if not radii:
         raise BodyError(f"{name} has no round shape around it; valid: a body with capsules for limbs")
-    turn = _BACKWARD if ahead > 0.0 else _FORWARD
+    turn = FRONT_OF_KNEE if ahead > 0.0 else _FORWARD
     return Effector(name, chain[-1], np.array([ahead * max(radii), 0.0, 0.0]), turn)
 
 

@@ -300,13 +300,14 @@ def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]
 def pairs_beside(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
     """Pairs of :func:`touching_pairs` that need not overlap: the segment's shapes end before its effector.
 
-    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere.
+    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere;
+    thigh and shank of a person who kneels neither.
     """
     return frozenset(
-        (body.effector(effector).segment, obstacle)
-        for effector, obstacle in effector_obstacles
-        if ends_before_tip(body, effector)
-    )
+        (segment, obstacle)
+        for effector, obstacle in effector_obstacles if ends_before_tip(body, effector)
+        for segment in end_segments(body, effector)
+    )  # fmt: skip
 
 
 def com_target(

@@ -24,6 +24,7 @@ from manikin.recordings.dynamics.recorded_dynamics import (
     margins_of_wrenches,
 )
 from manikin.recordings.dynamics.recorded_forces import torques_of
+from manikin.recordings.readers.marker_sets import SIDES
 from manikin.recordings.readers.markers import ForcePlate
 
 CUTOFF = 20.0
@@ -226,8 +227,6 @@ def _rms(values: FloatArray) -> float:
 
 JOINTS = ("hip_flexion", "hip_abduction", "knee_flexion", "ankle_dorsiflexion")
 """Hinges of a leg that are compared."""
-
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)

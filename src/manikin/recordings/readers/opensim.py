@@ -117,24 +117,17 @@ def _mot_table(text: str, file: str) -> tuple[list[str], FloatArray]:
                 f"{file}: row {number}: {len(row)} numbers for {len(names)} columns; "
                 f"valid: {len(names)} (is the file cut short?)"
             )
-    declared = _declared(head, file)
-    for key, count in (("rows", len(rows)), ("columns", len(names))):
-        if declared.get(key, count) != count:
-            raise InputError(f"{file}: {count} {key} where {declared[key]} are declared; valid: all of them")
+    counts = {"rows": len(rows), "columns": len(names)}
+    for line in head.splitlines():  # such as nRows=12 or datarows 12
+        key, *number = line.replace("=", " ").split() or [""]
+        for name in counts:
+            if key.lower() in (f"n{name}", f"data{name}"):
+                declared = whole_number(" ".join(number), f"{file}: {key}")
+                if declared != counts[name]:
+                    wrong = f"{counts[name]} {name} where {declared} are declared"
+                    raise InputError(f"{file}: {wrong}; valid: all of them")
     flat = numbers([word for row in rows for word in row], f"{file}: a row", gaps=True)
     return names, flat.reshape(len(rows), len(names))
-
-
-def _declared(head: str, file: str) -> dict[str, int]:
-    """Rows and columns of the header, ``nRows=12`` or ``datarows 12``."""
-    found = {}
-    for line in head.splitlines():
-        words = line.replace("=", " ").split()
-        key = words[0].lower() if words else ""
-        for name in ("rows", "columns"):
-            if key in (f"n{name}", f"data{name}"):
-                found[name] = whole_number(" ".join(words[1:]), f"{file}: {words[0]}")
-    return found
 
 
 def _mot_plates(names: list[str], file: str) -> dict[str, list[list[int]]]:

@@ -83,11 +83,9 @@ class PhaseSequence:
     @property
     def first_step(self) -> str | None:
         """The effector that touches down first; None if none does."""
-        for before, after in pairwise(self.phases):
-            for name in after.effectors:
-                if name not in before.effectors:
-                    return name
-        return None
+        pairs = ((before.effectors, after.effectors) for before, after in pairwise(self.phases))
+        steps = (name for before, after in pairs for name in after if name not in before)
+        return next(steps, None)
 
 
 def kind_of(effectors: Iterable[str]) -> str:
@@ -122,13 +120,11 @@ By = Literal["number", "kind", "effectors"]
 BYS: tuple[By, ...] = ("number", "kind", "effectors")
 
 
-def phase_durations(
-    sequences: Sequence[PhaseSequence], by: By = "number", *, cut: bool = False
-) -> dict[str, Spread]:
+def phase_durations(sequences: Sequence[PhaseSequence], by: By = "number") -> dict[str, Spread]:
     """Durations of the phases of the same name over all motions ([Qiu2012]_ Table 3.4, Fig. 3.11) [s].
 
-    Names, by the rule ``by``, are in the order in which they appear. With ``cut`` those count, too,
-    that begin or end with the recording.
+    Names, by the rule ``by``, are in the order in which they appear. Phases that begin or
+    end with the recording do not count.
 
     Raises:
         InputError: If ``by`` is unknown.
@@ -138,7 +134,7 @@ def phase_durations(
     values: dict[str, list[float]] = {}
     for one in sequences:
         for name, phase, whole in zip(names_of(one, by), one.phases, one.whole, strict=True):
-            if whole or cut:
+            if whole:
                 values.setdefault(name, []).append(phase.duration)
     return {name: Spread.of(durations) for name, durations in values.items()}
 

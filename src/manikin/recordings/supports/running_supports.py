@@ -26,7 +26,7 @@ from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.supports.body_supports import Places, Support, median_place, support_in
 from manikin.recordings.supports.support_levels import CUTOFF as SUPPORT_LEVELS_CUTOFF
-from manikin.recordings.supports.support_levels import Sole, com_path, track
+from manikin.recordings.supports.support_levels import RecordedSole, com_path, track
 
 FREE = 0.8
 """Downward acceleration over gravity from which, as a median, nothing carries: a tenth of a second of free
@@ -97,7 +97,7 @@ def by_the_force(
     falls = np.zeros(n, dtype=bool)
     for first, stop in mask_runs(force < FALLING):
         falls[first:stop] = stop - first >= SHORTEST_FALL * rate
-    feet = {name: Sole.of(both, rate, CUTOFF) for name, both in soles.items()}
+    feet = {name: RecordedSole.of(both, rate, CUTOFF) for name, both in soles.items()}
     table = _Table(feet, list(supports), np.array(surfaces), rate, start, n)
     table.cut(falls)
     table.fill(falls)
@@ -108,7 +108,7 @@ def by_the_force(
 class _Table:
     """Supports, by the frames from and up to which they last."""
 
-    feet: Mapping[str, Sole]
+    feet: Mapping[str, RecordedSole]
     supports: list[Support]
     surfaces: FloatArray
     rate: float

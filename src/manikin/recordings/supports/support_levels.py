@@ -161,14 +161,14 @@ def _moving(positions: FloatArray, rate: float) -> Track:
 
 
 @dataclass(frozen=True, eq=False)
-class Sole:
+class RecordedSole:
     """Heel and toes of a foot through a recording."""
 
     heel: Track
     toes: Track
 
     @classmethod
-    def of(cls, ends: Sequence[FloatArray], rate: float, cutoff: float = CUTOFF) -> "Sole":
+    def of(cls, ends: Sequence[FloatArray], rate: float, cutoff: float = CUTOFF) -> "RecordedSole":
         """Of (n, 3) heel and (n, 3) toes [m], by :func:`track`."""
         return cls(*(track(end, rate, cutoff) for end in ends))
 
@@ -226,7 +226,7 @@ class RestSurface:
     levels: tuple[float, ...]
 
 
-def surfaces_under(feet: Sequence[Sole], lying: NDArray[np.bool_]) -> tuple[RestSurface, ...]:
+def surfaces_under(feet: Sequence[RecordedSole], lying: NDArray[np.bool_]) -> tuple[RestSurface, ...]:
     """Surfaces on which feet stand, lowest first.
 
     A foot that rests while another one moves carries the body, so it rests on a surface; so does the lowest
@@ -245,7 +245,7 @@ def surfaces_under(feet: Sequence[Sole], lying: NDArray[np.bool_]) -> tuple[Rest
     return tuple(_surface([rest.height for rest in group]) for group in kept)
 
 
-def _rests(feet: Sequence[Sole], limit: float, lying: NDArray[np.bool_]) -> list["_Rest"]:
+def _rests(feet: Sequence[RecordedSole], limit: float, lying: NDArray[np.bool_]) -> list["_Rest"]:
     """Times in which both ends of a sole are slower than a limit [m/s]."""
     resting = [sole.heel.rests(limit) & sole.toes.rests(limit) for sole in feet]
     found = []

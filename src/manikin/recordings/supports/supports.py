@@ -39,8 +39,8 @@ from manikin.recordings.supports.support_levels import (
     LEVELS_APART,
     RAISED,
     SHIFT_SPEED,
+    RecordedSole,
     RestSurface,
-    Sole,
     Track,
     surfaces_under,
 )
@@ -99,7 +99,7 @@ def supports_of_points(
     Raises:
         InputError: If there are too few positions, or too few in a second.
     """
-    tracks = {name: Sole.of(ends, rate) for name, ends in soles.items()}
+    tracks = {name: RecordedSole.of(ends, rate) for name, ends in soles.items()}
     frames = min(len(end.speed) for sole in tracks.values() for end in (sole.heel, sole.toes))
     flat = {name: sole.heel.resting & sole.toes.resting for name, sole in tracks.items()}
     down = np.zeros(frames, dtype=bool) if lying is None else lying
@@ -158,7 +158,7 @@ def floor_under(soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Se
 
 
 def _offsets(
-    sole: Sole, stands: NDArray[np.bool_], levels: FloatArray, lying: NDArray[np.bool_]
+    sole: RecordedSole, stands: NDArray[np.bool_], levels: FloatArray, lying: NDArray[np.bool_]
 ) -> tuple[float, float] | None:
     """Heights of heel and toes above the surface where the foot stands: the errors of a model's sole [m].
 
@@ -182,7 +182,9 @@ def _height_above(heights: FloatArray, levels: FloatArray) -> FloatArray:
     return np.take_along_axis(above, np.argmin(np.abs(above), axis=1)[:, None], axis=1)[:, 0]
 
 
-def _toes_above(sole: Sole, toes: FloatArray, levels: FloatArray, lying: NDArray[np.bool_]) -> FloatArray:
+def _toes_above(
+    sole: RecordedSole, toes: FloatArray, levels: FloatArray, lying: NDArray[np.bool_]
+) -> FloatArray:
     """(n,) height of the toes, or of the lowest part of a steep sole, whichever is nearer to a level [m]."""
     above = _height_above(toes, levels)
     ball = np.where(sole.steep, _height_above(sole.height(lying), levels), np.inf)
@@ -195,7 +197,7 @@ def _touching(one: Track, height: FloatArray, near: FloatArray, away: FloatArray
     return switch(slow & (height > -away) & (height < near), fast | (np.abs(height) > away))
 
 
-def _steps(sole: Sole, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _steps(sole: RecordedSole, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(n,) whether a foot that seems to touch makes a step: the slowest point of its sole is too fast.
 
     A small step after a fast swing looks slow if the foot was down for too short to come to rest.
@@ -210,7 +212,7 @@ def _steps(sole: Sole, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _supports(
-    name: str, sole: Sole, touching: NDArray[np.bool_], surfaces: Sequence[RestSurface], start: float
+    name: str, sole: RecordedSole, touching: NDArray[np.bool_], surfaces: Sequence[RestSurface], start: float
 ) -> Iterator[Support]:
     """Runs in which heel, toes or ball touch, (3, n), without those that are too short."""
     rate, points = sole.heel.rate, (sole.heel, sole.toes, sole.ball)
