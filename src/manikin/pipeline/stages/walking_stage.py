@@ -162,7 +162,7 @@ def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
     phases = scenario.explicit_supports().resolved_phases()
     stays = [foot for foot in FEET if len(phases) > 1 and phases[1].get(foot) == phases[0][foot]]
     fitting = [one for one in choices if one.steps[-1].effector in stays] or choices
-    return min(fitting, key=lambda one: one.duration)
+    return min(fitting, key=lambda one: one.end - one.start)
 
 
 STAGE = "walk"
