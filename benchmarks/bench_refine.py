@@ -57,7 +57,7 @@ def problem(cases):
     time = sample_times(knots, 3)
     basis = SampledBasis.at(time, knots, 5)
     targets = refine_targets(body, scene, path, schedule, time, scales, None)
-    objective = RefineObjective(body, Proximity(body, scene), targets, basis, rooms_of(schedule))
+    objective = RefineObjective(body, Proximity(body, scene), targets, basis, rooms_of(schedule.sequence))
     points = np.tile(path.q[0], (basis.size, 1))
     return objective, points, scales, np.zeros((len(time), objective.task_rows)), basis
 

@@ -80,7 +80,7 @@ def test_margin_is_positive_every_10_ms(name, request):
     v, a = differences(body, time, q)
     found = centroidal_motion(body, q, v, a)
     margin, violation = balance_of(
-        result.schedule, rooms_of(result.schedule), time[1:-1], found.wrench[1:-1], found.com[1:-1]
+        result.schedule, rooms_of(result.schedule.sequence), time[1:-1], found.wrench[1:-1], found.com[1:-1]
     )
     assert margin.margin.min() > 0.0
     assert violation.max() == 0.0

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from manikin.errors import InputError
 from manikin.planning.whole_body import RefineScales, RefineSettings, refine_motion
-from manikin.planning.whole_body.refine_input import SHORTER, SHORTEST, KeyPath, around, shortened, shortening
+from manikin.planning.whole_body.refine_input import SHORTER, SHORTEST, KeyPath, around, shortening, stretched
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_only_slow_phases_are_shortened(results):
 @given(st.lists(st.floats(0.5, 1.0), min_size=5, max_size=5))
 def test_keys_move_with_their_phases(results, factors):
     case = results[0]
-    path, schedule = shortened(KeyPath(case.time, case.q), case.schedule, np.array(factors))
+    path, schedule = stretched(KeyPath(case.time, case.q), case.schedule, np.array(factors))
     np.testing.assert_allclose(schedule.durations, 0.9 * np.array(factors))
     np.testing.assert_allclose(np.interp(case.schedule.instants, case.time, path.time), schedule.instants)
     assert np.array_equal(path.q, KeyPath(case.time, case.q).q)

@@ -19,7 +19,9 @@ from manikin.planning.whole_body.contact_variables import (
     VariableChoice,
     VariableSamples,
     best_variables,
+    mean_cost,
 )
+from manikin.planning.whole_body.refine_physics import RefinedForces
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 BODY = human(1.75, 79.0, "male")
@@ -157,19 +159,16 @@ def test_of_two_hands_that_are_not_there_the_one_that_is_needed_stays():
 @given(st.lists(st.floats(0.05, 1.0), min_size=8, max_size=8), st.floats(0.0, 1.0), st.floats(-0.1, 0.2))
 def test_the_problem_of_a_phase_is_convex_and_solved(ends, share, com_x):
     """Between two variables its value is below the chord, and nowhere below that of the solution."""
-    from manikin.planning.whole_body.contact_variables import _Phase
-    from manikin.planning.whole_body.refine_physics import RefinedForces as ContactForces
-
     schedule = stand(hand(0.45), hand(0.45, side="left"))
     stance, samples = schedule.sequence[0].stance, standing_samples(schedule, com_x, 0.0)
     names = stance.effectors
-    problem = _Phase(ContactForces(stance, names), samples.wrench, 4, SCALES.missing_wrench, BODY.mass)
+    forces = RefinedForces(stance, names)
     first, second = np.array(ends[:4]), np.array(ends[4:])
     errors = {"left_foot": 0.0, "right_foot": 0.02, "right_hand": 0.01, "left_hand": 1.0}
     penalty = np.array([errors[name] for name in names])
 
     def total(c):
-        value, slope = problem.evaluate(c)
+        value, slope = mean_cost(forces, samples.wrench, SCALES.missing_wrench, WEIGHT, c)
         return value + penalty @ c, slope + penalty
 
     middle = share * first + (1.0 - share) * second
@@ -207,7 +206,8 @@ def test_what_the_keys_say_is_read_at_the_keys(cases):
     """A crouch's feet slide in the interpolation between its keys, but not at the keys themselves."""
     case = cases.crouch(1)
     names = case.schedule.sequence.effectors
-    samples = VariableSamples.at_rest(case.body, names, (case.time, case.q), (case.time, case.q))
+    still = np.zeros((len(case.time), case.body.nv))
+    samples = VariableSamples.of(case.body, names, case.time, (case.q, still, still))
     own = VariableChoice(case.body, case.scene, SCALES, 1e-3, 0.8)
     for number, phase in enumerate(case.schedule.sequence):
         interval = tuple(case.schedule.instants[number : number + 2])

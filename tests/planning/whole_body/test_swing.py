@@ -11,12 +11,17 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.whole_body.swing import SwingLimits, check_swing, plan_swing
 from manikin.planning.whole_body.swing_curve import SwingCurve
-from manikin.planning.whole_body.swing_path import EffectorPath, Pose, make_pose
+from manikin.planning.whole_body.swing_path import EffectorPath, Pose
 
 FACING_Y = rotation_from_yaw(np.pi / 2)
+IDENTITY = np.eye(3)
 FOOT = (0.28, 0.12, 0.06)
 THRESHOLD = ((0.05, 1.5, 0.3), (0.35, 0.75, 0.15))
 PLATFORM = ((1.1, 1.5, 0.2), (0.9, 0.75, 0.1))
+
+
+def make_pose(position, rotation=IDENTITY):
+    return Pose(np.array(position, dtype=float), rotation)
 
 
 def box_clearance(standing=None):
@@ -75,7 +80,6 @@ def test_swing_starts_and_ends_exactly_at_rest(curve):
     assert np.abs(state.velocity).max() < 1e-10
     assert np.abs(state.angular_velocity).max() < 1e-10
     assert np.abs(state.acceleration).max() < 1e-8
-    assert np.abs(state.angular_acceleration).max() < 1e-8
 
 
 @given(curves())
@@ -87,16 +91,11 @@ def test_velocity_and_acceleration_are_the_derivatives(curve):
     turn = Rotation.from_matrix(after.rotation @ np.swapaxes(before.rotation, 1, 2)).as_rotvec()
     # The error of central differences is h^2/6 times the third derivative, relative to the scale.
     speed = max(1.0, np.abs(here.velocity).max(), np.abs(here.angular_velocity).max())
-    push = max(1.0, np.abs(here.acceleration).max(), np.abs(here.angular_acceleration).max())
+    push = max(1.0, np.abs(here.acceleration).max())
     np.testing.assert_allclose((after.position - before.position) / (2 * h), here.velocity, atol=1e-6 * speed)
     np.testing.assert_allclose(turn / (2 * h), here.angular_velocity, atol=1e-5 * speed)
     np.testing.assert_allclose(
         (after.velocity - before.velocity) / (2 * h), here.acceleration, atol=1e-5 * push
-    )
-    np.testing.assert_allclose(
-        (after.angular_velocity - before.angular_velocity) / (2 * h),
-        here.angular_acceleration,
-        atol=1e-5 * push,
     )
 
 
@@ -111,9 +110,9 @@ def test_rotations_stay_rotations(curve):
 def test_acceleration_and_jerk_are_continuous():
     """Jumps between samples shrink with the step: the curve is C3 and more."""
     curve = SwingCurve.lift(make_pose((0, 0, 0)), make_pose((0.5, 0.2, 0.1), FACING_Y), 0.0, 0.8)
-    for name in ("acceleration", "angular_acceleration"):
+    for name, order in (("acceleration", 2), ("angular_velocity", 3)):
         coarse, fine = (
-            np.abs(np.diff(getattr(curve.evaluate(np.linspace(-0.1, 0.9, n)), name), n=2, axis=0)).max()
+            np.abs(np.diff(getattr(curve.evaluate(np.linspace(-0.1, 0.9, n)), name), n=order, axis=0)).max()
             for n in (2001, 4001)
         )
         # Second differences of a C1 function fall at least linearly, of a C2 one quadratically.
@@ -151,17 +150,17 @@ def test_lift_off_and_touch_down_follow_the_normal(normal):
         assert np.linalg.norm(offset - along * normal) < 0.35 * along
 
 
-def test_via_points_are_passed_at_their_time():
-    """The curve interpolates its via-points exactly."""
-    via = [(0.3, (0.1, 0.1, 0.3)), (0.7, (0.3, -0.1, 0.25))]
-    curve = SwingCurve.through(make_pose((0, 0, 0)), make_pose((0.5, 0, 0)), 1.0, 2.0, via)
-    state = curve.evaluate([1.3, 1.7])
-    np.testing.assert_allclose(state.position, [point for _, point in via], atol=1e-9)
+def test_the_apex_is_passed_at_its_time():
+    """As high above the higher end, and as far to the left of the travel, as asked."""
+    start, goal = make_pose((0, 0, 0)), make_pose((0.5, 0, 0.1))
+    curve = SwingCurve.lift(start, goal, 1.0, 2.0, height=0.2, lateral=0.07, apex=0.4)
+    np.testing.assert_allclose(curve.at(1.4).position[1:], [0.07, 0.3], atol=1e-9)
 
 
 def test_following_a_path_converges_to_it():
     """More control poses come closer to the polyline, and no faster than it allows."""
-    path = EffectorPath([0, 0.3, 0.7, 1.0], [[0, 0, 0], [0.2, 0, 0.4], [0.6, 0.2, 0.4], [0.7, 0.2, 0]])
+    corners = [[0, 0, 0], [0.2, 0, 0.4], [0.6, 0.2, 0.4], [0.7, 0.2, 0]]
+    path = EffectorPath([0, 0.3, 0.7, 1.0], corners, np.tile(np.eye(3), (4, 1, 1)))
     gaps = []
     for controls in (12, 24, 48, 96):
         state = SwingCurve.along(path, controls).evaluate(np.linspace(0, 1, 200))
@@ -182,18 +181,18 @@ def test_feet_step_over_the_threshold(start, goal, standing):
     assert plan.succeeded, plan.failure
     assert plan.failure is None
     assert plan.curve.peak_speed < 3.0
-    assert plan.curve.peak_acceleration < 20.0
-    assert plan.check.clearance >= 0.025 - 1e-9
+    assert np.linalg.norm(plan.curve.evaluate(np.linspace(0, 0.8, 101)).acceleration, axis=1).max() < 20.0
+    assert plan.clearance >= 0.025 - 1e-9
     # Denser than the planner looked: half a millimetre may be lost between its samples.
-    dense = check_swing(plan.curve, clearance, SwingLimits(clearance=0.0245), instants=801)
-    assert dense.kept, dense.failure
+    dense = check_swing(plan.curve, clearance, SwingLimits(clearance=0.0245, time_step=1e-3))
+    assert dense.succeeded, dense.failure
 
 
 def test_free_flight_needs_only_the_first_curve():
     """In open space the lowest curve is taken."""
-    plan = plan_swing(make_pose((0, 0, 0)), make_pose((0.3, 0, 0)), 0.0, 0.5, open_space)
+    plan = plan_swing(make_pose((0, 0, 0)), make_pose((0.3, 0, 0)), 0.0, 0.5, open_space, refine=0)
     assert plan.succeeded
-    assert plan.candidates == 1
+    assert plan.curve.at(0.25).position[2] == pytest.approx(0.06)
 
 
 def test_planning_is_deterministic():
@@ -249,15 +248,9 @@ def test_misuse_is_refused(change, message):
 
 
 def test_bad_curves_are_refused():
-    """Too few controls, too many via-points and poses that are none."""
-    pose = make_pose((0, 0, 0))
+    """Too few controls."""
     with pytest.raises(InputError, match="control poses"):
         SwingCurve(0.0, 1.0, np.zeros((5, 3)), np.tile(np.eye(3), (5, 1, 1)))
-    with pytest.raises(InputError, match="via-points"):
-        SwingCurve.through(pose, pose, 0, 1, [(0.1 * k, (0, 0, 0)) for k in range(1, 6)], controls=12)
-    with pytest.raises(InputError, match="rotation"):
-        make_pose((0, 0, 0), np.ones((3, 3)))
-    assert isinstance(pose, Pose)
 
 
 def test_too_fast_a_flight_is_not_lifted_higher():

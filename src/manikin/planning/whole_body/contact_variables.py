@@ -17,6 +17,7 @@ in that phase, but only where the others keep the wanted balance without it.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from types import MappingProxyType
 
 import numpy as np
@@ -72,33 +73,22 @@ class VariableSamples:
         return self.wrench[rows], self.com[rows]
 
     @classmethod
-    def at_rest(
-        cls, body: BodyModel, names: Sequence[str], keys: tuple[FloatArray, FloatArray],
-        between: tuple[FloatArray, FloatArray],
+    def of(
+        cls, body: BodyModel, names: Sequence[str], time: FloatArray,
+        states: tuple[FloatArray, FloatArray, FloatArray],
+        keys: tuple[FloatArray, FloatArray, FloatArray] | None = None,
     ) -> "VariableSamples":  # fmt: skip
-        """Key configurations as if each were at rest.
+        """A motion at ``time`` (n,) with configurations, velocities and accelerations.
 
         Args:
             names: Effectors that are looked at.
-            keys: (m,) times and (m, nq) configurations at which contacts should be held.
-            between: (n,) times and (n, nq) configurations at which the body has to be carried.
+            keys: (m,) times, (m, nq) configurations and (m, nv) velocities at which contacts should be held;
+                those of the motion when omitted.
         """
-        time, q = between
-        still = np.zeros((len(q), body.nv))
-        place, _ = _effectors(body, names, keys[1], np.zeros((len(keys[1]), body.nv)))
-        speed = {name: np.zeros(len(keys[0])) for name in names}
-        found = centroidal_motion(body, q, still, still)
-        return cls(time, found.wrench, found.com, keys[0], place, speed)
-
-    @classmethod
-    def of_motion(
-        cls, body: BodyModel, names: Sequence[str], time: FloatArray,
-        states: tuple[FloatArray, FloatArray, FloatArray],
-    ) -> "VariableSamples":  # fmt: skip
-        """A motion at ``time`` (n,) with configurations, velocities and accelerations."""
-        place, speed = _effectors(body, names, states[0], states[1])
+        key_time, q, v = keys or (time, *states[:2])
+        place, speed = _effectors(body, names, q, v)
         found = centroidal_motion(body, *states)
-        return cls(time, found.wrench, found.com, time, place, speed)
+        return cls(time, found.wrench, found.com, key_time, place, speed)
 
 
 class VariableChoice:
@@ -115,7 +105,7 @@ class VariableChoice:
     ) -> None:
         self._body, self._scene, self._scales = body, scene, scales
         self._tolerance, self._friction_share = tolerance, friction_share
-        self._off: dict[Contact, float] = {}
+        self._off_surface = cache(self._distance_off)
         self._rooms: dict[frozenset[Contact], MarginCost] = {}
 
     def choose(
@@ -186,16 +176,14 @@ class VariableChoice:
             return False
         return bool(room.margin(wrench, com).min() >= room.wanted(self._scales.margin, com.mean(axis=0)))
 
-    def _off_surface(self, contact: Contact) -> float:
+    def _distance_off(self, contact: Contact) -> float:
         """Distance of a contact from the nearest obstacle; 0 where it lies on one [m]."""
-        if contact not in self._off:
-            try:
-                self._scene.touched_obstacles(contact, TOUCHING)
-                self._off[contact] = 0.0
-            except ContactError:
-                near = abs(self._scene.nearest(contact.position)[1]) if self._scene.obstacles else np.inf
-                self._off[contact] = max(near, TOUCHING)
-        return self._off[contact]
+        try:
+            self._scene.touched_obstacles(contact, TOUCHING)
+        except ContactError:
+            near = abs(self._scene.nearest(contact.position)[1]) if self._scene.obstacles else np.inf
+            return max(near, TOUCHING)
+        return 0.0
 
 
 def best_variables(
@@ -218,42 +206,38 @@ def best_variables(
     names = stance.effectors
     columns = np.array([names.index(name) for name in free], dtype=np.int64)
     penalty = np.array([errors[name] for name in free])
-    problem = _Phase(
-        RefinedForces(stance, names), wrench, len(names), scales.missing_wrench, scales.force * mass
+    cost = partial(
+        mean_cost, RefinedForces(stance, names), wrench, scales.missing_wrench, scales.force * mass * 9.81
     )
     ones = np.ones(len(names))
-    _, slope = problem.evaluate(ones)
+    _, slope = cost(ones)
     if not len(free) or np.all(slope[columns] + penalty <= 0.0):
         return dict.fromkeys(free, 1.0)  # the corner is the minimum of a convex function
 
     def total(c: FloatArray) -> tuple[float, FloatArray]:
         full = ones.copy()
         full[columns] = c
-        value, slope = problem.evaluate(full)
+        value, slope = cost(full)
         return value + float(penalty @ c), slope[columns] + penalty
 
     found = minimize(total, ones[columns], jac=True, method="L-BFGS-B", bounds=[(LEAST, 1.0)] * len(free))
     return dict(zip(free, found.x.tolist(), strict=True))
 
 
-class _Phase:
-    """Mean of the force program over the samples of one phase, by the variables of its contacts."""
+def mean_cost(
+    forces: RefinedForces, wrench: FloatArray, tolerance: float, force: float, c: FloatArray
+) -> tuple[float, FloatArray]:
+    """Mean least value of the force program over the samples of a phase, and its derivative (k,).
 
-    def __init__(
-        self, forces: RefinedForces, wrench: FloatArray, count: int, tolerance: float, force: float
-    ) -> None:
-        self._forces, self._wrench, self._count = forces, wrench, count
-        self._tolerance, self._force = tolerance, force * 9.81
-
-    def evaluate(self, c: FloatArray) -> tuple[float, FloatArray]:
-        """Mean least value and its derivative (k,) by the variables (k,)."""
-        shared = self._forces.share(
-            self._wrench, np.tile(np.sqrt(c), (len(self._wrench), 1)),
-            tolerance=self._tolerance, force=self._force,
-        )  # fmt: skip
-        squares = np.mean(shared.magnitude**2, axis=0) / self._force**2
-        by_contact = np.bincount(self._forces.columns, squares, self._count)
-        return float(shared.cost.value.mean()), -0.5 * by_contact / c**2
+    Args:
+        wrench: (n, 6) needed, about the world origin.
+        tolerance: Missing wrench that costs one unit [N].
+        force: Force that costs one unit [N].
+        c: (k,) contact variables, by which it is differentiated.
+    """
+    shared = forces.share(wrench, np.tile(np.sqrt(c), (len(wrench), 1)), tolerance=tolerance, force=force)
+    by_contact = np.bincount(forces.columns, np.mean(shared.magnitude**2, axis=0) / force**2, len(c))
+    return float(shared.cost.value.mean()), -0.5 * by_contact / c**2
 
 
 def _without(stance: Stance, name: str) -> Stance:

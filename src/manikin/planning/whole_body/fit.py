@@ -60,35 +60,30 @@ class MotionFit:
         knots: Clamped knots of the spline [s].
     """
 
-    def __init__(self, objective: MotionObjective, knots: FloatArray, scales: MotionScales) -> None:
-        self._objective, self._knots, self._final = objective, knots, scales
+    def __init__(self, objective: MotionObjective, knots: FloatArray) -> None:
+        self._objective, self._knots = objective, knots
         self._basis = objective.basis
         self._system = BlockBandedSystem(self._basis, objective.targets.reference.shape[1])
         self._damping = np.full(self._basis.size, FIRST_DAMPING)
         self._multiplier = np.zeros((len(objective.targets.time), objective.task_rows))
 
-    def solve(self, start: ConfigurationSpline) -> FitResult:
-        """Solve from ``start``: first with loose tasks, so that the posture stays natural, then exactly."""
-        return self._solve(start, self._final, self._final.stages)
+    def solve(self, start: ConfigurationSpline, final: MotionScales, *, further: bool = False) -> FitResult:
+        """Solve from ``start``: first with loose tasks, so that the posture stays natural, then exactly.
 
-    def improve(self, start: ConfigurationSpline, scales: MotionScales) -> FitResult:
-        """Go on from an earlier solution ``start`` with other scales, at its multipliers."""
-        return self._solve(start, scales, scales.stages[-1:])
-
-    def _solve(self, start: ConfigurationSpline, final: MotionScales, stages: tuple[float, ...]) -> FitResult:
+        Args:
+            final: Scales of the last stage.
+            further: Go on from an earlier solution at its multipliers, with that stage alone.
+        """
         points, iterations = np.array(start.control_points), 0
-        scales = final.loosened(stages[0])
-        state = self._objective.linearise(points, scales, self._multiplier)
-        for number, factor in enumerate(stages):
-            if number > 0:
-                scales = final.loosened(factor)
-                state = self._objective.linearise(points, scales, self._multiplier)
-            points, state, taken = self._descend(points, state, scales, scales.max_iterations)
+        for factor in final.stages[-1:] if further else final.stages:
+            scales = final.loosened(factor)
+            state = self._objective.linearise(points, scales, self._multiplier)
+            points, state, taken = self._descend(points, state, scales)
             iterations += taken
-        points, state, taken = self._constrain(points, state, scales)
-        iterations += taken
-        points, taken = self._restore(points, state, scales)
-        return FitResult(ConfigurationSpline(self._knots, points, DEGREE), iterations + taken)
+        points, state, constrained = self._constrain(points, state, scales)
+        points, restored = self._restore(points, state, scales)
+        spline = ConfigurationSpline(self._knots, points, DEGREE)
+        return FitResult(spline, iterations + constrained + restored)
 
     def _constrain(
         self, points: FloatArray, current: FitLinearisation, scales: MotionScales
@@ -151,7 +146,7 @@ class MotionFit:
         return held[:, :, None] * state.task_jacobian, held * state.task_residual
 
     def _descend(
-        self, points: FloatArray, current: FitLinearisation, scales: MotionScales, most: int
+        self, points: FloatArray, current: FitLinearisation, scales: MotionScales
     ) -> tuple[FloatArray, FitLinearisation, int]:
         """Damped Gauss-Newton at fixed scales; the damping is kept from call to call.
 
@@ -159,7 +154,7 @@ class MotionFit:
         leg that is almost straight, it grows, and the rest of the motion is not held up.
         """
         taken = 0
-        while taken < most:
+        while taken < scales.max_iterations:
             taken += 1
             current.assemble(self._system)
             step = self._system.solve(self._damping)

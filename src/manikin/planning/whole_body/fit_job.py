@@ -184,10 +184,10 @@ class FitJob:
         knots = self.knots(goal.schedule, fine)
         time, basis = self.samples(knots)
         objective = goal.objective(time, basis, scales)
-        fit = MotionFit(objective, knots, scales)
+        fit = MotionFit(objective, knots)
         guess = objective.targets.reference if near is None else near.evaluate(time).q
         start = spline_through(guess, basis, knots)
-        return fit, fit.solve(start) if near is None else fit.improve(start, scales)
+        return fit, fit.solve(start, scales, further=near is not None)
 
     def attempt(
         self, goal: G, scales: MotionScales, fine: int = 0, near: ConfigurationSpline | None = None
@@ -201,7 +201,7 @@ class FitJob:
 
     def improve(self, last: FitAttempt[G], scales: MotionScales) -> FitAttempt[G]:
         """Go on with other scales on the same knots."""
-        result = last.fit.improve(last.result.spline, scales)
+        result = last.fit.solve(last.result.spline, scales, further=True)
         return self._measured(last.goal, scales, last.fine, True, last.fit, result)
 
     def repair(
@@ -294,12 +294,15 @@ def phase_knots(
     fine = np.concatenate([np.zeros(0), *(time + SUDDEN_KNOTS for time in sudden)])
     breaks = np.unique(np.concatenate([instants, fine[(fine > instants[0]) & (fine < instants[-1])]]))
     breaks = breaks[np.append(True, np.diff(breaks) > CLOSEST_KNOTS)]
-    inner: list[float] = []
-    for start, end in itertools.pairwise(breaks):
-        count = max(1, int(np.ceil((end - start) / spacing)))
-        inner.extend(np.linspace(start, end, count, endpoint=False))
-    ends = np.full(DEGREE, instants[0]), np.full(DEGREE + 1, instants[-1])
-    return np.concatenate([ends[0], inner, ends[1]])
+    inner = split_spans(breaks, spacing)[:-1]
+    return np.concatenate([np.full(DEGREE, instants[0]), inner, np.full(DEGREE + 1, instants[-1])])
+
+
+def split_spans(breaks: FloatArray, spacing: float) -> FloatArray:
+    """Breaks, and equal parts of at most ``spacing`` between them."""
+    counts = np.maximum(np.ceil(np.diff(breaks) / spacing), 1.0).astype(int)
+    parts = zip(breaks[:-1], breaks[1:], counts, strict=True)
+    return np.append(np.concatenate([np.linspace(*part, endpoint=False) for part in parts]), breaks[-1])
 
 
 def refined(knots: FloatArray, instants: FloatArray, within: float = NEAR_INSTANT) -> FloatArray:

@@ -227,20 +227,24 @@ class MotionObjective:
         buffer = np.minimum(scales.joint_buffer, 0.25 * (self._body.upper - self._body.lower))
         lower, upper = self._body.lower + buffer, self._body.upper - buffer
         outside = np.minimum(raw[:, 7:] - lower, 0.0) + np.maximum(raw[:, 7:] - upper, 0.0)
-        weight, residual = np.zeros_like(raw), np.zeros_like(raw)
-        weight[:, 7:] = (outside != 0.0) / scales.joint_limit
-        residual[:, 7:] = outside / scales.joint_limit
-        out.add_diagonal(0, weight, residual)
+        self._add_excess(out, 0, slice(7, None), outside, scales.joint_limit)
 
     def _add_rates(self, out: FitLinearisation, rate: FloatArray, scales: MotionScales) -> None:
         limit = scales.velocity_share * self._body.velocity_limit
         excess = np.sign(rate[:, 7:]) * np.maximum(np.abs(rate[:, 7:]) - limit, 0.0)
-        weight, residual = np.zeros_like(rate), np.zeros_like(rate)
-        weight[:, 7:] = (excess != 0.0) / scales.joint_velocity
-        residual[:, 7:] = excess / scales.joint_velocity
-        for end in (0, -1):
-            weight[end], residual[end] = 1.0 / scales.rest, rate[end] / scales.rest
-        out.add_diagonal(1, weight, residual)
+        excess[[0, -1]] = 0.0  # at both ends the body rests instead
+        self._add_excess(out, 1, slice(7, None), excess, scales.joint_velocity)
+        ends = np.zeros_like(rate)
+        ends[[0, -1]] = 1.0
+        out.add_diagonal(1, ends / scales.rest, ends * rate / scales.rest)
+
+    def _add_excess(
+        self, out: FitLinearisation, order: int, columns: slice | list[int], excess: FloatArray, scale: float
+    ) -> None:
+        """Residuals (n, c) of some coordinates, which cost nothing where they are zero."""
+        weight, residual = np.zeros_like(self.targets.reference), np.zeros_like(self.targets.reference)
+        weight[:, columns], residual[:, columns] = (excess != 0.0) / scale, excess / scale
+        out.add_diagonal(order, weight, residual)
 
     def _add_accelerations(self, out: FitLinearisation, second: FloatArray, scales: MotionScales) -> None:
         if self.targets.reference_second is not None:

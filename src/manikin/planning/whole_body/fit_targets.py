@@ -11,7 +11,8 @@ from manikin.body.limbs import hanging_segment, hangs
 from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, SolePart
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.fit_strength import HeldForces
-from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown
+from manikin.planning.whole_body.foot_roll import Rolls
+from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown, with_pairs
 from manikin.planning.whole_body.swing_planner import PlannedSwing, touch_pairs
 from manikin.scene import Scene
 
@@ -148,16 +149,15 @@ def _place(item: PlannedSwing, time: FloatArray, target: EffectorTarget) -> None
     target.position[rows], target.rotation[rows] = position, rotation
 
 
-def toe_angles(body: BodyModel, swings: Sequence[PlannedSwing], time: FloatArray) -> dict[int, FloatArray]:
+def toe_angles(body: BodyModel, rolls: Rolls, time: FloatArray) -> dict[int, FloatArray]:
     """Angle (n,) of each joint of toes that stay flat while their foot rolls [rad], by joint index."""
     found: dict[int, FloatArray] = {}
-    for item in swings:
-        toes = hanging_segment(body, body.effector(item.swing.effector).segment)
-        if item.roll is None or toes is None:
-            continue
-        joint = body.joint_index(toes.hinges[0].name)
-        rows = (time >= item.roll.instants[0]) & (time < item.roll.instants[2])
-        found.setdefault(joint, np.zeros(len(time)))[rows] = item.roll.toe_extension(time[rows])
+    for name, roll in rolls:
+        toes = hanging_segment(body, body.effector(name).segment)
+        if toes is not None:
+            rows = (time >= roll.instants[0]) & (time < roll.instants[2])
+            angle = found.setdefault(body.joint_index(toes.hinges[0].name), np.zeros(len(time)))
+            angle[rows] = roll.toe_extension(time[rows])
     return found
 
 
@@ -272,39 +272,20 @@ def ignored_pairs(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> tuple[Ignored, ...]:
     """Segments that may touch an obstacle at each time: those on, leaving or reaching a support."""
-    sequence = schedule.sequence
-    touching = [
-        {contact.effector: touch_pairs(body, scene, contact) for contact in phase.stance}
+    sequence, landing = schedule.sequence, list[tuple[Ignored, NDArray[np.bool_]]]()
+    per_phase = [
+        frozenset[tuple[str, str]]().union(*(touch_pairs(body, scene, contact) for contact in phase.stance))
         for phase in sequence
     ]
-    per_phase = []
-    for index in range(len(sequence)):
-        pairs: set[tuple[str, str]] = set()
-        for found in touching[index].values():
-            pairs |= found
-        per_phase.append(pairs)
-    landing: list[tuple[float, float, set[tuple[str, str]]]] = []
     for swing in sequence.swings():
-        if swing.end is not None and not hangs(body, swing.effector):
-            end = schedule.swing_interval(swing)[1]
-            landing.append((end - SITTING_DOWN, end, set(touch_pairs(body, scene, swing.end))))
-            continue
-        if swing.end is not None and swing.start is None:
-            end = schedule.swing_interval(swing)[1]
+        hanging, end = hangs(body, swing.effector), schedule.swing_interval(swing)[1]
+        if swing.end is not None and (swing.start is None or not hanging):
             # Time before its first contact in which an effector that was free may come close to it [s].
-            landing.append((end - 0.35, end, set(touch_pairs(body, scene, swing.end))))
+            early = 0.35 if hanging else SITTING_DOWN
+            landing.append((touch_pairs(body, scene, swing.end), (time >= end - early) & (time < end)))
             continue
-        for index in range(swing.first_phase, swing.last_phase + 1):
-            for contact in (swing.start, swing.end):
-                if contact is not None:
+        for contact in (swing.start, swing.end):
+            if contact is not None:
+                for index in range(swing.first_phase, swing.last_phase + 1):
                     per_phase[index] |= touch_pairs(body, scene, contact)
-    known: dict[tuple[int, tuple[bool, ...]], Ignored] = {}
-    found = []
-    for instant, index in zip(time, schedule.phase_at(time), strict=True):
-        near = tuple(start <= instant < end for start, end, _ in landing)
-        key = int(index), near
-        if key not in known:
-            extra = (pairs for (_, _, pairs), close in zip(landing, near, strict=True) if close)
-            known[key] = frozenset(per_phase[index].union(*extra))
-        found.append(known[key])
-    return tuple(found)
+    return with_pairs([per_phase[index] for index in schedule.phase_at(time)], landing)

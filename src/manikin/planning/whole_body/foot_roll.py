@@ -8,6 +8,7 @@ flight a point that moves from one to the other along the swing's curve. The ang
 timing are our own choice.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -129,6 +130,10 @@ class FootRoll:
         knots = {float(up): rest, float(off): self._at_lift_off}
         knots |= {float(land): at_landing, float(flat): rest}
         return BPoly.from_derivatives(list(knots), list(knots.values()))
+
+
+Rolls = Sequence[tuple[str, FootRoll]]
+"""Effector and roll of flights of feet that do not leave and land flat."""
 
 
 def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootRoll | None:

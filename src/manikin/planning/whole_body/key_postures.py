@@ -18,15 +18,14 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
-from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.kinematics import Placement, PostureProblem, PostureResult, SolverSettings, generate_posture
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyPlane, plan_com
 from manikin.planning.whole_body.certificate import WholeBodyRequirements
-from manikin.planning.whole_body.fit_targets import ignored_pairs
-from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
+from manikin.planning.whole_body.fit_targets import ignored_pairs, lay_toes_flat, toe_angles
+from manikin.planning.whole_body.foot_roll import FootRoll, Rolls, foot_roll
 from manikin.planning.whole_body.posture_style import READY, Guide, PostureStyle, reference_motion
 from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.planning.whole_body.swing_planner import leaning_pairs
@@ -133,103 +132,76 @@ def find_key_postures(
             posture before and the manner's when omitted.
         padded: Obstacles that any part of the body may lean on.
     """
-    instants = trajectory.schedule.instants
-    time = instants[trajectory.binds(instants)]
-    search = _KeyPostureSearch(
-        body, scene, trajectory, time, manner, (requirements or WholeBodyRequirements()).clearance,
-        range_margin, replace(SETTINGS, tolerance=tolerance), leaning_pairs(body, padded),
-        None if known is None else align_quaternions(np.array(known[: len(time)])),
-    )  # fmt: skip
-    return KeyPostures(search.run())
-
-
-class _KeyPostureSearch:
-    """The search for one plan, each posture starting from the one before."""
-
-    def __init__(
-        self, body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, time: FloatArray,
-        manner: PostureStyle, clearance: float, range_margin: float, settings: SolverSettings,
-        leaning: Ignored, known: FloatArray | None,
-    ) -> None:  # fmt: skip
-        self._body, self._schedule, self._time = body, trajectory.schedule, time
-        self._proximity = Proximity(body, scene)
-        self._manner, self._clearance = manner, clearance
-        self._range_margin, self._settings = range_margin, settings
-        self._com = trajectory.position(time)
-        self._rolls = rolls_of(body, trajectory.schedule)
-        self._is_known = known is not None
-        if known is None:
-            known = reference_motion(body, trajectory, time, manner)
-            _extend_toes(body, self._rolls, time, known)
-        self._reference = known
-        self._explained_one = False  # An examination takes seconds; the first is the one that is reported.
-        ignored = _ignored(body, scene, trajectory.schedule, time)
-        self._ignored = tuple(pairs | leaning for pairs in ignored)
-
-    def run(self) -> tuple[KeyPosture, ...]:
-        q, found = self._reference[0], []
-        for key in range(len(self._time)):
-            q = self._reference[key] if self._is_known else q
-            problem = self._problem(key)
-            result = generate_posture(problem, q, settings=self._settings)
-            found.append(self._posture(key, problem, result))
-            q = found[-1].q
-        return tuple(found)
-
-    def _problem(self, key: int) -> PostureProblem:
-        contacts, placements = requirements_at(self._schedule, key, self._rolls)
-        return PostureProblem(
-            self._body, contacts, placements, com=self._com[key], proximity=self._proximity,
-            clearance=self._clearance, self_clearance=self._clearance, ignore=self._ignored[key],
-            reference=self._reference[key], preferences=self._manner.preferences,
-            range_margin=self._range_margin,
+    schedule = trajectory.schedule
+    time = schedule.instants[trajectory.binds(schedule.instants)]
+    com, rolls = trajectory.position(time), rolls_of(body, schedule)
+    if known is None:
+        references = reference_motion(body, trajectory, time, manner)
+        lay_toes_flat(toe_angles(body, rolls, time), references)
+    else:
+        references = align_quaternions(np.array(known[: len(time)]))
+    leaning, proximity = leaning_pairs(body, padded), Proximity(body, scene)
+    clearance = (requirements or WholeBodyRequirements()).clearance
+    settings = replace(SETTINGS, tolerance=tolerance)
+    q, found = references[0], list[KeyPosture]()
+    for key, (reference, ignored) in enumerate(
+        zip(references, _ignored(body, scene, schedule, time), strict=True)
+    ):
+        contacts, placements = requirements_at(schedule, key, rolls)
+        problem = PostureProblem(
+            body, contacts, placements, com=com[key], proximity=proximity, clearance=clearance,
+            self_clearance=clearance, ignore=ignored | leaning, reference=reference,
+            preferences=manner.preferences, range_margin=range_margin,
         )  # fmt: skip
-
-    def _posture(self, key: int, problem: PostureProblem, result: PostureResult) -> KeyPosture:
-        contacts = (*(contact.effector for contact in problem.contacts), *problem.placements)
-        posture = KeyPosture(key, float(self._time[key]), max(key - 1, 0), contacts, self._com[key], result.q)
-        return posture if result.succeeded else self._explained(posture, problem, result)
-
-    def _explained(self, posture: KeyPosture, problem: PostureProblem, result: PostureResult) -> KeyPosture:
-        """The posture with the reason why it fails, and the nearest centre of mass with which one exists.
-
-        The nearest posture is also where a search that only ended in a poor minimum finds its way.
-        """
-        near = self._nearest(problem, result.q)
-        if near is None:
-            explain = replace(self._settings, explain=not self._explained_one)
-            self._explained_one = True
-            result = generate_posture(problem, result.q, settings=explain)
-            return replace(posture, reason=result.failure or "posture not found")
-        again = generate_posture(problem, near.q, settings=self._settings)
-        if again.succeeded:
-            return replace(posture, q=again.q)
-        com = np.array(Configuration(self._body, near.q).com)
-        away = float(np.linalg.norm(com - posture.com))
-        reason = (
-            f"{result.failure}; a posture exists without the centre-of-mass requirement, the nearest with "
-            f"it {away:.3f} m from {np.round(posture.com, 3).tolist()}, at {np.round(com, 3).tolist()} m"
-        )
-        return replace(posture, reason=reason, nearest_com=com)
-
-    def _nearest(self, problem: PostureProblem, start: FloatArray) -> PostureResult | None:
-        """The posture with the nearest centre of mass; None when there is none with any."""
-        free = generate_posture(replace(problem, com=None), start, settings=self._settings)
-        if not free.succeeded:
-            return None
-        nearest = free
-        for weight in NEARNESS:
-            wished = replace(problem, com_weight=weight)
-            found = generate_posture(wished, nearest.q, settings=replace(self._settings, restarts=False))
-            nearest = found if found.succeeded else nearest
-        return nearest
+        result = generate_posture(problem, q if known is None else reference, settings=settings)
+        names = (*(contact.effector for contact in contacts), *placements)
+        posture = KeyPosture(key, float(time[key]), max(key - 1, 0), names, com[key], result.q)
+        if not result.succeeded:
+            # An examination takes seconds; the first is the one that is reported.
+            first = all(item.found or item.nearest_com is not None for item in found)
+            posture = _explained(posture, problem, result, settings, first)
+        found.append(posture)
+        q = posture.q
+    return KeyPostures(tuple(found))
 
 
-Rolls = tuple[tuple[str, FootRoll], ...]
-"""Effector and roll of every flight of a foot that does not leave and land flat."""
+def _explained(
+    posture: KeyPosture, problem: PostureProblem, result: PostureResult, settings: SolverSettings, first: bool
+) -> KeyPosture:
+    """The posture with the reason why it fails, and the nearest centre of mass with which one exists.
+
+    The nearest posture is also where a search that only ended in a poor minimum finds its way.
+    """
+    near = _nearest(problem, result.q, settings)
+    if near is None:
+        result = generate_posture(problem, result.q, settings=replace(settings, explain=first))
+        return replace(posture, reason=result.failure or "posture not found")
+    again = generate_posture(problem, near, settings=settings)
+    if again.succeeded:
+        return replace(posture, q=again.q)
+    com = np.array(Configuration(problem.body, near).com)
+    away = float(np.linalg.norm(com - posture.com))
+    reason = (
+        f"{result.failure}; a posture exists without the centre-of-mass requirement, the nearest with "
+        f"it {away:.3f} m from {np.round(posture.com, 3).tolist()}, at {np.round(com, 3).tolist()} m"
+    )
+    return replace(posture, reason=reason, nearest_com=com)
 
 
-def rolls_of(body: BodyModel, schedule: ContactSchedule) -> Rolls:
+def _nearest(problem: PostureProblem, start: FloatArray, settings: SolverSettings) -> FloatArray | None:
+    """(nq,) posture with the nearest centre of mass; None when there is none with any."""
+    free = generate_posture(replace(problem, com=None), start, settings=settings)
+    if not free.succeeded:
+        return None
+    nearest = free.q
+    for weight in NEARNESS:
+        wished = replace(problem, com_weight=weight)
+        found = generate_posture(wished, nearest, settings=replace(settings, restarts=False))
+        nearest = found.q if found.succeeded else nearest
+    return nearest
+
+
+def rolls_of(body: BodyModel, schedule: ContactSchedule) -> tuple[tuple[str, FootRoll], ...]:
     """Rolls of the feet about their flights."""
     found = ((swing.effector, foot_roll(body, schedule, swing)) for swing in schedule.sequence.swings())
     return tuple((name, roll) for name, roll in found if roll is not None)
@@ -285,16 +257,6 @@ def _tilted(contact: Contact, time: float, rolls: Sequence[FootRoll]) -> Placeme
                 position, rotation = roll.pose(pivot.position[None], pivot.rotation[None], np.array([time]))
                 return Placement(position[0], rotation[0])
     return Placement(contact.position, contact.rotation_contact_to_world)
-
-
-def _extend_toes(body: BodyModel, rolls: Rolls, time: FloatArray, configurations: FloatArray) -> None:
-    """Bend the toes of rolling feet so that they lie flat."""
-    for name, roll in rolls:
-        toes = hanging_segment(body, body.effector(name).segment)
-        if toes is not None:
-            joint = 7 + body.joint_index(toes.hinges[0].name)
-            rows = (time >= roll.instants[0]) & (time < roll.instants[2])
-            configurations[rows, joint] = roll.toe_extension(time[rows])
 
 
 def _ignored(

@@ -29,7 +29,7 @@ from manikin.planning.whole_body.certificate import (
     WholeBodyRequirements,
     certify,
 )
-from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress
+from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress, split_spans
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_strength import HeldForces
@@ -48,7 +48,6 @@ from manikin.planning.whole_body.posture_style import (
     READY,
     Guide,
     PostureStyle,
-    guide_times,
     plan_guide,
     reference_motion,
 )
@@ -227,14 +226,13 @@ class _Goal:
             start, end = item.interval
             if item.failure is not None and start <= time <= end:
                 reason = f"{reason}; swing of {item.swing.effector}: {item.failure}"
-        near = [failure for failure in self.guide.failures if abs(failure.time - time) < 0.2]
-        if near:
-            reason = f"{reason}; posture at {near[0].time:.2f} s: {near[0].reason}"
+        for when, missed in [item for item in self.guide.failures if abs(item[0] - time) < 0.2][:1]:
+            reason = f"{reason}; posture at {when:.2f} s: {missed}"
         return WholeBodyFailure.at(self.schedule, time, reason)
 
     def _targets(self, time: FloatArray) -> FitTargets:
         planner, schedule, trajectory = self.planner, self.schedule, self.planner.trajectory
-        toes = toe_angles(planner.body, self.swings, time)
+        toes = planner.toes(self.swings, time)
         scale = np.tile(self.manner.scale(planner.body), (len(time), 1))
         reference = self.guide.at(time)
         straight = flat_share(planner.body, schedule, time) if self.straight_toes else {}
@@ -381,8 +379,8 @@ class _Planner:
         key = swings, manner, known, restarts
         if key not in self._guides:
             schedule = self.trajectory.schedule
-            time = guide_times(schedule.instants, self.settings.guide_spacing)
-            toes, reference = toe_angles(self.body, swings, time), self._reference(time, manner, known)
+            time = split_spans(schedule.instants, self.settings.guide_spacing)
+            toes, reference = self.toes(swings, time), self._reference(time, manner, known)
             lay_toes_flat(toes, reference)
             com = self.trajectory.position(time)
             com[~self.trajectory.binds(time)] = np.nan  # The body is safe without one.
@@ -392,6 +390,11 @@ class _Planner:
                 self.settings.fit.safe_distance, manner.preferences, tuple(toes), restarts,
             )  # fmt: skip
         return self._guides[key]
+
+    def toes(self, swings: tuple[PlannedSwing, ...], time: FloatArray) -> dict[int, FloatArray]:
+        """Angles (n,) of the joints of toes that stay flat [rad], see :func:`toe_angles`."""
+        rolls = [(item.swing.effector, item.roll) for item in swings if item.roll is not None]
+        return toe_angles(self.body, rolls, time)
 
     def _reference(self, time: FloatArray, manner: PostureStyle, known: Guide | None) -> FloatArray:
         """(n, nq) preferred postures: between those that are known, or the manner's."""

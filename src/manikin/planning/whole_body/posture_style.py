@@ -6,7 +6,6 @@ postures of [Qiu2012]_ 7.2.3 they tell, before the motion is fitted, whether it 
 and they are what the fitted motion stays near.
 """
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -31,30 +30,19 @@ MISSED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class GuideFailure:
-    """The first guide posture that could not be found.
-
-    Attributes:
-        time: [s].
-    """
-
-    time: float
-    reason: str
-
-
-@dataclass(frozen=True, eq=False)
 class Guide:
     """Guide postures.
 
     Attributes:
         time: (k,) [s].
         configurations: (k, nq), quaternions in one half-space.
-        failures: Postures that could not be found exactly; their best attempts are used.
+        failures: Time [s] and reason of the postures that could not be found exactly; their best attempts are
+            used.
     """
 
     time: FloatArray
     configurations: FloatArray
-    failures: tuple[GuideFailure, ...]
+    failures: tuple[tuple[float, str], ...]
 
     @property
     def misses_many(self) -> bool:
@@ -66,15 +54,6 @@ class Guide:
         rows = np.stack([np.interp(time, self.time, column) for column in self.configurations.T], axis=1)
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
         return rows
-
-
-def guide_times(instants: FloatArray, spacing: float) -> FloatArray:
-    """Every key instant, and equal parts of at most ``spacing`` [s] between them."""
-    parts = [
-        np.linspace(start, end, max(1, int(np.ceil((end - start) / spacing))), endpoint=False)
-        for start, end in itertools.pairwise(instants)
-    ]
-    return np.append(np.concatenate(parts), instants[-1])
 
 
 def plan_guide(
@@ -98,7 +77,7 @@ def plan_guide(
     """
     q = reference[0]
     found: list[FloatArray] = []
-    failures: list[GuideFailure] = []
+    failures: list[tuple[float, str]] = []
     touched: dict[str, FloatArray] = {}
     settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False, restarts=restarts)
     for k, instant in enumerate(time):
@@ -126,7 +105,7 @@ def plan_guide(
             retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
             result = retry if retry.succeeded else result
         if not result.succeeded:
-            failures.append(GuideFailure(float(instant), result.failure or "posture not found"))
+            failures.append((float(instant), result.failure or "posture not found"))
         q = result.q
         found.append(q)
     return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))

@@ -9,6 +9,7 @@ that breaks a requirement is repeated with other weights, knots, contacts or tim
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from types import MappingProxyType
 
 import numpy as np
@@ -16,8 +17,7 @@ from numpy.typing import ArrayLike
 
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule, StanceSequence
-from manikin.errors import InputError
+from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
 from manikin.numerics.banded import SampledBasis
@@ -41,8 +41,8 @@ from manikin.planning.whole_body.refine_input import (
     KeyPath,
     around,
     check_input,
-    shortened,
     shortening,
+    stretched,
     stretched_around,
     stretched_for_speed,
 )
@@ -56,7 +56,7 @@ from manikin.planning.whole_body.refine_measures import (
     sample_uniformly,
 )
 from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
-from manikin.planning.whole_body.refine_physics import MarginCost, least_slack
+from manikin.planning.whole_body.refine_physics import least_slack
 from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.scene import Proximity, Scene
@@ -117,9 +117,7 @@ class RefineSettings:
 
     def __post_init__(self) -> None:
         if self.speed_share is not None:
-            share = finite_number(self.speed_share, "refinement speed_share", above=0.0)
-            if share > 1.0:
-                raise InputError(f"refinement speed_share is {share:g}; valid: at most 1")
+            finite_number(self.speed_share, "refinement speed_share", above=0.0, at_most=1.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -184,12 +182,12 @@ class _RefineGoal:
         if self.forces is not None:
             held = HeldForces.of(job.body, self.schedule, self.forces, time)
             targets = replace(targets, fit=replace(targets.fit, forces=held))
-        wanted = job.rooms(self.schedule, job.settings.friction_share)
+        wanted = job.rooms(self.schedule.sequence, job.settings.friction_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
     def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
         """Sample a motion and certify it."""
-        job, schedule, rooms = self.job, self.schedule, self.job.rooms(self.schedule)
+        job, schedule, rooms = self.job, self.schedule, self.job.rooms(self.schedule.sequence)
         time = sample_uniformly(schedule, job.settings.sampling)
         polytopes = [room.polytope for room in rooms]
         motion, wrench = full_motion(job.body, schedule, polytopes, time, *spline.evaluate(time))
@@ -202,17 +200,18 @@ class _RefineGoal:
 
     def at_rest(self) -> VariableSamples:
         """Samples of the keys at rest, for the choice of the contacts."""
-        time = sample_uniformly(self.schedule, SPARSE)
-        return VariableSamples.at_rest(
-            self.job.body, self.schedule.sequence.effectors, (self.path.time, self.path.q),
-            (time, self.path.at(time)),
-        )  # fmt: skip
+        time, body = sample_uniformly(self.schedule, SPARSE), self.job.body
+        still, keys = np.zeros((len(time), body.nv)), self.path.q
+        states, at_keys = (self.path.at(time), still, still), (keys, np.zeros((len(keys), body.nv)))
+        return VariableSamples.of(
+            body, self.schedule.sequence.effectors, time, states, (self.path.time, *at_keys)
+        )
 
     def moving(self, spline: ConfigurationSpline) -> VariableSamples:
         """Samples of a motion, for the choice of the contacts."""
         time = sample_uniformly(self.schedule, SPARSE)
         names = self.schedule.sequence.effectors
-        return VariableSamples.of_motion(self.job.body, names, time, spline.evaluate(time))
+        return VariableSamples.of(self.job.body, names, time, spline.evaluate(time))
 
 
 class Refinement:
@@ -223,6 +222,7 @@ class Refinement:
 
     Attributes:
         variables: Of each phase, the contact variables of its effectors, as chosen last.
+        rooms: Wrench polytopes of a sequence with a share of the friction, see :func:`.rooms_of`.
     """
 
     def __init__(
@@ -236,7 +236,7 @@ class Refinement:
         self.body, self.scene, self.settings, self.task, self.padded = body, scene, settings, task, padded
         self.proximity = Proximity(body, scene)
         self.variables: Variables = ()
-        self._rooms: dict[tuple[StanceSequence, float], tuple[MarginCost, ...]] = {}
+        self.rooms = cache(rooms_of)
         self._job = FitJob(
             # Relative decrease of the objective below which a repair stops.
             settings.knot_spacing, settings.samples_per_span, penalties=PENALTIES, patience=0.004,
@@ -273,13 +273,6 @@ class Refinement:
         progress(1.0)
         return self._result(best, path.duration, schedule, began)
 
-    def rooms(self, schedule: ContactSchedule, friction_share: float = 1.0) -> tuple[MarginCost, ...]:
-        """Wrench polytope of each phase, with a share of the friction."""
-        key = schedule.sequence, friction_share
-        if key not in self._rooms:
-            self._rooms[key] = rooms_of(schedule, friction_share)
-        return self._rooms[key]
-
     def _remedy(self, number: int, last: FitAttempt[_RefineGoal]) -> FitAttempt[_RefineGoal]:
         """The next fit after one that breaks requirements: other contacts, weights, timing or knots."""
         goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
@@ -312,7 +305,7 @@ class Refinement:
             factors = shortening(self.body, best.motion, goal.schedule, share, settled)
             if np.all(factors == 1.0):
                 break
-            shorter = _RefineGoal(self, *shortened(goal.path, goal.schedule, factors))
+            shorter = _RefineGoal(self, *stretched(goal.path, goal.schedule, factors))
             near = _retimed(best.result.spline, goal.schedule, shorter.schedule)
             trial = self._job.attempt(shorter, best.scales, best.fine, near)
             if trial.broken:
@@ -359,8 +352,8 @@ class Refinement:
         smoothed = spline_through(path.at(fitted), basis, knots)
         before, start, after = (
             measure(
-                self.body, self.proximity, obstacles, path, schedule, self.rooms(schedule), time, samples,
-                self.task,
+                self.body, self.proximity, obstacles, path, schedule, self.rooms(schedule.sequence), time,
+                samples, self.task,
             )
             for samples in (path.at(time), smoothed.evaluate(time).q, spline.evaluate(time).q)
         )  # fmt: skip

@@ -178,25 +178,10 @@ def _turn_weight(contact: Contact) -> float:
     return 1.0 if contact.kind is ContactKind.SOLE else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class EffectorSpeed:
-    """Linear velocity of an effector with its derivatives by the raw coordinates.
-
-    Attributes:
-        value: (n, 3) in the world [m/s].
-        by_value: (n, 3, nq) derivative by the raw coordinates.
-        by_rate: (n, 3, nq) by their rates.
-    """
-
-    value: FloatArray
-    by_value: FloatArray
-    by_rate: FloatArray
-
-
 def effector_speed(
     motion: MotionSamples, jacobian: FloatArray, chain: np.ndarray, turn: TurnDerivatives
-) -> EffectorSpeed:
-    """Velocity of an effector at every sample.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n, 3) velocity of an effector [m/s], and (n, 3, nq) its derivatives by the raw coordinates and rates.
 
     With the columns ``J_i`` and axes ``z_i`` of the joints from the pelvis to the effector,
     ``d(J v)/dq_i = (sum_{k <= i} z_k v_k) x J_i + z_i x (sum_{k > i} J_k v_k)``.
@@ -226,4 +211,4 @@ def effector_speed(
     )
     by_rate[:, :, :3] = np.eye(3)
     by_rate[:, :, 3:7] = by_omega @ turn.omega_by_rate
-    return EffectorSpeed(value, by_value, by_rate)
+    return value, by_value, by_rate

@@ -75,10 +75,6 @@ class KeyPath:
         out[:, 3:7] = Slerp(self.time, Rotation.from_quat(self.q[:, 3:7]))(t).as_quat()
         return align_quaternions(out)
 
-    def retimed(self, before: FloatArray, after: FloatArray) -> "KeyPath":
-        """Path with its keys at other times: ``before`` (k,) becomes ``after`` (k,), linear in between."""
-        return KeyPath(np.interp(self.time, before, after), self.q)
-
 
 def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> None:
     """Refuse keys, contacts and bodies that do not fit each other.
@@ -112,9 +108,17 @@ def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> No
 def retime(
     path: KeyPath, schedule: ContactSchedule, before: FloatArray, after: FloatArray
 ) -> tuple[KeyPath, ContactSchedule]:
-    """Move keys and contacts to other times, see :meth:`KeyPath.retimed`."""
-    instants = np.interp(schedule.instants, before, after)
-    return path.retimed(before, after), ContactSchedule(schedule.sequence, instants)
+    """Keys and contacts at other times: ``before`` (k,) becomes ``after`` (k,), linear in between."""
+    keys = KeyPath(np.interp(path.time, before, after), path.q)
+    return keys, ContactSchedule(schedule.sequence, np.interp(schedule.instants, before, after))
+
+
+def stretched(
+    path: KeyPath, schedule: ContactSchedule, factors: FloatArray
+) -> tuple[KeyPath, ContactSchedule]:
+    """Keys and contacts with the duration of every phase times its factor (phases,)."""
+    after = schedule.instants[0] + np.concatenate([[0.0], np.cumsum(schedule.durations * factors)])
+    return retime(path, schedule, schedule.instants, after)
 
 
 def stretched_for_speed(
@@ -147,9 +151,7 @@ def stretched_around(
     """
     worst = int(schedule.phase_at(time))
     away = np.abs(np.arange(len(schedule.sequence)) - worst)
-    factors = np.select([away == 0, away == 1], [factor, 0.5 * (1.0 + factor)], 1.0)
-    after = schedule.instants[0] + np.concatenate([[0.0], np.cumsum(schedule.durations * factors)])
-    return retime(path, schedule, schedule.instants, after)
+    return stretched(path, schedule, np.select([away == 0, away == 1], [factor, 0.5 * (1.0 + factor)], 1.0))
 
 
 SHORTER = 0.88
@@ -181,14 +183,6 @@ def shortening(
     factors = np.maximum(factors, np.minimum(SHORTEST / schedule.durations, 1.0))
     factors[list(settled)] = 1.0
     return np.where(factors > SETTLED, 1.0, factors)
-
-
-def shortened(
-    path: KeyPath, schedule: ContactSchedule, factors: FloatArray
-) -> tuple[KeyPath, ContactSchedule]:
-    """Keys and contacts with every phase times its factor (phases,)."""
-    after = schedule.instants[0] + np.concatenate([[0.0], np.cumsum(schedule.durations * factors)])
-    return retime(path, schedule, schedule.instants, after)
 
 
 def around(schedule: ContactSchedule, time: float) -> frozenset[int]:

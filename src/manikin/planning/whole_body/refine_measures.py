@@ -16,7 +16,7 @@ import pinocchio as pin
 from manikin.balance import MotionMargin, motion_margin
 from manikin.body import BodyModel
 from manikin.body.limbs import end_segments
-from manikin.contact import ContactKind, ContactSchedule, Stance
+from manikin.contact import ContactKind, ContactSchedule, Stance, StanceSequence
 from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_map
@@ -29,7 +29,7 @@ from manikin.planning.whole_body.refine_contacts import (
 )
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.refine_physics import MarginCost, centre_of
-from manikin.planning.whole_body.sliding_touchdown import Ignored
+from manikin.planning.whole_body.sliding_touchdown import Ignored, with_pairs
 from manikin.planning.whole_body.swing_planner import leaning_pairs, touch_pairs
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint, segment_of
@@ -103,22 +103,12 @@ class RefineObstacles:
 
     def touching(self) -> tuple[Ignored, ...]:
         """Pairs that may go into each other at each sample: those in contact, and a hand about a grasp."""
-        return self._with([side for side in self._sides if side.grasped])
+        grasped = [side for side in self._sides if side.grasped]
+        return with_pairs(self.ignored, [(side.pairs, side.away < 1.0) for side in grasped])
 
     def during_flights(self) -> tuple[Ignored, ...]:
         """Pairs that do not count as clearance at each sample: in contact, leaving it or reaching it."""
-        return self._with(self._sides)
-
-    def _with(self, sides: list[_Side]) -> tuple[Ignored, ...]:
-        known: dict[tuple[Ignored, tuple[bool, ...]], Ignored] = {}
-        found = []
-        for sample, held in enumerate(self.ignored):
-            near = tuple(bool(side.away[sample] < 1.0) for side in sides)
-            if (held, near) not in known:
-                pairs = (side.pairs for side, close in zip(sides, near, strict=True) if close)
-                known[held, near] = held.union(*pairs)
-            found.append(known[held, near])
-        return tuple(found)
+        return with_pairs(self.ignored, [(side.pairs, side.away < 1.0) for side in self._sides])
 
     def wanted(self, found: ProximitySamples, safe: float, touching: float) -> FloatArray:
         """(k,) wanted distance of close pairs [m].
@@ -230,9 +220,9 @@ def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray
     return missing
 
 
-def rooms_of(schedule: ContactSchedule, friction_share: float = 1.0) -> tuple[MarginCost, ...]:
+def rooms_of(sequence: StanceSequence, friction_share: float = 1.0) -> tuple[MarginCost, ...]:
     """Wrench polytope of each phase, with a share of the friction."""
-    return tuple(room_of(phase.stance, friction_share) for phase in schedule.sequence)
+    return tuple(room_of(phase.stance, friction_share) for phase in sequence)
 
 
 def room_of(stance: Stance, friction_share: float = 1.0) -> MarginCost:

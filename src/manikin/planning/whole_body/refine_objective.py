@@ -9,6 +9,7 @@ here the control points of one spline, and every derivative is analytic.
 
 import itertools
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 import pinocchio as pin
@@ -160,10 +161,14 @@ class RefineObjective(MotionObjective):
         schedule, self._names = targets.schedule, tuple(targets.fit.effectors)
         time = targets.fit.time
         com = _centres_of_mass(body, targets.fit.reference)
-        self._wanted: dict[tuple[int, float], float] = {}
         # At a key instant the stances on both sides of it have to do.
         self._stances = [
-            (rows, RefinedForces(phase.stance, self._names), room, com[rows].mean(axis=0))
+            (
+                rows,
+                RefinedForces(phase.stance, self._names),
+                room,
+                cache(partial(room.wanted, com=com[rows].mean(axis=0))),
+            )
             for phase, room, (start, end) in zip(schedule.sequence, rooms, _relied_on(schedule), strict=True)
             for rows in (np.flatnonzero((time >= start) & (time <= end)),)
         ]
@@ -193,11 +198,8 @@ class RefineObjective(MotionObjective):
         """Joint ranges, and knees that stay bent."""
         assert isinstance(scales, RefineScales)
         super()._add_ranges(out, raw, scales)
-        missing = np.minimum(raw[:, self._knees] - scales.knee_flexion, 0.0) / scales.straight
-        weight, residual = np.zeros_like(raw), np.zeros_like(raw)
-        weight[:, self._knees] = (missing != 0.0) / scales.straight
-        residual[:, self._knees] = missing
-        out.add_diagonal(0, weight, residual)
+        missing = np.minimum(raw[:, self._knees] - scales.knee_flexion, 0.0)
+        self._add_excess(out, 0, self._knees, missing, scales.straight)
 
     def _com_weight(self, scales: MotionScales) -> FloatArray:
         del scales
@@ -226,30 +228,15 @@ class RefineObjective(MotionObjective):
     def wrench_cost(self, wrench: FloatArray, com: FloatArray, scales: RefineScales) -> WrenchCost:
         """Physics violation and missing balance of wrenches (n, 6) about the world origin, CoM (n, 3)."""
         n = len(wrench)
-        value, gradient, curvature = np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6))
-        by_com = np.zeros((n, 3))
-        weight = self._body.mass * 9.81
-        for rows, forces, room, place in self._stances:
-            part = wrench[rows]
-            share = forces.share(
-                part, self._load[rows], tolerance=scales.missing_wrench, force=scales.force * weight
-            )
-            wanted = self._wanted_margin(room, scales.margin, place)
-            cost = share.cost + room.cost(
-                part, com[rows], wanted, scales.margin_violation, scales.margin_softness
-            )
-            value[rows] += cost.value
-            gradient[rows] += cost.gradient
-            curvature[rows] += cost.curvature
-            by_com[rows] += cost.by_com
-        return WrenchCost(value, gradient, curvature, by_com)
-
-    def _wanted_margin(self, room: MarginCost, margin: float, place: FloatArray) -> float:
-        """:meth:`MarginCost.wanted`, found once for each stance."""
-        key = id(room), margin
-        if key not in self._wanted:
-            self._wanted[key] = room.wanted(margin, place)
-        return self._wanted[key]
+        total = WrenchCost(np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6)), np.zeros((n, 3)))
+        penalty = scales.margin_violation, scales.margin_softness
+        force = scales.force * (self._body.mass * 9.81)
+        for rows, forces, room, wanted in self._stances:
+            share = forces.share(wrench[rows], self._load[rows], tolerance=scales.missing_wrench, force=force)
+            margin = room.cost(wrench[rows], com[rows], wanted(scales.margin), *penalty)
+            for out, one, other in zip(total, share.cost, margin, strict=True):
+                out[rows] += one + other
+        return total
 
     def _add_contact_motion(self, out: FitLinearisation, motion: MotionSamples, scales: RefineScales) -> None:
         """Speeds of effectors in contact, and the EFORT of their limbs."""
@@ -258,11 +245,11 @@ class RefineObjective(MotionObjective):
             jacobian, chain = self._sampler.frame_jacobian(motion, number), self._chains[name]
             share = np.sqrt(self._refine.variables[name])
             weight = (share / scales.slide)[:, None]
-            speed = effector_speed(motion, jacobian, chain, turn)
-            residual = weight * speed.value
-            out.add(1, weight[:, :, None] * speed.by_rate, residual)
+            speed, by_value, by_rate = effector_speed(motion, jacobian, chain, turn)
+            residual = weight * speed
+            out.add(1, weight[:, :, None] * by_rate, residual)
             # Its change with the posture is small where the speed is; the gradient alone has it.
-            out.gradient[0] += np.einsum("nc,ncq->nq", weight * residual, speed.by_value)
+            out.gradient[0] += np.einsum("nc,ncq->nq", weight * residual, by_value)
             if name in self._refine.limbs:
                 alpha, slope = efort_with_derivative(self._refine.limbs[name], jacobian, chain)
                 clamped = np.maximum(alpha, LEAST)

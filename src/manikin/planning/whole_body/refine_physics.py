@@ -24,9 +24,10 @@ where ``s >= 0`` exactly where the margin of ``b`` in the stance's wrench polyto
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
+from scipy import linalg
 from scipy.optimize import linprog
 from scipy.sparse import block_diag, coo_array, vstack
 from scipy.special import expit
@@ -40,6 +41,7 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel
 from manikin.motion.configuration_spline import ConfigurationSpline
 from manikin.motion.dynamics import MotionSamples, centroidal_motion
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, skew, wrench_map
+from manikin.planning.whole_body.fit_objective import to_raw
 
 ARM = 0.25
 """Length that makes moments comparable with forces [m]."""
@@ -72,10 +74,7 @@ class WrenchSamples:
         jacobians = [
             np.concatenate([part[:, :3], part[:, 3:] + arm @ part[:, :3]], axis=1) for part in rate.jacobians
         ]
-        tangent = motion.tangent[:, :6]
-        by_com = np.concatenate(
-            [motion.com_jacobian[:, :, :6] @ tangent, motion.com_jacobian[:, :, 6:]], axis=2
-        )
+        by_com = to_raw(motion.com_jacobian, motion.tangent)
         jacobians[0][:, 3:] -= skew(force) @ by_com
         return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]), by_com)
 
@@ -85,8 +84,7 @@ def centre_of(stance: Stance) -> FloatArray:
     return np.mean([contact.position for contact in stance], axis=0) if len(stance) else np.zeros(3)
 
 
-@dataclass(frozen=True, eq=False)
-class WrenchCost:
+class WrenchCost(NamedTuple):
     """A convex function of wrenches with its second-order model.
 
     Attributes:
@@ -100,12 +98,6 @@ class WrenchCost:
     gradient: FloatArray
     curvature: FloatArray
     by_com: FloatArray
-
-    def __add__(self, other: "WrenchCost") -> "WrenchCost":
-        return WrenchCost(
-            self.value + other.value, self.gradient + other.gradient, self.curvature + other.curvature,
-            self.by_com + other.by_com,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,62 +252,46 @@ def contact_slack(schedule: ContactSchedule, time: FloatArray, wrench: FloatArra
         rows = np.flatnonzero(phases == number)
         if len(phase.stance) == 0:
             continue
-        program = _SlackProgram(phase.stance)
-        edges = [*range(0, len(rows), TOGETHER), len(rows)]
-        for start, end in pairwise(edges):
-            slack[rows[start:end]] = program.solve(wrench[rows[start:end]])
+        program, to_centre = _slack_program(phase.stance), wrench_map(centre_of(phase.stance)).T
+        for start in range(0, len(rows), TOGETHER):
+            part = rows[start : start + TOGETHER]
+            slack[part] = _solve_slack(program, wrench[part] @ to_centre)
     return slack
 
 
-class _SlackProgram:
-    """The program of one stance; its unknowns are the contacts' wrenches and the slack."""
+def _slack_program(stance: Stance) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows of the balance and of the limits, and bounds of these, on the contacts' wrenches and the slack."""
+    maps = [_map(contact, centre_of(stance)) for contact in stance]
+    parts = [_limits(contact, stance.friction_model) for contact in stance]
+    widths = [item.shape[1] for item in maps]
+    blocks = [left[:, :width] for (left, _), width in zip(parts, widths, strict=True)]
+    limits = np.asarray(linalg.block_diag(*blocks), dtype=np.float64)
+    bound = np.concatenate([right for _, right in parts])
+    if stance.normal_force_cap is not None:
+        normal = [
+            (contact.kind is not ContactKind.GRASP) * np.eye(width)[2]
+            for contact, width in zip(stance, widths, strict=True)
+        ]
+        limits = np.vstack([limits, np.concatenate(normal)])
+        bound = np.append(bound, stance.normal_force_cap)
+    balance = np.hstack([*maps, np.zeros((6, 1))])
+    return balance, np.hstack([limits, np.ones((len(limits), 1))]), bound
 
-    def __init__(self, stance: Stance) -> None:
-        self._centre = centre_of(stance)
-        parts = [_limits(contact, stance.friction_model) for contact in stance]
-        maps = [_map(contact, self._centre) for contact in stance]
-        self._balance = np.hstack([*maps, np.zeros((6, 1))])
-        limits = np.zeros((sum(len(part[1]) for part in parts), self._balance.shape[1]))
-        row = column = 0
-        for (left, right), item in zip(parts, maps, strict=True):
-            width = item.shape[1]
-            limits[row : row + len(right), column : column + width] = left[:, :width]
-            row, column = row + len(right), column + width
-        limits[:, -1] = 1.0
-        bound = np.concatenate([right for _, right in parts])
-        if stance.normal_force_cap is not None:
-            limits, bound = self._capped(stance, maps, limits, bound)
-        self._limits, self._bound = limits, bound
 
-    def _capped(
-        self, stance: Stance, maps: list[FloatArray], limits: FloatArray, bound: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        row, column = np.zeros(limits.shape[1]), 0
-        for contact, item in zip(stance, maps, strict=True):
-            row[column + 2] = contact.kind is not ContactKind.GRASP
-            column += item.shape[1]
-        row[-1] = 1.0
-        return np.vstack([limits, row]), np.append(bound, stance.normal_force_cap or 0.0)
-
-    def solve(self, wrench: FloatArray) -> FloatArray:
-        """(n,) slack at wrenches (n, 6) about the world origin."""
-        n, width = len(wrench), self._balance.shape[1]
-        cost = np.tile(np.append(np.zeros(width - 1), -1.0), n)
-        equal = block_diag([coo_array(self._balance)] * n)
-        below = block_diag([coo_array(self._limits)] * n)
-        wanted = (wrench @ wrench_map(self._centre).T).ravel()
-        found = linprog(
-            cost, A_ub=vstack([below]), b_ub=np.tile(self._bound, n), A_eq=equal, b_eq=wanted,
-            bounds=(None, None), method="highs",
-        )  # fmt: skip
-        if found.status != 0:  # too few directions of force: no slack whatever its size
-            return self._one_by_one(wrench)
+def _solve_slack(program: tuple[FloatArray, FloatArray, FloatArray], wrench: FloatArray) -> FloatArray:
+    """(n,) slack of one stance at wrenches (n, 6) about its centre."""
+    balance, limits, bound = program
+    n, width = len(wrench), balance.shape[1]
+    found = linprog(
+        np.tile(-np.eye(width)[-1], n), A_ub=vstack([block_diag([coo_array(limits)] * n)]),
+        b_ub=np.tile(bound, n), A_eq=block_diag([coo_array(balance)] * n), b_eq=wrench.ravel(),
+        bounds=(None, None), method="highs",
+    )  # fmt: skip
+    if found.status == 0:
         return found.x[width - 1 :: width]
-
-    def _one_by_one(self, wrench: FloatArray) -> FloatArray:
-        if len(wrench) == 1:
-            return np.array([-np.inf])
-        return np.concatenate([self.solve(row[None]) for row in wrench])
+    if n == 1:  # too few directions of force: no slack whatever its size
+        return np.array([-np.inf])
+    return np.concatenate([_solve_slack(program, row[None]) for row in wrench])
 
 
 def _map(contact: Contact, centre: FloatArray) -> FloatArray:

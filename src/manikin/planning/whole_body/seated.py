@@ -7,6 +7,7 @@ posture, but a whole body need only follow it loosely.
 """
 
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
 from manikin.contact import StanceSequence
 from manikin.kinematics import PostureProblem, PostureResult, generate_posture
-from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, Weights, plan_com
 from manikin.planning.whole_body.posture_style import READY
 from manikin.planning.whole_body.swing_planner import touch_pairs
@@ -29,6 +29,9 @@ WEIGHTS = Weights(
 CLEARANCES = (0.02, 0.0105)
 """Distances that the final posture keeps to the scene [m], tried in order; within the body the
 last one."""
+
+SITTING = replace(READY, angles=MappingProxyType({**READY.angles, "hip_flexion": 1.4, "knee_flexion": 1.3}))
+"""Bent hips and knees, from which the final posture is sought."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,26 +80,13 @@ def final_posture(
     body: BodyModel, scene: Scene, phases: StanceSequence, trajectory: CentroidalTrajectory
 ) -> PostureResult:
     """The sitting posture on the contacts of the last phase, its centre of mass left free."""
-    contacts = tuple(phases[len(phases) - 1].stance)
+    contacts, reference = tuple(phases[len(phases) - 1].stance), SITTING.posture(body)
+    reference[:3] = trajectory.position(trajectory.duration)
     problem = PostureProblem(
-        body, contacts, proximity=Proximity(body, scene), clearance=CLEARANCES[0],
-        self_clearance=CLEARANCES[-1],
+        body, contacts, proximity=Proximity(body, scene), self_clearance=CLEARANCES[-1],
         ignore=frozenset().union(*(touch_pairs(body, scene, contact) for contact in contacts)),
-        reference=_sitting(body, trajectory.position(trajectory.duration)),
+        reference=reference,
     )  # fmt: skip
-    result = generate_posture(problem)
-    for clearance in CLEARANCES[1:]:
-        if not result.succeeded:
-            result = generate_posture(replace(problem, clearance=clearance))
-    return result
-
-
-def _sitting(body: BodyModel, com: FloatArray) -> FloatArray:
-    """(nq,) ready posture with bent hips and knees about a centre of mass."""
-    q = READY.posture(body)
-    for index, name in enumerate(body.joint_names):
-        for key, angle in (("hip_flexion", 1.4), ("knee_flexion", 1.3)):
-            if name.endswith(key):
-                q[7 + index] = angle
-    q[:3] = com
-    return q
+    first, second = (replace(problem, clearance=clearance) for clearance in CLEARANCES)
+    found = generate_posture(first)
+    return found if found.succeeded else generate_posture(second)

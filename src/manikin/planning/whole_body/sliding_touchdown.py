@@ -6,6 +6,7 @@ contact's own frame is above the surface, and only the distance of the shapes sa
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +23,25 @@ from manikin.scene.distance import ProximitySamples, considered
 Ignored = frozenset[tuple[str, str]]
 """Pairs of segment and obstacle (or segment) whose distance does not count."""
 
+Samples = NDArray[np.bool_]
+"""(n,) whether something counts at each sample."""
+
 SITTING_DOWN = 0.15
 """Time before a seat is touched in which the trunk may come close to it [s]."""
 
 _REACH = 0.1
 """Distances beyond this are not measured [m]."""
+
+
+def with_pairs(held: Sequence[Ignored], more: Sequence[tuple[Ignored, Samples]]) -> tuple[Ignored, ...]:
+    """The pairs held at each sample, with further ones where these count."""
+
+    @cache
+    def union(own: Ignored, *near: bool) -> Ignored:
+        return own.union(*(pairs for (pairs, _), counts in zip(more, near, strict=True) if counts))
+
+    near = np.array([counts for _, counts in more]).reshape(-1, len(held)).T.tolist()
+    return tuple(union(own, *counts) for own, counts in zip(held, near, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +55,8 @@ class SlidingTouchdown:
     """
 
     pairs: Ignored
-    near: NDArray[np.bool_]
-    sliding: NDArray[np.bool_]
+    near: Samples
+    sliding: Samples
 
     def without(self, ignored: Sequence[Ignored]) -> tuple[Ignored, ...]:
         """The pairs that are ignored at each sample, but for those that meet there."""

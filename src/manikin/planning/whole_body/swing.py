@@ -67,58 +67,31 @@ class SwingLimits:
         finite_number(self.time_step, "swing limits time_step [s]", above=0.0)
 
 
-@dataclass(frozen=True)
-class SwingCheck:
-    """Measures of a curve beside its limits.
+@dataclass(frozen=True, eq=False)
+class SwingPlan:
+    """A curve, measured beside its limits.
 
     Attributes:
         slack: Smallest distance minus the distance required there [m]; negative is too close.
         clearance: Smallest distance while away from the two contacts [m].
-        speed: Peak speed [m/s].
-        angular_speed: Peak angular speed [rad/s].
         failure: None, or what is not kept, where and when.
     """
 
+    curve: SwingCurve
     slack: float
     clearance: float
-    speed: float
-    angular_speed: float
     failure: str | None
-
-    @property
-    def kept(self) -> bool:
-        """Whether every limit is kept."""
-        return self.failure is None
-
-
-@dataclass(frozen=True, eq=False)
-class SwingPlan:
-    """Result of :func:`plan_swing`.
-
-    Attributes:
-        curve: The curve found, or the best attempt when none keeps the limits.
-        candidates: Curves of the family that were tried.
-    """
-
-    curve: SwingCurve
-    check: SwingCheck
-    candidates: int = 0
 
     @property
     def succeeded(self) -> bool:
         """Whether the curve keeps every limit."""
-        return self.check.kept
-
-    @property
-    def failure(self) -> str | None:
-        """Limit that the best attempt breaks, or None."""
-        return self.check.failure
+        return self.failure is None
 
 
 def plan_swing(
     start: Pose, goal: Pose, start_time: float, end_time: float, clearance: Clearance, *,
     limits: SwingLimits | None = None, start_normal: ArrayLike = (0.0, 0.0, 1.0),
-    end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, refine: int = 20, controls: int = 20,
+    end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, refine: int = 20,
     heights: Sequence[float] = HEIGHTS, laterals: Sequence[float] = LATERALS,
 ) -> SwingPlan:  # fmt: skip
     """Find a smooth flight from ``start`` to ``goal`` that keeps clear.
@@ -135,7 +108,7 @@ def plan_swing(
         laterals: Lateral offsets of the apex that are tried, to the left of the travel [m].
 
     Returns:
-        A plan that says whether it succeeded and, if not, what its best attempt breaks.
+        The curve found, or the best attempt and what it breaks.
 
     Raises:
         InputError: If the times or normals are not usable.
@@ -150,24 +123,22 @@ def plan_swing(
     family = (
         SwingCurve.lift(
             start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
-            start_normal=normals[0], end_normal=normals[1], pitch=pitch, controls=controls,
+            start_normal=normals[0], end_normal=normals[1], pitch=pitch,
         )
         for height, lateral, apex in _choices(heights, laterals)
     )  # fmt: skip
-    best, best_check, tried = _first_clear(family, clearance, limits)
-    return SwingPlan(*_refine(best, best_check, clearance, limits, normals, refine), tried)
+    best = _first_clear(family, clearance, limits)
+    free = _free_directions(normals, len(best.curve.control_position))
+    return _refine(best, clearance, limits, free, refine)
 
 
-def check_swing(
-    curve: SwingCurve, clearance: Clearance, limits: SwingLimits, *, instants: int | None = None
-) -> SwingCheck:
+def check_swing(curve: SwingCurve, clearance: Clearance, limits: SwingLimits) -> SwingPlan:
     """Measure a curve against its limits, densely in time.
 
     Args:
         clearance: Signed distance of the effector at a time and pose [m].
-        instants: How many instants to look at; every ``limits.time_step`` when omitted.
     """
-    state = curve.evaluate(_instants(curve, limits, instants))
+    state = curve.evaluate(_instants(curve, limits))
     distance = _distances(state, clearance)
     required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
     slack = (distance - required)[1:-1]  # at the contacts themselves it is zero by definition
@@ -181,31 +152,28 @@ def check_swing(
             f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
             f"[{position}]; required {required[worst]:.4f} m"
         )
-    return SwingCheck(float(slack[worst - 1]), smallest, curve.peak_speed, curve.peak_angular_speed, failure)
+    return SwingPlan(curve, float(slack[worst - 1]), smallest, failure)
 
 
-def _first_clear(
-    family: Iterator[SwingCurve], clearance: Clearance, limits: SwingLimits
-) -> tuple[SwingCurve, SwingCheck, int]:
-    """First curve that keeps the limits, or else the first of those nearest to clear; how many were tried.
+def _first_clear(family: Iterator[SwingCurve], clearance: Clearance, limits: SwingLimits) -> SwingPlan:
+    """First curve that keeps the limits, or else the first of those nearest to clear.
 
     A curve is given up at the first instant at which it is too near and no better than the best one before
     it. Instants at which curves were given up are looked at first.
     """
-    best, least, tried = None, -np.inf, 0
+    best, least = None, -np.inf
     # Instants at which a curve of the family is looked at before it is checked densely.
     coarse, dense = _Slack(clearance, limits, 13), _Slack(clearance, limits)
     for curve in family:
-        tried += 1
         slack = coarse.least(curve, least)
         if slack >= -TOLERANCE and curve.haste(limits.speed, limits.angular_speed) is None:
             slack = dense.least(curve, least)
             if slack >= -TOLERANCE:
-                return curve, check_swing(curve, clearance, limits), tried
+                return check_swing(curve, clearance, limits)
         if best is None or min(slack, 0.0) > least:
             best, least = curve, min(slack, 0.0)
     assert best is not None  # a family has members
-    return best, check_swing(best, clearance, limits), tried
+    return check_swing(best, clearance, limits)
 
 
 class _Slack:
@@ -258,19 +226,19 @@ def _distances(state: SwingState, clearance: Clearance) -> FloatArray:
 
 
 def required_clearance(
-    moved: tuple[FloatArray, FloatArray], at_contact: tuple[float, float], limits: SwingLimits
+    moved: tuple[ArrayLike, ArrayLike], at_contact: tuple[float, float], limits: SwingLimits
 ) -> FloatArray:
     """Distance wanted: the full one in flight, less near the two contacts.
 
     Args:
-        moved: (k,) distances from the pose at lift-off and from the one at touch-down [m].
+        moved: Distances from the pose at lift-off and from the one at touch-down, any shape [m].
         at_contact: Clearances at these two poses [m].
         limits: Clearance in flight and how it is gained.
     """
-    wanted = np.full(len(moved[0]), limits.clearance)
-    for away, contact in zip(moved, at_contact, strict=True):
-        wanted = np.minimum(wanted, contact + limits.departure * away)
-    return wanted
+    left, reached = (
+        contact + limits.departure * np.asarray(away) for away, contact in zip(moved, at_contact, strict=True)
+    )
+    return np.minimum(np.minimum(limits.clearance, left), reached)
 
 
 def _required(
@@ -283,31 +251,24 @@ def _required(
 
 
 def _refine(
-    best: SwingCurve,
-    best_check: SwingCheck,
-    clearance: Clearance,
-    limits: SwingLimits,
-    normals: tuple[FloatArray, FloatArray],
-    iterations: int,
-) -> tuple[SwingCurve, SwingCheck]:
+    best: SwingPlan, clearance: Clearance, limits: SwingLimits, free: FloatArray, iterations: int
+) -> SwingPlan:
     """Move the control points until the curve keeps clear, at the least squared jerk."""
-    n = len(best.control_position)
-    free, curve = _free_directions(normals, n), best
+    curve = best.curve
     for _ in range(iterations):
         step = _best_step(curve, clearance, limits, free)
-        moved = curve.control_position + (free @ step).reshape(n, 3)
+        moved = curve.control_position + (free @ step).reshape(-1, 3)
         curve = SwingCurve(curve.start_time, curve.end_time, moved, curve.control_rotation)
-        check = check_swing(curve, clearance, limits)
-        if _rank(curve, check) > _rank(best, best_check):
-            best, best_check = curve, check
-        if np.abs(step).max() < (SETTLED if check.kept else STATIONARY):
+        plan = check_swing(curve, clearance, limits)
+        best = max(best, plan, key=_rank)
+        if np.abs(step).max() < (SETTLED if plan.succeeded else STATIONARY):
             break
-    return best, best_check
+    return best
 
 
-def _rank(curve: SwingCurve, check: SwingCheck) -> tuple[bool, float]:
+def _rank(plan: SwingPlan) -> tuple[bool, float]:
     """Order of preference: a curve that keeps the limits, then the least effort or the least violation."""
-    return check.kept, -curve.effort if check.kept else check.slack
+    return plan.succeeded, -plan.curve.effort if plan.succeeded else plan.slack
 
 
 def _free_directions(normals: tuple[FloatArray, FloatArray], n: int) -> FloatArray:

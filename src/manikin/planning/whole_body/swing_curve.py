@@ -8,7 +8,6 @@ acceleration and jerk vanish at both ends; the fifth one from either end lies on
 surface normal, so the curve leaves and meets the surface along its normal.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -18,7 +17,7 @@ from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, axes_of_normal, finite_number, frozen_array
 from manikin.planning.whole_body.swing_path import EffectorPath, Pose
 
 DEGREE = 5
@@ -42,7 +41,6 @@ class SwingState:
         velocity: (k, 3) [m/s].
         angular_velocity: (k, 3) [rad/s].
         acceleration: (k, 3) [m/s^2].
-        angular_acceleration: (k, 3) [rad/s^2].
     """
 
     time: FloatArray
@@ -51,14 +49,13 @@ class SwingState:
     velocity: FloatArray
     angular_velocity: FloatArray
     acceleration: FloatArray
-    angular_acceleration: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class SwingCurve:
     """A flight from rest to rest, C4 in time.
 
-    Use :meth:`through`, :meth:`lift` or :meth:`along` to make one.
+    Use :meth:`lift` or :meth:`along` to make one.
 
     Attributes:
         start_time: Lift-off [s].
@@ -85,46 +82,14 @@ class SwingCurve:
         )
 
     @classmethod
-    def through(
-        cls, start: Pose, goal: Pose, start_time: float, end_time: float,
-        via: Sequence[tuple[float, ArrayLike]] = (), *, start_normal: ArrayLike = (0.0, 0.0, 1.0),
-        end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, controls: int = 20,
-    ) -> "SwingCurve":  # fmt: skip
-        """Smoothest curve (least integral of squared jerk) from ``start`` to ``goal`` through via-points.
-
-        The rotation follows the shortest turn with the timing of a straight flight.
-
-        Args:
-            start_time: Lift-off [s].
-            end_time: Touch-down [s].
-            via: Points to pass: share of the duration in (0, 1) and (3,) position [m].
-            start_normal: (3,) surface normal along which the curve leaves.
-            end_normal: (3,) surface normal along which it arrives, reversed.
-            pitch: Extra turn about the effector's own y axis in early flight, toes down when
-                positive [rad], as of a foot whose heel comes up first.
-
-        Raises:
-            InputError: If a via-point or a time is not usable or there are too many via-points.
-        """
-        shares = [finite_number(share, "via-point share", above=0.0, at_most=1.0) for share, _ in via]
-        points = [frozen_array(point, "via-point [m]", (3,)) for _, point in via]
-        if len(via) > controls - MIN_CONTROLS:
-            raise InputError(f"swing has {len(via)} via-points; valid: at most {controls - MIN_CONTROLS}")
-        ends = end_conditions(start.position, goal.position, start_normal, end_normal, controls)
-        through = block_rows(basis(np.asarray(shares, dtype=np.float64), controls))
-        matrix = np.vstack([ends[0], through])
-        target = np.concatenate([ends[1], *points])
-        positions = _least_norm(jerk_energy(controls), matrix, target)
-        rotations = _turning(start.rotation, goal.rotation, pitch, controls)
-        return cls(start_time, end_time, positions, rotations)
-
-    @classmethod
     def lift(
         cls, start: Pose, goal: Pose, start_time: float, end_time: float, *, height: float = 0.08,
         lateral: float = 0.0, apex: float = 0.5, start_normal: ArrayLike = (0.0, 0.0, 1.0),
         end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, controls: int = 20,
     ) -> "SwingCurve":  # fmt: skip
-        """Curve over one apex.
+        """Smoothest curve (least integral of squared jerk) over one apex.
+
+        The rotation follows the shortest turn with the timing of a straight flight.
 
         Args:
             start_time: Lift-off [s].
@@ -132,19 +97,23 @@ class SwingCurve:
             height: Of the apex above the higher end, along the mean normal [m].
             lateral: Offset of the apex to the left of the travel, seen from above [m].
             apex: Share of the duration at which the apex is passed.
-            start_normal: (3,) surface normal at lift-off.
-            end_normal: (3,) surface normal at touch-down.
-            pitch: As for :meth:`through` [rad].
+            start_normal: (3,) surface normal along which the curve leaves.
+            end_normal: (3,) surface normal along which it arrives, reversed.
+            pitch: Extra turn about the effector's own y axis in early flight, toes down when
+                positive [rad], as of a foot whose heel comes up first.
         """
-        up, left = _flight_axes(start.position, goal.position, start_normal, end_normal)
+        up, left = _flight_axes(start.position, goal.position, np.add(start_normal, end_normal))
         share = 0.5 + 0.6 * (apex - 0.5)  # where along the way: close to the middle even for early apexes
         middle = (1.0 - share) * start.position + share * goal.position
         top = max(float(up @ start.position), float(up @ goal.position)) + height
         point = middle + (top - float(up @ middle)) * up + lateral * left
-        return cls.through(
-            start, goal, start_time, end_time, [(apex, point)],
-            start_normal=start_normal, end_normal=end_normal, pitch=pitch, controls=controls,
-        )  # fmt: skip
+        normals = _unit(start_normal), _unit(end_normal)
+        rows, target = _end_conditions(start.position, goal.position, normals, controls)
+        matrix = np.vstack([rows, block_rows(basis(np.array([apex]), controls))])
+        gain = _least_jerk(controls, matrix.tobytes())
+        positions = (gain @ np.concatenate([target, point])).reshape(controls, 3)
+        rotations = _turning(start.rotation, goal.rotation, pitch, controls)
+        return cls(start_time, end_time, positions, rotations)
 
     @classmethod
     def along(cls, path: EffectorPath, controls: int = 20, sharpening: int = 0) -> "SwingCurve":
@@ -198,16 +167,9 @@ class SwingCurve:
         share = np.clip((times - self.start_time) / self.duration, 0.0, 1.0)
         rate = 1.0 / self.duration
         weights = [basis(share, len(self.control_position), order) * rate**order for order in range(3)]
-        rotation, angular_velocity, angular_acceleration = self._turn(weights)
-        return SwingState(
-            times,
-            weights[0] @ self.control_position,
-            rotation,
-            weights[1] @ self.control_position,
-            angular_velocity,
-            weights[2] @ self.control_position,
-            angular_acceleration,
-        )
+        rotation, angular_velocity = self._turn(weights)
+        position, velocity, acceleration = (weight @ self.control_position for weight in weights)
+        return SwingState(times, position, rotation, velocity, angular_velocity, acceleration)
 
     def at(self, time: float) -> Pose:
         """Pose at one time [s]."""
@@ -235,11 +197,6 @@ class SwingCurve:
         return None
 
     @cached_property
-    def peak_acceleration(self) -> float:
-        """Largest linear acceleration [m/s^2], sampled at 1 % of the flight."""
-        return float(np.linalg.norm(self._dense.acceleration, axis=1).max())
-
-    @cached_property
     def effort(self) -> float:
         """Root mean square of the linear acceleration over the flight [m/s^2]."""
         return float(np.sqrt(np.mean(np.sum(self._dense.acceleration**2, axis=1))))
@@ -248,29 +205,22 @@ class SwingCurve:
     def _dense(self) -> SwingState:
         return self.evaluate(np.linspace(self.start_time, self.end_time, 101))
 
-    def _turn(self, weights: list[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rotation, angular velocity and acceleration in the world from the basis and its rates."""
+    def _turn(self, weights: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Rotation and angular velocity in the world from the basis and its rates."""
         count = len(weights[0])
         rotation = np.broadcast_to(self.control_rotation[0], (count, 3, 3)).copy()
-        velocity, acceleration = np.zeros((count, 3)), np.zeros((count, 3))  # in the turning frame
+        velocity = np.zeros((count, 3))  # in the turning frame
         relative = np.swapaxes(self.control_rotation[:-1], 1, 2) @ self.control_rotation[1:]
         turns = Rotation.from_matrix(relative).as_rotvec()
         turning = np.flatnonzero(np.any(np.abs(turns) > 1e-14, axis=1))
         # Cumulative basis: the sum of the basis functions from this control pose on.
-        shares = [[w[:, index + 1 :].sum(axis=1)[:, None] for w in weights] for index in turning]
-        angles = np.array([b * turns[index] for index, (b, _, _) in zip(turning, shares, strict=True)])
+        shares = [[w[:, index + 1 :].sum(axis=1)[:, None] for w in weights[:2]] for index in turning]
+        angles = np.array([b * turns[index] for index, (b, _) in zip(turning, shares, strict=True)])
         steps = Rotation.from_rotvec(angles.reshape(-1, 3)).as_matrix().reshape(-1, count, 3, 3)
-        for index, step, (_, b1, b2) in zip(turning, steps, shares, strict=True):
-            turn = turns[index]
-            carried = np.einsum("kji,kj->ki", step, velocity)
-            acceleration = np.einsum("kji,kj->ki", step, acceleration) + cross(carried, b1 * turn) + b2 * turn
-            velocity = carried + b1 * turn
+        for index, step, (_, rate) in zip(turning, steps, shares, strict=True):
+            velocity = np.einsum("kji,kj->ki", step, velocity) + rate * turns[index]
             rotation = rotation @ step
-        return (
-            rotation,
-            np.einsum("kij,kj->ki", rotation, velocity),
-            np.einsum("kij,kj->ki", rotation, acceleration),
-        )
+        return rotation, np.einsum("kij,kj->ki", rotation, velocity)
 
 
 def basis(share: FloatArray, controls: int, derivative: int = 0) -> FloatArray:
@@ -310,25 +260,20 @@ def jerk_energy(controls: int) -> FloatArray:
     return energy
 
 
-def end_conditions(
-    start: FloatArray, goal: FloatArray, start_normal: ArrayLike, end_normal: ArrayLike, controls: int
+def _end_conditions(
+    start: FloatArray, goal: FloatArray, normals: tuple[FloatArray, FloatArray], controls: int
 ) -> tuple[FloatArray, FloatArray]:
     """Matrix (8 x 3 + 4, 3 controls) and target that put the end control points where they belong.
 
     The unknowns are the control points, flattened row by row.
     """
-    rows: list[FloatArray] = []
-    target: list[FloatArray] = []
-    sides = ((range(RESTING), start, start_normal), (range(controls - RESTING, controls), goal, end_normal))
-    for indices, point, _ in sides:
-        for index in indices:
-            rows.append(_select(index, np.eye(3), controls))
-            target.append(point)
-    for index, point, normal in ((RESTING, start, start_normal), (controls - RESTING - 1, goal, end_normal)):
-        across = normal_tangents(normal)
-        rows.append(_select(index, across, controls))
-        target.append(across @ point)
-    return np.vstack(rows), np.concatenate(target)
+    across = [np.ascontiguousarray(axes_of_normal(normal)[:, :2].T) for normal in normals]
+    places = [(index, np.eye(3), start) for index in range(RESTING)]
+    places += [(index, np.eye(3), goal) for index in range(controls - RESTING, controls)]
+    places += [(RESTING, across[0], start), (controls - RESTING - 1, across[1], goal)]
+    rows = [np.kron(np.eye(controls)[[index]], block) for index, block, _ in places]
+    target = [block @ point for _, block, point in places]
+    return np.asarray(np.vstack(rows), dtype=np.float64), np.concatenate(target)
 
 
 def block_rows(weights: FloatArray) -> FloatArray:
@@ -336,41 +281,24 @@ def block_rows(weights: FloatArray) -> FloatArray:
     return np.asarray(np.kron(weights, np.eye(3)), dtype=np.float64)
 
 
-def _select(index: int, block: FloatArray, controls: int) -> FloatArray:
-    rows = np.zeros((len(block), 3 * controls))
-    rows[:, 3 * index : 3 * index + 3] = block
-    return rows
-
-
-def normal_tangents(normal: ArrayLike) -> FloatArray:
-    """(2, 3) orthonormal directions across a normal."""
+def _unit(normal: ArrayLike) -> FloatArray:
+    """(3,) direction of a normal."""
     n = frozen_array(normal, "surface normal", (3,))
     length = float(np.linalg.norm(n))
     if length < 1e-12:
         raise InputError(f"surface normal is {n.tolist()}; valid: a direction that is not zero")
-    n = n / length
-    helper = np.eye(3)[int(np.argmin(np.abs(n)))]
-    first = np.cross(n, helper)
-    first = first / np.linalg.norm(first)
-    return np.array([first, np.cross(n, first)], dtype=np.float64)
-
-
-def _least_norm(energy: FloatArray, matrix: FloatArray, target: FloatArray) -> FloatArray:
-    """Control points (n, 3) of least energy among those that meet ``matrix x = target``."""
-    gain = _least_norm_gain(len(energy), energy.tobytes(), matrix.tobytes())
-    return (gain @ target).reshape(len(energy), 3)
+    return n / length
 
 
 @lru_cache(maxsize=64)
-def _least_norm_gain(n: int, energy_bytes: bytes, matrix_bytes: bytes) -> FloatArray:
-    """(3n, m) linear map from the targets to the control points of least energy; cached by its matrices."""
-    energy = np.frombuffer(energy_bytes).reshape(n, n)
-    matrix = np.frombuffer(matrix_bytes).reshape(-1, 3 * n)
-    hessian = block_rows(energy / np.trace(energy)) + 1e-12 * np.eye(3 * n)
+def _least_jerk(controls: int, conditions: bytes) -> FloatArray:
+    """(3n, m) linear map from targets to the control points of least jerk that meet ``matrix x = target``."""
+    energy, matrix = jerk_energy(controls), np.frombuffer(conditions).reshape(-1, 3 * controls)
+    hessian = block_rows(energy / np.trace(energy)) + 1e-12 * np.eye(3 * controls)
     m = len(matrix)
     system = np.block([[hessian, matrix.T], [matrix, np.zeros((m, m))]])
-    targets = np.vstack([np.zeros((3 * n, m)), np.eye(m)])
-    return np.asarray(np.linalg.solve(system, targets)[: 3 * n], dtype=np.float64)
+    targets = np.vstack([np.zeros((3 * controls, m)), np.eye(m)])
+    return np.asarray(np.linalg.solve(system, targets)[: 3 * controls], dtype=np.float64)
 
 
 PITCH_DECLINE = 2.0
@@ -406,13 +334,10 @@ def _straight_shares(controls: int) -> FloatArray:
     return shares
 
 
-def _flight_axes(
-    start: FloatArray, goal: FloatArray, start_normal: ArrayLike, end_normal: ArrayLike
-) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors up (mean normal) and left of the travel."""
-    up = np.asarray(start_normal, dtype=np.float64) + np.asarray(end_normal, dtype=np.float64)
+def _flight_axes(start: FloatArray, goal: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors up, along the sum of the normals, and left of the travel."""
     length = float(np.linalg.norm(up))
     up = up / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
     left = np.cross(up, goal - start)
     size = float(np.linalg.norm(left))
-    return up, left / size if size > 1e-9 else normal_tangents(up)[0]
+    return up, left / size if size > 1e-9 else -axes_of_normal(up)[:, 0]

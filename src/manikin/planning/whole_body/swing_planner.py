@@ -8,7 +8,7 @@ wrong side.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -19,11 +19,11 @@ from manikin.contact import Contact, ContactSchedule, Swing
 from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
-from manikin.planning.whole_body.birrt import Feasible, FlightLimits
+from manikin.planning.whole_body.birrt import Feasible
 from manikin.planning.whole_body.fit_scales import RefineScales
 from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
 from manikin.planning.whole_body.refine_input import KeyPath
-from manikin.planning.whole_body.swing import HEIGHTS, LATERALS, SwingLimits, plan_swing
+from manikin.planning.whole_body.swing import HEIGHTS, LATERALS, Clearance, SwingLimits, plan_swing
 from manikin.planning.whole_body.swing_curve import SwingCurve
 from manikin.planning.whole_body.swing_path import EffectorClearance, Pose
 from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing
@@ -104,35 +104,28 @@ def _curve(
         return np.array([np.interp(time, times, column) for column in coms.T])
 
     clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
-    first, last = Pose.of(swing.start), Pose.of(swing.end)
+    ends = Pose.of(swing.start), Pose.of(swing.end)
     # Distance that a given path has to gain per metre from a contact to count as clear.
-    is_clear = ClearFlight(clearance, first, last, start, end, replace(limits, departure=0.1))
+    is_clear = ClearFlight(clearance, ends, (start, end), replace(limits, departure=0.1))
     between = zip(times[1:-1].tolist(), given[1:-1], strict=True)
     if all(is_clear(time, Pose.in_posture(body, q, swing.effector)) for time, q in between):
         return None
     plan = plan_swing(
-        first, last, start, end, clearance, limits=limits,
+        *ends, start, end, clearance, limits=limits,
         start_normal=swing.start.normal, end_normal=swing.end.normal,
     )  # fmt: skip
-    return plan.curve if plan.succeeded else _searched(clearance, first, last, (start, end), limits)
-
-
-def _searched(
-    clearance: EffectorClearance, first: Pose, last: Pose, interval: tuple[float, float], limits: SwingLimits
-) -> SwingCurve | None:
-    """A curve found by the Bi-RRT, which asks for a clear effector only; its draws are always the same."""
+    if plan.succeeded:
+        return plan.curve
 
     def check(extra: float) -> Feasible:
-        is_clear = ClearFlight(clearance, first, last, *interval, limits, extra)
+        is_clear = ClearFlight(clearance, ends, (start, end), limits, extra)
+        return lambda pose, time, _: is_clear(time, pose) or None
 
-        def feasible(pose: Pose, time: float, _hint: object) -> FloatArray | None:
-            return np.zeros(0) if is_clear(time, pose) else None
-
-        return feasible
-
-    rng = np.random.default_rng(0)
-    found = search_swing(first, last, *interval, check(0.0), rng, roomy=check(ROOM), iterations=600)
-    return found.curve
+    # The Bi-RRT asks for a clear effector only; its draws are always the same, and its flights slower.
+    rng, slower = np.random.default_rng(0), replace(limits, speed=2.0, angular_speed=5.0)
+    return search_swing(
+        *ends, start, end, check(0.0), rng, roomy=check(ROOM), limits=slower, iterations=600
+    ).curve
 
 
 REACHING_TIME = 0.7
@@ -188,7 +181,7 @@ class FlightPlanner:
         self._body, self._scene, self._trajectory = body, scene, trajectory
         self._limits, self._rng, self._reference = limits, rng, reference
         self._proximity = Proximity(body, scene)
-        self._touching: dict[int, frozenset[tuple[str, str]]] = {}  # by identity of the schedule's contacts
+        self._touching = cache(partial(touch_pairs, body, scene))
 
     @property
     def schedule(self) -> ContactSchedule:
@@ -206,15 +199,22 @@ class FlightPlanner:
             return self._reach(swing)
         start, end = self.schedule.swing_interval(swing)
         roll = foot_roll(self._body, self.schedule, swing)
-        if roll is not None:
-            return self._plan_rolling(swing, roll)
+        if roll is None:
+            ends, clearance = (Pose.of(swing.start), Pose.of(swing.end)), self._clearance(swing)
+            limits, heights, pitch = self._limits, HEIGHTS, self._pitch(swing, start)
+        else:
+            # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it rises.
+            limits = replace(
+                self._limits, clearance=0.6 * self._limits.clearance, departure=0.4 * self._limits.departure
+            )
+            ends, clearance = roll.pivots, self._rolling_clearance(swing, roll)
+            heights, pitch = ROLLING_HEIGHTS, 0.0
         plan = plan_swing(
-            Pose.of(swing.start), Pose.of(swing.end), start, end, self._clearance(swing), limits=self._limits,
-            start_normal=swing.start.normal, end_normal=swing.end.normal, pitch=self._pitch(swing, start),
-            laterals=self._laterals(swing),
+            *ends, start, end, clearance, limits=limits, start_normal=swing.start.normal,
+            end_normal=swing.end.normal, pitch=pitch, heights=heights, laterals=self._laterals(swing),
         )  # fmt: skip
-        smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
-        return smooth if plan.succeeded else self.search(swing, smooth)
+        smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure, roll)
+        return smooth if plan.succeeded or roll is not None else self.search(swing, smooth)
 
     def _reach(self, swing: Swing) -> PlannedSwing:
         """Curve between a contact and where the effector is in the preferred posture.
@@ -241,10 +241,8 @@ class FlightPlanner:
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "reach")
 
-    def _plan_rolling(self, swing: Swing, roll: FootRoll) -> PlannedSwing:
-        """Find a smooth curve of the point about which the foot tilts."""
-        assert swing.start is not None
-        assert swing.end is not None
+    def _rolling_clearance(self, swing: Swing, roll: FootRoll) -> Clearance:
+        """Clearance of the foot from the pose of the point about which it tilts."""
         distance = self._clearance(swing, lambda time: float(roll.toe_extension(np.array([time]))[0]))
 
         @cache
@@ -256,20 +254,7 @@ class FlightPlanner:
             turn, offset = tilt(time)
             return distance(time, Pose(pivot.position - pivot.rotation @ offset, pivot.rotation @ turn))
 
-        start, end = self.schedule.swing_interval(swing)
-        limits = replace(
-            self._limits,
-            # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it
-            # rises.
-            clearance=0.6 * self._limits.clearance,
-            departure=0.4 * self._limits.departure,
-        )
-        plan = plan_swing(
-            *roll.pivots, start, end, clearance, limits=limits,
-            start_normal=swing.start.normal, end_normal=swing.end.normal, heights=ROLLING_HEIGHTS,
-            laterals=self._laterals(swing),
-        )  # fmt: skip
-        return PlannedSwing(swing, plan.curve, "smooth", plan.failure, roll)
+        return clearance
 
     def search(self, swing: Swing, fallback: PlannedSwing, iterations: int = 2000) -> PlannedSwing:
         """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""
@@ -280,15 +265,12 @@ class FlightPlanner:
         clearance = self._clearance(swing)
 
         def check(extra: float) -> PostureCheck:
-            screen = ClearFlight(clearance, *ends, start, end, self._limits, extra)
-            return PostureCheck(
-                swing.effector, lambda time: self._problem(swing, time), screen, rotation_weight=0.3
-            )
+            screen = ClearFlight(clearance, ends, (start, end), self._limits, extra)
+            return PostureCheck(swing.effector, partial(self._problem, swing), screen, rotation_weight=0.3)
 
-        # What a smooth swing may do, its substitute may do too.
-        limits = FlightLimits(speed=self._limits.speed, angular_speed=self._limits.angular_speed)
+        limits, rng = self._limits, self._rng
         found = search_swing(
-            *ends, start, end, check(0.0), self._rng, roomy=check(0.01), limits=limits, iterations=iterations
+            *ends, start, end, check(0.0), rng, roomy=check(ROOM), limits=limits, iterations=iterations
         )
         if found.curve is None:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
@@ -328,18 +310,13 @@ class FlightPlanner:
             self._trajectory.position, bend,
         )  # fmt: skip
 
-    def _touch_pairs(self, contact: Contact) -> frozenset[tuple[str, str]]:
-        if id(contact) not in self._touching:
-            self._touching[id(contact)] = touch_pairs(self._body, self._scene, contact)
-        return self._touching[id(contact)]
-
     def _problem(self, swing: Swing, time: float) -> PostureProblem:
         stance = self.schedule.stance_at(time)
         others = [contact for contact in stance if contact.effector != swing.effector]
         touching = [*others, *(contact for contact in (swing.start, swing.end) if contact is not None)]
         return PostureProblem(
             self._body, tuple(others), com=self._trajectory.position(time), proximity=self._proximity,
-            ignore=frozenset().union(*(self._touch_pairs(item) for item in touching)),
+            ignore=frozenset().union(*(self._touching(item) for item in touching)),
             reference=self._reference(time),
         )  # fmt: skip
 
