@@ -118,6 +118,8 @@ class Controller:
         self._switch = SupportSwitch(schedule, self.settings.supports)
         self._geometry = _geometries(body, schedule, self.settings.supports.sole_inset)
         self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
+        contacts = [contact for phase in schedule.sequence for contact in phase.stance]
+        self._points = {c.effector for c in contacts if c.kind is ContactKind.POINT}
         self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
         carriers = {
             name for phase in schedule.sequence if phase.load is not None for name in phase.load.masses
@@ -264,11 +266,10 @@ class Controller:
             return swing_task(name, frame, planned, gain, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
-        if support.mode is SupportMode.LANDING:
-            target = landing_reference(support, planned)
-            return swing_task(name, frame, target, gains.swing, weight)
-        target = lifted(planned, support)
-        return swing_task(name, frame, target, gains.swing, weight, support.follow)
+        landing = support.mode is SupportMode.LANDING
+        target = landing_reference(support, planned) if landing else lifted(planned, support)
+        follow, point = 1.0 if landing else support.follow, name in self._points
+        return swing_task(name, frame, target, gains.swing, weight, follow, point=point)
 
     def _posture_weight(self, supports: Mapping[str, SupportState]) -> FloatArray:
         weight = np.full(self.body.nv - 6, self.settings.weights.posture)
