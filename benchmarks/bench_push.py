@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from manikin.body import human, kudoh
-from manikin.control.recovery import BalanceRecovery, FeltPush, Strategy, close_loop
+from manikin.control.recovery import BalanceRecovery, FeltPush, Strategy
+from manikin.control.recovery.standing import close_loop
 from manikin.simulation import RecoveryTask, push_near_com, recover
 
 BODIES = {"kudoh": kudoh, "human": human}

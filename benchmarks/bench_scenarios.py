@@ -34,7 +34,7 @@ def _plan_whole_body(name, trajectory):
     scenario = scenario_of(name)
     return plan_whole_body(
         scenario.build_body(), scenario.build_scene(), trajectory, rng=np.random.default_rng(scenario.seed),
-        settings=WholeBodySettings(manner=posture_style_of(scenario.manner)),
+        settings=WholeBodySettings(manner=posture_style_of(scenario.file.manner)),
     )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ def test_whole_body(benchmark, scenario):
     com = plan_com(scenario.build_centroidal_problem()).trajectory
     trajectory = replace(com, schedule=ContactSchedule(scenario.build_sequence(), com.schedule.instants))
     body, scene = scenario.build_body(), scenario.build_scene()
-    settings = WholeBodySettings(manner=posture_style_of(scenario.manner))
+    settings = WholeBodySettings(manner=posture_style_of(scenario.file.manner))
     result = benchmark.pedantic(
         lambda: plan_whole_body(body, scene, trajectory, rng=np.random.default_rng(0), settings=settings),
         rounds=2, iterations=1,

@@ -15,11 +15,12 @@ from manikin.body import human
 from manikin.contact import ContactModel, ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages.contact_stage import find_supports
-from manikin.pipeline.stages.refinement_stage import KeyedContacts
 from manikin.planning.com import CentroidalProblem, plan_com
 from manikin.planning.com.feasibility import polytopes_of
 from manikin.planning.whole_body import WholeBodySettings, plan_whole_body, refine_motion
 from manikin.planning.whole_body.posture_style import CLOSE
+from manikin.planning.whole_body.refine_input import KeyPath
+from manikin.planning.whole_body.swing_planner import with_mid_flights
 from manikin.scenarios import load_scenario
 from manikin.scenarios.planned import walk_before, walking_supports
 from manikin.scene import Box, Obstacle, Scene
@@ -108,9 +109,9 @@ def test_limbs_go_all_the_way_and_are_refined(name):
     body, scene = scenario.build_body(), scenario.build_scene()
     found = find_supports(scenario, body, scene, np.random.default_rng(scenario.seed))
     assert found.failure is None
-    keyed = KeyedContacts.of_plan(found.plan, ContactModel.of_body(body.mass))
-    keyed = keyed.with_lifted_feet(body, scene, ())
-    refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
+    schedule = found.plan.schedule(ContactModel.of_body(body.mass))
+    keyed = with_mid_flights(body, scene, schedule, KeyPath(*found.plan.keys(schedule.instants)), ())
+    refined = refine_motion(body, scene, keyed.time, keyed.q, schedule)
     assert refined.failure is None, refined.failure
     assert refined.certificate.value("min_margin") > 0.0
     assert refined.certificate.value("max_penetration_m") < 1e-3

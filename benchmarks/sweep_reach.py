@@ -73,7 +73,7 @@ def main(first, count):
         axes = region.normals[list(AXES)]
         low, high = -region.offsets[list(BACK)] - AROUND, region.offsets[list(AXES)] + AROUND
         points = rng.uniform(low, high, (PLACES, 3)) @ axes
-        inside = region.contains(points)
+        inside = region.violation(points) <= 0.0
         ok = np.array([found(body, stance, p, proximity) for p in points])
         totals[:4] += [inside.sum(), (inside & ok).sum(), ok.sum(), (inside & ok).sum()]
         missed = [np.round(points[i], 2).tolist() for i in np.flatnonzero(inside & ~ok)]

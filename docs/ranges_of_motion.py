@@ -32,7 +32,7 @@ from manikin.body.natural_range import FILE, FORMAT, UNIT
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.recordings import Recording, read_recording
-from manikin.recordings.readers.marker_sets import JOINTS, SIDES, segment_joint
+from manikin.recordings.readers.marker_sets import JOINTS, SIDES, joint_of
 from manikin.runtime.files import atomic_path
 
 HERE = Path(__file__).parent
@@ -105,7 +105,7 @@ def anatomy_of(recordings: Sequence[Recording], upright: Recording | None = None
     wrong = [r.name for r in recordings if r.joint_names != first.joint_names]
     if wrong:
         raise InputError(f"recording {wrong[0]!r} has other joints than {first.name!r}; valid: one skeleton")
-    joints = {segment: segment_joint(first, segment) for segment in JOINTS}
+    joints = {segment: joint_of(first, segment, {}) for segment in JOINTS}
     pose = _rest(first) if upright is None else upright
     axes = {
         "pelvis": _trunk(pose, joints, "pelvis", "thigh"),

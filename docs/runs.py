@@ -162,19 +162,18 @@ def described(file: str, folder: Path) -> bool:
     return "Run" in file or any(file in (folder / table).read_text() for table in tables)
 
 
-def force_of(found: Reconstruction, rate: float) -> FloatArray:
+def force_of(found: Reconstruction) -> FloatArray:
     """(n,) vertical force per weight, by the centre of mass."""
-    return 1.0 + vertical_acceleration(found, rate, CUTOFF) / GRAVITY
+    return 1.0 + vertical_acceleration(found, CUTOFF) / GRAVITY
 
 
 def measured(found: Reconstruction, supports: RecordedSupports, dynamics: RecordedDynamics) -> Measured:
     """Of supports and of a smooth motion."""
-    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0])
     margins = recorded_margins(dynamics, recorded_schedule(found, supports), supports.start)
     shift = least_shift(found, dynamics, margins)
     flight = np.array([margins.polytopes[phase] is None for phase in margins.phase])
     inside = (found.time > AT_END) & (found.time < found.time[-1] - AT_END)
-    force, weight = force_of(found, rate), GRAVITY * dynamics.body.mass
+    force, weight = force_of(found), GRAVITY * dynamics.body.mass
     feet = [one for one in supports.supports if one.effector.endswith("foot")]
     free = [one for one in supports.phases if not one.effectors]
     free = [one for one in free if one.start > supports.start and one.end < supports.end]
@@ -192,11 +191,10 @@ def measured(found: Reconstruction, supports: RecordedSupports, dynamics: Record
 
 def strides_of(found: Reconstruction, supports: RecordedSupports) -> list[float]:
     """Mean vertical force per weight between touch-downs of the same foot."""
-    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0])
-    force, means = force_of(found, rate), []
+    force, means = force_of(found), []
     for name in ("left_foot", "right_foot"):
         downs = [one.start - supports.start for one in supports.of(name) if one.start_seen]
-        frames = [round(instant * rate) for instant in downs if instant > AT_END]
+        frames = [round(instant * found.rate) for instant in downs if instant > AT_END]
         means += [float(np.mean(force[a:b])) for a, b in pairwise(frames)]
     return means
 
@@ -204,7 +202,7 @@ def strides_of(found: Reconstruction, supports: RecordedSupports) -> list[float]
 def run_of(file: str, folder: Path) -> Run | None:
     """Measure a recording; None of one without a description that is no run."""
     found = reconstruct(read_recording(folder / "mocap" / file))
-    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0])
+    rate = found.rate
     speed = float(np.linalg.norm((found.q[-1] - found.q[0])[:2]) / found.time[-1])
     if not described(file, folder) and speed < FASTEST_WALK:
         return None
@@ -357,10 +355,9 @@ def jump_text(folder: Path) -> str:
 def draw(folder: Path) -> None:
     """Force of a run, with its supports by both ways."""
     found = reconstruct(read_recording(folder / "mocap" / "cmu_asf_amc" / f"{SHOWN}.amc"))
-    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0])
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     axes = figure.subplots()
-    axes.plot(found.time, force_of(found, rate), color="#444444")
+    axes.plot(found.time, force_of(found), color="#444444")
     axes.axhline(FALLING, color="#444444", lw=0.8, ls=":")
     axes.axhline(0.0, color="#444444", lw=0.8)
     colours = {"left_foot": "#009E73", "right_foot": "#CC79A7"}

@@ -26,7 +26,7 @@ from manikin.recordings import (
     statistics_of,
 )
 from manikin.recordings.statistics.clips import GroupedFile, read_clips
-from manikin.recordings.statistics.phases import by_group, initials
+from manikin.recordings.statistics.phases import SHORTEST, by_group, initials
 from manikin.reports.figures import (
     LowestPoints,
     com_distances_figure,
@@ -384,7 +384,7 @@ def main() -> None:
         "walk_beyond": 1e3 * (farthest[True] - settings.limit),
         "beyond": 1e3 * (farthest[False] - settings.limit),
         "free": known.motions, "modal": known.counts[known.modal], "sequence": initials(known.modal),
-        "bar": BAR, "compared": COMPARED, "gravity": GRAVITY, "felt": FELT, "shortest": settings.shortest,
+        "bar": BAR, "compared": COMPARED, "gravity": GRAVITY, "felt": FELT, "shortest": SHORTEST,
     }  # fmt: skip
     parts = [
         TEXT, claims(), AFTER_CLAIMS, published_table(), OURS, durations(found), PHASES_SEEN,

@@ -14,7 +14,7 @@ from manikin.cli import app
 from manikin.motion.file import write_motions
 from manikin.reports import figures
 from manikin.scenarios import list_variants, load_scenario
-from manikin.scenarios.stance_file import load_stance_file
+from manikin.scenarios.stance_file import judge_stance_file
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -142,7 +142,7 @@ def test_stance_examples_give_every_documented_key(tmp_path):
     assert examples
     for text in examples:
         (tmp_path / "stance.yaml").write_text(text)
-        report = load_stance_file(tmp_path / "stance.yaml").evaluate().as_dict(polytope=True)
+        report = judge_stance_file(tmp_path / "stance.yaml").as_dict(polytope=True)
         assert {key for key in keys_of(report) if f"`{key}`" not in PAGES["json.md"]} == set()
         json.dumps(report, allow_nan=False)
 

@@ -62,7 +62,7 @@ def test_the_inner_models_equal_their_program_and_lie_in_the_outer(random_stance
     rng = np.random.default_rng(seed)
     stance = random_stance(rng, most=2)
     for model in ("inner", "cone"):
-        asked = stance.with_friction_model(model)
+        asked = Stance(stance.contacts, stance.normal_force_cap, model)
         program = contact_program(asked, model)
         assert_same_set(wrench_polytope(asked), program, rng)
         corners = [program.support(rng.normal(size=6))[1] for _ in range(5)]
@@ -213,7 +213,7 @@ def test_an_uncapped_stance_is_refused_with_the_remedy(contacts):
 
 def test_unknown_friction_models_and_references_are_refused(two_soles):
     with pytest.raises(ContactError, match="'outer', 'inner', 'cone'"):
-        wrench_polytope(two_soles, friction_model="circle")
+        Stance(two_soles.contacts, 1000.0, "circle")
     with pytest.raises(ContactError, match="reference"):
         wrench_polytope(two_soles, reference=(0, 0))
 

@@ -98,7 +98,7 @@ def test_nothing_in_a_limb_without_joints_can_be_violated():
     assert angles.shape == (5, 0)
     natural = NaturalRange(SITTER, PELVIS)
     assert (natural.normalised(angles) == 1.0).all()
-    assert natural.contains(angles).all()
+    assert natural.normalised(angles).min() >= 0.0
 
 
 @pytest.mark.parametrize(("body", "limb"), [*LIMBS, pytest.param(SITTER, PELVIS, id="pelvis")])
@@ -177,7 +177,7 @@ def test_reach_is_convex_closed_and_holds_every_sample(body, limb):
     assert volume.segment == parent_segment(body, limb)
     same = LimbKinematics(body, limb)
     places = same.place(same.random_angles(np.random.default_rng(3), 2000)).positions
-    assert volume.contains(places + body.segment(limb.segments[0]).origin, 1e-9).all()
+    assert volume.residual(places + body.segment(limb.segments[0]).origin).min() >= -1e-9
 
 
 def test_reach_is_within_the_length_of_the_arm_and_the_same_for_a_seed():
@@ -199,7 +199,7 @@ def test_the_inscribed_sphere_touches_the_hull_from_inside():
     assert volume.residual(centre) == pytest.approx(radius, abs=1e-9)
     directions = np.random.default_rng(6).standard_normal((200, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    assert volume.contains(centre + radius * directions, 1e-9).all()
+    assert volume.residual(centre + radius * directions).min() >= -1e-9
 
 
 def test_a_unit_cube_has_a_sphere_of_half_its_side():

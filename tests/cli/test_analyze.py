@@ -116,5 +116,5 @@ def test_a_recording_is_planned_anew_beside_it(standing_file, tmp_path, capsys):
     assert list(found.motions) == ["shifted", "recorded", "planned", "executed"]
     assert (out / "report.html").read_text().count("data:image/png;base64") >= 3
     assert main(["analyze", str(standing_file), "--plan", "quickly", "--json"]) == BAD_INPUT
-    assert "--plan is 'quickly'; valid: " in capsys.readouterr().err
+    assert "'--plan': 'quickly' is not one of 'keyframes', 'timing-free'" in capsys.readouterr().err
     assert main(["analyze", str(standing_file), "--execute", "--json"]) == BAD_INPUT

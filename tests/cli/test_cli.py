@@ -61,9 +61,9 @@ def pipeline(monkeypatch, finished_run):
             from manikin.pipeline.run_directory import RunDirectory
 
             directory = RunDirectory(out)
-            directory.write_scenario(scenario.to_yaml())
+            directory.write("scenario.yaml", scenario.to_yaml())
             write_motions(directory.path / "motion.h5", finished_run)
-            directory.write_summary(stand_in.summary)
+            directory.write("summary.json", stand_in.summary)
         return types.SimpleNamespace(
             summary=stand_in.summary,
             planned=finished_run.planned,
@@ -129,7 +129,7 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["run", "platform", "--stature", "5"], "--stature"),
         (["run", "platform", "--mass", "-3"], "--mass"),
         (["run", "platform", "--mass", "-79"], "--mass"),
-        (["run", "platform", "--sex", "other"], "'male' or 'female'"),
+        (["run", "platform", "--sex", "other"], "'other' is not one of 'male', 'female'"),
         (["run", "plattform"], "did you mean 'platform'"),
         (["run", "none.yaml"], "no such file"),
         (["run", "."], "is a directory"),
@@ -149,8 +149,8 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["view", "none"], "no such file"),
         (["view", "none", "--port", "99999"], "--port"),
         (["export", "none", "--format", "bvh"], "no such file"),
-        (["export", ".", "--format", "gltf"], "valid: bvh, csv"),
-        (["export", ".", "--format", "mp4"], "valid: bvh, csv"),
+        (["export", ".", "--format", "gltf"], "is not one of 'bvh', 'csv'"),
+        (["export", ".", "--format", "mp4"], "is not one of 'bvh', 'csv'"),
         (["export", "."], "--format"),
         (["balance", "none.yaml"], "no such file"),
         (["balance", "."], "is a directory"),

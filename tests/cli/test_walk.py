@@ -38,7 +38,7 @@ PROMISED = {
         ),
         ([*TO, "--stature", "9"], "stature [m] is 9"),
         ([*TO, "--mass", "nan"], "mass_kg is nan"),
-        ([*TO, "--sex", "other"], "sex is 'other'"),
+        ([*TO, "--sex", "other"], "'other' is not one of 'male', 'female'"),
         ([*TO, "--in", "nowhere"], "nowhere: there is no such file"),
         (["walk", "--to", "0.9", "0.75", "0", "--in", "platform"], "walking goal leaves -"),
         ([*TO, "--port", "8080"], "--port does not go with this run: it is for --drive"),

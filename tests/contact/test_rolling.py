@@ -6,7 +6,6 @@ import pytest
 from manikin.balance import least_zmp_distance, pseudo_wrench, support_plane, wrench_polytope
 from manikin.contact import (
     Phase,
-    Rolling,
     SolePart,
     Stance,
     StanceSequence,
@@ -96,7 +95,7 @@ def test_an_edge_gives_way_by_rolling():
 
 def test_a_step_is_split_into_heel_sole_and_toes():
     """The foot that leaves goes over its toes, the one that lands over its heel; places stay."""
-    rolled = roll_feet(step(), HINGE, Rolling(heel=0.08, toes=0.14, flat=0.05))
+    rolled = roll_feet(step(), HINGE)
     parts = [{c.effector: str(c.part) for c in phase.stance} for phase in rolled]
     assert parts == [
         {"left_foot": "full", "right_foot": "full"},

@@ -106,7 +106,9 @@ def test_stopping_uses_up_the_range_that_is_left(controller, speed, share):
     momentum = fall_momentum(state)
     amount = np.linalg.norm(momentum)
     whole = options.range * state.mass
-    law = com_law(state, controller.com, controller.area, options, share * whole * momentum / amount)
+    law = com_law(
+        state, controller.standing.com, controller.standing.area, options, share * whole * momentum / amount
+    )
     height, weight = controller.standing.height, state.mass * GRAVITY
     frequency = np.sqrt(GRAVITY / height)
     left = (1.0 - share) * whole
@@ -124,7 +126,8 @@ def test_less_range_that_is_left_asks_to_stop_harder(controller):
     towards = fall_momentum(state) / np.linalg.norm(fall_momentum(state))
     far = [
         com_law(
-            state, controller.com, controller.area, controller.settings, share * state.mass * towards
+            state, controller.standing.com, controller.standing.area, controller.settings,
+            share * state.mass * towards,
         ).settled @ towards
         for share in (0.0, 0.08, 0.14, 0.2)
     ]  # fmt: skip

@@ -12,20 +12,15 @@ from manikin.body import BodyModel, human, insect, kudoh
 from manikin.control.dynamics import Dynamics
 from manikin.control.recovery import (
     BalanceRecovery,
-    ClosedLoop,
     FeltPush,
-    LinearMap,
     RecoverySettings,
     Strategy,
-    StrategySwitch,
-    SupportArea,
-    close_loop,
     joint_groups,
-    leg_symmetry,
-    posture_control,
     zmp_of,
-    zmp_rows,
 )
+from manikin.control.recovery.recovery_problem import leg_symmetry
+from manikin.control.recovery.standing import ClosedLoop, LinearMap, SupportArea, close_loop, zmp_rows
+from manikin.control.recovery.strategy import StrategySwitch, posture_control
 from manikin.errors import BodyError, InputError
 from manikin.numerics.spatial import GRAVITY
 

@@ -9,15 +9,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from manikin.body import kudoh
-from manikin.control.recovery import (
-    BalanceRecovery,
-    RecoverySettings,
-    Standing,
-    SupportArea,
-    edge_limits,
-    held_impulse,
-)
+from manikin.control.recovery import BalanceRecovery, RecoverySettings, Standing, edge_limits, held_impulse
 from manikin.control.recovery.recovery_controller import held_posture
+from manikin.control.recovery.standing import SupportArea
 from manikin.control.recovery.turning import Turning, _swayed
 from manikin.control.stepping import StepSettings, SwingFoot, capture_after, step_goals
 from manikin.errors import InputError
@@ -186,8 +180,8 @@ def test_a_pendulum_that_cannot_turn_is_held_to_the_edge_of_its_sole():
     found = edge_limits(controller, KUDOH.standing_posture(), 1e-4)
     for limit in found:
         room = (
-            max(corner @ limit.normal for corner in controller.area.corners)
-            - controller.com[:2] @ limit.normal
+            max(corner @ limit.normal for corner in controller.standing.area.corners)
+            - controller.standing.com[:2] @ limit.normal
         )
         frequency = np.sqrt(GRAVITY / controller.standing.height)
         expected = KUDOH.mass * frequency * (room + limit.excess)

@@ -107,13 +107,14 @@ def arm_along(side, direction):
     """(nq,) the upper arm along a direction, by search over the shoulder's two first hinges."""
     from scipy.optimize import least_squares
 
-    from manikin.ergonomics.body_parts import joint_rotation
+    from manikin.kinematics.point_targets import SegmentPlacements
 
+    upper_arm = SegmentPlacements(HUMAN, [f"{side}_upper_arm"])
     names = [f"{side}_shoulder_flexion", f"{side}_shoulder_abduction"]
 
     def gap(x):
         q = HUMAN.posture(dict(zip(names, x, strict=True)))
-        return -joint_rotation(HUMAN, q[None], f"{side}_upper_arm")[0, :, 2] - direction
+        return -upper_arm.of(q[None]).turns[0, :, 2, 0] - direction
 
     found = least_squares(gap, [0.5, 0.5])
     assert found.cost < 1e-12

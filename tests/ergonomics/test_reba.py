@@ -7,10 +7,10 @@ import pytest
 
 from manikin.ergonomics import RebaSteps, bearing_of, postural_angles, reba_action_level, reba_score
 from manikin.ergonomics.rula_reba import (
+    COUPLINGS,
     REBA_TABLE_A,
     REBA_TABLE_B,
     REBA_TABLE_C,
-    reba_coupling,
     reba_load,
     reba_steps,
 )
@@ -71,7 +71,7 @@ def test_action_levels():
 def test_loads_and_couplings():
     loads = [(4.9, "static"), (5, "intermittent"), (10.5, "intermittent"), (0, "shock"), (11, "shock")]
     assert [reba_load(*load) for load in loads] == [0, 1, 2, 1, 3]
-    assert [reba_coupling(name) for name in ("good", "fair", "poor", "unacceptable")] == [0, 1, 2, 3]
+    assert [COUPLINGS.index(name) for name in ("good", "fair", "poor", "unacceptable")] == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("wrong", [{"legs": 5}, {"neck": 0}])

@@ -29,7 +29,6 @@ TERMS = {
     "com": ComTerm(np.array([0.1, 0.2, 0.9])),
     "com height": ComTerm(np.array([np.nan, np.nan, 0.9])),
     "upright": UprightTerm("thorax"),
-    "direction": UprightTerm("head", np.array([1.0, 0, 0]), np.array([0, 0.6, 0.8])),
     "edge": EdgeTerm(
         "left_foot",
         np.array([0.06, 0.0, 0.0]),
@@ -49,7 +48,6 @@ TERMS = {
         radius=0.05,
     ),
     "reference": ReferenceTerm(BODY.standing_posture()[7:]),
-    "limits": LimitTerm(BODY),
 }
 seeds = st.integers(0, 10_000)
 
@@ -89,12 +87,12 @@ def test_clearance_gradient_is_the_derivative(seed):
     q = BODY.standing_posture()
     q[7:] = np.clip(q[7:] + rng.uniform(-0.05, 0.05, len(q) - 7), BODY.lower, BODY.upper)
     configuration = Configuration(BODY)
-    found = term.evaluate(configuration.update(q))
+    found, pairs = term.evaluate(configuration.update(q))
 
     def distances(p):
-        near = term.evaluate(configuration.update(p))
-        table = dict(zip(near.pairs, near.residual, strict=True))
-        return np.array([table.get(pair, np.nan) for pair in found.pairs])
+        near, here = term.evaluate(configuration.update(p))
+        table = dict(zip(here, near.residual, strict=True))
+        return np.array([table.get(pair, np.nan) for pair in pairs])
 
     expected = numerical_jacobian(distances, q, 1e-5)
     smooth = np.all(np.isfinite(expected), axis=1)  # pairs at the edge of the activation come and go
@@ -108,10 +106,10 @@ def test_self_distances_have_their_own_safety_distance():
     """0.05 m to obstacles and 0.01 m between limbs are subtracted from the same distances."""
     proximity = Proximity(BODY, Scene())
     configuration = Configuration(BODY)
-    plain = ClearanceTerm(proximity, 0.0, 0.0, 0.15, NOTHING).evaluate(configuration)
-    kept = ClearanceTerm(proximity, 0.05, 0.01, 0.10, NOTHING).evaluate(configuration)
-    table = dict(zip(plain.pairs, plain.residual, strict=True))
-    for pair, value in zip(kept.pairs, kept.residual, strict=True):
+    plain, pairs = ClearanceTerm(proximity, 0.0, 0.0, 0.15, NOTHING).evaluate(configuration)
+    kept, kept_pairs = ClearanceTerm(proximity, 0.05, 0.01, 0.10, NOTHING).evaluate(configuration)
+    table = dict(zip(pairs, plain.residual, strict=True))
+    for pair, value in zip(kept_pairs, kept.residual, strict=True):
         assert table[pair] - value == pytest.approx(0.01 if "/" in pair[1] else 0.05, abs=1e-9)
 
 
@@ -134,6 +132,3 @@ def test_terms_describe_what_they_miss():
     assert TERMS["com height"].describe(np.array([-0.02])) == (
         "centre of mass misses by 0.0200 m (z -0.0200)"
     )
-    assert "60.0 deg" in TERMS["upright"].describe(np.array([0.6, 0, 0.8]))
-    assert "0.200 rad" in TERMS["reference"].describe(np.array([0.1, -0.2]))
-    assert "lumbar_flexion" in TERMS["limits"].describe(np.array([-0.1, *np.ones(BODY.nv - 7)]))

@@ -27,7 +27,7 @@ def test_a_way_ends_with_both_hands_on_the_object(rope):
     assert all(
         scene.touched_obstacles(last.contacts[hand]) == ("bar",) for hand in ("left_hand", "right_hand")
     )
-    assert found.scenario.act.force_N == 200.0
+    assert found.scenario.file.task.act.force_N == 200.0
 
 
 def test_an_object_out_of_reach_ends_in_an_explained_failure():
@@ -41,7 +41,7 @@ def test_another_seed_keeps_the_planner_s_options(rope):
     """A scenario that was changed has every default written out; its planning is still nobody's choice."""
     found, _ = rope
     scenario = load_scenario("pull-rope").with_seed(3)
-    planning = with_supports(scenario, found.plan).planning
+    planning = with_supports(scenario, found.plan).file.planning
     assert planning.degree == PLANNING["degree"]
     assert planning.weights.smoothness == PLANNING["weights"]["smoothness"]
 
@@ -76,5 +76,5 @@ def test_the_force_is_held_in_the_physics_engine(runs):
     assert not result.summary["execution"]["fell"]
     # The run directory holds the scenario with its supports and the act, ready to run again.
     again = load_scenario(result.directory / "scenario.yaml")
-    assert again.act.force_N == 200.0
+    assert again.file.task.act.force_N == 200.0
     assert "left_hand" in again.build_sequence()[-1].stance

@@ -8,7 +8,7 @@ import pytest
 
 from manikin.pipeline.batch import Job, RunOptions, built_in_jobs, run_jobs
 
-INFEASIBLE = "extends: platform\nname: greedy\nplanning: {min_margin: 75}\n"
+INFEASIBLE = "extends: platform\nname: greedy\nplanning: {min_margin: 120}\n"
 """More margin than the intersection of two polytopes allows: ends before any optimisation."""
 
 
@@ -153,7 +153,7 @@ def test_the_command_of_a_job(tmp_path):
 def test_real_runs_write_their_directories(tmp_path):
     """Two variants of a file that fail in the centroidal stage, in two processes."""
     file = tmp_path / "greedy.yaml"
-    file.write_text(INFEASIBLE + "variants:\n  more: {expect: failure, planning: {min_margin: 80}}\n")
+    file.write_text(INFEASIBLE + "variants:\n  more: {expect: failure, planning: {min_margin: 140}}\n")
     jobs = [Job(str(file)), Job(str(file), "more", "failure")]
     report = run_jobs(jobs, RunOptions(tmp_path / "out").command, workers=2)
     assert [run["failure"]["stage"] for run in report["runs"]] == ["centroidal", "centroidal"]

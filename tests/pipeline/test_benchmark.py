@@ -88,7 +88,7 @@ def test_what_is_done_stays_done_until_the_scene_or_the_stage_changes(tmp_path, 
     ("words", "message"),
     [
         (["--families", "stars"], "--families has 'stars'; valid: all, or some of"),
-        (["--stage", "feet"], "--stage is 'feet'; valid: contacts, all"),
+        (["--stage", "feet"], "'--stage': 'feet' is not one of 'contacts', 'all'"),
         (["--seeds", "0"], "--seeds"),
     ],
 )

@@ -13,9 +13,9 @@ from manikin.runtime.files import atomic_path, to_json, write_text
 
 def test_files_of_a_run(tmp_path):
     run = RunDirectory(tmp_path / "a" / "b")
-    run.write_scenario("name: x\n")
-    run.write_stage("centroidal", {"d_min": np.float64(33.0), "knots": np.arange(3.0), "nothing": None})
-    run.write_summary({"succeeded": True})
+    run.write("scenario.yaml", "name: x\n")
+    run.write("stages/centroidal.json", {"d_min": np.float64(33.0), "knots": np.arange(3.0), "nothing": None})
+    run.write("summary.json", {"succeeded": True})
     assert json.loads((run.path / "stages" / "centroidal.json").read_text()) == {
         "d_min": 33.0, "knots": [0.0, 1.0, 2.0], "nothing": None,
     }  # fmt: skip
@@ -24,9 +24,9 @@ def test_files_of_a_run(tmp_path):
 
 def test_second_run_removes_what_the_first_left(tmp_path):
     run = RunDirectory(tmp_path)
-    run.write_scenario("name: x\n")
-    run.write_stage("centroidal", {})
-    run.write_summary({})
+    run.write("scenario.yaml", "name: x\n")
+    run.write("stages/centroidal.json", {})
+    run.write("summary.json", {})
     (run.figures / "com.png").write_bytes(b"x")
     (tmp_path / "notes.txt").write_text("mine")
     RunDirectory(tmp_path)
@@ -57,8 +57,8 @@ def test_missing_and_damaged_summaries_give_one_line(tmp_path):
 
 def test_leftovers_of_a_killed_run_are_removed_by_the_next(tmp_path):
     first = RunDirectory(tmp_path)
-    first.write_scenario("name: a")
-    first.write_stage("centroidal", {})
+    first.write("scenario.yaml", "name: a")
+    first.write("stages/centroidal.json", {})
     for folder in (tmp_path, tmp_path / "stages"):
         (folder / ".motion.h5.0a1b.tmp").write_bytes(b"half")
     RunDirectory(tmp_path)

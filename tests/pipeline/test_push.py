@@ -38,12 +38,12 @@ def test_the_four_experiments_are_those_of_the_thesis(name):
         "push-sine-100": (100, 180, 5.0, 1.0), "push-right-200": (200, 90, 0.1, None),
     }[name]  # fmt: skip
     scenario = load_scenario(name)
-    push = scenario.push
+    push = scenario.file.push
     assert (push.force_N, push.direction_deg, push.duration_s, push.frequency_hz) == wanted
-    assert scenario.recovery.delay_s == 0.2
-    assert scenario.recovery.feet == "held"
+    assert scenario.file.recovery.delay_s == 0.2
+    assert scenario.file.recovery.feet == "held"
     assert scenario.build_body().name == "kudoh"
-    assert load_scenario(name, "free").recovery.feet == "free"
+    assert load_scenario(name, "free").file.recovery.feet == "free"
     assert "free" in list_variants(name)
 
 

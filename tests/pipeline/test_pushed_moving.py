@@ -51,7 +51,7 @@ def test_a_pushed_body_goes_on_to_its_goal(runs):
     scenario, push = load_scenario("platform@pushed"), result.summary["execution"]["push"]
     assert result.succeeded
     assert push["recovered"]
-    assert push["impulse_Ns"] == pytest.approx(scenario.push.force_N * scenario.push.duration_s)
+    assert push["impulse_Ns"] == pytest.approx(scenario.file.push.force_N * scenario.file.push.duration_s)
     assert push["max_deviation_m"] > 0.005
     assert push["return_s"] < 2.0
     assert push["waited_s"] > 0.1
@@ -65,6 +65,6 @@ def test_too_strong_a_push_ends_in_a_failure_that_is_explained():
     assert not result.succeeded
     assert failure["stage"] == "execution"
     assert failure["reason"].startswith("fell: the CoM is")
-    assert failure["time_s"] > load_scenario("platform@pushed-hard").push.at_s
+    assert failure["time_s"] > load_scenario("platform@pushed-hard").file.push.at_s
     assert not push["recovered"]
     assert push["return_s"] is None

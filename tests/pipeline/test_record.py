@@ -22,7 +22,7 @@ def write_run(path, content=None, *, com=True):
     """A run directory of the platform scenario, with a straight CoM path."""
     scenario = load_scenario("platform")
     directory = RunDirectory(path)
-    directory.write_scenario(scenario.to_yaml())
+    directory.write("scenario.yaml", scenario.to_yaml())
     if com:
         share = np.clip((np.arange(12) - 2) / 7, 0.0, 1.0)[:, None]
         points = scenario.start_com + share * (scenario.goal_com - scenario.start_com)
@@ -31,10 +31,10 @@ def write_run(path, content=None, *, com=True):
         instants = [0.0, *(4.193 * inner), 4.193]
         schedule = ContactSchedule(scenario.build_sequence(planning=True), instants)
         trajectory = CentroidalTrajectory(scenario.mass, spline, schedule)
-        directory.write_stage("com_trajectory", trajectory.to_dict())
+        directory.write("stages/com_trajectory.json", trajectory.to_dict())
     if content is not None:
         write_motions(directory.path / "motion.h5", content)
-    directory.write_summary(SUMMARY)
+    directory.write("summary.json", SUMMARY)
     return directory.path
 
 

@@ -10,13 +10,13 @@ from manikin.motion.dynamics import centroidal_motion
 from manikin.motion.file import read_motions
 from manikin.pipeline import runner
 from manikin.pipeline.run_directory import read_run
-from manikin.pipeline.stages import ExecutionRequirements
+from manikin.pipeline.stages import ExecutionRequirements, RunResult
 from manikin.planning.whole_body.refine_physics import contact_slack
 from manikin.reports.figures.effectors import flights_figure
 from manikin.reports.summary_table import verdict_line
 from manikin.scenarios import load_scenario
 
-REFINED = ("wholebody.method=refine",)
+REFINED = ("wholebody.method=refine", "contacts.attempts=1")
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +25,28 @@ def risen(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs") / "rise"
     strict = ExecutionRequirements(com_rms_error=0.0)
     return runner.run("stand-up-chair", overrides=REFINED, out=out, requirements=strict)
+
+
+def test_contacts_that_cannot_be_refined_are_planned_again_without_the_step(monkeypatch):
+    """The phase that the refinement names goes back to the search, which is asked once more."""
+    asked, tried = [], []
+
+    def refined(context, report, _):
+        tried.append(context)
+        if len(tried) == 1:
+            report.fail("wholebody", "a hand is torn off", 0.4, "phase 1 on left_hand")
+        return lambda: RunResult.of(report), None
+
+    def again(context, report, phase):
+        asked.append(phase)
+        report.try_again(phase)
+        return context
+
+    monkeypatch.setattr(runner, "plan_contacts", lambda context, _: context)
+    monkeypatch.setattr(runner, "_refined", refined)
+    monkeypatch.setattr(runner, "plan_contacts_again", again)
+    runner.run("climb")
+    assert (len(tried), asked) == (2, [1])
 
 
 def test_contacts_become_a_motion_that_keeps_to_physics(risen):

@@ -11,7 +11,7 @@ from manikin.scenarios import load_scenario
 
 
 def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
-    text = load_scenario("platform").to_yaml().replace("min_margin: 16.7", "min_margin: 75.0")
+    text = load_scenario("platform").to_yaml().replace("min_margin: 16.7", "min_margin: 120.0")
     file = tmp_path / "greedy.yaml"
     file.write_text(text)
     result = run(file, out=tmp_path / "out")
@@ -29,7 +29,7 @@ def test_the_walk_asks_for_the_published_margin_and_duration():
     """[Qiu2012]_ 5.4.4: 25.86 N.m about the ground, 0.96 m below the CoM, in 3.54 s, four steps."""
     scenario = load_scenario("walk")
     assert scenario.required_margin == pytest.approx(25.86 / np.hypot(1.0, 0.96), abs=0.05)
-    assert scenario.planning.max_duration_s == pytest.approx(3.54)
+    assert scenario.file.planning.max_duration_s == pytest.approx(3.54)
     assert scenario.goal_com - scenario.start_com == pytest.approx([0.0, 1.5, 0.0])
     assert len(scenario.build_sequence().swings()) == 4
 

@@ -9,7 +9,7 @@ from manikin.errors import ScenarioError
 from manikin.motion.dynamics import centroidal_motion
 from manikin.motion.file import read_motions
 from manikin.pipeline.runner import run
-from manikin.pipeline.stages.context import RunContext
+from manikin.pipeline.stages import walking_stage
 from manikin.pipeline.stages.walking_stage import plan_walks, walked_motion
 from manikin.scenarios import load_scenario
 from manikin.walking import Walker, walk_along
@@ -19,23 +19,36 @@ WALKING = ("goal-left", "goal-right", "corridor", "catch", "narrow")
 
 
 @pytest.fixture(scope="module")
-def ran(runs):
-    """Results of the scenarios and their directories."""
-    return lambda name: (runs(name), runs(name).directory)
-
-
-@pytest.fixture(scope="module")
-def planned():
-    """Contexts and ways of the scenarios, each planned once."""
+def walked(tmp_path_factory):
+    """Result, context and routes of a scenario, each run once."""
     found = {}
 
     def once(name):
         if name not in found:
-            context = RunContext.of(load_scenario(name))
-            found[name] = context, plan_walks(context)
+            routes = []
+
+            def noted(context, *places):
+                routes[:] = context, plan_walks(context, *places)
+                return routes[1]
+
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(walking_stage, "plan_walks", noted)
+                found[name] = run(name, out=tmp_path_factory.mktemp(name)), *routes
         return found[name]
 
     return once
+
+
+@pytest.fixture(scope="module")
+def ran(walked):
+    """Results of the scenarios and their directories."""
+    return lambda name: (walked(name)[0], walked(name)[0].directory)
+
+
+@pytest.fixture(scope="module")
+def planned(walked):
+    """Contexts and routes of the scenarios."""
+    return lambda name: walked(name)[1:]
 
 
 def moving(block):
@@ -74,7 +87,7 @@ def test_every_walk_is_walked(ran, name):
 def test_everybody_keeps_room_on_the_common_clock(planned, name):
     """Measured every millisecond and until all have come, between all who walk and what stands there."""
     context, plan = planned(name)
-    room = context.scenario.walking.room_m
+    room = context.scenario.file.walking.room_m
     end = max(route.duration for route in (plan.route, *plan.others.values()))
     time = np.arange(0.0, end, 1e-3)
     standing = len(plan.obstacles) - len(plan.others)

@@ -31,7 +31,7 @@ def test_a_straight_line_stays(slope, start, instants):
 
 
 def test_the_cutoff_is_highest_at_touch_downs():
-    cutoff = local_cutoff(TIME, (1.0, 1.1), 5.0, peak=8.0, width=0.08)
+    cutoff = local_cutoff(TIME, (1.0, 1.1), 5.0)
     assert cutoff.max() == pytest.approx(8.0)
     assert cutoff[108] == pytest.approx(5.0 + 3.0 * np.exp(-(0.02**2) / 0.08**2))
     np.testing.assert_allclose(cutoff[200:], 5.0, atol=1e-12)

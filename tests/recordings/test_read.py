@@ -93,7 +93,7 @@ def test_our_own_bvh_comes_back(tmp_path):
     for frame in range(n):
         state = Configuration(body, q[frame])
         for segment in body.segments:
-            joint = found.joint_index(segment.name)
+            joint = found.joint_names.index(segment.name)
             rotation, position = state.segment_placement(segment.name)
             np.testing.assert_allclose(found.positions[frame, joint], position, atol=1e-7)
             np.testing.assert_allclose(found.world_rotations[frame, joint], rotation, atol=1e-7)
@@ -226,7 +226,7 @@ def table(folder, name):
 
 def head_and_end(found):
     name = "head" if "head" in found.joint_names else "Head"
-    joint = found.joint_index(name)
+    joint = found.joint_names.index(name)
     end = found.positions[:, joint] + found.world_rotations[:, joint] @ found.ends[name]
     return found.positions[:, joint], end
 
@@ -298,7 +298,7 @@ STANDING = {"accad_male1_bvh/Male1_A1_Stand.bvh": "Head", "accad_male1_bvh/Male1
 def test_people_who_stand_are_as_tall_as_people(recordings_folder, clip):
     """From the lowest joint to the end of the head's bone: a wrong unit would be off by far more."""
     found = read_recording(recordings_folder / clip)
-    joint = found.joint_index(STANDING[clip])
+    joint = found.joint_names.index(STANDING[clip])
     top = found.positions[:, joint] + found.world_rotations[:, joint] @ found.ends[STANDING[clip]]
     tall = top[:, 2] - found.positions[..., 2].min(axis=1)
     assert 1.4 < np.median(tall) < 2.1
@@ -309,4 +309,4 @@ def _shoulder(found, side):
         "left": ("lhumerus", "LeftArm", "LeftShoulder"),
         "right": ("rhumerus", "RightArm", "RightShoulder"),
     }
-    return found.positions[:, found.joint_index(next(n for n in names[side] if n in found.joint_names))]
+    return found.positions[:, found.joint_names.index(next(n for n in names[side] if n in found.joint_names))]

@@ -158,7 +158,7 @@ def test_a_standing_foot_is_level_whatever_its_bone(person):
     q = np.tile(person.standing_posture(), (3, 1))
     ours = recorded(person, q)
     offsets = np.array(ours.offsets)
-    offsets[[ours.joint_index(f"{side}_toes") for side in ("left", "right")], 2] += 0.03
+    offsets[[ours.joint_names.index(f"{side}_toes") for side in ("left", "right")], 2] += 0.03
     other = Recording(
         "other feet", ours.joint_names, ours.parents, offsets, ours.ends, ours.rotations,
         ours.root_positions, ours.rate,

@@ -13,7 +13,7 @@ from manikin.kinematics import PointTargets
 from manikin.numerics.spatial import GRAVITY
 from manikin.recordings import ForcePlate, Reconstruction, read_recording, reconstruct
 from manikin.recordings.supports.body_supports import RecordedSupports, Support, SupportPhase
-from manikin.recordings.supports.support_levels import slowest_speed, track
+from manikin.recordings.supports.support_levels import RecordedSole
 from manikin.recordings.supports.supports import plate_loads, supports_of, supports_of_points, timing_errors
 
 STAND, SWING = 0.5, 0.45
@@ -197,18 +197,18 @@ def test_the_slowest_point_of_a_sole_is_nearest_to_what_it_turns_about(share, sl
     # At 1 rad/s, about a point on the sole or one sole's length, 0.25 m, before its toes.
     time = np.arange(200) / 100.0
     along = np.stack([np.cos(time), np.zeros(200), -np.sin(time)], axis=1) * np.linalg.norm(TOES)
-    heel, toes = (track(way * along, 100.0) for way in (-share, 1.0 - share))
-    assert slowest_speed(heel, toes)[50:150] == pytest.approx(slowest, abs=1e-3)
+    sole = RecordedSole.of([way * along for way in (-share, 1.0 - share)], 100.0)
+    assert sole.speed[50:150] == pytest.approx(slowest, abs=1e-3)
 
 
 @pytest.mark.parametrize(
-    ("count", "cutoff", "told"),
-    [(3, 5.0, "valid: at least 4"), (50, 60.0, "valid: above 0, below half the rate")],
+    ("count", "rate", "told"),
+    [(3, 100.0, "valid: at least 4"), (50, 10.0, "valid: above 0, below half the rate")],
 )
-def test_too_little_is_refused_in_one_line(count, cutoff, told):
+def test_too_little_is_refused_in_one_line(count, rate, told):
     feet = {name: (np.zeros((count, 3)), np.zeros((count, 3))) for name in ("left_foot", "right_foot")}
     with pytest.raises(InputError, match=told) as refused:
-        supports_of_points(feet, 100.0, cutoff=cutoff)
+        supports_of_points(feet, rate)
     assert "\n" not in str(refused.value)
 
 
@@ -227,7 +227,7 @@ def support(name, start, end, heel):
 
 
 def test_loads_of_a_plate_are_without_blinks():
-    loads = plate_loads(plate([(0.5, 0.9), (0.91, 1.2), (2.0, 2.05), (2.5, 3.0)]))
+    loads = list(plate_loads(plate([(0.5, 0.9), (0.91, 1.2), (2.0, 2.05), (2.5, 3.0)])))
     assert [(load.start, load.end) for load in loads] == [(0.5, 1.2), (2.5, pytest.approx(3.0, abs=2e-3))]
     assert [(load.start_seen, load.end_seen) for load in loads] == [(True, True), (True, False)]
     np.testing.assert_allclose(loads[0].first_cop, 0.0, atol=1e-12)
@@ -410,7 +410,7 @@ def test_a_jump_has_no_support_where_it_is_highest(recordings_folder):
         pytest.skip("the drop jump is not there")
     recording = read_recording(path)
     found = supports_of(reconstruct(recording), start=recording.start)
-    loads = [plate_loads(plate) for plate in recording.plates]
+    loads = [list(plate_loads(plate)) for plate in recording.plates]
     off = max(load.end for each in loads for load in each if load.end_seen)
     carried = [np.interp(recording.time, plate.time, plate.force[:, 2]) for plate in recording.plates]
     again = recording.time[(recording.time > off + 0.1) & (np.sum(carried, axis=0) > 20.0)][0]

@@ -292,7 +292,7 @@ def test_numbers_are_read_as_yaml_1_2_has_them(tmp_path):
     with pytest.raises(ScenarioError, match=r"seed is 10\.0"):
         load_scenario(write(tmp_path, text))
     scenario = load_scenario(write(tmp_path, text.replace("010", "10")))
-    assert (scenario.seed, scenario.mass, scenario.push.force_N) == (10, 80.0, 100.0)
+    assert (scenario.seed, scenario.mass, scenario.file.push.force_N) == (10, 80.0, 100.0)
 
 
 def test_mesh_path_is_relative_to_the_file_and_absolute_in_the_resolved_one(tmp_path):

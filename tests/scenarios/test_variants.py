@@ -62,21 +62,25 @@ def test_a_file_is_laid_over_the_one_it_extends(tmp_path):
     )
     assert child.file.scene == base.file.scene
     assert child.file.planning == base.file.planning
-    assert child.description == base.description
+    assert child.file.description == base.file.description
 
 
 def test_variants_are_laid_over_the_file(tmp_path):
     path = write(tmp_path, CHILD)
     plain, slow = load_scenario(path), load_scenario(path, "slow")
-    assert (slow.name, slow.description, slow.planning.max_duration_s) == ("child@slow", "slower", 9.0)
+    assert (slow.name, slow.file.description, slow.file.planning.max_duration_s) == (
+        "child@slow",
+        "slower",
+        9.0,
+    )
     assert slow.file.supports == plain.file.supports
     bare = load_scenario(f"{path}@bare")
     assert bare.file.floor_height_m is None
     assert bare.file.com_constraints == []
-    assert bare.planning.weights.margin is None
-    assert bare.planning.min_margin == plain.planning.min_margin
+    assert bare.file.planning.weights.margin is None
+    assert bare.file.planning.min_margin == plain.file.planning.min_margin
     inherited = list_variants("platform")
-    assert list_variants(path) == inherited | {"slow": "slower", "bare": plain.description}
+    assert list_variants(path) == inherited | {"slow": "slower", "bare": plain.file.description}
 
 
 def test_variants_are_inherited_changed_and_can_be_extended(tmp_path):
@@ -84,10 +88,10 @@ def test_variants_are_inherited_changed_and_can_be_extended(tmp_path):
     change = {"variants": {"slow": {"planning": {"min_margin": 10.0}}, "bare": None}}
     heir = write(tmp_path, {"extends": "child.yaml", "name": "heir"} | change, "heir.yaml")
     assert list(list_variants(heir)) == [*list_variants("platform"), "slow"]
-    planning = load_scenario(heir, "slow").planning
+    planning = load_scenario(heir, "slow").file.planning
     assert (planning.max_duration_s, planning.min_margin) == (9.0, 10.0)
     of_variant = load_scenario(write(tmp_path, {"extends": "child.yaml@slow"}, "of.yaml"))
-    assert (of_variant.name, of_variant.planning.max_duration_s) == ("child@slow", 9.0)
+    assert (of_variant.name, of_variant.file.planning.max_duration_s) == ("child@slow", 9.0)
 
 
 def test_the_resolved_scenario_stands_alone(tmp_path):
@@ -105,7 +109,7 @@ def test_every_built_in_scenario_and_variant_is_usable():
     for name in list_scenarios():
         for scenario in (load_scenario(name), *(load_scenario(name, v) for v in list_variants(name))):
             assert scenario.name.split("@")[0] == name
-            assert scenario.description
+            assert scenario.file.description
             scene = scenario.build_scene()
             if scenario.file.supports is None:
                 continue  # its contacts are planned, tests/pipeline/test_contact_search.py

@@ -272,7 +272,7 @@ def test_mesh_with_too_many_loose_triangles_is_refused():
 
 @pytest.mark.parametrize("change", [
     {"timestep": 0.0}, {"timestep": float("nan")}, {"friction": 0.0}, {"friction": -0.5},
-    {"armature": -1.0}, {"joint_damping": float("inf")}, {"cone": "square"}, {"impratio": 0},
+    {"armature": -1.0}, {"joint_damping": float("inf")}, {"soft_time_constant": 0},
 ])  # fmt: skip
 def test_nonsense_options_are_refused(change):
     with pytest.raises(InputError, match="valid"):

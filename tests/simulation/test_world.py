@@ -5,7 +5,7 @@ import pytest
 from manikin.errors import BodyError, InputError
 from manikin.numerics.spatial import GRAVITY_VECTOR
 from manikin.scene import Box, Obstacle, Scene
-from manikin.simulation import PhysicsOptions, World, compile_model
+from manikin.simulation import PhysicsOptions, Push, World, compile_model
 from manikin.simulation.world import Grip
 
 
@@ -43,7 +43,7 @@ def test_states_come_back_in_pinocchio_order(body, world):
 
 def test_push_changes_the_momentum_by_its_impulse(body, flying):
     """A push of 200 N over 5 ms gives 1 N.s (gravity apart), only while it lasts."""
-    flying.apply_push("thorax", (200.0, 0.0, 0.0), start=0.002, duration=0.005)
+    flying.apply_push(Push("thorax", np.array([200.0, 0.0, 0.0]), start=0.002, duration=0.005))
     flying.advance(np.zeros(body.nv - 6), 20)
     gained = momentum(body, flying.q, flying.v)
     assert gained[0] == pytest.approx(1.0, abs=1e-3)
@@ -138,9 +138,9 @@ def test_gripping_hand_passes_through_what_it_grips(body):
 
 def test_misuse_is_refused(world):
     with pytest.raises(BodyError, match="valid"):
-        world.apply_push("tail", (1, 0, 0), 0.0, 0.1)
+        world.apply_push(Push("tail", np.array([1.0, 0, 0]), 0.0, 0.1))
     with pytest.raises(InputError, match="push duration"):
-        world.apply_push("thorax", (1, 0, 0), 0.0, 0.0)
+        Push("thorax", np.array([1.0, 0, 0]), 0.0, 0.0)
     with pytest.raises(InputError, match="planned touch of obstacle 'moon'"):
         world.plan_touches([(("left_foot",), "moon")])
 

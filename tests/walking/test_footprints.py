@@ -1,4 +1,4 @@
-"""Footprints in time and the stances they make."""
+"""Footprints in time."""
 
 import numpy as np
 import pytest
@@ -23,39 +23,6 @@ def test_phases_are_double_and_single_supports_in_turn():
     assert held == [sorted(FEET), ["right_foot"], sorted(FEET), ["left_foot"], sorted(FEET)]
     assert [seconds for _, seconds in walk.phases()] == pytest.approx([0.5, 0.4, 0.2, 0.5, 0.4])
     assert walk.count == 2
-
-
-def test_schedule_has_the_flights_of_the_walk_at_their_times():
-    walk = two_steps()
-    schedule = walk.schedule(length=0.28, width=0.12, friction=0.7, normal_force_cap=1500.0)
-    flights = [(swing.effector, schedule.swing_interval(swing)) for swing in schedule.sequence.swings()]
-    assert [name for name, _ in flights] == list(FEET)
-    assert np.allclose([times for _, times in flights], [(0.5, 0.9), (1.1, 1.6)])
-    landed = schedule.sequence.swings()[0].end
-    assert landed is not None
-    assert np.allclose(landed.position, [0.4, 0.1, 0.0])
-
-
-def test_a_walk_goes_on_where_another_ends():
-    """Places, order and durations stay; standing in between is one double support."""
-    walk = two_steps()
-    later = Footprints([
-        Footprint(step.effector, step.placed([0.4, 0.0, 0.0]).position, step.yaw, step.lands, step.leaves)
-        for step in walk.steps
-    ])  # fmt: skip
-    whole = walk.followed_by(later)
-    assert whole.count == 4
-    assert whole.duration == pytest.approx(walk.duration + later.duration)
-    durations = [seconds for _, seconds in whole.phases()]
-    assert durations == pytest.approx([0.5, 0.4, 0.2, 0.5, 0.4 + 0.5, 0.4, 0.2, 0.5, 0.4])
-    with pytest.raises(InputError, match="from where left_foot stands"):
-        walk.followed_by(walk)
-
-
-def test_placing_turns_and_shifts():
-    step = Footprint("left_foot", [1.0, 0.0, 0.0], 0.2, 0.0, 1.0).placed([2.0, 3.0, np.pi / 2], height=0.5)
-    assert np.allclose(step.position, [2.0, 4.0, 0.5])
-    assert step.yaw == pytest.approx(np.pi / 2 + 0.2)
 
 
 @pytest.mark.parametrize(

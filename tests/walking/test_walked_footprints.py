@@ -28,7 +28,7 @@ def test_feet_stand_when_they_do_in_the_walk(way):
         more = held[:-1].astype(int) - walk.support[:-1, column]
         assert more.min() == 0
         assert more.sum() <= len(found.of(foot))
-    assert found.duration == pytest.approx(walk.time[-1])
+    assert found.end - found.start == pytest.approx(walk.time[-1])
     counts = [len(stance) for stance, _ in found.phases()]
     assert counts == [2, 1] * found.count + [2]
     assert min(seconds for _, seconds in found.phases()) >= frame - 1e-9

@@ -18,12 +18,7 @@ from manikin.analysis.contact_adaptation import (
     within_toe_strength,
     without_remnants,
 )
-from manikin.analysis.posture_adaptation import (
-    AdaptedMotion,
-    adapt_postures,
-    rate_on_contacts,
-    rate_on_plan,
-)
+from manikin.analysis.posture_adaptation import AdaptedMotion, adapt_postures, rate_on_contacts, rate_on_plan
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, StanceSequence
 from manikin.control import ControlSettings, TaskWeights
@@ -122,18 +117,17 @@ HEIGHT_ROOM = 0.1
 def plan_recorded_com(
     mass: float, recording: RecordedCom, velocity: FloatArray, method: Method
 ) -> CentroidalResult:
-    """Plan the centre of mass.
+    """Plan the centre of mass of a mass [kg].
 
-    Args:
-        mass: [kg].
-        recording: Samples, key frames and stances.
-        velocity: (2, 3) of the recorded centre of mass at both ends, kept by the timing-free method [m/s].
+    The timing-free method keeps the velocity (2, 3) of the recorded one at both ends [m/s].
     """
     if method == "keyframes":
         return plan_near_recorded_com(mass, recording)
+    durations = zip(recording.sequence, recording.schedule.durations.tolist(), strict=True)
+    free = [Phase(phase.stance, SHORTEST * lasting, LONGEST * lasting) for phase, lasting in durations]
     return plan_com(
         CentroidalProblem(
-            mass, _free_durations(recording), recording.com[0], recording.com[-1],
+            mass, StanceSequence(free), recording.com[0], recording.com[-1],
             start_velocity=velocity[0], goal_velocity=velocity[1],
             support_distance=farthest_support(recording), geometric=_recorded_heights(recording),
         )
@@ -141,42 +135,26 @@ def plan_recorded_com(
 
 
 def plan_near_recorded_com(mass: float, recording: RecordedCom) -> NearKeyFramesResult:
-    """Plan the centre of mass near the recorded one.
-
-    Args:
-        mass: [kg].
-        recording: Samples, key frames and stances, and the rate of the angular momentum.
-    """
+    """Plan the centre of mass of a mass [kg] near the recorded one."""
     return plan_com_near_key_frames(KeyframeProblem(mass, recording, start_velocity=None, goal_velocity=None))
 
 
 def farthest_support(recording: RecordedCom) -> float:
     """Largest distance of the recorded centre of mass from a contact ([Qiu2012]_ Table 3.5, 5.26) [m]."""
-    phases, farthest = recording.schedule.phase_at(recording.time), 0.0
+    phases, distances = recording.schedule.phase_at(recording.time), [0.0]
     for index, phase in enumerate(recording.sequence):
         # The last sample of a phase is the first of the next one.
         rows = np.flatnonzero(phases == index)
         com = recording.com[rows[0] : rows[-1] + 2]
-        for contact in phase.stance:
-            farthest = max(farthest, float(np.linalg.norm(com - contact.position, axis=1).max()))
-    return farthest
+        distances += [np.linalg.norm(com - contact.position, axis=1).max() for contact in phase.stance]
+    return float(max(distances))
 
 
 def _recorded_heights(recording: RecordedCom) -> tuple[GeometricConstraint, ...]:
     """Recorded heights with some room; contacts alone would admit a way through the floor."""
     heights = recording.com[:, 2]
-    lower, upper = (
-        BentSurface(float(height), 0.0, 0.0, 0.0)
-        for height in (heights.min() - HEIGHT_ROOM, heights.max() + HEIGHT_ROOM)
-    )
-    return height_band(lower, upper)
-
-
-def _free_durations(recording: RecordedCom) -> StanceSequence:
-    return StanceSequence([
-        Phase(phase.stance, SHORTEST * duration, LONGEST * duration)
-        for phase, duration in zip(recording.sequence, recording.schedule.durations.tolist(), strict=True)
-    ])  # fmt: skip
+    ends = heights.min() - HEIGHT_ROOM, heights.max() + HEIGHT_ROOM
+    return height_band(*(BentSurface(float(height), 0.0, 0.0, 0.0) for height in ends))
 
 
 SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
@@ -316,10 +294,7 @@ def adapt_recording(
 
 
 def _with_turning(
-    body: BodyModel,
-    scene: Scene,
-    recording: RecordedCom,
-    recorded: tuple[FloatArray, FloatArray],
+    body: BodyModel, scene: Scene, recording: RecordedCom, recorded: tuple[FloatArray, FloatArray]
 ) -> RecordedCom:
     """Recording with a rate of the angular momentum that the body can follow.
 

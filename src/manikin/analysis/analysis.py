@@ -20,7 +20,6 @@ from manikin.recordings.dynamics.plate_forces import (
     TorqueComparison,
     compare_torques,
     compare_with_plates,
-    mass_on_plates,
     plate_forces,
 )
 from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics, RecordedMargins
@@ -47,11 +46,7 @@ OTHER_MASS = 0.03
 
 
 def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
-    """Reasons to doubt the numbers, a line each.
-
-    Args:
-        recording: What they were measured on.
-    """
+    """Reasons to doubt what was measured on a recording, a line each."""
     found, supports, lines = analysis.found, analysis.supports, []
     if found.median > LARGE_RESIDUAL:
         lines.append(
@@ -117,12 +112,9 @@ class MeasuredMotion:
         return self.shifted if self.shifted is not None and self.shifted.believable else None
 
     def lowest_shifted(self, frames: NDArray[np.bool_] | None = None) -> tuple[float | None, bool | None]:
-        """Lowest margin of the shifted motion [N.m], and whether it is the imposed floor.
+        """Lowest margin of the shifted motion [N.m] in some frames (n,) or all; whether it is the floor.
 
-        A margin that is the floor was put there by the shift: it is no result, and None stands for it.
-
-        Args:
-            frames: (n,) the frames looked at; all if None.
+        The imposed floor was put there by the shift: it is no result, and None stands for it.
         """
         if self.shifted is None:
             return None, None
@@ -214,32 +206,14 @@ def _torques(compared: Sequence[TorqueComparison]) -> dict[str, dict[str, float]
     }
 
 
-def measured_mass(
-    plates: Sequence[ForcePlate], dynamics: RecordedDynamics, schedule: ContactSchedule, start: float
-) -> float | None:
-    """Mass by the plates [kg]; None without plates or too short on them.
-
-    Args:
-        plates: On the clock of the schedule.
-        dynamics: Its motion, of any mass.
-        start: The schedule's clock at the motion's first instant [s].
-    """
-    if not plates:
-        return None
-    return mass_on_plates(dynamics, plate_forces(plates, dynamics.time + start, schedule))
-
-
 def plate_report(
     plates: Sequence[ForcePlate], supports: RecordedSupports, schedule: ContactSchedule,
     measured: MeasuredMotion, motions: tuple[Motion, Motion | None], mass: float | None,
 ) -> PlateReport:  # fmt: skip
-    """Compare a motion with the plates under it.
+    """Compare a motion with the plates under it, at least one, on the clock of the supports.
 
-    Args:
-        plates: At least one, on the clock of the supports.
-        measured: The motion, with the person's mass.
-        motions: As recorded, and shifted where that is to be believed, with forces and torques.
-        mass: Of the person, by the plates [kg].
+    ``motions`` are as recorded, and shifted where that is to be believed, with forces and torques; the mass
+    is that of the person by the plates [kg].
     """
     forces = plate_forces(plates, measured.recorded.time + supports.start, schedule)
     height = float(np.mean([plate.origin[2] for plate in plates]))
@@ -347,16 +321,20 @@ class Analysis(Displayed):
 
     def series(self) -> dict[str, FloatArray]:
         """(n,) columns for a table, by name and unit."""
+        momentum, shifted = self.motion.angular_momentum, self.measured.shifted
         columns: dict[str, FloatArray] = {"time_s": self.time}
-        for axis, name in enumerate("xyz"):
-            columns[f"com_{name}_m"] = self.motion.com[:, axis]
-        for axis, name in enumerate("xyz"):
-            columns[f"angular_momentum_{name}_kgm2ps"] = self.motion.angular_momentum[:, axis]
+        columns |= {f"com_{name}_m": self.motion.com[:, axis] for axis, name in enumerate("xyz")}
+        columns |= {f"angular_momentum_{name}_kgm2ps": momentum[:, axis] for axis, name in enumerate("xyz")}
         columns |= {
             "margin_Nm": self.motion.margin,
             "point_mass_margin_Nm": self.point_mass_margin,
             "recorded_margin_Nm": self.measured.recorded_margins.whole_body,
-            **self._shifted_series(),
+        }
+        if shifted is not None:
+            columns["shifted_margin_Nm"] = shifted.margins.whole_body
+            columns["shifted_at_floor"] = shifted.at_floor.astype(np.float64)
+            columns["shift_m"] = shifted.size
+        columns |= {
             "balance_force_N": self.measured.recorded_margins.body.force,
             "zmp_distance_m": self.measured.recorded_margins.body.zmp_distance,
             "vertical_force_N": self.vertical_force,
@@ -371,16 +349,6 @@ class Analysis(Displayed):
             columns |= {f"plates_cop_{name}_m": self.plates.cop[:, axis] for axis, name in enumerate("xy")}
         skipped = ("time_s", "margin_Nm")
         return columns | {name: one for name, one in self.ergonomics.series().items() if name not in skipped}
-
-    def _shifted_series(self) -> dict[str, FloatArray]:
-        shifted = self.measured.shifted
-        if shifted is None:
-            return {}
-        return {
-            "shifted_margin_Nm": shifted.margins.whole_body,
-            "shifted_at_floor": shifted.at_floor.astype(np.float64),
-            "shift_m": shifted.size,
-        }
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready numbers (SI), as ``manikin analyze --json`` prints them."""

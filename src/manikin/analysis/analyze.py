@@ -8,14 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from manikin.analysis.analysis import (
-    Analysis,
-    MeasuredMotion,
-    PlateReport,
-    measured_mass,
-    plate_report,
-    remarks_on,
-)
+from manikin.analysis.analysis import Analysis, MeasuredMotion, PlateReport, plate_report, remarks_on
 from manikin.balance.zmp import LEAST_LOAD
 from manikin.body.limbs import with_knees_and_elbows
 from manikin.body.strength import HANDS, carrying
@@ -23,6 +16,7 @@ from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, uprig
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.recordings.dynamics.plate_forces import mass_on_plates, plate_forces
 from manikin.recordings.dynamics.recorded_dynamics import (
     CUTOFF,
     RecordedDynamics,
@@ -55,18 +49,14 @@ def walked_segments(found: Reconstruction) -> PathSegments | None:
     """Holonomic and nonholonomic stretches of a walk, by the shoulders ([Truong2010]_ function 1).
 
     None where the trunk ever lies or is bent so far that the shoulders do not give the heading.
-
-    Args:
-        found: At least three instants at an even rate.
     """
     places = _places(found, found.q)
     standing = _places(found, found.body.standing_posture()[None])[0]
     height = places[:, :2, 2].mean(axis=1) - places[:, 2, 2]
     if np.any(height < UPRIGHT * float(standing[:2, 2].mean() - standing[2, 2])):
         return None
-    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0])
     try:
-        return segment_path(ShoulderPaths(places[:, 0, :2], places[:, 1, :2], rate))
+        return segment_path(ShoulderPaths(places[:, 0, :2], places[:, 1, :2], found.rate))
     except InputError:  # the shoulders are above each other
         return None
 
@@ -109,9 +99,7 @@ def recordings_in(sources: Iterable[str | Path]) -> tuple[Path, ...]:
     """Recordings among files and folders, each once: files as given, those of a folder in order of path.
 
     A file that is named is taken whatever its ending, so that its reader can say what is wrong with it.
-
-    Args:
-        sources: Files, or folders that are searched to any depth.
+    Folders are searched to any depth.
 
     Raises:
         InputError: If a source is not there, or a folder holds no recording.
@@ -232,7 +220,9 @@ def analyze(
     schedule = recorded_schedule(found, supports, friction=given.friction)
     touch_downs = touch_downs_of(supports)
     dynamics = dynamics_of(found, touch_downs=touch_downs)
-    mass = measured_mass(plates, dynamics, schedule, supports.start)
+    mass = None
+    if plates:
+        mass = mass_on_plates(dynamics, plate_forces(plates, dynamics.time + supports.start, schedule))
     stated = given.mass is not None or (isinstance(recording, MarkerRecording) and recording.subject.mass)
     if mass is not None and not stated and (weighed := _weighed(found, mass - given.load)) is not None:
         found = weighed

@@ -99,11 +99,8 @@ def leaving_with_the_hinge(
     """Stances with every foot that leaves from its toes off as soon as their hinge has moved away.
 
     A recorded foot rolls over the tips of its toes in the last hundredths of a second, hardly loaded; a stiff
-    toe segment lies flat up to the end, and would hold the leg back.
-
-    Args:
-        time: (n,) [s], on the schedule's clock.
-        q: (n, nq) recorded postures then.
+    toe segment lies flat up to the end, and would hold the leg back. Recorded are postures (n, nq) at times
+    (n,) on the schedule's clock [s].
     """
     instants = np.array(schedule.instants)
     phases = list(schedule.sequence)
@@ -137,12 +134,8 @@ def rising_at_once(
     """Stances with a seat that is left as soon as the buttocks have risen from it.
 
     Flesh and cushion follow a person up by some centimetres; a stiff seat does not, and would hold the
-    pelvis back while the rest of the body rises.
-
-    Args:
-        schedule: Contacts in time, a seat at one place.
-        time: (n,) [s], on the schedule's clock.
-        q: (n, nq) recorded postures then.
+    pelvis back while the rest of the body rises. The seat is at one place; recorded postures are as for
+    :func:`leaving_with_the_hinge`.
     """
     if SEAT not in schedule.sequence.effectors:
         return schedule
@@ -172,35 +165,19 @@ def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSc
 
 def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
     """Stances with all contacts of a seat that lie near each other at one place: chairs do not move."""
-    seats = [
-        (index, contact)
-        for index, phase in enumerate(schedule.sequence)
-        for contact in phase.stance
-        if contact.effector == SEAT
-    ]
-    changed: dict[int, Contact] = {}
+    seats = [item for phase in schedule.sequence for item in phase.stance if item.effector == SEAT]
+    changed: dict[Contact, Contact] = {}
     while seats:
-        near = [one for one in seats if np.linalg.norm(one[1].position - seats[0][1].position) < SAME_SEAT]
-        place = frozen_array(np.median([contact.position for _, contact in near], axis=0), "seat place [m]")
-        turn = seats[0][1].rotation_contact_to_world
-        for index, contact in near:
-            changed[index] = replace(contact, position=place, rotation_contact_to_world=turn)
-        seats = [one for one in seats if one[0] not in changed]
-    phases = [
-        replace(phase, stance=phase.stance.with_contacts(
-            changed[index] if contact.effector == SEAT else contact for contact in phase.stance
-        ))
-        for index, phase in enumerate(schedule.sequence)
-    ]  # fmt: skip
-    return ContactSchedule(StanceSequence(phases), schedule.instants)
+        near = [item for item in seats if np.linalg.norm(item.position - seats[0].position) < SAME_SEAT]
+        place = frozen_array(np.median([item.position for item in near], axis=0), "seat place [m]")
+        turn = seats[0].rotation_contact_to_world
+        changed |= {item: replace(item, position=place, rotation_contact_to_world=turn) for item in near}
+        seats = [item for item in seats if item not in changed]
+    return _with_contacts(schedule, lambda contact: changed.get(contact, contact))
 
 
 def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
-    """A floor, and a block under every contact above it; grasps hold on to nothing that is in the way.
-
-    Args:
-        floor: Height of the floor [m].
-    """
+    """A floor at a height [m], and a block under every contact above it; grasps hold on to nothing."""
     blocks: list[Obstacle] = []
     known: set[tuple[float, ...]] = set()
     for phase in schedule.sequence:
@@ -282,9 +259,7 @@ def _whole(contact: Contact, body: BodyModel) -> Contact:
 
 
 def _alike(first: Stance, second: Stance) -> bool:
-    if set(first.effectors) != set(second.effectors):
-        return False
-    return all(
+    return set(first.effectors) == set(second.effectors) and all(
         first[name].part is second[name].part and np.array_equal(first[name].position, second[name].position)
         for name in first.effectors
     )

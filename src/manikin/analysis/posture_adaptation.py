@@ -8,7 +8,7 @@ the tips of a foot kept off the surface. All this is our own.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import groupby
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -101,12 +101,7 @@ class EffectorPaths:
 def effector_paths(
     body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray
 ) -> EffectorPaths:
-    """Adapt the recorded paths of the effectors to their contacts.
-
-    Args:
-        time: (n,) [s].
-        q: (n, nq) recorded postures then.
-    """
+    """Adapt the recorded paths of the effectors, in postures (n, nq) at times (n,) [s], to their contacts."""
     targets, toes = {}, {}
     for name in schedule.sequence.effectors:
         path = _Path(body, schedule, time, q, name)
@@ -223,13 +218,8 @@ class _Path:
     def _lift(self, rows: slice, near: FloatArray, share: FloatArray, cut: tuple[bool, bool]) -> None:
         """Keep heel, hinge and tips of a foot off the surface in flight.
 
-        At a clip's end that cuts a flight, a foot may be as near to it as it was recorded, about to land.
-
-        Args:
-            rows: Samples of the flight.
-            near: (n,) share of the flight to its nearer contact.
-            share: (n,) of the flight since its beginning.
-            cut: Whether the clip begins, or ends, within it.
+        At an end of the clip that cuts a flight, a foot may be as near to it as it was recorded, about to
+        land. Shares of the flight are (n,) from its nearer contact and since its beginning.
         """
         tilt, half = _pitch(self.rotation[rows]), 0.5 * (self.body.sole_length or 0.0)
         height, hinge = self.position[rows, 2], 0.0 if self.hinge is None else float(self.hinge[0])
@@ -263,10 +253,9 @@ def _up_to(limit: float, angle: FloatArray) -> FloatArray:
 
 def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
     """Part of a contact with the first and the last but one phase in which it is the one."""
-    changes = [i for i in range(1, len(contacts)) if contacts[i].part is not contacts[i - 1].part]
-    bounds = [0, *changes, len(contacts)]
-    for begin, end in pairwise(bounds):
-        yield contacts[begin].part, begin, end
+    for part, run in groupby(range(len(contacts)), key=lambda number: contacts[number].part):
+        numbers = list(run)
+        yield part, numbers[0], numbers[-1] + 1
 
 
 KNOT_SPACING = 0.035
@@ -350,10 +339,6 @@ def rate_on_contacts(
 
     At a recording's samples. Soles that stay in place and land flat make legs swing a little
     otherwise than they were recorded, and with them the rest of the body.
-
-    Args:
-        recording: The recorded centre of mass on the contacts.
-        recorded: (n,) instants [s] and (n, nq) postures.
     """
     clock = recording.key_times, recording.key_times
     task = _Task.of(body, scene, recording.schedule, recorded, clock)
@@ -372,14 +357,9 @@ def rate_on_plan(
     body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory,
     recorded: tuple[FloatArray, FloatArray], recording: RecordedCom,
 ) -> FloatArray:  # fmt: skip
-    """(n, 3) rate of the angular momentum of recorded postures adapted to a plan [N.m].
+    """(n, 3) rate of the angular momentum of recorded postures adapted to a plan near them [N.m].
 
-    At a recording's samples.
-
-    Args:
-        trajectory: Planned near the recording, at its pace.
-        recorded: (n,) instants [s] and (n, nq) postures.
-        recording: On whose stances it was planned.
+    At the samples of the recording on whose stances it was planned.
     """
     clock = trajectory.schedule.instants, recording.key_times
     spline = _Task.of(body, scene, trajectory.schedule, recorded, clock).follow(trajectory)

@@ -63,9 +63,8 @@ class Balance(Displayed):
 
         figure = new_figure(6.0, 6.0, str(self))
         axes = figure.add_subplot()
-        for polygon, label in (
-            (self.report.support_polygon, "support"), (self.report.com_polygon, "CoM may rest"),
-        ):  # fmt: skip
+        areas = {"support": self.report.support_polygon, "CoM may rest": self.report.com_polygon}
+        for label, polygon in areas.items():
             if len(polygon) > 2:
                 axes.fill(*np.asarray(polygon).T, alpha=0.2, label=label)
         for contact in self.stance:
@@ -110,7 +109,11 @@ class Unnamed:
 
     def named(self, effector: str) -> Contact:
         """The contact of an effector."""
-        return self._kind(effector, _point3(self._position, effector), **self._options)
+        place = tuple(self._position)
+        if len(place) not in (2, 3):
+            raise ContactError(f"{effector} is at {place}; valid: [x, y] or [x, y, z] in metres")
+        at = frozen_array((*place, 0.0)[:3], f"{effector} position [m]", (3,), ContactError)
+        return self._kind(effector, at, **self._options)
 
 
 def sole(
@@ -167,11 +170,10 @@ def stance(
     """
     made = []
     for effector, given in contacts.items():
-        if isinstance(given, Contact):
-            made.append(given)
-            continue
-        kind = given if isinstance(given, Unnamed) else sole(given, friction=friction)
-        made.append(kind.named(effector))
+        if not isinstance(given, Contact):
+            kind = given if isinstance(given, Unnamed) else sole(given, friction=friction)
+            given = kind.named(effector)
+        made.append(given)
     return Stance(made, normal_force_cap, friction_model)
 
 
@@ -189,10 +191,9 @@ def creature(
     Raises:
         BodyError: If the file or a limb is not usable.
     """
-    if str(source) == "insect":
-        return insect(**options)
-    if str(source) == "quadruped":
-        return quadruped(**options)
+    built_in = {"insect": insect, "quadruped": quadruped}
+    if str(source) in built_in:
+        return built_in[str(source)](**options)
     if limbs is None:
         raise InputError(f"creature {str(source)!r} has no limbs; valid: limbs={{name: {{'tip': link}}}}")
     return creature_from_urdf(source, limbs, **options)
@@ -211,10 +212,3 @@ def scene(source: str | Path | Sequence[Obstacle] = (), *, floor: float | None =
     if isinstance(source, str | Path):
         return load_scenario(str(source)).build_scene()
     return Scene(source, floor)
-
-
-def _point3(position: Sequence[float], effector: str) -> FloatArray:
-    given = tuple(position)
-    if len(given) not in (2, 3):
-        raise ContactError(f"{effector} is at {given}; valid: [x, y] or [x, y, z] in metres")
-    return frozen_array((*given, 0.0)[:3], f"{effector} position [m]", (3,), ContactError)

@@ -155,8 +155,7 @@ class Comparison(Displayed):
     def facts(self) -> dict[str, str]:
         """Labels and texts of the value."""
         first, second = self.result.names
-        matched = sum(pair.matched for pair in self.result.pairs)
-        return {"first": first, "second": second, "matched phases": str(matched)}
+        return {"first": first, "second": second, "matched phases": str(self.result.matched_phases)}
 
     def plot(self, figure: str = "compare_timing") -> "Figure":
         """Draw a figure of both.

@@ -67,7 +67,9 @@ class ContactGenerators:
                 contact when omitted.
             grasp_moments: Whether grasps may use their moments.
         """
-        parts: list[tuple[FloatArray, ...]] = []
+        none = np.zeros(0)
+        empty = np.zeros((0, 3))
+        parts: list[tuple[np.ndarray, ...]] = [(empty, empty, empty, none.astype(np.int64), none, none)]
         for number, contact in enumerate(stance):
             local = contact.points if points is None else points[number]
             if contact.kind is ContactKind.GRASP:
@@ -84,9 +86,6 @@ class ContactGenerators:
                 couple, normal = np.zeros(force.shape), np.ones(len(force))
                 upper = np.full(len(force), np.inf)
             parts.append((point, force, couple, np.full(len(force), number), normal, upper))
-        if not parts:
-            nothing = np.zeros((0, 3))
-            return cls(nothing, nothing, nothing, np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
         return cls(*(np.concatenate(part) for part in zip(*parts, strict=True)))  # type: ignore[arg-type]
 
     def about(self, reference: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytop
 from manikin.body import BodyModel, Configuration
 from manikin.contact import ContactKind, Stance, default_normal_force_cap
 from manikin.errors import InputError
-from manikin.numerics.polytope import convex_polygon, polygon_of_halfplanes, signed_distance
+from manikin.numerics.polytope import convex_polygon, inset_polygon, polygon_of_halfplanes, signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_array, skew
 
 
@@ -116,7 +116,6 @@ def admissible_zmp_polygon(
     momentum. Friction makes it smaller than the support polygon; without admissible acceleration it is empty.
 
     Args:
-        W: Wrench polytope.
         mass: [kg].
         com: (3,) [m], above or below the plane.
         vertical_acceleration: Of the CoM [m/s^2], above ``-g``.
@@ -165,19 +164,10 @@ class StaticRegion:
         The distance is ``inset`` [m], or half or a quarter of it where the region is too narrow.
         """
         for distance in (inset, 0.5 * inset, 0.25 * inset):
-            inner = self._inset(distance)
+            inner = self.polygon if self.is_empty else inset_polygon(self.polygon, distance)
             if len(inner) >= 3:
                 return _onto(inner, point)
         return None
-
-    def _inset(self, distance: float) -> FloatArray:
-        if self.is_empty:
-            return self.polygon
-        edges = np.roll(self.polygon, -1, axis=0) - self.polygon
-        lengths = np.linalg.norm(edges, axis=1)
-        edges, start = edges[lengths > 1e-9], self.polygon[lengths > 1e-9]
-        normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths[lengths > 1e-9, None]
-        return polygon_of_halfplanes(normals, np.einsum("ni,ni->n", normals, start) - distance)
 
 
 def _onto(polygon: FloatArray, point: FloatArray) -> FloatArray:
@@ -203,7 +193,6 @@ def static_room(
         stance: The contacts that carry the body; a sum of normal forces without a cap has the default one.
         mass: Of the body [kg].
         com: (3,) centre of mass [m].
-        directions: Number of directions.
         acceleration: (3,) of the centre of mass, held in that motion then [m/s^2]; none when omitted.
 
     Returns:

@@ -13,7 +13,7 @@ import numpy as np
 from manikin.contact import Contact, ContactKind, FrictionModel
 from manikin.contact.contact import friction_model as checked
 from manikin.numerics.facet_enumeration import fan_of_generators
-from manikin.numerics.polytope import convex_polygon, facet_rows
+from manikin.numerics.polytope import convex_polygon, walls
 from manikin.numerics.spatial import FloatArray, cross
 
 
@@ -124,11 +124,9 @@ def _is_polygon(contact: Contact) -> bool:
 def _polygon_rows(contact: Contact) -> list[Row]:
     """CoP inside the hull of the points, about their middle."""
     corners = convex_polygon((contact.points - contact.centre)[:, :2])
-    edges = np.roll(corners, -1, axis=0) - corners
-    out = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
     words = {(0, True): "front", (0, False): "rear", (1, True): "left", (1, False): "right"}
     rows: list[Row] = []
-    for (x, y), corner in zip(out.tolist(), corners, strict=True):
+    for (x, y), corner in zip(walls(corners)[0].tolist(), corners, strict=True):
         axis = int(abs(y) > abs(x))
         side = words[axis, (x, y)[axis] > 0.0]
         room = float(corner @ [x, y])
@@ -171,7 +169,7 @@ def _yaw_facets(sole: Contact, friction_model: FrictionModel) -> FloatArray:
     size = np.hypot(sole.length, sole.width)
     edges[:, 3:] /= size
     fan = fan_of_generators(edges, np.ones((len(edges), 1)), np.ones(1, dtype=np.bool_))
-    H, h, _ = facet_rows(fan, 1.0)
+    H, h, _ = fan.facet_rows(1.0)
     rows = H[(np.abs(h) < 1e-9) & (np.abs(H[:, 5]) > 1e-9)]
     rows[:, 3:] /= size
     return rows / np.abs(rows[:, 5:])
@@ -203,20 +201,12 @@ for _table in (_CORNERS, _CONE_EDGES):
 
 
 def pyramid_friction(contact: Contact, friction_model: FrictionModel) -> float:
-    """Largest tangential force along the contact's x or y axis per unit normal force.
-
-    Raises:
-        ContactError: If the model is unknown.
-    """
+    """Largest tangential force along the contact's x or y axis per unit normal force."""
     return contact.friction / np.sqrt(2.0) if checked(friction_model) == "inner" else contact.friction
 
 
 def pyramid_edges(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
-    """(k, 3) forces along the pyramid's edges, 4 or with ``cone`` 8, with unit normal force, contact frame.
-
-    Raises:
-        ContactError: If the model is unknown.
-    """
+    """(k, 3) forces along the pyramid's edges, 4 or with ``cone`` 8, of unit normal force, contact frame."""
     if checked(friction_model) == "cone":
         tangential = contact.friction * _CONE_EDGES
     else:
@@ -243,9 +233,6 @@ def pyramid_sides(contact: Contact, friction_model: FrictionModel = "outer") -> 
     """(k, 3) sides ``[n_x, n_y, -slope]`` of the pyramid: a force ``f`` is inside where ``sides @ f <= 0``.
 
     Both are in the contact frame; ``(n_x, n_y)`` is of unit length.
-
-    Raises:
-        ContactError: If the model is unknown.
     """
     if checked(friction_model) == "cone":
         angles, slope = _CONE_ANGLES + np.pi / _CONE_SIDES, contact.friction * np.cos(np.pi / _CONE_SIDES)

@@ -18,7 +18,7 @@ from manikin.balance.criteria import (
     zero_moment_point,
 )
 from manikin.balance.wrench import LimitingConstraint, WrenchPolytope, pseudo_wrench, wrench_polytope
-from manikin.contact import ContactKind, FrictionModel, Stance
+from manikin.contact import ContactKind, Stance
 from manikin.errors import InputError
 from manikin.numerics.polytope import Polytope, least_change, signed_distance
 from manikin.numerics.spatial import FloatArray, cross, frozen_array, skew
@@ -72,7 +72,6 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
     leads back to the flat takes the place of its pairs of rows.
 
     Args:
-        W: Wrench polytope.
         wrench: (..., 6) about ``W.reference``, of a point mass or a whole body.
         com: (..., 3) in the world [m].
 
@@ -166,7 +165,6 @@ class BalanceReport(Displayed):
     """Balance of one stance and CoM state.
 
     Attributes:
-        W: The wrench polytope.
         wrench: (6,) pseudo-wrench about ``W.reference`` [N, N.m].
         balanced: Whether the wrench is in W_p (to a rounding of 1e-9 of its size).
         margin: Ms3 about the CoM, alpha = 1 m: the same wherever the scene stands [N.m].
@@ -178,7 +176,7 @@ class BalanceReport(Displayed):
         moment_space: T_p at the pseudo-force.
         support_polygon: (k, 2) [m].
         com_polygon: (k, 2) where the CoM may rest on these contacts [m].
-        plane_height: Height of the plane of ZMP, FRI and CMP [m].
+        plane_height: Height of the plane of ZMP, FRI and CMP, the mean one of the supports [m].
         com_projection: CoM on the ground.
         zmp: Zero moment point; the CoP when all contacts lie in the plane.
         fri: Foot rotation indicator; None unless one sole is the only support.
@@ -248,8 +246,7 @@ class BalanceReport(Displayed):
 
 def evaluate_balance(
     stance: Stance, mass: float, com: ArrayLike, acceleration: ArrayLike = (0.0, 0.0, 0.0),
-    angular_momentum_rate: ArrayLike = (0.0, 0.0, 0.0), *, friction_model: FrictionModel | None = None,
-    reference: ArrayLike = (0.0, 0.0, 0.0), plane_height: float | None = None,
+    angular_momentum_rate: ArrayLike = (0.0, 0.0, 0.0), *, reference: ArrayLike = (0.0, 0.0, 0.0),
 ) -> BalanceReport:  # fmt: skip
     """Judge one stance and CoM state by W_p and by every classical criterion.
 
@@ -259,9 +256,7 @@ def evaluate_balance(
         com: (3,) [m].
         acceleration: (3,) of the CoM [m/s^2].
         angular_momentum_rate: (3,) about the CoM [N.m].
-        friction_model: Replaces that of the stance.
         reference: (3,) point of the moments [m].
-        plane_height: Of ZMP, FRI and CMP [m]; the mean height of the supports when omitted.
 
     Raises:
         InputError: If a number is not usable, or (ContactError) nothing caps a contact's force.
@@ -269,11 +264,11 @@ def evaluate_balance(
     x = frozen_array(com, "com [m]", (3,))
     a = frozen_array(acceleration, "acceleration [m/s^2]", (3,))
     rate = frozen_array(angular_momentum_rate, "angular_momentum_rate [N.m]", (3,))
-    W = wrench_polytope(stance, friction_model=friction_model, reference=reference)
+    W = wrench_polytope(stance, reference=reference)
     wrench = pseudo_wrench(mass, x, a, rate, W.reference)
     margins = stability_margins(W, wrench, x)
     polygon = support_polygon(stance)
-    height = support_height(stance) if plane_height is None else plane_height
+    height = support_height(stance)
     zmp = zero_moment_point(wrench, height, W.reference)
     fri = foot_rotation_indicator(wrench, height, None, W.reference)
     single = len(stance) == 1 and stance.contacts[0].kind is ContactKind.SOLE

@@ -48,14 +48,14 @@ def full_motion(
     needed, load = centroidal_motion(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
     if load is not None:
         needed = replace(needed, wrench=needed.wrench + load.wrench)
-    forces = plan_forces(body, schedule, time, q, v, a)
+    tau, forces = plan_forces(body, schedule, time, q, v, a)
     stances = [phase.stance for phase in schedule.sequence]
     margin = motion_margin(stances, schedule.phase_at(time), needed.wrench, needed.com, polytopes=polytopes)
     names = schedule.sequence.effectors
     motion = Motion(
-        time=time, q=q, v=v, a=a, tau=forces.tau, com=needed.com, angular_momentum=needed.angular_momentum,
+        time=time, q=q, v=v, a=a, tau=tau, com=needed.com, angular_momentum=needed.angular_momentum,
         margin=margin.margin, support=schedule.support(time, names),
-        contact_force=forces.contact_force, contact_names=names, joint_names=body.joint_names,
+        contact_force=forces, contact_names=names, joint_names=body.joint_names,
     )  # fmt: skip
     return motion, needed.wrench
 
@@ -111,23 +111,6 @@ _HANGING_COST = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class ContactForces:
-    """Forces of a planned motion.
-
-    Attributes:
-        tau: (n, nv) generalised forces; the first six are what no contact force could
-            supply (zero for a motion in balance) [N, N.m].
-        contact_force: (n, c, 6) force and moment about the contact's origin, in world
-            axes [N, N.m].
-        missing_wrench: (n,) norm of the first six entries of ``tau``.
-    """
-
-    tau: FloatArray
-    contact_force: FloatArray
-    missing_wrench: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class _Generators(ContactGenerators):
     """Force directions of one stance and the joints that carry them; contacts count among the contact names.
 
@@ -146,24 +129,23 @@ class _Generators(ContactGenerators):
         """(6, g) wrench of each unit magnitude about the world origin."""
         return self.about(np.zeros(3))
 
-    @cached_property
-    def balance(self) -> tuple[FloatArray, FloatArray]:
-        """Mean contact point (3,) and the (6, g) wrenches about it, moments in units of force."""
+    def centred(self, wrench: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Wrenches (6, g) of the generators and wanted ones (n, 6) about the mean contact point.
+
+        Moments are in units of force, for conditioning.
+        """
         centre = self.point.mean(axis=0)
-        wrenches = self.about(centre)
-        wrenches[3:] /= _ARM
-        return centre, wrenches
+        own, target = self.about(centre), wrench_about(wrench, centre)
+        own[3:] /= _ARM
+        target[:, 3:] /= _ARM
+        return own, target
 
     def settling(
         self, number: int, contact: Contact, position: FloatArray, rotation: FloatArray
     ) -> "_Generators":
-        """The same forces with those of a settling contact where its effector is now, cheapest where low.
+        """The same forces with those of a settling contact at the pose where its effector is now.
 
-        Args:
-            number: Index of the contact's effector among the contact names.
-            contact: The contact that is still settling.
-            position: (3,) of its effector [m].
-            rotation: (3, 3) effector-to-world.
+        They are cheapest where low. The number is that of the effector among the contact names.
         """
         own = self.contact == number
         point, cost = self.point.copy(), self.cost.copy()
@@ -191,8 +173,13 @@ class _Generators(ContactGenerators):
 
 def plan_forces(
     body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray
-) -> ContactForces:
-    """Distribute the contact forces of a motion and compute its joint torques, see :func:`full_motion`."""
+) -> tuple[FloatArray, FloatArray]:
+    """Distribute the contact forces of a motion and compute its joint torques, see :func:`full_motion`.
+
+    Returns:
+        (n, nv) generalised forces, of which the first six are what no contact force could supply (zero for a
+        motion in balance), and (n, c, 6) force and moment about each contact's origin in world axes [N, N.m].
+    """
     dynamics, load = FreeDynamics.of(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
     if load is not None:
         dynamics = dynamics.carrying(load)
@@ -206,7 +193,7 @@ def plan_forces(
             tau[rows] = part.needed  # in the air nothing pushes
             continue
         cost = generators.cost / shares[rows][:, generators.contact]
-        matrix, target = _centred(generators, part.wrench)
+        matrix, target = generators.centred(part.wrench)
         magnitude = share(matrix, target, cost**-2.0, _MISSING_COST).magnitude
         tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
         over = np.any(body.torque_share(tau[rows, 6:]) > 1.0, axis=1)
@@ -221,7 +208,7 @@ def plan_forces(
                 magnitude[k] = other
                 tau[rows[k]] = part.needed[k] - joint_map @ other
         forces[rows] = _by_contact(generators, magnitude, stance, names)
-    return ContactForces(tau, forces, np.linalg.norm(tau[:, :6], axis=1))
+    return tau, forces
 
 
 def _alike(
@@ -250,18 +237,14 @@ def _alike(
 def load_shares(schedule: ContactSchedule, time: FloatArray, names: tuple[str, ...]) -> FloatArray:
     """(n, c) readiness of each contact to carry load, ramping from 0.05 to 1 at its ends."""
     shares = np.ones((len(time), len(names)))
-    held = np.array([[name in phase.stance for name in names] for phase in schedule.sequence])
-    for column in range(len(names)):
-        for phase in range(1, len(held)):
-            instant = schedule.instants[phase]
-            if held[phase, column] and not held[phase - 1, column]:
-                after = time >= instant
-                settles = schedule.sequence[phase].stance[names[column]].settle > 0.0
-                ramp = _SUDDEN_RAMP if settles else _RAMP
-                shares[after, column] = np.minimum(shares[after, column], (time[after] - instant) / ramp)
-            if held[phase - 1, column] and not held[phase, column]:
-                before = time < instant
-                shares[before, column] = np.minimum(shares[before, column], (instant - time[before]) / _RAMP)
+    for swing in schedule.sequence.swings():
+        own, (lift_off, landing) = shares[:, names.index(swing.effector)], schedule.swing_interval(swing)
+        if swing.start is not None:
+            before = time < lift_off
+            own[before] = np.minimum(own[before], (lift_off - time[before]) / _RAMP)
+        if swing.end is not None:
+            after, ramp = time >= landing, _SUDDEN_RAMP if swing.end.settle > 0.0 else _RAMP
+            own[after] = np.minimum(own[after], (time[after] - landing) / ramp)
     return np.clip(shares, 0.05, 1.0)
 
 
@@ -289,22 +272,9 @@ def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
     full = contact.kind is ContactKind.SOLE and contact.part is SolePart.FULL
     if not full or line is None or (abs(line) >= 0.5 * contact.length and not contact.hangs_over):
         return contact.points
-    if contact.hangs_over:
-        ends = chord(contact.outline, line)
-        return contact.points if ends is None else np.vstack([contact.points, [[line, y, 0.0] for y in ends]])
     half = 0.5 * contact.width
-    return np.vstack([contact.points, [[line, half, 0.0], [line, -half, 0.0]]])
-
-
-def _centred(generators: _Generators, wrench: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Wrenches (6, g) of the generators and the wanted ones (n, 6) about the mean contact point.
-
-    In units of force, for conditioning.
-    """
-    centre, matrix = generators.balance
-    target = wrench_about(wrench, centre)
-    target[:, 3:] /= _ARM
-    return matrix, target
+    ends = chord(contact.outline, line) if contact.hangs_over else (half, -half)
+    return contact.points if ends is None else np.vstack([contact.points, [[line, y, 0.0] for y in ends]])
 
 
 def _share_within_limits(
@@ -313,15 +283,8 @@ def _share_within_limits(
 ) -> FloatArray | None:  # fmt: skip
     """Magnitudes (g,) that keep the joints' torques and the grasps' forces within their limits, or None.
 
-    Args:
-        generators: Force directions of the stance.
-        matrix: (6, g) their wrenches about the mean contact point.
-        target: (6,) wrench to supply, about that point.
-        cost: (g,) cost of each magnitude.
-        needed: (nv - 6,) joint torques without contacts [N.m].
-        joint_map: (nv - 6, g) torque that a unit magnitude takes from each joint.
-        torque_lower: (nv - 6,) most negative joint torques [N.m].
-        torque_upper: (nv - 6,) largest ones [N.m].
+    The generators' wrenches (6, g) supply the target (6,); the torques are those without contacts, (nv - 6,)
+    [N.m], less what ``joint_map`` (nv - 6, g) takes per unit magnitude.
     """
     cost = cost**2
     count = len(cost)

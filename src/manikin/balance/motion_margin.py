@@ -134,8 +134,6 @@ def _polytopes(
 ) -> dict[int, WrenchPolytope]:
     """Polytopes of the phases that have samples and contacts, by number."""
     held = [number for number in present if len(stances[number])]
-    known = {} if given is None else {number: given[number] for number in held}
-    missing = [number for number in held if known.get(number) is None]
-    computed = wrench_polytopes([stances[number] for number in missing])
-    ready = {number: polytope for number, polytope in known.items() if polytope is not None}
-    return ready | dict(zip(missing, computed, strict=True))
+    known = {k: item for k in held if given is not None and (item := given[k]) is not None}
+    missing = [number for number in held if number not in known]
+    return known | dict(zip(missing, wrench_polytopes([stances[k] for k in missing]), strict=True))

@@ -32,7 +32,7 @@ from manikin.balance.friction import (
 from manikin.contact import Contact, ContactKind, FrictionModel, Stance
 from manikin.errors import ContactError
 from manikin.numerics.facet_enumeration import fan_of_generators
-from manikin.numerics.polytope import Polytope, facet_rows, vertices_around
+from manikin.numerics.polytope import Polytope, vertices_around
 from manikin.numerics.spatial import (
     GRAVITY_VECTOR,
     FloatArray,
@@ -121,13 +121,13 @@ def _merged(shares: list[LimitShare]) -> list[LimitShare]:
 def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap: float) -> list[LimitShare]:
     limits = contact_limits(contact, W.friction_model)
     if contact.kind is ContactKind.GRASP:
-        weights = np.maximum(limits.A @ _twist_at(contact.position - W.reference, normal), 0.0)
+        weights = np.maximum(limits.A @ rows_about(normal[None], contact.position - W.reference)[0], 0.0)
         if contact.max_moment == 0:
             weights[[kind is LimitKind.GRASP_MOMENT for kind in limits.kinds]] = 0.0
     else:
         rotation = contact.rotation_contact_to_world
         contact = _centred(contact)
-        in_world = _twist_at(contact.position - W.reference, normal)
+        in_world = rows_about(normal[None], contact.position - W.reference)[0]
         twist = np.concatenate([rotation.T @ in_world[:3], rotation.T @ in_world[3:]])
         twist[2] -= cap
         components = 3 if contact.kind is ContactKind.POINT else 6
@@ -150,11 +150,6 @@ def _centred(contact: Contact) -> Contact:
         return contact
     middle = contact.position + contact.rotation_contact_to_world @ contact.centre
     return replace(contact, position=middle, points=contact.points - contact.centre)
-
-
-def _twist_at(arm: FloatArray, normal: FloatArray) -> FloatArray:
-    """A facet normal, as a twist, at a point ``arm`` away from the reference (world axes)."""
-    return np.concatenate([normal[:3] + np.cross(normal[3:], arm), normal[3:]])
 
 
 def _multipliers(limits: ContactLimits, twist: FloatArray, components: int) -> FloatArray:
@@ -270,19 +265,14 @@ def pseudo_wrench(
     return np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
 
 
-def wrench_polytope(
-    stance: Stance, *, friction_model: FrictionModel | None = None, reference: ArrayLike = (0.0, 0.0, 0.0)
-) -> WrenchPolytope:
+def wrench_polytope(stance: Stance, *, reference: ArrayLike = (0.0, 0.0, 0.0)) -> WrenchPolytope:
     """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
 
-    Without any contact (flight) it is the single point 0. A ``friction_model`` replaces that of the stance;
-    ``reference`` (3,) is the point of the moments [m].
+    Without any contact (flight) it is the single point 0; ``reference`` (3,) is the point of the moments [m].
 
     Raises:
         ContactError: If the normal force of a contact is bounded by no cap.
     """
-    if friction_model is not None:
-        stance = stance.with_friction_model(friction_model)
     origin = frozen_array(reference, "reference [m]", (3,), ContactError)
     local = _middle(stance) if len(stance) else origin
     caps, total = _caps(stance)
@@ -290,7 +280,7 @@ def wrench_polytope(
     segments = [_grasp_segments(c, local) for c in stance if c.kind is ContactKind.GRASP]
     fan = fan_of_generators(generators, levels, np.ones(levels.shape[1], dtype=np.bool_))
     fan = fan.plus_segments(np.vstack([np.zeros((0, 6)), *segments]))
-    H, h, multipliers = facet_rows(fan, max(1.0, float(np.abs(generators).max(initial=0.0))))
+    H, h, multipliers = fan.facet_rows(max(1.0, float(np.abs(generators).max(initial=0.0))))
     of_stance = np.zeros(len(h)) if total is None else multipliers[:, -1] / total
     return WrenchPolytope(rows_about(H, origin - local), h, stance, origin, of_stance)
 

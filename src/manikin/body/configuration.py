@@ -60,8 +60,6 @@ class Configuration:
             self._results[key] = result
             return result
 
-    # --- centre of mass and momentum -------------------------------------------------------
-
     @property
     def com(self) -> FloatArray:
         """(3,) centre of mass [m]."""
@@ -87,8 +85,6 @@ class Configuration:
     def angular_momentum(self) -> FloatArray:
         """(3,) about the centre of mass [kg.m^2/s]."""
         return self._once("angular_momentum", lambda: self.centroidal_map[3:] @ self.v)
-
-    # --- frames ------------------------------------------------------------------------------
 
     def effector_placement(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Rotation (3, 3) from the effector's axes to the world's, and position (3,) [m]."""
@@ -128,8 +124,6 @@ class Configuration:
             ("jacobian", frame), lambda: pin.getFrameJacobian(model, self._frames, frame, _WORLD_ALIGNED)
         )
 
-    # --- dynamics ----------------------------------------------------------------------------
-
     @property
     def mass_matrix(self) -> FloatArray:
         """(nv, nv) symmetric inertia matrix ``M`` of ``M a + h = tau + J^T f``."""
@@ -149,9 +143,6 @@ class Configuration:
         )
 
 
-# --- the manifold of configurations ----------------------------------------------------------
-
-
 def integrate(body: BodyModel, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> FloatArray:
     """(nq,) configuration reached from ``q`` with the constant velocity ``v`` during ``dt`` [s]."""
     step = dt * _vector(v, body.nv, "v")
@@ -169,11 +160,11 @@ def interpolate(body: BodyModel, start: ArrayLike, end: ArrayLike, share: float)
     return pin.interpolate(body.pinocchio, first, last, float(share))
 
 
-def random_configuration(body: BodyModel, rng: np.random.Generator, spread: float = 1.0) -> FloatArray:
-    """(nq,) random configuration: hinges uniform in their ranges, the root within ``spread`` [m] of 0."""
+def random_configuration(body: BodyModel, rng: np.random.Generator) -> FloatArray:
+    """(nq,) random configuration: hinges uniform in their ranges, the root within 1 m of 0 on each axis."""
     quaternion = rng.standard_normal(4)
     angles = rng.uniform(body.lower, body.upper)
-    position = rng.uniform(-spread, spread, 3)
+    position = rng.uniform(-1.0, 1.0, 3)
     return np.concatenate([position, quaternion / np.linalg.norm(quaternion), angles])
 
 

@@ -9,7 +9,7 @@ one segment with several hinges.
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -64,7 +64,6 @@ def creature_from_urdf(
     of each other are found.
 
     Args:
-        path: The file.
         limbs: Limbs by name; mappings have the keys of :class:`LimbSpec`.
         standing: Joint angles of the standing posture [rad]; others are 0, or the nearer limit.
         sole_length: Length of the soles [m], of limbs that touch with one.
@@ -131,15 +130,8 @@ def _without_empty_root(robot: Urdf, where: str) -> Urdf:
     return robot
 
 
-@dataclass(frozen=True, eq=False)
-class _Member:
-    """A link as part of a segment.
-
-    Attributes:
-        segment: Name of the segment.
-        rotation: (3, 3) from the link's axes to the root's, in the zero posture.
-        place: (3,) of its origin in the root's frame [m].
-    """
+class _Member(NamedTuple):
+    """A link's segment, its rotation (3, 3) and place (3,) [m] in the root's frame, in the zero posture."""
 
     segment: str
     rotation: FloatArray
@@ -156,7 +148,10 @@ class _SegmentTree:
         for name in robot.links:
             self.members[name] = self._member(name)
         hinges = {name: self._hinges(name) for name in self._heads()}
-        parents = {name: self._parent(name) for name in self._heads()}
+        above = {name: joint.parent for name, joint in robot.joints.items()}
+        parents = {
+            name: self.members[above[name]].segment if name in above else None for name in self._heads()
+        }
         self._fold(hinges, parents)
         self.folded = {name for name in self._heads() if name not in hinges}
         self.segments = tuple(self._segment(name, parents[name], hinges[name]) for name in hinges)
@@ -176,10 +171,6 @@ class _SegmentTree:
             above.place + above.rotation @ joint.translation,
         )
 
-    def _parent(self, name: str) -> str | None:
-        joint = self.robot.joints.get(name)
-        return None if joint is None else self.members[joint.parent].segment
-
     def _hinges(self, name: str) -> tuple[Hinge, ...]:
         joint: UrdfJoint | None = self.robot.joints.get(name)
         if joint is None:
@@ -193,7 +184,10 @@ class _SegmentTree:
         """Give the hinges of massless segments to their only child at the same place."""
         for name in list(hinges):
             parent = parents[name]
-            if parent is None or not self._empty(parent) or parents[parent] is None:
+            if parent is None or parents[parent] is None:
+                continue
+            links = [self.robot.links[link] for link in self._links(parent)]
+            if any(link.mass or link.shapes for link in links):
                 continue
             only = [child for child in hinges if parents[child] == parent] == [name]
             if only and np.allclose(self._origin(name, parent), 0.0, rtol=0.0, atol=1e-12):
@@ -201,10 +195,6 @@ class _SegmentTree:
                 if len(joined) <= _MOST_HINGES:
                     hinges[name], parents[name] = joined, parents[parent]
                     del hinges[parent]
-
-    def _empty(self, segment: str) -> bool:
-        links = [self.robot.links[name] for name in self._links(segment)]
-        return not any(link.mass or link.shapes for link in links)
 
     def _links(self, segment: str) -> list[str]:
         return [name for name, member in self.members.items() if member.segment == segment]
@@ -251,8 +241,6 @@ class _SegmentTree:
             for member in (self.members[name],)
             for number, shape in enumerate(self.robot.links[name].shapes)
         ]  # fmt: skip
-
-    # --- limbs -----------------------------------------------------------------------------------
 
     def _link(self, limb: str, name: str, what: str) -> _Member:
         if name not in self.members or self.members[name].segment in self.folded:

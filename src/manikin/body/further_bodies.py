@@ -177,19 +177,15 @@ def _joint(segment: str, side: str) -> tuple[Hinge, ...]:
     }[segment]
 
 
-# --- segments ------------------------------------------------------------------------------------
-
-
 def _trunk() -> tuple[Segment, ...]:
     loins, chest, head = (PARTS[name] for name in ("loins", "chest", "head"))
     ribs = chest.radius
     return (
         _upright("loins", None, 0.0, (), across("hips", 0.10, HIP_WIDTH, 0.5 * loins.length)),
         _upright("chest", "loins", loins.length, _waist(),
-                 upright_capsule("chest", ribs, (0.0, 0.0, ribs), (0.0, 0.0, chest.length - ribs))),
+                 upright_capsule("chest", ribs, ribs, chest.length - ribs)),
         _upright("head", "chest", chest.length, _hinges("neck"),
-                 upright_capsule("head", head.radius, (0.0, 0.0, head.radius),
-                                 (0.0, 0.0, head.length - head.radius))),
+                 upright_capsule("head", head.radius, head.radius, head.length - head.radius)),
     )  # fmt: skip
 
 
@@ -229,7 +225,7 @@ def _hanging(side: str, name: str, parent: str, origin: FloatArray) -> Segment:
     part = PARTS[name]
     radius = min(part.radius, 0.49 * part.length)
     start = -radius if name == "hand" else 0.0
-    shape = upright_capsule(name, radius, (0.0, 0.0, start), (0.0, 0.0, radius - part.length))
+    shape = upright_capsule(name, radius, start, radius - part.length)
     com = 0.5 * _below(name)
     return Segment(
         f"{side}_{name}", parent, origin, _joint(name, side), part.mass, com, part.inertia, (shape,)
@@ -246,9 +242,6 @@ def _foot(side: str) -> Segment:
     return Segment(
         f"{side}_foot", f"{side}_shank", _below("shank"), hinges, part.mass, middle, inertia, (sole,)
     )
-
-
-# --- what it touches with --------------------------------------------------------------------------
 
 
 def _effectors() -> list[Effector]:

@@ -32,9 +32,9 @@ from manikin.body.human_parts import (
 )
 from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
-from manikin.body.strength import DEFAULT_AGE, HANDS, carrying, check_strength, hinge_strength
+from manikin.body.strength import AGE_RANGE, DEFAULT_AGE, HANDS, carrying, hinge_strength
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, skew
+from manikin.numerics.spatial import FloatArray, finite_number, skew
 
 _SOFT_PAIRS = (
     # One short link apart: the shapes overlap in ordinary postures.
@@ -56,6 +56,12 @@ BUTTOCK_RADIUS = 0.027
 
 SEAT_WIDTH = 0.14
 """Distance between the two lines that press on a seat, as a share of the stature."""
+
+FRONT_OF_KNEE = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+"""Rotation from the knee's effector to the lower leg."""
+
+SKIN = 0.005
+"""Distance of the effectors of knees and fists to the shapes behind them, which need not be level [m]."""
 
 _STANDING_DEG = MappingProxyType(
     {"hip_flexion": 2.0, "knee_flexion": 10.0, "ankle_dorsiflexion": 8.0, "elbow_flexion": 15.0}
@@ -83,6 +89,8 @@ def human(
     Effectors: ``left_foot``, ``right_foot`` (sole centre, x to the toes, z up),
     ``left_hand``, ``right_hand`` (palm centre, x along the fingers, z out of the back of the
     hand: parallel to the world when the palm lies on a table, fingers forward),
+    ``left_fist``, ``right_fist`` (end of the hand, z to the wrist),
+    ``left_knee``, ``right_knee`` (before the thigh's round end, z through the joint, backwards),
     ``head`` (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on
     a seat, axes as the pelvis).
 
@@ -111,7 +119,8 @@ def human(
         BodyError: If a value is out of its range.
     """
     size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths)
-    check_strength(age, strength)
+    finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
+    finite_number(strength, "strength", above=0.0, error=BodyError)
     builder = _HumanBuilder(size, off_axis_masses, age, strength)
     return BodyModel(
         name="human",
@@ -207,6 +216,12 @@ class _HumanBuilder:
     def __init__(self, size: Anthropometry, off_axis_masses: bool, age: float, strength: float) -> None:
         self.size, self.off_axis_masses, self.age, self.strength = size, off_axis_masses, age, strength
         self.stature, self.girth = size.stature, size.girth
+        self._seat_x = -0.017 * self.stature  # the buttocks' middle, behind the hip joints
+        self._hand_thickness = 0.016 * self.stature
+        # Height of the shoulder joints above the thorax' origin.
+        self._shoulder_in_thorax = (
+            size.shoulder_height - size.length("lower_trunk") - size.length("middle_trunk")
+        )
 
     def segments(self) -> tuple[Segment, ...]:
         trunk = [self._pelvis(), self._lumbar(), self._thorax(), *self._neck_and_head()]
@@ -227,24 +242,26 @@ class _HumanBuilder:
             effectors.append(Effector(f"{side}_foot", f"{side}_foot", sole))
             palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
             effectors.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
+            fist = np.array([0.0, 0.0, -size.length("hand") - SKIN])
+            effectors.append(Effector(f"{side}_fist", f"{side}_hand", fist))
+            knee = np.array([self._leg_radii[0] + SKIN, 0.0, 0.0])
+            effectors.append(Effector(f"{side}_knee", f"{side}_leg", knee, FRONT_OF_KNEE))
         return effectors
+
+    @property
+    def _leg_radii(self) -> tuple[float, float]:
+        """Radii of thigh and shank [m]."""
+        return 0.038 * self.stature * self.girth, 0.029 * self.stature * self.girth
 
     def _strength(self, hinge: str) -> tuple[float, float]:
         size = self.size
         against, along = hinge_strength(hinge, size.mass, size.stature, str(size.sex), self.age)
         return self.strength * against, self.strength * along
 
-    # --- trunk -----------------------------------------------------------------------------
-
     def _pelvis(self) -> Segment:
         length = self.size.length("lower_trunk")
         hips = across("hips", 0.060 * self.stature, 0.191 * self.stature * self.girth, 0.35 * length)
         return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (hips, *self._buttocks()))
-
-    @property
-    def _seat_x(self) -> float:
-        """Place of the buttocks' middle behind the hip joints [m]."""
-        return -0.017 * self.stature
 
     def _buttocks(self) -> tuple[Shape, Shape]:
         """Two short capsules from back to front; their lowest lines are what a seat carries."""
@@ -272,12 +289,6 @@ class _HumanBuilder:
         chest = across("chest", 0.062 * self.stature, breadth, 0.4 * length)
         girdle = across("shoulders", 0.035 * self.stature, size.shoulder_distance, self._shoulder_in_thorax)
         return self._trunk_segment("thorax", "lumbar", "upper_trunk", border, (chest, girdle))
-
-    @property
-    def _shoulder_in_thorax(self) -> float:
-        """Height of the shoulder joints above the thorax' origin [m]."""
-        size = self.size
-        return size.shoulder_height - size.length("lower_trunk") - size.length("middle_trunk")
 
     def _trunk_segment(
         self, name: str, parent: str | None, row: str, height: float, shapes: tuple[Shape, ...]
@@ -307,7 +318,7 @@ class _HumanBuilder:
         base = np.array([0.0, 0.0, size.length("upper_trunk")])
         top = np.array([0.0, 0.0, neck_length])
         radius = 0.034 * self.stature
-        shape = upright_capsule("neck", radius, (0.0, 0.0, 0.0), (0.0, 0.0, neck_length))
+        shape = upright_capsule("neck", radius, 0.0, neck_length)
         return (
             Segment("neck", "thorax", base, hinges, neck.mass, neck.com, neck.moments, (shape,)),
             Segment(
@@ -325,12 +336,6 @@ class _HumanBuilder:
         jaw = Shape("jaw", ShapeKind.SPHERE, (jaw_radius,), (0.75 * jaw_radius, 0.0, 0.45 * jaw_radius))
         return skull, jaw
 
-    # --- arms ------------------------------------------------------------------------------
-
-    @property
-    def _hand_thickness(self) -> float:
-        return 0.016 * self.stature
-
     def _arm(self, side: str) -> list[Segment]:
         size = self.size
         sign = 1.0 if side == "left" else -1.0
@@ -340,11 +345,11 @@ class _HumanBuilder:
         return [
             self._limb(
                 side, "upper_arm", "thorax", "upper_arm", shoulder,
-                (upright_capsule("arm", radius, (0.0, 0.0, 0.0), (0.0, 0.0, -upper)),),
+                (upright_capsule("arm", radius, 0.0, -upper),),
             ),
             self._limb(
                 side, "forearm", f"{side}_upper_arm", "forearm", (0.0, 0.0, -upper),
-                (upright_capsule("arm", 0.8 * radius, (0.0, 0.0, 0.0), (0.0, 0.0, -lower)),), sideways=True,
+                (upright_capsule("arm", 0.8 * radius, 0.0, -lower),), sideways=True,
             ),
             self._limb(
                 side, "hand", f"{side}_forearm", "hand", (0.0, 0.0, -lower),
@@ -354,17 +359,14 @@ class _HumanBuilder:
             ),
         ]  # fmt: skip
 
-    # --- legs ------------------------------------------------------------------------------
-
     def _leg(self, side: str) -> list[Segment]:
         size = self.size
-        thigh_radius, shank_radius = (share * self.stature * self.girth for share in (0.038, 0.029))
+        thigh_radius, shank_radius = self._leg_radii
         sign = 1.0 if side == "left" else -1.0
         thigh, shank = size.length("thigh"), size.length("shank")
         hip = (0.0, 0.5 * sign * size.hip_distance, 0.0)
-        thigh_shape = upright_capsule("thigh", thigh_radius, (0.0, 0.0, 0.0), (0.0, 0.0, -thigh))
-        ankle_end = 0.012 * self.stature - shank
-        shank_shape = upright_capsule("shank", shank_radius, (0.0, 0.0, 0.0), (0.0, 0.0, ankle_end))
+        thigh_shape = upright_capsule("thigh", thigh_radius, 0.0, -thigh)
+        shank_shape = upright_capsule("shank", shank_radius, 0.0, 0.012 * self.stature - shank)
         return [
             self._limb(side, "thigh", "pelvis", "thigh", hip, (thigh_shape,)),
             self._limb(side, "leg", f"{side}_thigh", "shank", (0.0, 0.0, -thigh), (shank_shape,)),

@@ -30,7 +30,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from manikin.body.anthropometry import Anthropometry, Sex
 from manikin.body.segments import Hinge, Limb, Shape, ShapeKind
@@ -220,16 +219,16 @@ def across(name: str, radius: float, breadth: float, height: float) -> Shape:
     return Shape(name, ShapeKind.CAPSULE, (radius, length), (0.0, 0.0, height), ALONG_Y)
 
 
-def upright_capsule(name: str, radius: float, start: ArrayLike, end: ArrayLike) -> Shape:
-    """Upright capsule between two points on one vertical."""
-    first, last = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    return Shape(name, ShapeKind.CAPSULE, (radius, abs(last[2] - first[2])), 0.5 * (first + last))
+def upright_capsule(name: str, radius: float, start: float, end: float) -> Shape:
+    """Upright capsule through the origin between two heights [m]."""
+    return Shape(name, ShapeKind.CAPSULE, (radius, abs(end - start)), (0.0, 0.0, 0.5 * (start + end)))
 
 
-def cylinder_inertia(mass: float, radius: float, length: float) -> FloatArray:
-    """Inertia of an upright solid cylinder about its centre."""
-    across_axis = mass * (3.0 * radius**2 + length**2) / 12.0
-    return np.diag([across_axis, across_axis, 0.5 * mass * radius**2])
+def cylinder_inertia(mass: float, radius: float, length: float, axis: int = 2) -> FloatArray:
+    """Inertia (3, 3) of a solid cylinder along one axis about its centre."""
+    moments = np.full(3, mass * (3.0 * radius**2 + length**2) / 12.0)
+    moments[axis] = 0.5 * mass * radius**2
+    return np.diag(moments)
 
 
 def cuboid_inertia(mass: float, extents: FloatArray) -> FloatArray:

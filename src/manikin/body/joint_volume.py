@@ -144,10 +144,6 @@ class JointVolume:
         along = np.where(over == 0.0, slope / self.step, 0.0)
         return along - over / np.maximum(beyond, _ROUNDING)[..., None]
 
-    def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:
-        """(...) whether (..., 3) angles are inside or on the surface."""
-        return self.distance(angles) >= 0.0
-
     def _on_grid(self, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Points of the grid in steps, and the distance [rad] from the angles to them."""
         q = np.asarray(angles, dtype=np.float64)
@@ -190,8 +186,10 @@ def volume_of(
     closing = finite_number(closing, "closing [rad]", at_least=margin, error=BodyError)
     fine = finite_number(step, "step [rad]", above=0.0, error=BodyError) / _FINER
     origin, seen = _seen(recorded, fine, closing + 2.0 * step, fewest)
-    near = _largest_part(fine * _distance_to_zeros(~seen) <= closing)
-    hull = fine * _distance_to_zeros(near) > closing - margin
+    parts = np.zeros(seen.shape, dtype=np.int32)
+    label(fine * _distance_to_zeros(~seen) <= closing, output=parts)
+    largest = 1 + int(np.argmax(np.bincount(parts.ravel())[1:]))
+    hull = fine * _distance_to_zeros(parts == largest) > closing - margin
     inside, outside = (fine * _distance_to_zeros(part) for part in (hull, ~hull))
     signed = np.where(hull, inside - 0.5 * fine, 0.5 * fine - outside)
     kept = signed[::_FINER, ::_FINER, ::_FINER]
@@ -219,12 +217,6 @@ def _seen(
 def _distance_to_zeros(mask: NDArray[np.bool_]) -> FloatArray:
     """Distance of each point to the nearest one that is False, in points."""
     return np.asarray(distance_transform_edt(mask), dtype=np.float64)
-
-
-def _largest_part(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    names = np.zeros(mask.shape, dtype=np.int32)
-    label(mask, output=names)
-    return names == 1 + int(np.argmax(np.bincount(names.ravel())[1:]))
 
 
 def _cropped(origin: FloatArray, step: float, distances: FloatArray) -> JointVolume:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manikin.body.human_parts import ALONG_X, ALONG_Y, cylinder_inertia
 from manikin.body.model import BodyModel
 from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
 from manikin.contact import ContactKind
@@ -24,9 +25,6 @@ from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, finite_number
 
 _SPEED = 12.0
-_TO_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Turn a capsule's own z axis into the trunk's x axis, and into the y axis of a leg that points aside."""
 
 _HingeEntry = tuple[str, tuple[float, float, float], float, float, float]
 
@@ -109,8 +107,8 @@ def insect(length: float = 0.4, mass: float = 2.0) -> BodyModel:
     length, mass = _size("insect", length, mass)
     own = mass * (1.0 - 6.0 * sum(share for *_, share in _INSECT.parts.values()))
     radius = _INSECT_RADIUS * length
-    shape = Shape("trunk", ShapeKind.CAPSULE, (radius, length - 2.0 * radius), rotation=_TO_X)
-    inertia = _rod_inertia(own, radius, length, axis=0)
+    shape = Shape("trunk", ShapeKind.CAPSULE, (radius, length - 2.0 * radius), rotation=ALONG_X)
+    inertia = cylinder_inertia(own, radius, length, axis=0)
     trunk = Segment("trunk", None, np.zeros(3), (), own, np.zeros(3), inertia, (shape,))
     x = np.array([1.0, 0.0, 0.0])
     turns = {}
@@ -133,11 +131,11 @@ def quadruped(length: float = 0.8, mass: float = 32.0) -> BodyModel:
     head, at = _HEAD_SHARE * mass, np.array(_HEAD_AT) * length
     radius = _QUADRUPED_RADIUS * length
     shapes = (
-        Shape("trunk", ShapeKind.CAPSULE, (radius, length - 2.0 * radius), rotation=_TO_X),
+        Shape("trunk", ShapeKind.CAPSULE, (radius, length - 2.0 * radius), rotation=ALONG_X),
         Shape("head", ShapeKind.SPHERE, (_HEAD_RADIUS * length,), at),
     )
     middle = head * at / (own + head)
-    inertia = _rod_inertia(own, radius, length, axis=0) + _point(own, middle) + _point(head, at - middle)
+    inertia = cylinder_inertia(own, radius, length, axis=0) + _point(own, middle) + _point(head, at - middle)
     trunk = Segment("trunk", None, np.zeros(3), (), own + head, middle, inertia, shapes)
     standing = _QUADRUPED.standing_deg["front"]
     lean = np.deg2rad(standing["knee"] - standing["pitch"])  # the shank stands at that angle
@@ -181,10 +179,10 @@ def _leg(plan: _LegPlan, leg: str, pair: str, sign: float, length: float, mass: 
     for part, (share, thick, mass_share) in plan.parts.items():
         reach, radius, part_mass = direction * (share * length), thick * length, mass_share * mass
         span = share * length - radius * (1.0 + (plan.tip_free if part == list(plan.parts)[-1] else 0.0))
-        turn = _TO_Y if plan.axis == 1 else None
+        turn = ALONG_Y if plan.axis == 1 else None
         shape = Shape(part, ShapeKind.CAPSULE, (radius, span), direction * (0.5 * span), turn)
         hinges = _mirrored_hinges(leg, sign, 9.81 * mass * length, plan.hinges[part])
-        inertia = _rod_inertia(part_mass, radius, share * length, plan.axis)
+        inertia = cylinder_inertia(part_mass, radius, share * length, plan.axis)
         parts.append(
             Segment(f"{leg}_{part}", parent, origin, hinges, part_mass, 0.5 * reach, inertia, (shape,))
         )
@@ -204,13 +202,6 @@ def _mirrored_hinges(
         )
         for joint, axis, lower, upper, torque in entries
     )  # fmt: skip
-
-
-def _rod_inertia(mass: float, radius: float, length: float, axis: int) -> FloatArray:
-    """Inertia (3, 3) of a solid cylinder along one axis about its centre."""
-    moments = np.full(3, mass * (3.0 * radius**2 + length**2) / 12.0)
-    moments[axis] = 0.5 * mass * radius**2
-    return np.diag(moments)
 
 
 def _point(mass: float, at: FloatArray) -> FloatArray:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.body.configuration import Configuration
-from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.body.model import BodyModel
+from manikin.body.human import FRONT_OF_KNEE, SEAT_LENGTH, SEAT_WIDTH, SKIN
+from manikin.body.model import BodyModel, look_up
 from manikin.body.segments import Effector, Hinge, Limb, Segment, ShapeKind
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
@@ -45,26 +45,33 @@ def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
 
     They are its own and the one hanging on it; of a knee or an elbow both that meet in the joint.
     """
-    own = body.effector(effector).segment
-    for limb in body.limbs:
-        if limb.effector == effector and len(limb.segments) > 1 and is_further(body, limb):
-            return own, limb.segments[-2]
+    own, parent = body.effector(effector).segment, _meeting(body, effector)
+    if parent is not None:
+        return own, parent
     hanging = hanging_segment(body, own)
     return (own,) if hanging is None else (own, hanging.name)
 
 
-def ends_before_tip(body: BodyModel, effector: str) -> bool:
-    """Whether a limb touches in a point at its end, and all shapes of its last segment end before that."""
+def _meeting(body: BodyModel, effector: str) -> str | None:
+    """Segment that meets that of an effector in the joint with which it touches, or None."""
     frame = body.effector(effector)
-    shapes = body.segment(frame.segment).shapes
-    return (
-        any(
-            limb.effector == effector and limb.kind is ContactKind.POINT and not is_further(body, limb)
-            for limb in body.limbs
-        )
-        and bool(shapes)
-        and all(item.distance_to(frame.translation) > BEFORE_TIP for item in shapes)
-    )
+    own = body.segment(frame.segment)
+    shapes = () if own.parent is None else body.segment(own.parent).shapes
+    near = (shape.distance_to(own.origin + frame.translation) for shape in shapes)
+    return own.parent if any(distance < SKIN + BEFORE_TIP for distance in near) else None
+
+
+def ends_before_tip(body: BodyModel, effector: str) -> bool:
+    """Whether an effector touches in a point, and all shapes with which it does end before that."""
+    frame, meeting = body.effector(effector), _meeting(body, effector)
+    kinds = {limb.kind for limb in body.limbs if limb.effector == effector}
+    if not (kinds == {ContactKind.POINT} or (meeting is not None and not kinds)):
+        return False
+    own = [shape.distance_to(frame.translation) for shape in body.segment(frame.segment).shapes]
+    if meeting is not None:
+        place = body.segment(frame.segment).origin + frame.translation
+        own += [shape.distance_to(place) for shape in body.segment(meeting).shapes]
+    return bool(own) and min(own) > BEFORE_TIP
 
 
 def hinge_line(body: BodyModel, effector: str) -> float | None:
@@ -84,15 +91,11 @@ def carrying_segment(body: BodyModel, effector: str, point: FloatArray) -> str:
     return hanging.name if hanging is not None and line is not None and point[0] > line else own
 
 
-_OTHER = {"left_": "right_", "right_": "left_"}
-
-
 def mirrored_name(name: str) -> str:
     """Name of the same part on the other side; one in the middle keeps its name."""
-    for prefix, other in _OTHER.items():
-        if name.startswith(prefix):
-            return other + name[len(prefix) :]
-    return name
+    side, _, part = name.partition("_")
+    other = {"left": "right", "right": "left"}.get(side)
+    return name if other is None else f"{other}_{part}"
 
 
 def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
@@ -134,7 +137,6 @@ def mirrored(body: BodyModel, q: ArrayLike) -> FloatArray:
     return reflected
 
 
-_BACKWARD = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 _FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 _JOINTS = (
     # Contact, the segments of the limb, where the contact is seen from the joint.
@@ -167,7 +169,7 @@ def with_further_contacts(body: BodyModel, kinds: Collection[str] = FURTHER) -> 
         for side, other in (("left", "right"), ("right", "left")):
             chain = tuple(f"{side}_{part}" for part in parts)
             name = f"{side}_{joint}"
-            effectors[name] = _effector(body, name, chain, ahead)
+            effectors.setdefault(name, _effector(body, name, chain, ahead))
             limbs.append(Limb(name, name, chain, ContactKind.POINT, f"{other}_{joint}"))
     if "pelvis" in kinds:
         limbs.append(_pelvis(body))
@@ -193,7 +195,7 @@ def _effector(body: BodyModel, name: str, chain: tuple[str, ...], ahead: float) 
     radii = [float(shape.size[0]) for shape in shapes if shape.kind is ShapeKind.CAPSULE]
     if not radii:
         raise BodyError(f"{name} has no round shape around it; valid: a body with capsules for limbs")
-    turn = _BACKWARD if ahead > 0.0 else _FORWARD
+    turn = FRONT_OF_KNEE if ahead > 0.0 else _FORWARD
     return Effector(name, chain[-1], np.array([ahead * max(radii), 0.0, 0.0]), turn)
 
 
@@ -225,10 +227,7 @@ def limb_named(body: BodyModel, name: str) -> Limb:
     Raises:
         BodyError: If there is none.
     """
-    for limb in body.limbs:
-        if limb.name == name:
-            return limb
-    raise BodyError(f"no limb {name!r}; valid: {', '.join(limb.name for limb in body.limbs) or 'none'}")
+    return look_up({limb.name: limb for limb in body.limbs}, name, "limb")
 
 
 def parent_segment(body: BodyModel, limb: Limb) -> str:
@@ -278,7 +277,7 @@ def limb_placement(state: Configuration, limb: Limb) -> tuple[FloatArray, FloatA
     return rotation, state.point(parent, limb_origin(state.body, limb))
 
 
-def are_mirrored(body: BodyModel, first: Limb, second: Limb, tolerance: float = 1e-12) -> bool:
+def are_mirrored(body: BodyModel, first: Limb, second: Limb) -> bool:
     """Whether equal angles of two limbs are postures reflected in the sagittal plane.
 
     Both must hang on the same segment and have reflected origins, axes and effectors and equal
@@ -291,18 +290,20 @@ def are_mirrored(body: BodyModel, first: Limb, second: Limb, tolerance: float = 
     end, other = body.effector(first.effector), body.effector(second.effector)
     reflected = np.outer(REFLECTION, REFLECTION) * end.rotation
     return (
-        all(_segments_mirrored(body.segment(a), body.segment(b), tolerance) for a, b in pairs)
-        and np.allclose(REFLECTION * end.translation, other.translation, rtol=0.0, atol=tolerance)
-        and np.allclose(reflected, other.rotation, rtol=0.0, atol=tolerance)
+        all(_segments_mirrored(body.segment(a), body.segment(b)) for a, b in pairs)
+        and _close(REFLECTION * end.translation, other.translation)
+        and _close(reflected, other.rotation)
     )
 
 
-def _segments_mirrored(first: Segment, second: Segment, tolerance: float) -> bool:
+def _segments_mirrored(first: Segment, second: Segment) -> bool:
     if len(first.hinges) != len(second.hinges):
         return False
-    close = np.allclose(REFLECTION * first.origin, second.origin, rtol=0.0, atol=tolerance)
-    return close and all(
-        np.allclose(-REFLECTION * a.axis, b.axis, rtol=0.0, atol=tolerance)
-        and (a.lower, a.upper) == (b.lower, b.upper)
+    return _close(REFLECTION * first.origin, second.origin) and all(
+        _close(-REFLECTION * a.axis, b.axis) and (a.lower, a.upper) == (b.lower, b.upper)
         for a, b in zip(first.hinges, second.hinges, strict=True)
     )
+
+
+def _close(first: FloatArray, second: FloatArray) -> bool:
+    return np.allclose(first, second, rtol=0.0, atol=1e-12)

@@ -32,6 +32,8 @@ from manikin.runtime.display import Displayed
 OFF_AXIS = "off axis"
 """Value of ``masses`` in a signature of :attr:`BodyModel.off_axis_masses`."""
 
+_MAPPINGS = ("effectors", "standing_angles", "lengths", "loads")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BodyModel(Displayed):
@@ -102,18 +104,14 @@ class BodyModel(Displayed):
         total = fsum(segment.mass for segment in self.segments)
         if self.nominal_mass is not None and abs(total - self.nominal_mass) > 1e-12 * total:
             raise BodyError(f"segments weigh {total!r} kg; valid: {self.nominal_mass!r} kg")
-        object.__setattr__(self, "effectors", MappingProxyType(dict(self.effectors)))
-        object.__setattr__(self, "standing_angles", MappingProxyType(dict(self.standing_angles)))
-        object.__setattr__(self, "lengths", MappingProxyType(dict(self.lengths)))
-        object.__setattr__(self, "loads", MappingProxyType(dict(self.loads)))
+        for name in _MAPPINGS:
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what describes the body, for other processes; what was computed from it is left out."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
-        plain = {name: dict(given[name]) for name in ("effectors", "standing_angles", "lengths", "loads")}
+        plain = {name: dict(given[name]) for name in _MAPPINGS}
         return partial(BodyModel, **(given | plain)), ()
-
-    # --- description ---------------------------------------------------------------------
 
     @cached_property
     def mass(self) -> float:
@@ -188,21 +186,19 @@ class BodyModel(Displayed):
 
     def segment(self, name: str) -> Segment:
         """Segment by name; BodyError if there is none."""
-        return _look_up(self._segment_index, name, "segment")
+        return look_up(self._segment_index, name, "segment")
 
     def effector(self, name: str) -> Effector:
         """Effector by name; BodyError if there is none."""
-        return _look_up(self.effectors, name, "effector")
+        return look_up(self.effectors, name, "effector")
 
     def joint_index(self, name: str) -> int:
         """Position of a hinge among the ``nv - 6`` hinges; add 7 for ``q`` and 6 for ``v``."""
-        return _look_up(self._joint_index, name, "hinge")
+        return look_up(self._joint_index, name, "hinge")
 
     @cached_property
     def _joint_index(self) -> Mapping[str, int]:
         return {name: number for number, name in enumerate(self.joint_names)}
-
-    # --- Pinocchio and Coal ----------------------------------------------------------------
 
     @cached_property
     def pinocchio(self) -> Any:
@@ -232,13 +228,11 @@ class BodyModel(Displayed):
 
     def effector_frame(self, name: str) -> int:
         """Pinocchio frame id of an effector; BodyError if there is none."""
-        return _look_up(self._effector_frames, name, "effector")
+        return look_up(self._effector_frames, name, "effector")
 
     def segment_frame(self, name: str) -> int:
         """Pinocchio frame id of a segment; BodyError if there is none."""
-        return _look_up(self._segment_frames, name, "segment")
-
-    # --- self-collision --------------------------------------------------------------------
+        return look_up(self._segment_frames, name, "segment")
 
     @cached_property
     def segment_pairs(self) -> tuple[tuple[str, str], ...]:
@@ -257,8 +251,6 @@ class BodyModel(Displayed):
             for first in self.segment(a).shapes
             for second in self.segment(b).shapes
         )
-
-    # --- configurations --------------------------------------------------------------------
 
     def zero_posture(self) -> FloatArray:
         """(nq,) root at the world's origin, every hinge at 0."""
@@ -287,8 +279,6 @@ class BodyModel(Displayed):
             q[2] -= float(np.mean([data.oMf[self.effector_frame(name)].translation[2] for name in soles]))
         return q
 
-    # --- as plain values -------------------------------------------------------------------
-
     def signature(self) -> dict[str, str | float]:
         """Name of the body and the arguments of its maker, from which a file builds it again."""
         values = {
@@ -303,11 +293,12 @@ class BodyModel(Displayed):
         return {key: value for key, value in values.items() if value is not None}
 
 
-def _look_up(index: Mapping[str, Any], name: str, kind: str) -> Any:
+def look_up(index: Mapping[str, Any], name: str, kind: str) -> Any:
+    """Item by name; BodyError with the valid names of its kind if there is none."""
     try:
         return index[name]
     except KeyError:
-        raise BodyError(f"no {kind} {name!r}; valid: {', '.join(index)}") from None
+        raise BodyError(f"no {kind} {name!r}; valid: {', '.join(index) or 'none'}") from None
 
 
 def _build_pinocchio(body: BodyModel) -> Any:
@@ -316,7 +307,9 @@ def _build_pinocchio(body: BodyModel) -> Any:
     joint_of: dict[str, int] = {}
     frame_of: dict[str, int] = {}
     for segment in body.segments:
-        attachment = _attachment(model, segment, frame_of)
+        attachment = pin.SE3(np.eye(3), np.array(segment.origin))
+        if segment.parent is not None:  # in the joint that carries the parent
+            attachment = model.frames[frame_of[segment.parent]].placement * attachment
         joint, placement = _add_joints(model, segment, attachment, joint_of)
         inertia = pin.Inertia(segment.mass, np.array(segment.com), np.array(segment.inertia))
         model.appendBodyToJoint(joint, inertia, placement)
@@ -335,14 +328,6 @@ def _build_pinocchio(body: BodyModel) -> Any:
         )  # fmt: skip
     model.lowerPositionLimit[:7], model.upperPositionLimit[:7] = -np.inf, np.inf
     return model
-
-
-def _attachment(model: Any, segment: Segment, frame_of: Mapping[str, int]) -> Any:
-    """Placement of the segment's origin in the joint that carries its parent."""
-    origin = pin.SE3(np.eye(3), np.array(segment.origin))
-    if segment.parent is None:
-        return origin
-    return model.frames[frame_of[segment.parent]].placement * origin
 
 
 def _add_joints(

@@ -15,20 +15,20 @@ behind the back.
 """
 
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from manikin.body.human_parts import human_hinges
 from manikin.body.joint_volume import JointVolume
 from manikin.body.limbs import limb_hinges, limb_slots
 from manikin.body.model import BodyModel
-from manikin.body.segments import Hinge, Limb, Segment
+from manikin.body.segments import Limb, Segment
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, frozen_array
 
@@ -69,9 +69,6 @@ def load_volumes(path: str | Path) -> dict[str, JointVolume]:
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         reason = " ".join(str(error).split())[:100]
         raise BodyError(f"{path}: cannot be read ({reason}); valid: a file of joint volumes") from None
-
-
-_SIDES = ("left", "right")
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,15 +127,24 @@ class NaturalRange:
 
     def normalised(self, angles: ArrayLike) -> FloatArray:
         """(n,) normalised distance of (n, k) angles, negative outside."""
-        return self._least(self._checked(angles), self._of_hinges)
+        q, least = np.asarray(angles, dtype=np.float64), self.volume_distance(angles)
+        if not len(self.columns):
+            return np.minimum(least, 1.0)
+        lower, upper, part = self.lower[self.columns], self.upper[self.columns], q[:, self.columns]
+        of_hinges = np.min(np.minimum(part - lower, upper - part) / (0.5 * (upper - lower)), axis=1)
+        return np.minimum(least, of_hinges)
 
     def volume_distance(self, angles: ArrayLike) -> FloatArray:
         """(n,) the same of the ball joints with volumes alone; infinite without one."""
-        return self._least(self._checked(angles), lambda q: np.full(len(q), np.inf))
-
-    def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether (n, k) angles are within the range of motion."""
-        return self.normalised(angles) >= 0.0
+        q = np.asarray(angles, dtype=np.float64)
+        if q.ndim != 2 or q.shape[1] != len(self.lower):
+            raise BodyError(
+                f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self.lower)})"
+            )
+        least = np.full(len(q), np.inf)
+        for columns, ball in self.balls:
+            least = np.minimum(least, ball.normalised(q[:, columns]))
+        return least
 
     def random_angles(self, rng: np.random.Generator, count: int) -> FloatArray:
         """(count, k) angles, uniform within the range of motion [rad]."""
@@ -150,27 +156,6 @@ class NaturalRange:
             kept += len(parts[-1])
         return np.concatenate(parts)[:count]
 
-    def _least(self, q: FloatArray, others: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        least = others(q)
-        for columns, ball in self.balls:
-            least = np.minimum(least, ball.normalised(q[:, columns]))
-        return least
-
-    def _of_hinges(self, q: FloatArray) -> FloatArray:
-        if not len(self.columns):
-            return np.ones(len(q))
-        lower, upper = self.lower[self.columns], self.upper[self.columns]
-        part = q[:, self.columns]
-        return np.min(np.minimum(part - lower, upper - part) / (0.5 * (upper - lower)), axis=1)
-
-    def _checked(self, angles: ArrayLike) -> FloatArray:
-        q = np.asarray(angles, dtype=np.float64)
-        if q.ndim != 2 or q.shape[1] != len(self.lower):
-            raise BodyError(
-                f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self.lower)})"
-            )
-        return q
-
 
 @dataclass(frozen=True, eq=False)
 class LearntJoint:
@@ -179,7 +164,6 @@ class LearntJoint:
     Attributes:
         segment: Name of the segment that it moves.
         hinges: Places of its three angles among those of all hinges.
-        range: Its range.
     """
 
     segment: str
@@ -224,15 +208,9 @@ def _learnt_range(part: str, ends: tuple[tuple[float, float], ...]) -> BallRange
 
 def _learnt_part(segment: Segment) -> str | None:
     """Name of the volume of a segment whose hinges are those of the human."""
-    for side in _SIDES:
-        part = segment.name.removeprefix(f"{side}_")
-        if part != segment.name and part in human_volumes():
-            human = human_hinges(part, side, lambda _: (1.0, 1.0))
-            own = segment.hinges
-            same = len(own) == len(human) and all(map(_same_hinge, own, human))
-            return part if same else None
-    return None
-
-
-def _same_hinge(first: Hinge, second: Hinge) -> bool:
-    return first.name == second.name and bool(np.allclose(first.axis, second.axis))
+    side, _, part = segment.name.partition("_")
+    if side not in ("left", "right") or part not in human_volumes():
+        return None
+    own, human = segment.hinges, human_hinges(part, side, lambda _: (1.0, 1.0))
+    same = [hinge.name for hinge in own] == [hinge.name for hinge in human]
+    return part if same and np.allclose([h.axis for h in own], [h.axis for h in human]) else None

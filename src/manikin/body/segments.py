@@ -298,19 +298,15 @@ def segments_by_name(segments: tuple[Segment, ...]) -> Mapping[str, Segment]:
 
 def segment_triangles(segment: Segment, rounds: int = 24) -> tuple[FloatArray, np.ndarray] | None:
     """Vertices (n, 3) [m] and faces (m, 3) of all shapes, capsules of ``rounds`` corners around, or None."""
-    parts = [_placed(shape, rounds) for shape in segment.shapes]
+    parts = [_mesh(shape, rounds) for shape in segment.shapes]
     if not parts:
         return None
+    for shape, mesh in zip(segment.shapes, parts, strict=True):
+        placement = np.eye(4)
+        placement[:3, :3], placement[:3, 3] = shape.rotation, shape.translation
+        mesh.apply_transform(placement)
     whole = trimesh.util.concatenate(parts)
     return np.asarray(whole.vertices), np.asarray(whole.faces)
-
-
-def _placed(shape: Shape, rounds: int) -> trimesh.Trimesh:
-    mesh = _mesh(shape, rounds)
-    placement = np.eye(4)
-    placement[:3, :3], placement[:3, 3] = shape.rotation, shape.translation
-    mesh.apply_transform(placement)
-    return mesh
 
 
 def _mesh(shape: Shape, rounds: int) -> trimesh.Trimesh:

@@ -233,12 +233,6 @@ def hinge_strength(
     return against.torque(mass, stature, sex, age), along.torque(mass, stature, sex, age)
 
 
-def check_strength(age: float, strength: float) -> None:
-    """Raise a BodyError for an age [years] or a multiple of the strength out of its range."""
-    finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
-    finite_number(strength, "strength", above=0.0, error=BodyError)
-
-
 HANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"left": ("left_hand",), "right": ("right_hand",), "both": ("left_hand", "right_hand")}
 )
@@ -264,16 +258,7 @@ def carrying(body: BodyModel, mass: float, hand: str = "both") -> BodyModel:
 
 
 def hand_masses(body: BodyModel, mass: float, hand: str = "both") -> dict[str, float]:
-    """What each hand of a body carries of a load [kg], by the name of its effector.
-
-    Args:
-        body: Who carries it.
-        mass: Of the load [kg]; of 0 nothing.
-        hand: ``"left"``, ``"right"`` or ``"both"``.
-
-    Raises:
-        BodyError: If the mass is negative, the hand is not known, or the body has no such hand.
-    """
+    """What each hand of a body carries of a load [kg], by the name of its effector; see :func:`carrying`."""
     finite_number(mass, "load [kg]", at_least=0.0, error=BodyError)
     if hand not in HANDS:
         raise BodyError(f"hand of the load is {hand!r}; valid: {', '.join(HANDS)}")

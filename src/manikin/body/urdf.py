@@ -31,18 +31,9 @@ class UrdfShape:
     translation: FloatArray
 
 
-def read_shapes(link: Element, where: str, folder: Path) -> tuple[UrdfShape, ...]:
-    """Collision shapes of a ``<link>`` in a file of a folder; ``where`` is for messages.
-
-    Raises:
-        BodyError: If a shape is not understood, not positive, or its mesh cannot be read.
-    """
-    return tuple(_shape(element, where, folder) for element in link.findall("collision"))
-
-
 def _shape(element: Element, link: str, folder: Path) -> UrdfShape:
     where = f"{link} collision"
-    rotation, translation = placement(element.find("origin"), where)
+    rotation, translation = _placement(element.find("origin"), where)
     geometry = element.find("geometry")
     items = [] if geometry is None else list(geometry)
     if len(items) != 1 or items[0].tag not in ("box", "sphere", "cylinder", "capsule", "mesh"):
@@ -62,11 +53,11 @@ def _primitive(item: Element, where: str, folder: Path) -> _Primitive:
     if item.tag == "mesh":
         return _of_mesh(item, where, folder)
     if item.tag == "box":
-        return ShapeKind.BOX, vector(item, "size", f"{where} box"), np.eye(3), np.zeros(3)
-    radius = number(item, "radius", f"{where} {item.tag}")
+        return ShapeKind.BOX, _numbers(item, "size", f"{where} box"), np.eye(3), np.zeros(3)
+    radius = _number(item, "radius", f"{where} {item.tag}")
     if item.tag == "sphere":
         return ShapeKind.SPHERE, np.array([radius]), np.eye(3), np.zeros(3)
-    length = number(item, "length", f"{where} {item.tag}")
+    length = _number(item, "length", f"{where} {item.tag}")
     if item.tag == "capsule":
         return ShapeKind.CAPSULE, np.array([radius, length]), np.eye(3), np.zeros(3)
     if length > 2.0 * radius:
@@ -77,7 +68,7 @@ def _primitive(item: Element, where: str, folder: Path) -> _Primitive:
 def _of_mesh(item: Element, where: str, folder: Path) -> _Primitive:
     """The shape around a mesh file."""
     name = item.get("filename", "")
-    scale = vector(item, "scale", f"{where} mesh", np.ones(3))
+    scale = _numbers(item, "scale", f"{where} mesh", np.ones(3))
     file = _mesh_file(name, folder)
     if file is None:
         raise BodyError(f"{where} mesh {name[:200]!r} is not found from {folder}; valid: a mesh file")
@@ -150,43 +141,34 @@ def _capsule(local: FloatArray, along: int) -> tuple[float, float]:
     return radius, max(2.0 * float((np.abs(local[:, along]) - caps).max()), _THINNEST)
 
 
-def number(element: Element, key: str, where: str, default: float | None = None) -> float:
-    """Finite number in an attribute, or its default; ``where`` is for the message.
+def _number(element: Element, key: str, where: str, default: float | None = None) -> float:
+    """Finite number in an attribute, as :func:`_numbers`."""
+    return float(_numbers(element, key, where, None if default is None else np.array([default]), 1)[0])
 
-    Raises:
-        BodyError: If it is missing without a default, or no finite number.
-    """
+
+def _numbers(
+    element: Element, key: str, where: str, default: FloatArray | None = None, count: int = 3
+) -> FloatArray:
+    """(count,) finite numbers in an attribute, or their default; ``where`` is for the message."""
     text = element.get(key)
     if text is None and default is not None:
         return default
-    return float(_numbers(text, f"{where} {key}", 1)[0])
-
-
-def vector(element: Element, key: str, where: str, default: FloatArray | None = None) -> FloatArray:
-    """(3,) finite numbers in an attribute, as :func:`number`."""
-    text = element.get(key)
-    if text is None and default is not None:
-        return default
-    return _numbers(text, f"{where} {key}", 3)
-
-
-def placement(origin: Element | None, where: str) -> tuple[FloatArray, FloatArray]:
-    """Rotation (3, 3) and translation (3,) [m] of an ``<origin>``; the identity without one."""
-    if origin is None:
-        return np.eye(3), np.zeros(3)
-    roll, pitch, yaw = vector(origin, "rpy", f"{where} origin", np.zeros(3))
-    return rotation_from_rpy(roll, pitch, yaw), vector(origin, "xyz", f"{where} origin", np.zeros(3))
-
-
-def _numbers(text: str | None, where: str, count: int) -> FloatArray:
     try:
         values = np.array((text or "").split(), dtype=np.float64)
     except ValueError:
         values = np.zeros(0)
     if len(values) != count or not np.all(np.isfinite(values)):
         shown = "missing" if text is None else repr(text[:40])
-        raise BodyError(f"{where} is {shown}; valid: {count} finite number{'s' if count > 1 else ''}")
+        raise BodyError(f"{where} {key} is {shown}; valid: {count} finite number{'s' if count > 1 else ''}")
     return values
+
+
+def _placement(origin: Element | None, where: str) -> tuple[FloatArray, FloatArray]:
+    """Rotation (3, 3) and translation (3,) [m] of an ``<origin>``; the identity without one."""
+    if origin is None:
+        return np.eye(3), np.zeros(3)
+    roll, pitch, yaw = _numbers(origin, "rpy", f"{where} origin", np.zeros(3))
+    return rotation_from_rpy(roll, pitch, yaw), _numbers(origin, "xyz", f"{where} origin", np.zeros(3))
 
 
 JOINT_KINDS = ("revolute", "continuous", "fixed", "floating")
@@ -217,8 +199,6 @@ class UrdfJoint:
     Attributes:
         name: Unique.
         kind: One of :data:`JOINT_KINDS`.
-        parent: Name of a link.
-        child: Name of a link.
         rotation: (3, 3) from the child's axes to the parent's at angle 0.
         translation: (3,) of the child's origin in the parent's frame [m].
         axis: (3,) unit axis in the child's frame.
@@ -297,14 +277,14 @@ def _link(element: ElementTree.Element, file: Path) -> UrdfLink:
     name = _name(element, "link", str(file))
     where = f"{file}: link {name!r}"
     inertial = element.find("inertial")
-    shapes = read_shapes(element, where, file.parent)
+    shapes = tuple(_shape(item, where, file.parent) for item in element.findall("collision"))
     if inertial is None:
         return UrdfLink(name, 0.0, np.zeros(3), np.zeros((3, 3)), shapes)
-    turn, com = placement(inertial.find("origin"), f"{where} inertial")
-    mass = number(_child(inertial, "mass", where), "value", f"{where} mass")
+    turn, com = _placement(inertial.find("origin"), f"{where} inertial")
+    mass = _number(_child(inertial, "mass", where), "value", f"{where} mass")
     matrix = _child(inertial, "inertia", where)
     xx, yy, zz, xy, xz, yz = (
-        number(matrix, key, f"{where} inertia") for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        _number(matrix, key, f"{where} inertia") for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass < 0.0:
@@ -321,10 +301,12 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         raise BodyError(f"{place} type is {kind[:40]!r}; valid: {', '.join(JOINT_KINDS)}")
     if element.find("mimic") is not None:
         raise BodyError(f"{place} mimics another one; valid: joints that move on their own")
-    rotation, translation = placement(element.find("origin"), place)
+    rotation, translation = _placement(element.find("origin"), place)
     parent, child = (_child(element, key, place).get("link", "") for key in ("parent", "child"))
     axis_element = element.find("axis")
-    axis = np.array([1.0, 0.0, 0.0]) if axis_element is None else vector(axis_element, "xyz", f"{place} axis")
+    axis = (
+        np.array([1.0, 0.0, 0.0]) if axis_element is None else _numbers(axis_element, "xyz", f"{place} axis")
+    )
     length = float(np.linalg.norm(axis))
     if kind in ("revolute", "continuous") and length < 1e-9:
         raise BodyError(f"{place} axis is {axis.tolist()}; valid: not zero")
@@ -338,11 +320,11 @@ def _limits(element: ElementTree.Element, kind: str, place: str) -> tuple[float,
         return 0.0, 0.0, 0.0, 0.0
     limit = _child(element, "limit", place)
     place = f"{place} limit"
-    effort, velocity = (number(limit, key, place) for key in ("effort", "velocity"))
+    effort, velocity = (_number(limit, key, place) for key in ("effort", "velocity"))
     lower, upper = (
         (-CONTINUOUS, CONTINUOUS)
         if kind == "continuous"
-        else (number(limit, key, place, 0.0) for key in ("lower", "upper"))
+        else (_number(limit, key, place, 0.0) for key in ("lower", "upper"))
     )
     if not (lower < upper and effort > 0.0 and velocity > 0.0):
         raise BodyError(

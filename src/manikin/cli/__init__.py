@@ -25,6 +25,7 @@ from manikin.cli.console import (
     complain,
     flag,
     print_json,
+    print_table,
 )
 from manikin.cli.ergonomics import ergonomics
 from manikin.cli.push import push
@@ -60,7 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         return status if isinstance(status, int) else DONE
     except typer.TyperException as error:
-        return complain(f"{error.format_message().rstrip('.')}; see 'manikin --help'", BAD_INPUT)
+        problem = error.format_message().rstrip(".").replace("Value error, ", "")
+        return complain(f"{problem}; see 'manikin --help'", BAD_INPUT)
     except InputError as error:
         return complain(str(error), BAD_INPUT)
     except ManikinError as error:
@@ -93,13 +95,11 @@ def scenarios(json: JsonOption = False) -> None:
     if json:
         print_json({"scenarios": descriptions, "variants": variants})
         return
-    rows: dict[str, str] = {}
+    rows = {}
     for name, description in descriptions.items():
         rows[name] = description
         rows |= {f"{name}@{variant}": text for variant, text in variants[name].items()}
-    width = max(len(name) for name in rows)
-    for name, description in rows.items():
-        typer.echo(f"{name:{width}}  {description}")
+    print_table(rows)
 
 
 for _command in (

@@ -3,7 +3,7 @@
 import time as clock
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -57,7 +57,8 @@ def analyze(
         bool, flag("--as-recorded", "Look for no shifted motion to stand beside the recorded one.")
     ] = False,
     plan: Annotated[
-        str | None, option("keyframes|timing-free", "Re-plan the recording on its own stances.")
+        Literal["keyframes", "timing-free"] | None,
+        option("keyframes|timing-free", "Re-plan the recording on its own stances."),
     ] = None,
     execute: Annotated[
         bool, flag("--execute", "With --plan: the whole body, executed in the physics engine.")
@@ -88,22 +89,27 @@ def analyze(
 
 
 def _one(
-    path: Path, directory: Path | None, options: Any, plan: tuple[str | None, bool], *, draw: bool, json: bool
+    path: Path,
+    directory: Path | None,
+    options: Any,
+    plan: "tuple[Method | None, bool]",
+    *,
+    draw: bool,
+    json: bool,
 ) -> int:
     method, execute = plan
     with stdout_kept_clean():
         from manikin.analysis import analyze_file
         from manikin.reports.analysis_directory import AnalysisDirectory, summary_of, write_analysis
 
-        chosen = None if method is None else _method(method)
         if directory is not None:
             AnalysisDirectory(directory)
         result, planned = analyze_file(path, options), None
-        if chosen is not None:
+        if method is not None:
             from manikin.analysis.adaptation import adapt_recording
 
             planned = adapt_recording(
-                result.found, result.supports, method=chosen, execute=execute, friction=options.friction
+                result.found, result.supports, method=method, execute=execute, friction=options.friction
             )
         if directory is not None:
             write_analysis(result, directory, draw=draw, plan=planned)
@@ -121,15 +127,6 @@ def _one(
             f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True
         )
     return FAILED if failure else DONE
-
-
-def _method(name: str) -> "Method":
-    from manikin.analysis.adaptation import METHODS
-
-    for method in METHODS:
-        if name == method:
-            return method
-    raise InputError(f"--plan is {name!r}; valid: {', '.join(METHODS)}")
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:
@@ -151,7 +148,13 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
             + ("never in contact" if share is None else f"positive in {share:.1%} of the frames in contact")
         )
     if share is not None and (shifted := margin["shifted"]) is not None:
-        shown["shifted"] = _shifted(shifted)
+        shown["shifted"] = (
+            f"by {1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest), "
+            f"{'' if shifted['believed'] else 'not '}to be believed: "
+            f"positive in {shifted['share_positive_in_contact']:.1%}, "
+            f"in {shifted['share_at_floor_in_contact']:.1%} at the imposed floor "
+            f"({shifted['floor_m']:g} m x weight = {shifted['floor_Nm']:.1f} N.m)"
+        )
     for name in ("rula", "reba"):
         if (score := effort[name]) is not None:
             shown[name.upper()] = (
@@ -183,22 +186,13 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     return shown
 
 
-def _shifted(shifted: dict[str, Any]) -> str:
-    """The shifted motion in a line."""
-    words = f"by {1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest), " + (
-        "to be believed" if shifted["believed"] else "not to be believed"
-    )
-    words += f": positive in {shifted['share_positive_in_contact']:.1%}"
-    floor = f"the imposed floor ({shifted['floor_m']:g} m x weight = {shifted['floor_Nm']:.1f} N.m)"
-    return f"{words}, in {shifted['share_at_floor_in_contact']:.1%} at {floor}"
-
-
 def _several(
     paths: Sequence[Path], directory: Path | None, options: Any, interruption: Interruption,
     jobs: int | None, *, draw: bool, json: bool,
 ) -> int:  # fmt: skip
+    from joblib import cpu_count
+
     from manikin.analysis import AnalysisJob
-    from manikin.pipeline.batch import usable_cores
     from manikin.reports.analysis_directory import (
         AnalysisDirectory,
         analyze_files,
@@ -213,7 +207,7 @@ def _several(
     work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
     began, entries = clock.perf_counter(), {}
     with bars(interruption) as progress:
-        for entry in analyze_files(work, options, workers=jobs or usable_cores()):
+        for entry in analyze_files(work, options, workers=jobs or cpu_count()):
             entries[entry.job.path] = entry
             if entry.summary is None:
                 complain(entry.refusal, BAD_INPUT)

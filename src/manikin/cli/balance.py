@@ -25,11 +25,10 @@ def balance(
     polytope: Annotated[bool, flag("--polytope", "Add the rows H and h to the JSON.")] = False,
 ) -> None:
     """Polytope and margins of one stance and centre-of-mass state."""
-    from manikin.scenarios.stance_file import load_stance_file
+    from manikin.scenarios.stance_file import judge_stance_file
 
-    question = load_stance_file(stance)
     with stdout_kept_clean():
-        report = question.evaluate().as_dict(polytope=polytope and json)
+        report = judge_stance_file(stance).as_dict(polytope=polytope and json)
     if json:
         print_json(report)
     else:

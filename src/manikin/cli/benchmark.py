@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -18,6 +18,7 @@ from manikin.cli.console import (
     flag,
     option,
     print_json,
+    print_table,
 )
 from manikin.errors import InputError
 
@@ -27,7 +28,9 @@ def benchmark(
     families: Annotated[str, option("all|A,B", "Families of scenes; --list shows them.")] = "all",
     seeds: Annotated[int, option("N", "Scenes of each.", min=1, max=100_000)] = 5,
     first_seed: Annotated[int, option("N", "Number of the first scene.", min=0)] = 0,
-    stage: Annotated[str, option("contacts|all", "Contacts alone, or whole runs.")] = "contacts",
+    stage: Annotated[
+        Literal["contacts", "all"], option("contacts|all", "Contacts alone, or whole runs.")
+    ] = "contacts",
     jobs: JobsOption = None,
     time_limit: Annotated[
         float, option("S", "Processor time after which a task is ended [s].", min=1.0)
@@ -56,15 +59,12 @@ def benchmark(
         raise InputError(f"SCENARIO {scenario!r} is given without --check; valid: --check PLAN.json SCENARIO")
     chosen = chosen_families(families)
     numbers = range(first_seed, first_seed + seeds)
-    if stage not in tasks.STAGES:
-        raise InputError(f"--stage is {stage!r}; valid: {', '.join(tasks.STAGES)}")
     if list_families:
         descriptions = {name: family.description for name, family in FAMILIES.items()}
         if json:
             print_json({"families": descriptions})
         else:
-            width = max(map(len, descriptions))
-            typer.echo("\n".join(f"{name:{width}}  {text}" for name, text in descriptions.items()))
+            print_table(descriptions)
         return DONE
     if write_scenes is not None:
         tasks.write_scenes(chosen, numbers, write_scenes)
@@ -77,8 +77,8 @@ def benchmark(
             progress("benchmark", done / count, f"{done} of {count}, {entry['family']}-{entry['seed']}")
 
         result = tasks.run_benchmark(
-            chosen, numbers, stage=cast("tasks.StageName", stage), path=directory, jobs=jobs,
-            time_limit=time_limit, fresh=fresh, report=report,
+            chosen, numbers, stage=stage, path=directory, jobs=jobs, time_limit=time_limit, fresh=fresh,
+            report=report,
         )  # fmt: skip
     from manikin.reports.pages import write_benchmark_page
     from manikin.reports.summary_table import failure_lines, family_table
@@ -87,9 +87,7 @@ def benchmark(
     if json:
         print_json(result)
         return DONE
-    typer.echo(family_table(result))
-    for line in failure_lines(result):
-        typer.echo(line)
+    typer.echo("\n".join([family_table(result), *failure_lines(result)]))
     if page is not None:
         typer.echo(f"report: {page}")
     return DONE
@@ -108,7 +106,5 @@ def _checked(plan: Path, scenario: str | None, *, json: bool) -> int:
     if json:
         print_json(report)
     else:
-        typer.echo(result.verdict)
-        for line in requirement_lines(report["requirements"]):
-            typer.echo(line)
+        typer.echo("\n".join([result.verdict, *requirement_lines(report["requirements"])]))
     return DONE if result.held else FAILED

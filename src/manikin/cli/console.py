@@ -5,12 +5,12 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import typer
 from rich.console import Console
@@ -50,55 +50,13 @@ class Interruption:
             signal.signal(number, handler)
 
     def check(self) -> None:
-        """Raise if a signal has come.
-
-        Raises:
-            KeyboardInterrupt: If so.
-        """
+        """Raise :class:`KeyboardInterrupt` if a signal has come."""
         if self.requested:
             raise KeyboardInterrupt
 
     def _stop(self, _number: int, _frame: FrameType | None) -> None:
         self.requested = True
         raise KeyboardInterrupt
-
-
-class StageProgress:
-    """Shows one bar per stage; call it from the job with (stage, share done, remark).
-
-    On a terminal the bars move; elsewhere each stage is one line when it is done.
-    """
-
-    def __init__(self, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True)
-        self._bars: dict[str, TaskID] = {}
-        self._done: set[str] = set()
-        self._progress = Progress(
-            TextColumn("{task.description:<14}"),
-            BarColumn(bar_width=30),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[remark]}"),
-            console=self._console,
-            disable=not self._console.is_terminal,
-        )
-
-    def __enter__(self) -> Self:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._progress.stop()
-
-    def __call__(self, stage: str, share: float, remark: str = "") -> None:
-        """Report that ``share`` (0 to 1) of ``stage`` is done."""
-        if stage not in self._bars:
-            self._bars[stage] = self._progress.add_task(stage, total=1.0, remark=remark)
-        self._progress.update(self._bars[stage], completed=share, remark=remark)
-        if share >= 1.0 and stage not in self._done:
-            self._done.add(stage)
-            if self._progress.disable:
-                self._console.print(f"{stage}: done {remark}".rstrip(), highlight=False, markup=False)
 
 
 DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
@@ -124,9 +82,10 @@ JsonOption = Annotated[bool, flag("--json", "Print one JSON object on standard o
 OutOption = Annotated[Path | None, option("DIR", "Directory. Default: one in runs; none with --json.")]
 FiguresOption = Annotated[bool, typer.Option(help="Draw the figures into the directory.")]
 JobsOption = Annotated[int | None, option("N", "Processes side by side; default: one per core.", min=1)]
-SexOption = Annotated[str | None, option("male|female", "Sex of the person.")]
+SexOption = Annotated[Literal["male", "female"] | None, option("male|female", "Sex of the person.")]
 LoadHandOption = Annotated[
-    str | None, option("left|right|both", "Hand that carries --load-kg. Default: both.")
+    Literal["left", "right", "both"] | None,
+    option("left|right|both", "Hand that carries --load-kg. Default: both."),
 ]
 MotionArgument = Annotated[Path, argument("DIR|FILE", "Run directory or motion file (.h5).")]
 
@@ -154,16 +113,12 @@ class JobOutcome:
         """Exit status: done only for a run that succeeded."""
         return DONE if self.summary["succeeded"] else FAILED
 
-    def print(self, shown: Mapping[str, Any] | None = None) -> None:
-        """Print the verdict, the requirements, further values, and last the path of the report page.
-
-        Args:
-            shown: Values to print below the requirements.
-        """
+    def print(self, shown: dict[str, Any] | None = None) -> None:
+        """Print the verdict, the requirements, the values ``shown``, and last the path of the report page."""
         for line in verdict_lines(self.summary):
             typer.echo(line)
         if shown:
-            print_table(dict(shown))
+            print_table(shown)
         if self.viewable is not None:
             typer.echo(f"watch it with: manikin view {self.viewable}")
         if self.page is not None:
@@ -175,7 +130,6 @@ def run_job(job: "Scenario", directory: Path | None, interruption: Interruption,
 
     Args:
         directory: Run directory, or None to write nothing.
-        interruption: Asked whether to go on whenever something was reported.
         draw: Whether figures are drawn into the directory.
     """
     with bars(interruption) as progress:
@@ -196,16 +150,28 @@ def run_job(job: "Scenario", directory: Path | None, interruption: Interruption,
 
 @contextmanager
 def bars(interruption: Interruption) -> Iterator[Callable[..., None]]:
-    """Context with bars on standard error, which yields what reports (stage, share done, remark).
+    """Context with one bar per stage on standard error, which yields what reports (stage, share, remark).
 
-    Standard output is kept clean. Each report asks whether the command is to be interrupted.
+    On a terminal the bars move; elsewhere each stage is one line when it is done. Standard output is kept
+    clean. Each report asks whether the command is to be interrupted.
     """
-    with stdout_kept_clean(), StageProgress() as progress:
+    console, known, done = Console(stderr=True), dict[str, TaskID](), set[str]()
+    remark_column = TextColumn("{task.fields[remark]}")
+    words, percents = TextColumn("{task.description:<14}"), TextColumn("{task.percentage:>3.0f} %")
+    columns = words, BarColumn(bar_width=30), percents, TimeElapsedColumn(), remark_column
+    progress = Progress(*columns, console=console, disable=not console.is_terminal)
 
-        def report(stage: str, share: float, remark: str = "") -> None:
-            interruption.check()
-            progress(stage, share, remark)
+    def report(stage: str, share: float, remark: str = "") -> None:
+        interruption.check()
+        if stage not in known:
+            known[stage] = progress.add_task(stage, total=1.0, remark=remark)
+        progress.update(known[stage], completed=share, remark=remark)
+        if share >= 1.0 and stage not in done:
+            done.add(stage)
+            if progress.disable:
+                console.print(f"{stage}: done {remark}".rstrip(), highlight=False, markup=False)
 
+    with stdout_kept_clean(), progress:
         yield report
 
 

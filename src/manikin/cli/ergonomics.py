@@ -6,7 +6,6 @@ from typing import Annotated, Any
 import typer
 
 from manikin.cli.console import (
-    DONE,
     JsonOption,
     LoadHandOption,
     MotionArgument,
@@ -57,7 +56,7 @@ def ergonomics(
         float, option("X", "Share of the strength above which a joint counts as loaded.")
     ] = 0.5,
     neck: Annotated[float, option("DEG", "Flexion of the neck when it is upright.", "--neck-deg")] = 0.0,
-) -> int:
+) -> None:
     """Judge a motion: RULA and REBA over time, torques against strength, effort, lowest margin."""
     if planned and executed:
         raise InputError("--planned and --executed exclude each other; valid: one of them or none")
@@ -99,7 +98,6 @@ def ergonomics(
         print_json(report)
     else:
         _print(report)
-    return DONE
 
 
 def _print(report: dict[str, Any]) -> None:

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from manikin.cli.console import (
-    DONE,
     FiguresOption,
     Interruption,
     JobsOption,
@@ -23,29 +22,11 @@ from manikin.cli.console import (
     run_job,
 )
 from manikin.errors import InputError
+from manikin.reports.summary_table import columns
 
 if TYPE_CHECKING:
     from manikin.scenarios import Scenario
-    from manikin.simulation import HeldImpulse, PushMap
-
-_OPTIONS: dict[tuple[str | int, ...], str] = {
-    ("push", "direction_deg"): "--direction",
-    ("push", "duration_s"): "--duration",
-    ("recovery", "duration_s"): "--duration",
-    ("recovery", "delay_s"): "--delay",
-    ("recovery", "feet"): "--feet",
-    ("recovery", "support"): "--support",
-    ("recovery", "feet_apart_m"): "--feet-apart",
-    ("recovery", "steps"): "--steps",
-    ("recovery", "ankle_stiffness"): "--ankle-stiffness",
-    ("recovery", "locked"): "--locked",
-    ("recovery", "strength"): "--strength",
-    ("body", "model"): "--body",
-    ("body", "stature_m"): "--stature",
-    ("body", "mass_kg"): "--mass",
-    ("body", "sex"): "--sex",
-}
-"""Options that give the values of the scenario, for messages."""
+    from manikin.simulation import DirectionSearch, HeldImpulse, PushMap
 
 _COMPARED: dict[str, tuple[str, Callable[[str], Any]]] = {
     "feet": ("feet", str),
@@ -58,6 +39,18 @@ _COMPARED: dict[str, tuple[str, Callable[[str], Any]]] = {
     "locked": ("locked", lambda value: [] if value == "none" else value.split("+")),
 }
 """Settings of ``--compare``: key of the recovery and how its value is read."""
+
+_OPTIONS: dict[tuple[str | int, ...], str] = {
+    ("push", "direction_deg"): "--direction",
+    ("push", "duration_s"): "--duration",
+    ("recovery", "duration_s"): "--duration",
+    **{("recovery", key): f"--{name}" for name, (key, _) in _COMPARED.items()},
+    ("body", "model"): "--body",
+    ("body", "stature_m"): "--stature",
+    ("body", "mass_kg"): "--mass",
+    ("body", "sex"): "--sex",
+}
+"""Options that give the values of the scenario, for messages."""
 
 SHOWN = (
     "recovered", "impulse_Ns", "direction_deg", "feet", "time_to_rest_s", "steps", "posture_share",
@@ -92,7 +85,7 @@ def push(
         bool, flag("--posture-control-only", "Leave the quadratic program out.")
     ] = False,
     strength: Annotated[float, option("X", "Torque and speed limits relative to the body's.")] = 1.0,
-    body: Annotated[str, option("kudoh|human", "Who is pushed.")] = "kudoh",
+    body: Annotated[Literal["kudoh", "human"], option("kudoh|human", "Who is pushed.")] = "kudoh",
     stature: Annotated[float | None, option("M", "Of a human [m].")] = None,
     mass: Annotated[float | None, option("KG", "Of a human [kg].")] = None,
     sex: SexOption = None,
@@ -111,14 +104,12 @@ def push(
     out: OutOption = None,
     figures: FiguresOption = True,
     json: JsonOption = False,
-) -> int:
+) -> int | None:
     """Push a standing body and see whether it stays on its feet."""
     from manikin.numerics.spatial import finite_number
     from manikin.scenarios.planned import push_task
     from manikin.simulation.push_force import STRONGEST
 
-    if body not in ("kudoh", "human"):
-        raise InputError(f"--body is {body!r}; valid: kudoh or human")
     person = _given({"model": body, "stature_m": stature, "mass_kg": mass, "sex": sex})
     recovery = _given({
         "feet": feet, "support": support, "feet_apart_m": feet_apart, "steps": steps, "delay_s": delay,
@@ -133,15 +124,17 @@ def push(
         )  # fmt: skip
 
     if map_:
+        from manikin.pipeline.stages.recovery_stage import push_map_searches
+
         refuse(force is not None, "--force", "it is what a map searches")
         refuse(direction is not None, "--direction", "a map has all of them")
         within = 1.0 if tolerance is None else tolerance
         within = finite_number(within, "--tolerance", at_least=0.01, at_most=100.0)
         changed = ({}, *(_changes(text) for text in compare or ()))
         scenarios = [scenario("push-map", 1.0, 0.0, changes) for changes in changed]
-        searched = scenarios, 24 if directions is None else directions, within
+        asked = push_map_searches(scenarios, 24 if directions is None else directions, within)
         directory = directory_of(out, "push-map", json=json)
-        return _search(*searched, directory, context.obj, jobs=jobs, draw=figures, json=json)
+        return _search(asked, directory, context.obj, jobs=jobs, draw=figures, json=json)
     only_maps: dict[str, Any] = {
         "--directions": directions, "--tolerance": tolerance, "--compare": compare, "--jobs": jobs,
     }  # fmt: skip
@@ -189,16 +182,20 @@ def _changes(text: str) -> dict[str, Any]:
 
 
 def _search(
-    scenarios: "list[Scenario]", directions: int, tolerance: float, path: Path | None,
-    interruption: Interruption, *, jobs: int | None, draw: bool, json: bool,
-) -> int:  # fmt: skip
-    """Search one map for each scenario, keep every direction as soon as it is known, draw and print."""
-    from manikin.pipeline.batch import usable_cores
-    from manikin.pipeline.stages.recovery_stage import push_map_searches
+    asked: "list[tuple[PushMap, list[DirectionSearch]]]",
+    path: Path | None,
+    interruption: Interruption,
+    *,
+    jobs: int | None,
+    draw: bool,
+    json: bool,
+) -> None:
+    """Search maps, keep every direction as soon as it is known, draw and print."""
+    from joblib import cpu_count
+
     from manikin.reports.directories import MapDirectory, maps_as_dict
     from manikin.simulation import search_directions
 
-    asked = push_map_searches(scenarios, directions, tolerance)
     maps = [empty for empty, _ in asked]
     directory = None if path is None else MapDirectory(path, maps)
     if directory is not None:
@@ -209,7 +206,7 @@ def _search(
     with bars(interruption) as progress:
         progress("map", known / total, f"{known} of {total} directions")
         searches = [asked[number][1][index] for number, index in waiting]
-        done = search_directions(searches, jobs=jobs or usable_cores())
+        done = search_directions(searches, jobs=jobs or cpu_count())
         for count, (which, result) in enumerate(done, known + 1):
             number, index = waiting[which]
             maps[number] = maps[number].with_found(index, result)
@@ -226,7 +223,6 @@ def _search(
         _print_maps(maps)
         if path is not None:
             typer.echo(f"files in {path}", err=True)
-    return DONE
 
 
 def _print_maps(maps: "list[PushMap]") -> None:
@@ -238,9 +234,7 @@ def _print_maps(maps: "list[PushMap]") -> None:
     rows = [["towards [deg]", *(name or "held" for name in names)]]
     for place, direction in enumerate(maps[0].directions):
         rows.append([f"{direction:g}", *(_impulse(item.found[place]) for item in maps)])
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        typer.echo("  ".join(f"{text:>{width}}" for text, width in zip(row, widths, strict=True)))
+    typer.echo(columns(rows, right=range(len(rows[0]))))
 
 
 def _impulse(found: "HeldImpulse | None") -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from manikin.recordings.statistics.phases import By
 
 
-SEXES = ("male", "female")
-
 Box = tuple[float, float, float, float, float]
 
 
@@ -52,15 +50,21 @@ def statistics(
     limit: Annotated[
         float | None, option("M", "Distance from the centre of mass to a support. Default: 1.08.")
     ] = None,
-    effectors: Annotated[str, option("all|feet", "Whose supports tell phases and sequences.")] = "all",
+    effectors: Annotated[
+        Literal["all", "feet"], option("all|feet", "Whose supports tell phases and sequences.")
+    ] = "all",
     phases: Annotated[int | None, option("N", "Compare the first N phases of sequences only.", min=1)] = None,
     start: Annotated[
         str | None, option("KIND", "Compare sequences from the first such phase on: DS.")
     ] = None,
     origin: Annotated[
-        str, option("stance|lowest|highest", "From where placements are seen: stance, or CoM.")
+        Literal["stance", "lowest", "highest"],
+        option("stance|lowest|highest", "From where placements are seen: stance, or CoM."),
     ] = "stance",
-    by: Annotated[str, option("number|kind|effectors", "What phases have in common.")] = "kind",
+    by: Annotated[
+        Literal["number", "kind", "effectors"],
+        option("number|kind|effectors", "What phases have in common."),
+    ] = "kind",
     sex: SexOption = "male",
     out: Annotated[Path | None, option("DIR", "Write statistics.json, phases.csv and figures there.")] = None,
     json: JsonOption = False,
@@ -72,14 +76,11 @@ def statistics(
         }  # fmt: skip
         for option, value in options.items():
             refuse(value is not None, option, "the published motions are numbers already")
-        return _published(out, by, json=json)
+        return _published(out, json=json)
     if not files:
         raise InputError("no FILE is given; valid: recordings, folders or patterns, or --published")
     settings = _settings(bar, box, limit, effectors, phases, start, origin)
-    _check_by(by)
-    if sex not in (None, *SEXES):
-        raise InputError(f"--sex is {sex!r}; valid: {', '.join(SEXES)}")
-    return _recorded(files, settings, cast("By", by), sex or "male", out, context.obj, json=json)
+    return _recorded(files, settings, by, sex or "male", out, context.obj, json=json)
 
 
 def _recorded(
@@ -116,11 +117,10 @@ def _recorded(
     return BAD_INPUT if read.refused else DONE
 
 
-def _published(out: Path | None, by: str, *, json: bool) -> int:
+def _published(out: Path | None, *, json: bool) -> int:
     from manikin.recordings.statistics.clip_statistics import published_statistics
     from manikin.recordings.statistics.phases import published_heights, published_phases
 
-    _check_by(by)
     result, heights = published_statistics(), published_heights()
     content = {
         "groups": {group: item.as_dict() for group, item in result.items()},
@@ -136,47 +136,32 @@ def _published(out: Path | None, by: str, *, json: bool) -> int:
     if json:
         print_json(content)
     else:
-        _print(result, cast("By", "number"), None)
+        _print(result, "number", None)
     return DONE
-
-
-def _check_by(by: str) -> None:
-    from manikin.recordings.statistics.phases import BYS
-
-    if by not in BYS:
-        raise InputError(f"--by is {by!r}; valid: {', '.join(BYS)}")
 
 
 def _settings(
     bar: float | None, box: Box | None, limit: float | None, effectors: str, phases: int | None,
-    start: str | None, origin: str,
+    start: str | None, origin: "From",
 ) -> "StatisticsSettings":  # fmt: skip
-    """Settings of the statistics.
-
-    Raises:
-        InputError: If a word is unknown, a number does not fit, or both a bar and a box are given.
-    """
+    """Settings of the statistics; a bar and a box exclude each other."""
     from manikin.numerics.spatial import finite_number
-    from manikin.recordings.statistics.clip_statistics import FROMS, StatisticsSettings
+    from manikin.recordings.statistics.clip_statistics import StatisticsSettings
     from manikin.recordings.statistics.passages import LIMIT, Overhead
     from manikin.recordings.supports.supports import FEET
 
-    if effectors not in ("all", "feet"):
-        raise InputError(f"--effectors is {effectors!r}; valid: all, feet")
-    if origin not in FROMS:
-        raise InputError(f"--origin is {origin!r}; valid: {', '.join(FROMS)}")
     refuse(bar is not None and box is not None, "--bar", "a box is given")
-    overhead = None
-    if bar is not None:
-        overhead = Overhead(bar)
-    elif box is not None:
-        overhead = Overhead(box[4], (box[0], box[1]), (box[2], box[3]))
+    overhead = None if bar is None else Overhead(bar)
+    if box is not None:
+        overhead = Overhead(box[4], box[:2], box[2:4])
     within = LIMIT if limit is None else finite_number(limit, "--limit [m]", above=0.0)
     active = None if effectors == "all" else FEET
-    return StatisticsSettings(overhead, within, active, phases, start, origin=cast("From", origin))
+    return StatisticsSettings(overhead, within, active, phases, start, origin=origin)
 
 
 def _print(groups: Mapping[str, "GroupStatistics"], by: "By", limit: float | None) -> None:
+    from manikin.recordings.statistics.phases import initials
+
     for group, item in groups.items():
         typer.echo(f"{group}: {len(item.motions)} motions")
         spreads = item.durations[by]
@@ -186,7 +171,13 @@ def _print(groups: Mapping[str, "GroupStatistics"], by: "By", limit: float | Non
                 f"  {name:{width}}  n {s.count:3d}  mean {s.mean:.3f} s  SD {_known(s.deviation)}"
                 f"  CV {_known(s.variation)}  {s.smallest:.3f} to {s.largest:.3f}"
             )
-        _print_sequence(item)
+        known = item.consistency
+        steps = ", ".join(f"{name} {count}" for name, count in known.first_steps.items()) or "none"
+        typer.echo(
+            f"  sequence of {known.counts.get(known.modal, 0)} of {known.motions}"
+            f" ({known.mirrored_share:.0%} with mirror images): {initials(known.modal)}"
+        )
+        typer.echo(f"  first steps: {steps}")
         for effector, s in item.distances.items():
             within = f"; {100 * item.within[effector]:.1f} % within {limit:g} m" if item.within else ""
             typer.echo(
@@ -202,18 +193,6 @@ def _print(groups: Mapping[str, "GroupStatistics"], by: "By", limit: float | Non
                 f"  {motion}: under it {under.start:.2f} to {under.end:.2f} s, CoM {under.com_lowest:.2f} m, "
                 f"{under.below:.2f} below it{room}"
             )
-
-
-def _print_sequence(one: "GroupStatistics") -> None:
-    from manikin.recordings.statistics.phases import initials
-
-    known = one.consistency
-    steps = ", ".join(f"{name} {count}" for name, count in known.first_steps.items()) or "none"
-    typer.echo(
-        f"  sequence of {known.counts.get(known.modal, 0)} of {known.motions}"
-        f" ({known.mirrored_share:.0%} with mirror images): {initials(known.modal)}"
-    )
-    typer.echo(f"  first steps: {steps}")
 
 
 def _known(value: float) -> str:

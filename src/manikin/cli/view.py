@@ -1,7 +1,7 @@
 """``manikin view``, ``compare`` and ``export``: runs and motions watched, compared, written for others."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -90,15 +90,13 @@ def compare(
 
 def export(
     source: MotionArgument,
-    format: Annotated[str, option("bvh|csv", "File format.", "--format")],
+    format: Annotated[Literal["bvh", "csv"], option("bvh|csv", "File format.", "--format")],
     out: Annotated[Path | None, option("FILE", "Default: beside the motion.")] = None,
     motion: Annotated[str | None, option("planned|executed", "Default: executed if there is one.")] = None,
     rate: Annotated[float | None, option("HZ", "Samples per second; default: 100 (bvh), all (csv).")] = None,
 ) -> None:
     """Write a motion for other programs."""
-    from manikin.reports.export import check_format, export_motion
-
-    check_format(format)
     from manikin.motion.file import read_motions
+    from manikin.reports.export import export_motion
 
     typer.echo(str(export_motion(read_motions(source), source, format, out=out, which=motion, rate=rate)))

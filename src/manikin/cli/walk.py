@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from manikin.cli.console import (
-    DONE,
     FiguresOption,
     JobsOption,
     JsonOption,
@@ -64,7 +63,7 @@ def walk(
     out: OutOption = None,
     figures: FiguresOption = True,
     json: JsonOption = False,
-) -> int:
+) -> int | None:
     """Walk to a place as people do: path by optimal control, whole body from recorded walks."""
     body: dict[str, Any] = {"model": "human", "stature_m": stature, "mass_kg": mass, "sex": sex}
     if drive:
@@ -91,7 +90,7 @@ def walk(
     return outcome.status
 
 
-def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> int:
+def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> None:
     """Serve the page until Ctrl-C."""
     from manikin.body import human
     from manikin.scenarios import load_scenario
@@ -102,7 +101,6 @@ def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> 
     around = None if scene is None else load_scenario(scene).build_scene()
     place = (start[0], start[1], math.radians(start[2]))
     serve_drive(WalkController(person, place=place), around, port, announce)
-    return DONE
 
 
 def words(
@@ -116,59 +114,47 @@ def words(
         bool | None, flag("--figures/--no-figures", "Draw the figures into the directory.")
     ] = None,
     json: JsonOption = False,
-) -> int:
+) -> None:
     """Partition the goals of a walk by the word of the best path; an interrupted run is continued."""
     headings = _headings(slices)
     directory = directory_of(out, "words", json=json)
     refuse(figures is True and directory is None, "--figures", "there is no directory to draw into")
-    from manikin.pipeline.batch import usable_cores
+    from joblib import cpu_count
+
     from manikin.reports.directories import solve_partition
     from manikin.walking.words import THESIS_GRID
 
     with bars(context.obj) as progress:
         summary = solve_partition(
-            headings, THESIS_GRID, directory, jobs=jobs or usable_cores(), draw=figures is not False,
+            headings, THESIS_GRID, directory, jobs=jobs or cpu_count(), draw=figures is not False,
             progress=progress,
         )  # fmt: skip
     if json:
         print_json(summary)
     else:
-        _print(summary)
+        width = max(len(word) for word in summary["counts"])
+        for word, count in summary["counts"].items():
+            typer.echo(f"{word:{width}}  {count:6d}  {100 * summary['shares'][word]:6.2f} %")
+        typer.echo(f"{'all':{width}}  {summary['solved']:6d}")
         typer.echo(f"files in {directory}", err=True)
-    return DONE
 
 
 def _headings(text: str) -> list[int]:
-    """Headings [deg] of an option.
-
-    Raises:
-        InputError: If it is not a list of headings.
-    """
+    """Headings [deg] of an option."""
     from manikin.walking.words import HEADINGS
 
     if text == "all":
         return list(HEADINGS)
     valid = {str(heading): heading for heading in HEADINGS}
-    parts = [part.strip() for part in text.split(",")]
-    for part in parts:
-        if part not in valid:
-            raise InputError(
-                f"--slices {text}: {part!r} is no slice; valid: all, or 0, 10, ... 350 with commas between"
-            )
-    return sorted({valid[part] for part in parts})
+    try:
+        return sorted({valid[part.strip()] for part in text.split(",")})
+    except KeyError as error:
+        raise InputError(
+            f"--slices {text}: {error} is no slice; valid: all, or 0, 10, ... 350 with commas between"
+        ) from None
 
 
-def _print(summary: dict[str, Any]) -> None:
-    """Words, number of goals and share of each."""
-    width = max(len(word) for word in summary["counts"])
-    for word, count in summary["counts"].items():
-        typer.echo(f"{word:{width}}  {count:6d}  {100 * summary['shares'][word]:6.2f} %")
-    typer.echo(f"{'all':{width}}  {summary['solved']:6d}")
-
-
-library = typer.Typer(
-    help="Walking cycles by velocity, from recorded motion.", no_args_is_help=True, rich_markup_mode=None
-)
+library = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 
 @library.callback()
@@ -185,7 +171,7 @@ def build(
     ],
     out: Annotated[Path, typer.Option(help="File to write (.npz).")] = Path("walking_library.npz"),
     json: JsonOption = False,
-) -> int:
+) -> None:
     """Cut cycles from recordings and write them, as Fourier coefficients, to a file."""
     from manikin.walking.gait.library_build import build_library
     from manikin.walking.gait.motion_library import save_library
@@ -209,4 +195,3 @@ def build(
         print_json(summary)
     else:
         print_table(summary | {"classes": ", ".join(f"{number} {kind}" for kind, number in classes.items())})
-    return DONE

@@ -20,7 +20,6 @@ from manikin.contact.stance import (
     CarriedLoad,
     ContactSchedule,
     Phase,
-    Rolling,
     Stance,
     StanceSequence,
     Swing,
@@ -29,7 +28,7 @@ from manikin.contact.stance import (
 
 __all__ = [
     "BODY_WEIGHTS_CAP", "FRICTION_MODELS", "CarriedLoad", "Contact", "ContactKind", "ContactModel",
-    "ContactSchedule", "FrictionModel", "Phase", "Rolling", "SolePart", "Stance", "StanceSequence",
+    "ContactSchedule", "FrictionModel", "Phase", "SolePart", "Stance", "StanceSequence",
     "Swing", "default_normal_force_cap", "grasp", "point", "roll_feet", "rolling_front", "sole",
     "sole_part", "soles_overlap",
 ]  # fmt: skip

@@ -23,6 +23,7 @@ from manikin.contact.contact import (
     sole_part,
 )
 from manikin.errors import ContactError
+from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 
@@ -103,10 +104,6 @@ class Stance(Displayed):
     def with_contacts(self, contacts: Iterable[Contact]) -> "Stance":
         """Other contacts under the same contact model."""
         return Stance(tuple(contacts), model=self.model)
-
-    def with_friction_model(self, friction: FrictionModel) -> "Stance":
-        """The same contacts and caps under another friction model."""
-        return Stance(self.contacts, model=replace(self.model, friction=friction))
 
     def bounded(self, mass: float) -> "Stance":
         """The stance itself, with the default cap of a body's mass [kg] where a normal force has none."""
@@ -223,19 +220,11 @@ class StanceSequence(Displayed):
         return tuple(sorted(swings, key=lambda swing: (swing.first_phase, swing.effector)))
 
     def _swings_of(self, effector: str) -> Iterator[Swing]:
-        held = [effector in phase.stance for phase in self.phases]
-        index = 0
-        while index < len(held):
-            if held[index]:
-                index += 1
-                continue
-            last = index
-            while last + 1 < len(held) and not held[last + 1]:
-                last += 1
-            start = self.phases[index - 1].stance[effector] if index > 0 else None
-            end = self.phases[last + 1].stance[effector] if last + 1 < len(held) else None
-            yield Swing(effector, index, last, start, end)
-            index = last + 1
+        free = np.array([effector not in phase.stance for phase in self.phases])
+        for first, stop in mask_runs(free):
+            start = self.phases[first - 1].stance[effector] if first > 0 else None
+            end = self.phases[stop].stance[effector] if stop < len(free) else None
+            yield Swing(effector, first, stop - 1, start, end)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -297,29 +286,20 @@ class ContactSchedule(Displayed):
         return float(self.instants[swing.first_phase]), float(self.instants[swing.last_phase + 1])
 
 
-@dataclass(frozen=True)
-class Rolling:
-    """Durations of the parts of a rolling foot's support.
+ON_HEEL = 0.08
+"""Least time on the heel's edge of a rolling foot after it landed [s]."""
 
-    Attributes:
-        heel: Least time on the heel's edge after landing [s].
-        toes: Least time on the toes before lift-off [s].
-        flat: Least time in between during which both feet lie flat [s].
-        stretch: The phases on heel or toes last at most this many times their least time.
-    """
+ON_TOES = 0.14
+"""Least time on its toes before it lifts off [s]."""
 
-    heel: float = 0.08
-    toes: float = 0.14
-    flat: float = 0.04
-    stretch: float = 1.5
+FLAT = 0.04
+"""Least time in between during which both feet lie flat [s]."""
 
-    def __post_init__(self) -> None:
-        for name in ("heel", "toes", "flat"):
-            finite_number(getattr(self, name), f"rolling {name} [s]", above=0.0, error=ContactError)
-        finite_number(self.stretch, "rolling stretch", at_least=1.0, error=ContactError)
+STRETCH = 1.5
+"""The phases on heel or toes last at most this many times their least time."""
 
 
-def roll_feet(sequence: StanceSequence, hinge: float, rolling: Rolling | None = None) -> StanceSequence:
+def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
     """Split every phase in which a foot lands or leaves beside another full contact.
 
     The phases of a foot keep its place; the parts' shares are taken from the split phase's least
@@ -328,30 +308,28 @@ def roll_feet(sequence: StanceSequence, hinge: float, rolling: Rolling | None = 
     Args:
         sequence: Stances with full soles.
         hinge: Where the hinge of the toes crosses a sole's x axis [m].
-        rolling: Least durations of the parts.
     """
-    rolling = rolling or Rolling()
-    parts = (_split(sequence, index, hinge, rolling) for index in range(len(sequence)))
+    parts = (_split(sequence, index, hinge) for index in range(len(sequence)))
     return StanceSequence([phase for split in parts for phase in split])
 
 
-def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling) -> Iterator[Phase]:
+def _split(sequence: StanceSequence, index: int, hinge: float) -> Iterator[Phase]:
     phase = sequence[index]
     landing = _changing(phase.stance, sequence[index - 1].stance) if index > 0 else ()
     leaving = _changing(phase.stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
-    taken = (rolling.heel if landing else 0.0) + (rolling.toes if leaving else 0.0)
+    taken = (ON_HEEL if landing else 0.0) + (ON_TOES if leaving else 0.0)
     if landing:
         stance = _with_part(phase.stance, landing, SolePart.HEEL, hinge)
-        yield Phase(stance, rolling.heel, rolling.stretch * rolling.heel, phase.load)
+        yield Phase(stance, ON_HEEL, STRETCH * ON_HEEL, phase.load)
     if landing or leaving:
-        least = max(phase.min_duration - taken, rolling.flat)
+        least = max(phase.min_duration - taken, FLAT)
         most = None if phase.max_duration is None else max(phase.max_duration - taken, least)
         yield replace(phase, min_duration=least, max_duration=most)
     else:
         yield phase
     if leaving:
         stance = _with_part(phase.stance, leaving, SolePart.TOES, hinge)
-        yield Phase(stance, rolling.toes, rolling.stretch * rolling.toes, phase.load)
+        yield Phase(stance, ON_TOES, STRETCH * ON_TOES, phase.load)
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:

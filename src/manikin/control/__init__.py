@@ -1,20 +1,11 @@
 """Control: weighted multi-task inverse dynamics that follows a planned motion."""
 
-from manikin.control.build_qp import ControlProblem, build_qp
 from manikin.control.controller import Controller, ControlOutput
-from manikin.control.settings import (
-    ControlSettings,
-    Impedance,
-    Impedances,
-    ReturnSettings,
-    SupportSettings,
-    TaskWeights,
-)
-from manikin.control.supports import SupportMode, SupportState
-from manikin.control.tasks import AccelerationTask, ForceWish
+from manikin.control.settings import ControlSettings, ReturnSettings, SupportSettings, TaskWeights
+from manikin.control.supports import SupportMode
+from manikin.control.tasks import ForceWish
 
 __all__ = [
-    "AccelerationTask", "ControlOutput", "ControlProblem", "ControlSettings", "Controller", "ForceWish",
-    "Impedance", "Impedances", "ReturnSettings", "SupportMode", "SupportSettings", "SupportState",
-    "TaskWeights", "build_qp",
+    "ControlOutput", "ControlSettings", "Controller", "ForceWish", "ReturnSettings", "SupportMode",
+    "SupportSettings", "TaskWeights",
 ]  # fmt: skip

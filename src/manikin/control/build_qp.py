@@ -40,12 +40,7 @@ class JointBounds:
     ) -> "JointBounds":
         """Limits of a body at a state; see :func:`joint_acceleration_bounds`.
 
-        Args:
-            body: With limits of its own on torques, angles and speeds.
-            state: Its angles and speeds.
-            horizon: Angles and speeds must stay admissible over this time [s].
-            largest: No joint is accelerated faster than this [rad/s^2].
-            strength: Torque and speed limits relative to the body's own.
+        ``strength`` is that of torque and speed limits relative to the body's own.
         """
         accelerations = joint_acceleration_bounds(
             state.q[7:], state.v[6:], body.lower, body.upper, strength * body.velocity_limit, horizon, largest

@@ -116,7 +116,9 @@ class Controller:
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
         self._wishes = {wish.effector: wish for wish in wishes}
         self._switch = SupportSwitch(schedule, self.settings.supports)
-        self._geometry = _geometries(body, schedule, self.settings.supports.sole_inset)
+        contacts = {_touching_points(item): item for phase in schedule.sequence for item in phase.stance}
+        inset = self.settings.supports.sole_inset
+        self._geometry = {key: contact_geometry(body, item, inset) for key, item in contacts.items()}
         self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
         contacts = [contact for phase in schedule.sequence for contact in phase.stance]
         self._points = {c.effector for c in contacts if c.kind is ContactKind.POINT}
@@ -152,21 +154,23 @@ class Controller:
         waited = self.clock.waited
         time = self.clock.at(time)
         supports = self._switch.update(time, touching)
-        state = self._dynamics.evaluate(q, v, self._carried_at(time))
+        state = self._dynamics.evaluate(q, v, self.carried_at(time))
         reference, deviation = self._where(time, state, supports)
         problem = self.problem(state, reference, supports, time, deviation)
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else problem.torque(solution.x)
         self._previous = tau
-        if solution is not None:
-            self._remember_loads(supports, problem.normal_forces(solution.x))
+        if solution is not None:  # what each support carries until its unloading begins
+            for name, load in problem.normal_forces(solution.x).items():
+                if supports[name].unload_share >= 1.0:
+                    self._carried[name] = load
         x = np.zeros(len(problem.program.gradient)) if solution is None else solution.x
         return ControlOutput(
             tau, problem.acceleration(x).copy(), problem.wrenches(x), supports, fallback, state, reference,
             problem, iterations=0 if solution is None else solution.iterations, waited=waited,
         )  # fmt: skip
 
-    def _carried_at(self, time: float) -> Mapping[str, float]:
+    def carried_at(self, time: float) -> Mapping[str, float]:
         """Point masses [kg] that effectors carry at a time of the plan [s]."""
         load = self.schedule.sequence[int(self.schedule.phase_at(time))].load
         return {} if load is None else load.masses
@@ -326,12 +330,6 @@ class Controller:
                 shares[beyond] = np.minimum(shares[beyond], share)
         return np.repeat(shares, edges)
 
-    def _remember_loads(self, supports: Mapping[str, SupportState], loads: Mapping[str, float]) -> None:
-        """Keep what each support carries until its unloading begins."""
-        for name, load in loads.items():
-            if supports[name].unload_share >= 1.0:
-                self._carried[name] = load
-
     def _solve(self, problem: ControlProblem) -> tuple[QPSolution | None, str]:
         solution = self._solver.solve(problem.program)
         if solution.solved:
@@ -345,14 +343,6 @@ class Controller:
 def _touching_points(contact: Contact) -> tuple[str, SolePart, bytes]:
     """What tells the points of contacts apart: a sole may hang over an edge at one place alone."""
     return contact.effector, contact.part, contact.points.tobytes()
-
-
-def _geometries(
-    body: BodyModel, schedule: ContactSchedule, inset: float
-) -> dict[tuple[str, SolePart, bytes], ContactGeometry]:
-    """Force-carrying points of every part of an effector that touches somewhere."""
-    contacts = {_touching_points(item): item for phase in schedule.sequence for item in phase.stance}
-    return {key: contact_geometry(body, item, inset) for key, item in contacts.items()}
 
 
 def _hanging_joints(body: BodyModel, effector: str) -> list[int]:

@@ -67,11 +67,7 @@ class Dynamics:
     """Evaluates :class:`DynamicsState` with Pinocchio; holds its work space."""
 
     def __init__(self, body: BodyModel, frames: dict[str, int]) -> None:
-        """Choose the frames to evaluate.
-
-        Args:
-            frames: Pinocchio frame indices by the name they get in ``DynamicsState.frames``.
-        """
+        """Evaluate frames: Pinocchio indices by the names they get in ``DynamicsState.frames``."""
         self._model = body.pinocchio
         self._data = self._model.createData()
         self._frames = dict(frames)

@@ -7,7 +7,7 @@ import numpy as np
 
 from manikin.balance.friction import edges_in_world
 from manikin.body import BodyModel
-from manikin.body.limbs import hanging_segment
+from manikin.body.limbs import hanging_segment, hinge_line
 from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
 from manikin.control.dynamics import DynamicsState
 from manikin.numerics.polytope import chord, inset_polygon
@@ -39,11 +39,7 @@ class ContactGeometry:
 
 
 def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
-    """Find the points of the body that carry the forces of a contact.
-
-    Args:
-        contact: A contact of one of its effectors.
-        inset: Distance kept from the edge of the sole [m].
+    """Find the points of the body that carry the forces of a contact, ``inset`` [m] from the sole's edge.
 
     Raises:
         BodyError: If the body has no such effector.
@@ -54,36 +50,33 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
     def on_segment(points: FloatArray) -> FloatArray:
         return effector.translation + points @ effector.rotation.T
 
+    none, line = np.zeros((0, 3)), hinge_line(body, contact.effector)
     if contact.part is not SolePart.FULL:
         points = contact.points.copy()
         points[:, 1] -= inset * np.sign(points[:, 1])
         points[:, 2] += contact.edge_radius  # the force on a round edge goes through its axis
         if contact.part is SolePart.TOES:
             points[points[:, 0] >= points[:, 0].max(), 0] -= inset
-        if contact.part is SolePart.TOES and toes is not None:
-            return ContactGeometry(contact.effector, ((toes.name, on_segment(points) - toes.origin),))
-        return ContactGeometry(contact.effector, ((effector.segment, on_segment(points)),))
-    if contact.kind is not ContactKind.SOLE:
-        return ContactGeometry(contact.effector, ((effector.segment, on_segment(contact.points)),))
-    line = 0.0 if toes is None else float((effector.rotation.T @ (toes.origin - effector.translation))[0])
-    if contact.hangs_over:
+        on_toes = contact.part is SolePart.TOES and toes is not None
+        heel, tips = (none, points) if on_toes else (points, none)
+    elif contact.kind is not ContactKind.SOLE:
+        heel, tips = contact.points, none
+    elif contact.hangs_over:
         polygon = inset_polygon(contact.outline, inset)
         if contact.length <= ROUND:  # on a rod: a line, about which the foot could turn
             middle, side = contact.centre, 0.5 * contact.width - inset
             polygon = np.array([[middle[0], middle[1] + side], [middle[0], middle[1] - side]])
-        heel, tips = _parts(polygon, np.inf if toes is None else line)
-        patches = [(effector.segment, on_segment(heel))] if len(heel) else []
-        if toes is not None and len(tips):
-            patches.append((toes.name, on_segment(tips) - toes.origin))
-        return ContactGeometry(contact.effector, tuple(patches))
-    half_length, half_width = 0.5 * contact.length - inset, 0.5 * contact.width - inset
-    if toes is None:
-        corners = _rectangle((-half_length, half_length), half_width)
-        return ContactGeometry(contact.effector, ((effector.segment, on_segment(corners)),))
-    line = float(np.clip(line, -half_length + 0.01, half_length - 0.01))
-    heel = on_segment(_rectangle((-half_length, line), half_width))
-    tips = on_segment(_rectangle((half_length,), half_width)) - toes.origin
-    return ContactGeometry(contact.effector, ((effector.segment, heel), (toes.name, tips)))
+        heel, tips = _parts(polygon, np.inf if line is None else line)
+    else:
+        half_length, half_width = 0.5 * contact.length - inset, 0.5 * contact.width - inset
+        heel, tips = _rectangle((-half_length, half_length), half_width), none
+        if line is not None:
+            line = float(np.clip(line, -half_length + 0.01, half_length - 0.01))
+            heel, tips = _rectangle((-half_length, line), half_width), _rectangle((half_length,), half_width)
+    patches = [(effector.segment, on_segment(heel))] if len(heel) else []
+    if toes is not None and len(tips):
+        patches.append((toes.name, on_segment(tips) - toes.origin))
+    return ContactGeometry(contact.effector, tuple(patches))
 
 
 def _parts(polygon: FloatArray, line: float) -> tuple[FloatArray, FloatArray]:
@@ -199,14 +192,10 @@ SLIDING_SPEED = 0.03
 
 
 def sliding_edges(contact: Contact, velocity: FloatArray, edges: FloatArray) -> FloatArray:
-    """(e, 3) edges of a contact that slides: all of them the kinetic friction with unit normal force.
+    """(e, 3) edges of a contact at a velocity (3,) [m/s]: those given where it does not slide.
 
-    That is on the friction cone, so outside the inner pyramid: what slides has no other friction.
-
-    Args:
-        contact: The contact.
-        velocity: (3,) of the effector [m/s].
-        edges: (e, 3) what holds when it does not slide.
+    Where it does, all are the kinetic friction with unit normal force. That is on the friction cone, so
+    outside the inner pyramid: what slides has no other friction.
     """
     along = velocity - (velocity @ contact.normal) * contact.normal
     speed = float(np.linalg.norm(along))

@@ -87,11 +87,9 @@ class Reference:
     """
 
     def __init__(self, body: BodyModel, motion: Motion, frames: dict[str, int], period: float) -> None:
-        """Bind a motion to a body.
+        """Bind a motion to the body that it was planned for.
 
         Args:
-            body: The body that the motion was planned for.
-            motion: Planned motion.
             frames: Pinocchio frame indices by the name they get in ``ReferenceSample.effectors``.
             period: Time for which torques are held [s].
 
@@ -110,12 +108,9 @@ class Reference:
         self._next: tuple[float, ReferenceSample] | None = None
 
     def sample(self, time: float, rate: float = 1.0, next_rate: float = 1.0) -> ReferenceSample:
-        """Return the planned state at a time, interpolated between the samples.
+        """Return the planned state at a time of the plan [s], interpolated between the samples.
 
-        Args:
-            time: Of the plan [s].
-            rate: How fast the plan's time goes now, relative to real time.
-            next_rate: And at the end of the hold.
+        The plan's time goes at ``rate`` relative to real time now, at ``next_rate`` at the end of the hold.
         """
         end = time + next_rate * self._period
         now, then = self._rates(time), self._rates(end)

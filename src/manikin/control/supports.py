@@ -132,11 +132,8 @@ def support_intervals(
 ) -> tuple[SupportInterval, ...]:
     """Collect the planned supports of one effector in order of time.
 
-    Args:
-        schedule: Stances and their instants.
-        effector: Name of the effector.
-        early_window: Largest advance of a touch-down [s]; more before the end of a long flight,
-            which comes down slowly, but at most its last third.
+    ``early_window`` is the largest advance of a touch-down [s]; it is more before the end of a long flight,
+    which comes down slowly, but at most its last third.
     """
     intervals: list[SupportInterval] = []
     phases = list(schedule.sequence)

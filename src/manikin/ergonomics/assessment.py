@@ -13,11 +13,11 @@ from manikin.ergonomics.body_parts import SIDES, Bearing, bearing_of
 from manikin.ergonomics.postural_angles import PosturalAngles, postural_angles
 from manikin.ergonomics.rula_reba import (
     ACTIONS,
+    COUPLINGS,
     RISKS,
     Circumstances,
     Scores,
     reba_action_level,
-    reba_coupling,
     reba_load,
     reba_score,
     reba_steps,
@@ -61,10 +61,7 @@ class CumulativeEffort:
 
 
 def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | None:
-    """Add up what the joints do; frames without torques are left out.
-
-    Args:
-        body: Whose torque limits are taken.
+    """Add up what the joints do, with the torque limits of the body; frames without torques are left out.
 
     Returns:
         None if there are not two frames with torques, or the body has no joint.
@@ -72,13 +69,9 @@ def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | Non
     rows = known_torques(motion)
     if not len(body.joint_names) or rows.sum() < 2:
         return None
-    both = rows[1:] & rows[:-1]
-    weight = np.zeros(len(motion.time))
-    half = 0.5 * np.diff(motion.time) * both
-    weight[:-1] += half
-    weight[1:] += half
-    weight, torque, rate = weight[rows], motion.tau[rows, 6:], motion.v[rows, 6:]
-    power = torque * rate
+    weight = durations(motion.time, rows[1:] & rows[:-1])[rows]
+    torque = motion.tau[rows, 6:]
+    power = torque * motion.v[rows, 6:]
     return CumulativeEffort(
         joint_names=body.joint_names,
         squared_share=weight @ body.torque_share(torque) ** 2,
@@ -136,11 +129,7 @@ class JointStrength:
 
 
 def joint_strength(body: BodyModel, motion: Motion, fraction: float = LOADED) -> JointStrength | None:
-    """Compare torques with strength.
-
-    Args:
-        body: Whose torque limits are taken.
-        fraction: Share of the strength above which a joint counts as loaded.
+    """Compare torques with the limits of the body; above ``fraction`` of them a joint counts as loaded.
 
     Returns:
         None if the motion has no frame with torques, or the body no joint.
@@ -176,11 +165,11 @@ def known_torques(motion: Motion) -> np.ndarray:
     return np.asarray(np.isfinite(motion.tau).all(axis=1))
 
 
-def durations(time: FloatArray) -> FloatArray:
-    """(n,) time that each sample stands for, half to each neighbour [s]; 1 for a single sample."""
+def durations(time: FloatArray, counted: NDArray[np.bool_] | bool = True) -> FloatArray:
+    """(n,) time that each sample stands for, half of the steps (n - 1,) that count [s]; 1 for one sample."""
     if len(time) == 1:
         return np.ones(1)
-    steps = np.diff(time)
+    steps = np.diff(time) * counted
     return 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
 
 
@@ -194,19 +183,13 @@ RATE = 5.0
 """Rate at which postures are compared [Hz]."""
 
 
-def held(
-    time: FloatArray, angles: FloatArray, duration: float = LONG, band: float = STILL
-) -> NDArray[np.bool_] | None:
-    """Whether each frame belongs to a posture that is held for long.
+def held(time: FloatArray, angles: FloatArray, duration: float = LONG) -> NDArray[np.bool_] | None:
+    """(n,) whether each frame belongs to a posture that is held for long; None of a motion that is too short.
 
     Args:
         time: (n,) increasing [s].
-        angles: (n, k) [rad].
+        angles: (n, k), each of which stays in a band of the width :data:`STILL` [rad].
         duration: Shortest time that counts [s].
-        band: Width of the band that every angle stays in [rad].
-
-    Returns:
-        (n,), or None of a motion that is too short.
     """
     if time[-1] - time[0] < duration:
         return None
@@ -217,11 +200,9 @@ def held(
         return None
     middle = slice(size // 2, size // 2 + len(even) - size + 1)
     spread = maximum_filter1d(even_angles, size, axis=0) - minimum_filter1d(even_angles, size, axis=0)
-    starts = np.flatnonzero(np.all(spread[middle] <= band, axis=1))
-    steps = np.zeros(len(even) + 1)
-    np.add.at(steps, starts, 1.0)
-    np.add.at(steps, starts + size, -1.0)
-    inside = np.cumsum(steps[:-1]) > 0
+    inside = np.zeros(len(even), dtype=bool)
+    for start in np.flatnonzero(np.all(spread[middle] <= STILL, axis=1)):
+        inside[start : start + size] = True
     return inside[np.clip(np.rint((time - even[0]) * RATE).astype(int), 0, len(even) - 1)]
 
 
@@ -259,37 +240,27 @@ class Assessment:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values: the worst and mean score, the time at each level, and the worst posture's steps."""
-        score, weight = self.score, durations(self.time)
-        worst = int(score.argmax())
+        score, levels, weight = self.score, self.level, durations(self.time)
+        worst, share = int(score.argmax()), weight / weight.sum()
         side = max(SIDES, key=lambda name: self.sides[name][worst])
-        steps = self.steps[side]
-        share = weight / weight.sum()
         return {
             "max": int(score.max()),
             "max_at_s": float(self.time[worst]),
             "max_side": side,
-            "max_steps": {name: int(values[worst]) for name, values in vars(steps).items()},
+            "max_steps": {name: int(values[worst]) for name, values in vars(self.steps[side]).items()},
             "mean": float(share @ score),
             "left_max": int(self.sides["left"].max()),
             "right_max": int(self.sides["right"].max()),
-            "action_level": int(self.level.max()),
-            "action": self.levels[int(self.level.max())],
-            "share_of_time": {
-                str(level): float(share[self.level == level].sum()) for level in self.levels
-            },
+            "action_level": int(levels.max()),
+            "action": self.levels[int(levels.max())],
+            "share_of_time": {str(level): float(share[levels == level].sum()) for level in self.levels},
             "static_known": self.static_known,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, eq=False)
 class PosturalAssessment:
-    """Assessment of postures alone.
-
-    Attributes:
-        bearing: What carries the weight.
-        rula: Scores 1 to 7.
-        reba: Scores 1 to 15.
-    """
+    """Assessment of postures alone, by RULA, 1 to 7, and REBA, 1 to 15."""
 
     angles: PosturalAngles
     bearing: Bearing
@@ -302,9 +273,6 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
 
     Static muscle work is found where the motion lasts longer than a minute: of an arm, and of trunk, neck and
     legs, each by itself. Of a shorter motion :attr:`Circumstances.static` says it.
-
-    Args:
-        given: Circumstances that the motion does not contain.
 
     Raises:
         BodyError: If the body is no human.
@@ -329,7 +297,7 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
         reba[side] = reba_score(
             in_reba[side],
             load=reba_load(circumstances.load_kg, circumstances.load_pattern),
-            coupling=reba_coupling(circumstances.coupling),
+            coupling=COUPLINGS.index(circumstances.coupling),
             activity=(trunk | arm).astype(int) + circumstances.repeated + circumstances.rapid,
         )
     time = motion.time

@@ -1,6 +1,6 @@
 """Trunk, neck, arms and legs of a body: their rotations and what carries the weight, frame by frame."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from manikin.body import BodyModel, limb_named
 from manikin.errors import BodyError
 from manikin.motion import Motion
 from manikin.motion.motion import com_velocity, effector_positions
-from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.numerics.spatial import GRAVITY, FloatArray
 
 Flags = NDArray[np.bool_]
 
@@ -57,14 +57,13 @@ def bearing_of(body: BodyModel, motion: Motion) -> Bearing:
     above the other.
     """
     known = bool(motion.contact_names) and bool(np.any(motion.support))
-    feet = [f"{side}_foot" for side in SIDES]
-    places = effector_positions(body, motion, tuple(feet))
+    feet = ("left_foot", "right_foot")
+    places = effector_positions(body, motion, feet)
     height = np.column_stack([places[name][:, 2] for name in feet])
-    if known:
-        on = np.column_stack([_support(motion, name) for name in feet])
-    else:
+    marked = [_contact(motion, name) for name in feet]
+    on, load = (np.column_stack(part) for part in zip(*marked, strict=True))
+    if not known:
         on = height <= height.min(axis=1, keepdims=True) + NEAR_FLOOR
-    load = np.column_stack([_vertical(motion, name) for name in feet])
     total = load.sum(axis=1)
     left_foot, right_foot = (places[name] for name in feet)
     way = (left_foot - right_foot)[:, :2]
@@ -74,30 +73,24 @@ def bearing_of(body: BodyModel, motion: Motion) -> Bearing:
     with np.errstate(invalid="ignore", divide="ignore"):
         left = np.where(total > 0.0, load[:, 0] / total, between)
     both = on.all(axis=1)
-    speed = np.linalg.norm(com_velocity(motion)[:, :2], axis=1)
-    weight = body.mass * GRAVITY
+    least = ARM_WEIGHT * (body.mass * GRAVITY)
     return Bearing(
         balanced=both & (np.minimum(left, 1.0 - left) >= EVEN),
         both_legs=np.asarray(both, dtype=bool),
-        seated=_support(motion, "buttocks"),
-        walking=speed > WALKING_SPEED,
-        arms={side: _vertical(motion, f"{side}_hand") >= ARM_WEIGHT * weight for side in SIDES},
+        seated=_contact(motion, "buttocks")[0],
+        walking=np.linalg.norm(com_velocity(motion)[:, :2], axis=1) > WALKING_SPEED,
+        arms={side: _contact(motion, f"{side}_hand")[1] >= least for side in SIDES},
         source="contacts" if known else "heights of the soles",
     )
 
 
-def _support(motion: Motion, effector: str) -> Flags:
+def _contact(motion: Motion, effector: str) -> tuple[Flags, FloatArray]:
+    """(n,) whether an effector is in contact, and (n,) upward force on it [N], 0 where it is not known."""
     if effector not in motion.contact_names:
-        return np.zeros(len(motion.time), dtype=bool)
-    return motion.support[:, motion.contact_names.index(effector)]
-
-
-def _vertical(motion: Motion, effector: str) -> FloatArray:
-    """(n,) upward force on an effector [N]; 0 where it is not known."""
-    if effector not in motion.contact_names:
-        return np.zeros(len(motion.time))
-    force = motion.contact_force[:, motion.contact_names.index(effector), 2]
-    return np.maximum(np.nan_to_num(force), 0.0)
+        return np.zeros(len(motion.time), dtype=bool), np.zeros(len(motion.time))
+    column = motion.contact_names.index(effector)
+    force = np.maximum(np.nan_to_num(motion.contact_force[:, column, 2]), 0.0)
+    return motion.support[:, column], force
 
 
 SIDES = ("left", "right")
@@ -149,53 +142,6 @@ def _chain(body: BodyModel, name: str) -> tuple[str, ...]:
         chain.insert(0, following)
         following = body.segment(following).parent
     return tuple(chain)
-
-
-def joint_rotation(body: BodyModel, q: FloatArray, segment: str) -> FloatArray:
-    """(n, 3, 3) rotation of a segment in its parent, for all frames at once.
-
-    Each hinge turns about a constant axis, so that Rodrigues' formula needs only its sines and cosines.
-
-    Args:
-        q: (n, nq) configurations.
-    """
-    found = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-    for hinge in body.segment(segment).hinges:
-        angle = q[:, 7 + body.joint_index(hinge.name)][:, None, None]
-        turn = skew(hinge.axis)
-        found = found @ (np.eye(3) + np.sin(angle) * turn + (1.0 - np.cos(angle)) * (turn @ turn))
-    return found
-
-
-def root_rotation(q: FloatArray) -> FloatArray:
-    """(n, 3, 3) rotation of the root in the world."""
-    x, y, z, w = (q[:, 3:7] / np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
-
-
-def placements(
-    body: BodyModel, q: FloatArray, segments: Sequence[str], rotation: FloatArray, place: FloatArray
-) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Rotations (n, 3, 3) and origins (n, 3) [m] of a chain of segments.
-
-    Args:
-        q: (n, nq) configurations.
-        segments: Each the parent of the next.
-        rotation: (n, 3, 3) of the first one's parent, in the frame that is asked for.
-        place: (n, 3) or (3,) its origin there [m].
-    """
-    rotations, places = [], []
-    for name in segments:
-        place = place + rotation @ body.segment(name).origin
-        rotation = rotation @ joint_rotation(body, q, name)
-        rotations.append(rotation)
-        places.append(place)
-    return rotations, places
 
 
 def twist_about_z(rotation: FloatArray) -> FloatArray:

@@ -12,23 +12,16 @@ frames (x forward, y left, z up). All are 0 in the zero posture: upright, arms h
 Twists are what a rotation is left with when the shortest swing of the long axis is taken away.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.ergonomics.body_parts import (
-    SIDES,
-    Parts,
-    joint_rotation,
-    parts_of,
-    placements,
-    root_rotation,
-    twist_about_z,
-)
+from manikin.ergonomics.body_parts import SIDES, parts_of, twist_about_z
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray
+from manikin.kinematics.point_targets import SegmentPlacements
+from manikin.numerics.spatial import FloatArray, dot
 
 SIDEWAYS = np.deg2rad(45.0)
 """An upper arm lifted further sideways than this has no angle in the sagittal plane worth the name; ours."""
@@ -101,8 +94,8 @@ class PosturalAngles:
     def arm(self, side: str) -> FloatArray:
         """(n, 7) what an arm does [rad]: flexion, abduction, elbow, outward, and the wrist's three."""
         arm = self.arms[side]
-        columns = (arm.flexion, arm.abduction, arm.elbow, arm.outward)
-        return np.column_stack([*columns, arm.wrist_flexion, arm.wrist_deviation, arm.wrist_twist])
+        wrist = arm.wrist_flexion, arm.wrist_deviation, arm.wrist_twist
+        return np.column_stack([arm.flexion, arm.abduction, arm.elbow, arm.outward, *wrist])
 
     def trunk_and_legs(self) -> FloatArray:
         """(n, 8) what trunk, neck and knees do [rad]."""
@@ -112,19 +105,12 @@ class PosturalAngles:
 
     def columns_deg(self) -> dict[str, FloatArray]:
         """Every angle in degrees by its name, ``left_arm_flexion_deg`` and so on."""
-        found = {
-            f"{f.name}_deg": np.rad2deg(getattr(self, f.name))
-            for f in fields(self)
-            if f.name not in ("arms", "knees")
-        }
+        found = {name: angle for name, angle in vars(self).items() if name not in ("arms", "knees")}
         for side in SIDES:
-            found |= {
-                f"{side}_arm_{f.name}_deg": np.rad2deg(getattr(self.arms[side], f.name))
-                for f in fields(ArmAngles)
-                if f.name != "aside"
-            }
-            found[f"{side}_knee_flexion_deg"] = np.rad2deg(self.knees[side])
-        return found
+            arm = vars(self.arms[side]).items()
+            found |= {f"{side}_arm_{name}": angle for name, angle in arm if name != "aside"}
+            found[f"{side}_knee_flexion"] = self.knees[side]
+        return {f"{name}_deg": np.rad2deg(angle) for name, angle in found.items()}
 
 
 def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -> PosturalAngles:
@@ -143,23 +129,20 @@ def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -
     if q.ndim != 2 or q.shape[1] != body.nq:
         raise BodyError(f"configurations have shape {q.shape}; valid: (n, {body.nq})")
     parts = parts_of(body)
-    pelvis = root_rotation(q)
-    rotations, places = placements(body, q, parts.trunk[1:], pelvis, np.zeros(3))
-    chest = rotations[-1] if rotations else pelvis
-    chest_place = places[-1] if places else np.zeros((len(q), 3))
-    base_of_neck = chest_place + chest @ body.segment(parts.neck[0]).origin
-    forward, aside = _bend(_upright_axes(pelvis), base_of_neck)
-    neck, _ = placements(body, q, parts.neck, np.broadcast_to(np.eye(3), pelvis.shape), np.zeros(3))
-    head = neck[-1]
+    pelvis, chest, neck, head = parts.trunk[0], parts.trunk[-1], parts.neck[0], parts.neck[-1]
+    limbs = [name for side in SIDES for name in (*parts.arms[side], *parts.legs[side])]
+    at = _Frames(body, q, [pelvis, chest, neck, head, *limbs])
+    forward, aside = _bend(_upright_axes(at.turns[pelvis]), at.places[neck])
+    looks = at.turned(head, chest)
     return PosturalAngles(
         trunk_flexion=forward,
         trunk_side_bend=aside,
-        trunk_twist=twist_about_z(np.swapaxes(pelvis, 1, 2) @ chest),
-        neck_flexion=np.arctan2(head[:, 0, 2], head[:, 2, 2]) - neck_upright,
-        neck_side_bend=_arcsin(head[:, 1, 2]),
-        neck_twist=twist_about_z(head),
-        arms={side: _arm(body, q, parts, side, chest) for side in SIDES},
-        knees={side: _arccos(joint_rotation(body, q, parts.legs[side][1])[:, 2, 2]) for side in SIDES},
+        trunk_twist=twist_about_z(at.turned(chest, pelvis)),
+        neck_flexion=np.arctan2(looks[:, 0, 2], looks[:, 2, 2]) - neck_upright,
+        neck_side_bend=_arcsin(looks[:, 1, 2]),
+        neck_twist=twist_about_z(looks),
+        arms={side: _arm(at, parts.arms[side], chest, side) for side in SIDES},
+        knees={side: _tilt(at.turned(shank, thigh)) for side, (thigh, shank, _) in parts.legs.items()},
     )
 
 
@@ -170,13 +153,7 @@ def upright_neck(body: BodyModel, q: FloatArray) -> float | None:
     skeletons we looked at), while the neck of our human is upright at 0. So where recorded points are
     followed an upright neck has that angle. It is taken from the recording itself: the median over the frames
     whose trunk is within 10 degrees of the vertical, or None without such a frame. A person who looks down
-    all the time is not noticed.
-
-    Args:
-        q: (n, nq) configurations.
-
-    Raises:
-        BodyError: As :func:`postural_angles`.
+    all the time is not noticed. Arguments and errors are those of :func:`postural_angles`.
     """
     angles = postural_angles(body, q)
     upright = np.hypot(angles.trunk_flexion, angles.trunk_side_bend) <= UPRIGHT
@@ -197,24 +174,34 @@ def _bend(axes: FloatArray, line: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.arctan2(x, z), _arcsin(y)
 
 
-def _arm(body: BodyModel, q: FloatArray, parts: Parts, side: str, chest: FloatArray) -> ArmAngles:
+class _Frames:
+    """Rotations (n, 3, 3) of segments to the world, and their places (n, 3) from the root [m], by name."""
+
+    def __init__(self, body: BodyModel, q: FloatArray, names: Sequence[str]) -> None:
+        placed = SegmentPlacements(body, names).of(q)
+        self.turns = dict(zip(names, placed.turns.transpose(0, 3, 1, 2), strict=True))
+        self.places = dict(zip(names, placed.shifts.transpose(0, 2, 1), strict=True))
+
+    def turned(self, segment: str, carrier: str) -> FloatArray:
+        """(n, 3, 3) rotation of a segment in the frame of another one."""
+        return np.swapaxes(self.turns[carrier], 1, 2) @ self.turns[segment]
+
+
+def _arm(at: _Frames, arm: tuple[str, str, str], chest: str, side: str) -> ArmAngles:
     outward = 1.0 if side == "left" else -1.0
-    still = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-    rotations, places = placements(body, q, parts.arms[side], still, np.zeros(3))
-    upper, fore = -rotations[0][:, :, 2], -rotations[1][:, :, 2]  # limbs hang along -z
-    vertical = -np.einsum("nj,nj->n", chest[:, 2, :], upper)
-    in_upper_arm = np.swapaxes(rotations[0], 1, 2) @ rotations[1]
-    wrist = np.swapaxes(rotations[1], 1, 2) @ rotations[2]
+    upper, fore = (-at.turned(name, chest)[:, :, 2] for name in arm[:2])  # limbs hang along -z
+    away = at.places[arm[2]] - at.places[chest]
+    in_upper_arm, wrist = at.turned(arm[1], arm[0]), at.turned(arm[2], arm[1])
     in_hand = wrist[:, 2, :]  # the forearm's long axis, free of a turn about it
     turn = twist_about_z(in_upper_arm) + np.arctan2(-wrist[:, 0, 1], wrist[:, 1, 1])
     return ArmAngles(
         flexion=np.arctan2(upper[:, 0], -upper[:, 2]),
         abduction=outward * _arcsin(upper[:, 1]),
-        elevation=_arccos(-upper[:, 2]),
-        from_vertical=_arccos(vertical),
-        elbow=_arccos(np.einsum("ni,ni->n", upper, fore)),
+        elevation=_tilt(at.turned(arm[0], chest)),
+        from_vertical=_tilt(at.turns[arm[0]]),
+        elbow=_tilt(in_upper_arm),
         outward=outward * _arcsin(fore[:, 1]),
-        aside=outward * places[2][:, 1],
+        aside=outward * dot(at.turns[chest][:, :, 1], away),
         wrist_flexion=-outward * _arcsin(in_hand[:, 1]),
         wrist_deviation=np.arctan2(in_hand[:, 0], in_hand[:, 2]),
         wrist_twist=-outward * turn,
@@ -225,5 +212,7 @@ def _arcsin(value: FloatArray) -> FloatArray:
     return np.arcsin(np.clip(value, -1.0, 1.0))
 
 
-def _arccos(value: FloatArray) -> FloatArray:
-    return np.arccos(np.clip(value, -1.0, 1.0))
+def _tilt(turn: FloatArray) -> FloatArray:
+    """(n,) angle between the z axes of a segment and of the frame that it is turned in [rad]."""
+    x, y, z = turn[:, :, 2].T
+    return np.arctan2(np.hypot(x, y), z)

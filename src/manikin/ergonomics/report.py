@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -92,18 +93,25 @@ def lowest_margin(
     if not np.isfinite(motion.margin).any():
         return None
     row = int(np.nanargmin(motion.margin))
-    on = tuple(name for name, held in zip(motion.contact_names, motion.support[row], strict=True) if held)
-    found = LowestMargin(float(motion.margin[row]), motion.margin_unit, float(motion.time[row]), on)
+    held = zip(motion.contact_names, motion.support[row], strict=True)
+    supports = tuple(name for name, touches in held if touches)
+    found = LowestMargin(float(motion.margin[row]), motion.margin_unit, float(motion.time[row]), supports)
     if motion.margin_unit != "N.m" or body.is_point_mass:
         return replace(found, unknown="the margin of a point mass in the force space has no stance")
-    if schedule is not None:
-        return _of_schedule(found, body, motion, schedule, row)
-    stance = rebuilt_stance(body, motion, row, friction)
-    if not len(stance):
-        return replace(found, unknown="nothing is in contact at that instant")
-    (W,) = wrench_polytopes([stance])
-    com, wrench = _dynamic_wrench(body, motion, row)
-    return _explained(found, W, wrench, com, "effectors in contact")
+    com, wrench = _dynamic_wrench(body, motion, row, schedule)
+    if schedule is None:
+        source, on, wrenches = "effectors in contact", "in contact", [wrench]
+        stances = [rebuilt_stance(body, motion, row, friction)]
+    else:
+        source, on = "planned contacts", "planned to be in contact"
+        stances = _planned_stances(body, schedule, found.time)
+        wrenches = [*_measured_wrench(motion, schedule, row), wrench]
+    polytopes = wrench_polytopes([stance for stance in stances if len(stance)])
+    if not polytopes:
+        return replace(found, unknown=f"nothing is {on} at that instant")
+    W, wrench = min(product(polytopes, wrenches), key=lambda pair: abs(_margin_of(*pair, com) - found.value))
+    limiting = W.limiting(wrench_about(wrench, W.reference), com)
+    return replace(found, limiting=limiting, again=_margin_of(W, wrench, com), stance=source)
 
 
 def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = FRICTION) -> Stance:
@@ -112,8 +120,8 @@ def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = 
     if body.stature is not None:
         sizes["buttocks"] = SEAT_LENGTH * body.stature, SEAT_WIDTH * body.stature
     if body.sole_length is not None and body.sole_width is not None:
-        sole_size = body.sole_length, body.sole_width
-        sizes |= {name: sole_size for name in motion.contact_names if name.endswith("foot")}
+        feet = [name for name in motion.contact_names if name.endswith("foot")]
+        sizes |= dict.fromkeys(feet, (body.sole_length, body.sole_width))
     placements = {
         name: configuration.effector_placement(name)
         for name, held in zip(motion.contact_names, motion.support[row], strict=True)
@@ -122,34 +130,18 @@ def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = 
     return stance_at(placements, sizes, friction, default_normal_force_cap(body.mass))
 
 
-def _of_schedule(
-    found: LowestMargin, body: BodyModel, motion: Motion, schedule: ContactSchedule, row: int
-) -> LowestMargin:
-    com, wrench = _dynamic_wrench(body, motion, row, schedule)
-    wrenches = [wrench]
+def _planned_stances(body: BodyModel, schedule: ContactSchedule, time: float) -> list[Stance]:
+    """Of the phase at an instant [s] and its neighbours."""
+    phase, phases = int(schedule.phase_at(time)), schedule.sequence
+    near = [number for number in (phase, phase - 1, phase + 1) if 0 <= number < len(phases)]
+    return [phases[number].stance.bounded(body.mass) for number in near]
+
+
+def _measured_wrench(motion: Motion, schedule: ContactSchedule, row: int) -> list[FloatArray]:
+    """The (6,) sum of the motion's contact forces in one frame; none where it is not known."""
     frame = replace(motion, **{name: array[row : row + 1] for name, array in motion.arrays().items()})
     measured = contact_wrench(frame, schedule)[0]
-    if np.isfinite(measured).all() and measured.any():
-        wrenches.insert(0, measured)
-    phase = int(schedule.phase_at(found.time))
-    near = [phase, phase - 1, phase + 1]
-    polytopes = wrench_polytopes([
-        schedule.sequence[number].stance.bounded(body.mass)
-        for number in near
-        if 0 <= number < len(schedule.sequence) and len(schedule.sequence[number].stance)
-    ])  # fmt: skip
-    if not polytopes:
-        return replace(found, unknown="nothing is planned to be in contact at that instant")
-    pairs: list[tuple[WrenchPolytope, FloatArray]] = [(W, wrench) for W in polytopes for wrench in wrenches]
-    W, wrench = min(pairs, key=lambda pair: abs(_margin_of(*pair, com) - found.value))
-    return _explained(found, W, wrench, com, "planned contacts")
-
-
-def _explained(
-    found: LowestMargin, W: WrenchPolytope, wrench: FloatArray, com: FloatArray, stance: str
-) -> LowestMargin:
-    limiting = W.limiting(wrench_about(wrench, W.reference), com)
-    return replace(found, limiting=limiting, again=_margin_of(W, wrench, com), stance=stance)
+    return [measured] if np.isfinite(measured).all() and measured.any() else []
 
 
 def _margin_of(W: WrenchPolytope, wrench: FloatArray, com: FloatArray) -> float:
@@ -241,10 +233,9 @@ def ergonomics_of(
     given: Circumstances | None = None, fraction: float = LOADED, friction: float = FRICTION,
     untold: Sequence[str] = (), lowest: LowestMargin | None = None,
 ) -> Ergonomics:  # fmt: skip
-    """Judge a motion, recorded, planned or executed.
+    """Judge a motion, recorded, planned or executed; RULA and REBA exist for humans only.
 
     Args:
-        body: Who moves; RULA and REBA exist for humans only.
         schedule: Its planned contacts, for the limiting contact.
         given: Circumstances that the motion does not contain.
         fraction: Share of the strength above which a joint counts as loaded.
@@ -261,8 +252,7 @@ def ergonomics_of(
             f"motion has {len(motion.joint_names)} joints, not those of body {body.name!r}; "
             "valid: a motion of this body"
         )
-    missing: dict[str, str] = {}
-    posture = None
+    missing, posture = {}, None
     try:
         if parts_of(body).trunk[-1] in untold:
             missing["posture"] = "the recording says nothing about the trunk"
@@ -279,14 +269,14 @@ def ergonomics_of(
         missing["margin"] = "the motion has no margin"
     elif margin.unknown is not None:
         missing["margin"] = f"no limiting contact: {margin.unknown}"
-    return Ergonomics(
-        motion.time, given or Circumstances(), posture, strength, effort, margin, motion.margin, missing,
-        tuple(untold),
-    )  # fmt: skip
+    found = posture, strength, effort, margin, motion.margin
+    return Ergonomics(motion.time, given or Circumstances(), *found, missing, tuple(untold))
 
 
 def _strength(found: JointStrength) -> dict[str, Any]:
     worst = found.order[0]
+    joints = {"limit_Nm": found.limit, "max_share": found.peak, "max_at_s": found.peak_time}
+    joints["share_of_time_above"] = found.loaded
     return {
         "max_share": float(found.peak[worst]),
         "max_joint": found.joint_names[worst],
@@ -294,19 +284,18 @@ def _strength(found: JointStrength) -> dict[str, Any]:
         "fraction": found.fraction,
         "known_share": found.known,
         "limits": found.source,
-        "joints": {
-            found.joint_names[index]: {
-                "limit_Nm": float(found.limit[index]),
-                "max_share": float(found.peak[index]),
-                "max_at_s": float(found.peak_time[index]),
-                "share_of_time_above": float(found.loaded[index]),
-            }
-            for index in found.order
-        },
+        "joints": {found.joint_names[index]: _row(joints, index) for index in found.order},
     }
 
 
+def _row(columns: Mapping[str, FloatArray], index: int) -> dict[str, float]:
+    """One joint's values of columns (j,) each, by their names."""
+    return {name: float(values[index]) for name, values in columns.items()}
+
+
 def _effort(found: CumulativeEffort) -> dict[str, Any]:
+    joints = {"squared_share_s": found.squared_share, "positive_work_J": found.positive_work}
+    joints["negative_work_J"] = found.negative_work
     return {
         "duration_s": found.duration,
         "squared_share_s": float(found.squared_share.sum()),
@@ -314,14 +303,7 @@ def _effort(found: CumulativeEffort) -> dict[str, Any]:
         "positive_work_J": float(found.positive_work.sum()),
         "negative_work_J": float(found.negative_work.sum()),
         "absolute_work_J": float(found.absolute_work.sum()),
-        "joints": {
-            joint: {
-                "squared_share_s": float(found.squared_share[index]),
-                "positive_work_J": float(found.positive_work[index]),
-                "negative_work_J": float(found.negative_work[index]),
-            }
-            for index, joint in enumerate(found.joint_names)
-        },
+        "joints": {name: _row(joints, index) for index, name in enumerate(found.joint_names)},
     }
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from manikin.ergonomics.body_parts import SIDES, Bearing
+from manikin.ergonomics.body_parts import Bearing
 from manikin.ergonomics.postural_angles import ArmAngles, PosturalAngles
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number
@@ -20,11 +20,7 @@ Scores = NDArray[np.int64]
 
 
 def looked_up(table: Scores, **steps: ArrayLike) -> Scores:
-    """Entries of a table whose axes all begin with the score 1.
-
-    Args:
-        table: One axis per step.
-        steps: Scores of each axis in order, arrays or numbers; their names are those of the messages.
+    """Entries of a table whose axes all begin with the score 1, by scores named as in messages, in order.
 
     Raises:
         InputError: If a score is no whole number from 1 to the length of its axis.
@@ -59,20 +55,15 @@ TURNED = 10.0
 ABDUCTED = 20.0
 """Beyond this an upper arm is abducted [deg]; a hanging arm stands off by up to 15."""
 
-WRIST_NEUTRAL = 5.0
-"""Up to this a wrist is neither flexed nor extended [deg]."""
-
-WRIST_BENT = 15.0
-"""Beyond this it is strongly so [deg]; published."""
+WRIST_NEUTRAL, WRIST_BENT = 5.0, 15.0
+"""Up to this a wrist is neither flexed nor extended; beyond the second, published, strongly so [deg]."""
 
 WRIST_AT_END = 60.0
 """Beyond this a forearm is turned to near the end of its range [deg], which is 80 deg to either side."""
 
-OUTWARD = 30.0
-"""A bent forearm that points further out than this works out to the side of the body [deg]."""
-
-BENT_ELBOW = 30.0
-"""Less bent arms hang; they point where the upper arm does [deg]."""
+OUTWARD, BENT_ELBOW = 30.0, 30.0
+"""A bent forearm that points further out than this works out to the side of the body; arms that are less bent
+than the second hang, and point where the upper arm does [deg]."""
 
 
 def degrees(angle: FloatArray) -> FloatArray:
@@ -86,19 +77,31 @@ def band(value: FloatArray, *borders: float) -> NDArray[np.int64]:
 
 
 def turned(angle: FloatArray) -> NDArray[np.bool_]:
-    """(n,) whether a trunk or neck is twisted or bent to the side."""
+    """(n,) whether a trunk or neck is twisted or bent to the side, or a wrist deviated."""
     return np.abs(degrees(angle)) > TURNED
 
 
-def out_of_line(arm: ArmAngles) -> NDArray[np.bool_]:
-    """(n,) whether an arm works across the midline of the body or out to its side."""
-    out = (degrees(arm.elbow) > BENT_ELBOW) & (degrees(arm.outward) > OUTWARD)
-    return out | (arm.aside < 0.0)
+def _out(arm: ArmAngles, outward: FloatArray) -> NDArray[np.bool_]:
+    """(n,) whether a bent forearm points out of the sagittal plane by an angle (n,) [rad]."""
+    return (degrees(arm.elbow) > BENT_ELBOW) & (degrees(outward) > OUTWARD)
 
 
-def rotated(arm: ArmAngles) -> NDArray[np.bool_]:
-    """(n,) whether an upper arm is turned about itself: the bent forearm points out of the sagittal plane."""
-    return (degrees(arm.elbow) > BENT_ELBOW) & (np.abs(degrees(arm.outward)) > OUTWARD)
+def _bent_trunk(angles: PosturalAngles) -> Scores:
+    """Score of the trunk's flexion, the same in both methods."""
+    flexion = degrees(angles.trunk_flexion)
+    return np.maximum(band(flexion, NEUTRAL, 20.0, 60.0), band(-flexion, NEUTRAL, 20.0))
+
+
+def _raised_arm(arm: ArmAngles) -> Scores:
+    """Score of an upper arm's flexion, the same in both methods."""
+    raised = degrees(arm.raised)
+    return np.where(raised < -20.0, 2, band(raised, 20.0, 45.0, 90.0))
+
+
+def _lower_arm(arm: ArmAngles) -> Scores:
+    """Score of an elbow, the same in both methods."""
+    elbow = degrees(arm.elbow)
+    return np.where((elbow >= 60.0) & (elbow <= 100.0), 1, 2)
 
 
 PATTERNS = ("intermittent", "static", "shock")
@@ -190,13 +193,7 @@ _SLIGHT, _KNEE, _DEEP_KNEE, _HANGING = 20.0, 30.0, 60.0, 20.0
 class RebaSteps:
     """Scores of the parts of the body, (n,) each or numbers; those of an arm are of one side.
 
-    Attributes:
-        trunk: 1 to 5.
-        neck: 1 to 3.
-        legs: 1 to 4.
-        upper_arm: 1 to 6.
-        lower_arm: 1 or 2.
-        wrist: 1 to 3.
+    Trunk 1 to 5, neck 1 to 3, legs 1 to 4, upper arm 1 to 6, lower arm 1 or 2, wrist 1 to 3.
     """
 
     trunk: ArrayLike
@@ -210,16 +207,13 @@ class RebaSteps:
 def reba_score(
     steps: RebaSteps, *, load: ArrayLike = 0, coupling: ArrayLike = 0, activity: ArrayLike = 0
 ) -> Scores:
-    """REBA score of postures, 1 to 15.
+    """(n,) REBA score of postures, 1 to 15; of shape () for numbers.
 
     Args:
         load: 0 to 3, see :func:`reba_load`.
         coupling: 0 (good) to 3 (unacceptable).
         activity: 0 to 3: 1 each for what is held for more than a minute, small movements repeated more than
             four times a minute, and rapid large changes of posture or an unstable base.
-
-    Returns:
-        (n,), or of shape () for numbers.
 
     Raises:
         InputError: If a score is not among those of its part.
@@ -243,43 +237,28 @@ def reba_action_level(score: ArrayLike) -> Scores:
     return np.searchsorted(_LEVEL_BEGINS, np.asarray(score), side="right")
 
 
-def reba_coupling(coupling: str) -> int:
-    """Coupling score of a grip by name, 0 to 3."""
-    return COUPLINGS.index(coupling)
-
-
 def reba_steps(
     angles: PosturalAngles, bearing: Bearing, given: Circumstances | None = None
 ) -> Mapping[str, RebaSteps]:
-    """Step scores of a motion, by side.
+    """Step scores of a motion, (n,) each, by side.
 
     Ours: an arm is assisted by gravity when it hangs, within 20 degrees of the vertical, from a trunk that is
     bent by more than that.
-
-    Args:
-        angles: (n,) each.
-        bearing: What carries the weight.
     """
-    circumstances = given or Circumstances()
-    trunk, neck, legs = _reba_trunk(angles), _reba_neck(angles), _legs(angles, bearing)
-    return {
-        side: RebaSteps(
-            trunk, neck, legs, _upper_arm(angles, bearing, circumstances, side), *_fore(angles.arms[side])
-        )
-        for side in SIDES
-    }
-
-
-def _reba_trunk(angles: PosturalAngles) -> Scores:
-    flexion = degrees(angles.trunk_flexion)
-    score = np.maximum(band(flexion, NEUTRAL, 20.0, 60.0), band(-flexion, NEUTRAL, 20.0))
-    return score + (turned(angles.trunk_twist) | turned(angles.trunk_side_bend))
-
-
-def _reba_neck(angles: PosturalAngles) -> Scores:
+    given = given or Circumstances()
+    trunk = _bent_trunk(angles) + (turned(angles.trunk_twist) | turned(angles.trunk_side_bend))
     flexion = degrees(angles.neck_flexion)
-    score = np.where((flexion > _SLIGHT) | (flexion < -NEUTRAL), 2, 1)
-    return score + (turned(angles.neck_twist) | turned(angles.neck_side_bend))
+    neck = np.where((flexion > _SLIGHT) | (flexion < -NEUTRAL), 2, 1)
+    neck = neck + (turned(angles.neck_twist) | turned(angles.neck_side_bend))
+    legs, leaning, found = _legs(angles, bearing), degrees(angles.trunk_flexion) > _SLIGHT, {}
+    for side, arm in angles.arms.items():
+        upper = _raised_arm(arm) + ((degrees(arm.abduction) > ABDUCTED) | _out(arm, np.abs(arm.outward)))
+        hangs = (degrees(arm.from_vertical) <= _HANGING) & leaning
+        upper = np.clip(upper + int(given.shoulder_raised) - (bearing.arms[side] | hangs), 1, 6)
+        turned_hand = turned(arm.wrist_deviation) | (np.abs(degrees(arm.wrist_twist)) > WRIST_AT_END)
+        wrist = band(np.abs(degrees(arm.wrist_flexion)), WRIST_BENT) + turned_hand
+        found[side] = RebaSteps(trunk, neck, legs, upper, _lower_arm(arm), wrist)
+    return found
 
 
 def _legs(angles: PosturalAngles, bearing: Bearing) -> Scores:
@@ -292,24 +271,6 @@ def _legs(angles: PosturalAngles, bearing: Bearing) -> Scores:
     knee = np.where(bearing.walking, knees.min(axis=0), knees.max(axis=0))
     bent = (knee >= _KNEE).astype(np.int64) + (knee > _DEEP_KNEE)
     return score + np.where(bearing.seated, 0, bent)
-
-
-def _upper_arm(angles: PosturalAngles, bearing: Bearing, given: Circumstances, side: str) -> Scores:
-    arm = angles.arms[side]
-    raised = degrees(arm.raised)
-    score = np.where(raised < -_SLIGHT, 2, band(raised, _SLIGHT, 45.0, 90.0))
-    score = score + ((degrees(arm.abduction) > ABDUCTED) | rotated(arm)) + int(given.shoulder_raised)
-    hangs = (degrees(arm.from_vertical) <= _HANGING) & (degrees(angles.trunk_flexion) > _SLIGHT)
-    return np.clip(score - (bearing.arms[side] | hangs), 1, 6)
-
-
-def _fore(arm: ArmAngles) -> tuple[Scores, Scores]:
-    """Scores of lower arm and wrist."""
-    elbow = degrees(arm.elbow)
-    off_line = np.abs(degrees(arm.wrist_deviation)) > TURNED
-    twisted = np.abs(degrees(arm.wrist_twist)) > WRIST_AT_END
-    wrist = band(np.abs(degrees(arm.wrist_flexion)), WRIST_BENT) + (off_line | twisted)
-    return np.where((elbow >= 60.0) & (elbow <= 100.0), 1, 2), wrist
 
 
 TABLE_A = np.array([
@@ -357,14 +318,7 @@ ACTIONS = {
 class RulaSteps:
     """Scores of the parts of the body, (n,) each or numbers; those of an arm are of one side.
 
-    Attributes:
-        upper_arm: 1 to 6.
-        lower_arm: 1 to 3.
-        wrist: 1 to 4.
-        wrist_twist: 1 or 2.
-        neck: 1 to 6.
-        trunk: 1 to 6.
-        legs: 1 or 2.
+    Upper arm 1 to 6, lower arm 1 to 3, wrist 1 to 4, its twist 1 or 2, neck and trunk 1 to 6, legs 1 or 2.
     """
 
     upper_arm: ArrayLike
@@ -379,15 +333,12 @@ class RulaSteps:
 def rula_score(
     steps: RulaSteps, *, muscle_arm: ArrayLike = 0, muscle_body: ArrayLike = 0, force: ArrayLike = 0
 ) -> Scores:
-    """Grand score of postures, 1 to 7.
+    """(n,) grand score of postures, 1 to 7; of shape () for numbers.
 
     Args:
         muscle_arm: 1 where the arm is held for more than a minute or moves more than four times a minute.
         muscle_body: The same of neck, trunk and legs.
         force: 0 to 3, see :func:`rula_force`; it counts for both.
-
-    Returns:
-        (n,), or of shape () for numbers.
 
     Raises:
         InputError: If a score is not among those of its part.
@@ -418,44 +369,28 @@ def rula_action_level(score: ArrayLike) -> Scores:
 def rula_steps(
     angles: PosturalAngles, bearing: Bearing, given: Circumstances | None = None
 ) -> Mapping[str, RulaSteps]:
-    """Step scores of a motion, by side.
-
-    Args:
-        angles: (n,) each.
-        bearing: What carries the weight.
-    """
-    circumstances = given or Circumstances()
-    neck, trunk = _neck(angles), _trunk(angles, bearing, circumstances)
-    legs = np.where(bearing.balanced | (bearing.seated & bearing.both_legs), 1, 2)
-    return {side: _arm(angles, bearing, circumstances, side, neck, trunk, legs) for side in SIDES}
-
-
-def _neck(angles: PosturalAngles) -> Scores:
+    """Step scores of a motion, (n,) each, by side."""
+    given = given or Circumstances()
     flexion = degrees(angles.neck_flexion)
-    score = np.where(flexion < -NEUTRAL, 4, band(flexion, 10.0, 20.0))
-    return score + turned(angles.neck_twist) + turned(angles.neck_side_bend)
+    neck = np.where(flexion < -NEUTRAL, 4, band(flexion, 10.0, 20.0))
+    neck = neck + turned(angles.neck_twist) + turned(angles.neck_side_bend)
+    trunk = _sitting_trunk(angles, bearing, given)
+    legs, found = np.where(bearing.balanced | (bearing.seated & bearing.both_legs), 1, 2), {}
+    for side, arm in angles.arms.items():
+        upper = _raised_arm(arm) + (degrees(arm.abduction) > ABDUCTED)
+        upper = np.clip(upper + int(given.shoulder_raised) - bearing.arms[side], 1, 6)
+        lower = _lower_arm(arm) + (_out(arm, arm.outward) | (arm.aside < 0.0))  # or across the midline
+        bent = np.abs(degrees(arm.wrist_flexion))
+        wrist = band(bent, WRIST_NEUTRAL, WRIST_BENT) + turned(arm.wrist_deviation)
+        twist = np.where(np.abs(degrees(arm.wrist_twist)) > WRIST_AT_END, 2, 1)
+        found[side] = RulaSteps(upper, lower, wrist, twist, neck, trunk, legs)
+    return found
 
 
-def _trunk(angles: PosturalAngles, bearing: Bearing, given: Circumstances) -> Scores:
-    flexion = degrees(angles.trunk_flexion)
-    forward, backward = band(flexion, NEUTRAL, 20.0, 60.0), band(-flexion, NEUTRAL, 20.0)
-    score = np.maximum(forward, backward)
+def _sitting_trunk(angles: PosturalAngles, bearing: Bearing, given: Circumstances) -> Scores:
+    """Score of a trunk in RULA, of who sits with or without support, too."""
+    score = _bent_trunk(angles)
     unsupported = bearing.seated & (not given.trunk_supported)
-    supported = bearing.seated & given.trunk_supported & (flexion <= NEUTRAL)
+    supported = bearing.seated & given.trunk_supported & (degrees(angles.trunk_flexion) <= NEUTRAL)
     score = np.where(supported, 1, np.where(unsupported, np.maximum(score, 2), score))
     return score + turned(angles.trunk_twist) + turned(angles.trunk_side_bend)
-
-
-def _arm(
-    angles: PosturalAngles, bearing: Bearing, given: Circumstances, side: str, neck: Scores,
-    trunk: Scores, legs: Scores,
-) -> RulaSteps:  # fmt: skip
-    arm = angles.arms[side]
-    raised, elbow = degrees(arm.raised), degrees(arm.elbow)
-    upper = np.where(raised < -20.0, 2, band(raised, 20.0, 45.0, 90.0)) + (degrees(arm.abduction) > ABDUCTED)
-    upper = upper + int(given.shoulder_raised) - bearing.arms[side]
-    lower = np.where((elbow >= 60.0) & (elbow <= 100.0), 1, 2) + out_of_line(arm)
-    bent = np.abs(degrees(arm.wrist_flexion))
-    wrist = band(bent, WRIST_NEUTRAL, WRIST_BENT) + (np.abs(degrees(arm.wrist_deviation)) > TURNED)
-    twist = np.where(np.abs(degrees(arm.wrist_twist)) > WRIST_AT_END, 2, 1)
-    return RulaSteps(np.clip(upper, 1, 6), lower, wrist, twist, neck, trunk, legs)

@@ -13,26 +13,19 @@ and lean of one trunk, is our own.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, ContactKind
 from manikin.kinematics.reach_sampler import LocalContact, ReachBody, ReachSampler
 from manikin.numerics.spatial import FloatArray, frozen_array, rotations
 
-
-def _template() -> FloatArray:
-    """(26, 3) unit vectors towards the faces, edges and corners of a cube."""
-    grid = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    vectors = grid[np.abs(grid).sum(axis=1) > 0.0]
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
-
-
-NORMALS = frozen_array(_template(), "normals")
+_CUBE = np.delete(np.array(list(product([-1.0, 0.0, 1.0], repeat=3))), 13, axis=0)  # without its middle
+NORMALS = frozen_array(_CUBE / np.linalg.norm(_CUBE, axis=1)[:, None], "normals")
 """(26, 3) normals of a region in the heading frame of its stance."""
-
 
 ROOM = 0.01
 """Room that is left to the faces of a region around places that are known to be reached [m]."""
@@ -45,22 +38,18 @@ class ComRegion:
     Attributes:
         normals: (m, 3) unit outward normals.
         offsets: (m,) the region is ``normals @ p <= offsets`` [m].
-        heading: (2,) least and largest heading of the root found there [rad], from that of the stance.
-        lean: (2,) least and largest pitch of the trunk found there [rad].
         missed: Least violation found where no posture holds the contacts [rad, or 3 rad a metre]; 0 where
             there is one. An empty region has no rows.
     """
 
     normals: FloatArray
     offsets: FloatArray
-    heading: FloatArray
-    lean: FloatArray
     missed: float = 0.0
 
     @classmethod
     def everywhere(cls) -> "ComRegion":
         """The region without a face."""
-        return cls(np.zeros((0, 3)), np.zeros(0), np.zeros(2), np.zeros(2))
+        return cls(np.zeros((0, 3)), np.zeros(0))
 
     @property
     def empty(self) -> bool:
@@ -89,10 +78,6 @@ class ComRegion:
             return np.full(places.shape[:-1], np.inf)
         return np.max(places @ self.normals.T - self.offsets, axis=-1, initial=-np.inf)
 
-    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
-        """(...) whether (..., 3) points are inside or at most ``tolerance`` [m] beyond a face."""
-        return self.violation(points) <= tolerance
-
 
 class ComReach:
     """Regions of the centre of mass of one body over any of its stances.
@@ -110,9 +95,10 @@ class ComReach:
         }
 
     @staticmethod
+    @lru_cache(maxsize=16)
     def of(body: BodyModel) -> "ComReach":
         """The regions of a body, prepared once."""
-        return _reach_of(body)
+        return ComReach(body)
 
     def region(self, contacts: Sequence[Contact]) -> ComRegion:
         """Region of the centre of mass with all contacts held.
@@ -140,13 +126,8 @@ class ComReach:
     def _sampled(self, contacts: Sequence[LocalContact]) -> ComRegion:
         held = ReachSampler(self.parts, contacts, NORMALS).held()
         if held.missed > 0.0:
-            nothing = np.zeros(2)
-            return ComRegion(np.zeros((0, 3)), np.zeros(0), nothing, nothing, held.missed)
-        yaw, lean = held.unknowns[:, 3], held.unknowns[:, 4]
-        return ComRegion(
-            NORMALS, held.projections.max(axis=0), np.array([yaw.min(), yaw.max()]),
-            np.array([lean.min(), lean.max()]),
-        )  # fmt: skip
+            return ComRegion(np.zeros((0, 3)), np.zeros(0), held.missed)
+        return ComRegion(NORMALS, held.projections.max(axis=0))
 
     def _heading_frame(self, contacts: Sequence[Contact]) -> tuple[FloatArray, FloatArray]:
         """Axes and origin of the stance: the middle of its contacts, heading as standing fits them best."""
@@ -162,11 +143,6 @@ class ComReach:
             turn = np.exp(1j * contacts[0].yaw)
         yaw = float(np.angle(turn))
         return rotations(np.array(yaw), np.array(0.0), np.array(0.0)), origin
-
-
-@lru_cache(maxsize=16)
-def _reach_of(body: BodyModel) -> ComReach:
-    return ComReach(body)
 
 
 def _in_frame(contact: Contact, frame: FloatArray, origin: FloatArray) -> LocalContact:

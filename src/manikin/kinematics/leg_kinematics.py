@@ -125,15 +125,9 @@ def _plane(
 ) -> FloatArray:
     """(..., 3, 3) axes (front, side, up) of the plane in which the leg bends.
 
-    It is turned about the line from hip to ankle so that the shank's left-right axis is perpendicular to the
-    foot's long axis, as the two axes of the ankle demand.
-
-    Args:
-        up: (..., 3) from the ankle to the hip, unit.
-        aside: (..., 3) to the left, roughly.
-        toes: (..., 3) the foot's long axis, unit.
-        rotation: (...) of the knee [rad].
-        lean: (...) of the shank from the line [rad].
+    It is turned about the line from hip to ankle, ``up`` (..., 3), so that the shank's left-right axis, after
+    the knee's rotation and at its lean from the line (...) [rad], is perpendicular to the foot's long axis
+    ``toes``, as the two axes of the ankle demand; ``aside`` is roughly to the left.
     """
     side = aside - dot(aside, up)[..., None] * up
     side /= np.sqrt(dot(side, side))[..., None]

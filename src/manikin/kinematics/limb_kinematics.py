@@ -48,17 +48,18 @@ class ReachVolume:
         """(...) residual radius ``min(b - A s)`` of (..., 3) points ([Tonneau2015]_ algorithm 1) [m]."""
         return np.min(self.b - np.asarray(points, dtype=np.float64) @ self.A.T, axis=-1)
 
-    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
-        """(...) whether (..., 3) points are inside or at most ``tolerance`` [m] beyond a face."""
-        return self.residual(points) >= -tolerance
-
     @cached_property
     def inscribed_sphere(self) -> tuple[FloatArray, float]:
         """Centre (3,) and radius [m] of the largest sphere inside, the Chebyshev sphere (4.1.2)."""
-        table = np.column_stack([self.A, np.ones(len(self.b))])
-        bounds = [(None, None)] * 3 + [(0.0, None)]
-        ball = linprog([0.0, 0.0, 0.0, -1.0], A_ub=table, b_ub=self.b, bounds=bounds).x
-        return frozen_array(ball[:3], "centre"), float(ball[3])
+        return inscribed_ball(self.A, self.b)
+
+
+def inscribed_ball(normals: FloatArray, offsets: FloatArray) -> tuple[FloatArray, float]:
+    """Centre (3,) and radius of the largest ball inside ``normals x <= offsets``, unit normals (m, 3)."""
+    table = np.column_stack([normals, np.ones(len(offsets))])
+    bounds = [(None, None)] * 3 + [(0.0, None)]
+    ball = linprog([0.0, 0.0, 0.0, -1.0], A_ub=table, b_ub=offsets, bounds=bounds).x
+    return frozen_array(ball[:3], "centre"), float(ball[3])
 
 
 def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
@@ -94,8 +95,6 @@ def reach_volume(
     """Sample the reach of a limb within its joint ranges ([Tonneau2015]_ 4.3.4).
 
     Args:
-        limb: One of its limbs.
-        rng: Source of randomness.
         count: Number of samples, at least :data:`MIN_COUNT`; a limb without joints needs none.
         natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3).
 

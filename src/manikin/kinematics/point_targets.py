@@ -182,9 +182,23 @@ class PostureCost:
     def __init__(self, body: BodyModel, targets: PointTargets) -> None:
         """Prepare a body and the points of its segments."""
         self._body = body
-        self._points = PointEquations(body, targets)
         self._rest = body.standing_posture()[7:]
-        moving = self._points.moving
+        marked = tuple(dict.fromkeys(targets.segments))
+        self._placements = SegmentPlacements(body, marked)
+        self._carriers = np.array([marked.index(name) for name in targets.segments])
+        self._local, self._weights = np.array(targets.points), np.array(targets.weights)
+        names = [segment.name for segment in body.segments]
+        below = np.eye(len(names), dtype=bool)
+        for number in range(len(names) - 1, 0, -1):
+            below[names.index(body.segments[number].parent or "")] |= below[number]
+        carried = below[:, [names.index(name) for name in targets.segments]]
+        owners = np.repeat(np.arange(len(names)), [len(segment.hinges) for segment in body.segments])
+        moving = np.flatnonzero(carried[owners].any(axis=1))
+        moved = np.concatenate([np.zeros(6, dtype=np.int64), owners[moving]])
+        loaded, self._load = np.unique(moved, return_inverse=True)
+        self._carried = carried[loaded].astype(np.float64)
+        self._coupled = np.tril(below[moved[None], moved[:, None]])
+        self._table = _table()
         self._still = np.setdiff1d(np.arange(len(self._rest)), moving)
         self.slots = np.concatenate([np.arange(6), 6 + moving])
         self._angles = 7 + moving
@@ -208,14 +222,14 @@ class PostureCost:
 
     def distances(self, q: FloatArray, wanted: FloatArray) -> FloatArray:
         """(n, k) distances of the points from their targets (n, k, 3) [m], NaN where one is not seen."""
-        points = self._points.placed(q)[1].transpose(2, 0, 1)
+        points = self._placed(q)[1].transpose(2, 0, 1)
         return np.linalg.norm(q[:, None, :3] + points - wanted, axis=2)
 
     def at(self, q: FloatArray, held: FloatArray, wanted: FloatArray) -> Evaluation:
         """The cost of (n, nq) postures drawn to angles ``held``, with targets (n, k, 3) [m]."""
-        placed, points = self._points.placed(q)
+        placed, points = self._placed(q)
         error = points + (placed.roots - wanted.transpose(1, 2, 0))
-        weights = self._points.weights[:, None] * ~np.isnan(error[:, 0])
+        weights = self._weights[:, None] * ~np.isnan(error[:, 0])
         error[np.isnan(error)] = 0.0
         away = q[:, 7:] - held
         cost = np.einsum("kn,kin,kin->n", weights, error, error) + HOLD * np.einsum("nh,nh->n", away, away)
@@ -223,7 +237,15 @@ class PostureCost:
 
     def equations(self, here: Evaluation) -> tuple[FloatArray, FloatArray]:
         """Half the gradient (n, d) by :attr:`slots`, and the lower Gauss-Newton matrix (n, d, d)."""
-        gradient, matrix = self._points.assembled(here.columns, here.points, here.error, here.weights)
+        x, w, columns = here.points, here.weights[:, None], here.columns[self.slots]
+        wx, force = w * x, w * here.error
+        squares, turning = ((item[:, :, None] * x[:, None]).reshape(len(x), 9, -1) for item in (wx, force))
+        moments = np.concatenate([w, wx, squares, force, turning], axis=1)
+        sums = (self._carried @ moments.reshape(len(x), -1)).reshape(-1, *moments.shape[1:])
+        loads = (self._table @ sums).reshape(len(sums), 7, 6, -1)[self._load]
+        gradient = np.einsum("din,din->nd", columns, loads[:, 6])
+        pushed = np.einsum("dijn,djn->nid", loads[:, :6], columns).transpose(0, 2, 1)
+        matrix = (pushed @ np.ascontiguousarray(columns.transpose(2, 1, 0))) * self._coupled
         gradient[:, 6:] += HOLD * (here.q[:, self._angles] - here.held[:, self._angles - 7])
         hinges = np.arange(6, len(self.slots))
         matrix[:, hinges, hinges] += HOLD
@@ -247,58 +269,11 @@ class PostureCost:
         moved[:, 7:] = np.clip(moved[:, 7:], self._body.lower, self._body.upper)
         return moved
 
-
-class PointEquations:
-    """Which velocities move which points, and the equations that follow.
-
-    Attributes:
-        moving: Numbers of the hinges that move a point.
-        weights: (k,) of the points.
-    """
-
-    def __init__(self, body: BodyModel, targets: PointTargets) -> None:
-        """Prepare the points of a body's segments."""
-        marked = tuple(dict.fromkeys(targets.segments))
-        self._placements = SegmentPlacements(body, marked)
-        self._carriers = np.array([marked.index(name) for name in targets.segments])
-        self._local, self.weights = np.array(targets.points), np.array(targets.weights)
-        names = [segment.name for segment in body.segments]
-        below = np.eye(len(names), dtype=bool)
-        for number in range(len(names) - 1, 0, -1):
-            below[names.index(body.segments[number].parent or "")] |= below[number]
-        carried = below[:, [names.index(name) for name in targets.segments]]
-        owners = np.repeat(np.arange(len(names)), [len(segment.hinges) for segment in body.segments])
-        self.moving = np.flatnonzero(carried[owners].any(axis=1))
-        moved = np.concatenate([np.zeros(6, dtype=np.int64), owners[self.moving]])
-        self._velocities = np.concatenate([np.arange(6), 6 + self.moving])
-        loaded, self._load = np.unique(moved, return_inverse=True)
-        self._carried = carried[loaded].astype(np.float64)
-        self._coupled = np.tril(below[moved[None], moved[:, None]])
-        self._table = _table()
-
-    def placed(self, q: FloatArray) -> tuple[Placements, FloatArray]:
+    def _placed(self, q: FloatArray) -> tuple[Placements, FloatArray]:
         """The segments with points in (n, nq) postures, and the points (k, 3, n) from the root [m]."""
         placed = self._placements.of(q)
         turned = np.einsum("kijn,kj->kin", placed.turns[self._carriers], self._local)
         return placed, placed.shifts[self._carriers] + turned
-
-    def assembled(
-        self, columns: FloatArray, x: FloatArray, error: FloatArray, weights: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Half the gradient (n, d) and the lower Gauss-Newton matrix (n, d, d) of the weighted squares.
-
-        Velocities are those of the root, linear and angular in its own axes, and of the hinges that are
-        :attr:`moving`. Arguments are those of :class:`Evaluation`.
-        """
-        w, columns = weights[:, None], columns[self._velocities]
-        wx, force = w * x, w * error
-        squares, turning = ((item[:, :, None] * x[:, None]).reshape(len(x), 9, -1) for item in (wx, force))
-        moments = np.concatenate([w, wx, squares, force, turning], axis=1)
-        sums = (self._carried @ moments.reshape(len(x), -1)).reshape(-1, *moments.shape[1:])
-        loads = (self._table @ sums).reshape(len(sums), 7, 6, -1)[self._load]
-        gradient = np.einsum("din,din->nd", columns, loads[:, 6])
-        pushed = np.einsum("dijn,djn->nid", loads[:, :6], columns).transpose(0, 2, 1)
-        return gradient, (pushed @ np.ascontiguousarray(columns.transpose(2, 1, 0))) * self._coupled
 
 
 def _table() -> FloatArray:

@@ -15,7 +15,6 @@ from manikin.body.natural_range import LearntJoint, learnt_joints
 from manikin.contact import Contact, ContactKind, SolePart
 from manikin.errors import BodyError, InputError
 from manikin.kinematics.posture_terms import (
-    UP,
     ClearanceTerm,
     ComTerm,
     EdgeTerm,
@@ -23,6 +22,7 @@ from manikin.kinematics.posture_terms import (
     Linearised,
     PositionTerm,
     ReferenceTerm,
+    Requirement,
     RotationTerm,
     Term,
     UprightTerm,
@@ -197,9 +197,9 @@ class PostureProblem:
         if self.learnt_margin is not None:
             finite_number(self.learnt_margin, "posture learnt_margin [rad]", at_least=0.0)
 
-    def requirements(self) -> tuple[Term, ...]:
+    def requirements(self) -> tuple[Requirement, ...]:
         """Terms that must be zero."""
-        terms: list[Term] = []
+        terms: list[Requirement] = []
         for contact in self.contacts:
             if contact.part is not SolePart.FULL:
                 terms.append(self._edge(contact))
@@ -258,9 +258,7 @@ class PostureProblem:
             sides = ("left_upper_arm", "right_upper_arm")
             tilts = {"pelvis": weights.pelvis, "thorax": weights.trunk, "head": weights.head}
             tilts.update(dict.fromkeys(sides, weights.arms))
-            wishes += [
-                (np.full(3, weight), UprightTerm(name, UP)) for name, weight in tilts.items() if name in names
-            ]
+            wishes += [(np.full(3, w), UprightTerm(name)) for name, w in tilts.items() if name in names]
         return tuple(wishes)
 
     def limits(self) -> LimitTerm:
@@ -302,13 +300,14 @@ def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]
 def pairs_beside(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
     """Pairs of :func:`touching_pairs` that need not overlap: the segment's shapes end before its effector.
 
-    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere.
+    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere;
+    thigh and shank of a person who kneels neither.
     """
     return frozenset(
-        (body.effector(effector).segment, obstacle)
-        for effector, obstacle in effector_obstacles
-        if ends_before_tip(body, effector)
-    )
+        (segment, obstacle)
+        for effector, obstacle in effector_obstacles if ends_before_tip(body, effector)
+        for segment in end_segments(body, effector)
+    )  # fmt: skip
 
 
 def com_target(

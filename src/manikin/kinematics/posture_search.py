@@ -120,10 +120,8 @@ def generate_posture(
     """Find a posture.
 
     Args:
-        problem: Requirements and preferences.
         start: (nq,) where to begin, such as a neighbouring posture; the reference placed over
             the contacts when omitted.
-        settings: Tolerances and effort.
 
     Returns:
         A posture that meets all requirements (without ``start`` the better of the first two
@@ -234,7 +232,7 @@ class PostureSolver:
                 break
         return self._exact(iterate) if iterate.violation < 5.0 * NEAR else iterate
 
-    def _best_move(self, iterate: _Iterate, trust: float) -> "_Step":
+    def _best_move(self, iterate: _Iterate, trust: float) -> _Step:
         """The step of the quadratic programme, bent back onto the requirements where that is better."""
         before = self._merit(iterate)
         step, predicted = self._step(iterate, trust)
@@ -247,7 +245,7 @@ class PostureSolver:
             move = other if other.gained > move.gained else move
         return move
 
-    def _move(self, iterate: _Iterate, step: FloatArray, before: float, expected: float) -> "_Step":
+    def _move(self, iterate: _Iterate, step: FloatArray, before: float, expected: float) -> _Step:
         candidate = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
         gained = before - self._merit(candidate)
         return _Step(candidate, float(np.abs(step).max()), before, gained, expected)
@@ -285,11 +283,9 @@ class PostureSolver:
         ends = np.cumsum([0, *(len(item.residual) for item in requirements)])
         parts = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         wishes = [term.evaluate(configuration) for term in self._wishes]
-        if self._clearances is None:
-            clearance, pairs = Linearised(np.zeros(0), np.zeros((0, nv))), ()
-        else:
-            residual, jacobian, pairs = self._clearances.evaluate(configuration)
-            clearance = Linearised(residual, jacobian)
+        clearance, pairs = _stack([], nv), ()
+        if self._clearances is not None:
+            clearance, pairs = self._clearances.evaluate(configuration)
         return _Iterate(q, _stack(requirements, nv), parts, _stack(wishes, nv), clearance, pairs)
 
     def result(self, iterate: _Iterate, iterations: int) -> PostureResult:

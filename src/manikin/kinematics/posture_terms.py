@@ -5,7 +5,7 @@ Each term takes a :class:`~manikin.body.configuration.Configuration` and gives a
 for a tangent vector ``v`` of Pinocchio's ``integrate``.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -35,11 +35,15 @@ class Linearised(NamedTuple):
 
 
 class Term(Protocol):
-    """A residual that is to be zero (a requirement) or small (a preference)."""
+    """A residual that is to be small."""
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """Residual and Jacobian at a configuration."""
         ...
+
+
+class Requirement(Term, Protocol):
+    """A residual that is to be zero."""
 
     def describe(self, residual: FloatArray) -> str:
         """Meaning of a residual of this term in words."""
@@ -60,7 +64,7 @@ class PositionTerm:
         return Linearised(position - self.position, configuration.effector_jacobian(self.effector)[:3])
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Term`."""
+        """See :class:`Requirement`."""
         return f"{self.kind} '{self.effector}' misses its position by {np.linalg.norm(residual):.4f} m"
 
 
@@ -82,7 +86,7 @@ class RotationTerm:
         return Linearised(pin.log3(error), jacobian)
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Term`."""
+        """See :class:`Requirement`."""
         angle = np.rad2deg(np.linalg.norm(residual))
         return f"{self.kind} '{self.effector}' misses its orientation by {angle:.2f} deg"
 
@@ -142,7 +146,7 @@ class EdgeTerm:
         return Linearised(np.array(residual), np.vstack(rows))
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Term`."""
+        """See :class:`Requirement`."""
         gap, angle = np.linalg.norm(residual[:3]), np.rad2deg(np.linalg.norm(residual[3:]))
         return f"edge of contact '{self.effector}' misses its place by {gap:.4f} m and {angle:.2f} deg"
 
@@ -159,7 +163,7 @@ class ComTerm:
         return Linearised(configuration.com[axes] - self.position[axes], configuration.com_jacobian[axes])
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Term`."""
+        """See :class:`Requirement`."""
         axes = [axis for axis, value in zip("xyz", self.position, strict=True) if np.isfinite(value)]
         parts = ", ".join(f"{axis} {value:+.4f}" for axis, value in zip(axes, residual, strict=True))
         return f"centre of mass misses by {np.linalg.norm(residual):.4f} m ({parts})"
@@ -171,29 +175,15 @@ class UprightTerm:
 
     For small tilts it is as long as the tilt; unlike the sine it grows up to the opposite
     direction, so that a raised arm is drawn down.
-
-    Attributes:
-        segment: Name of the segment.
-        axis: (3,) unit axis of the segment that is to point along ``direction``.
-        direction: (3,) unit direction in the world.
     """
 
     segment: str
-    axis: FloatArray = field(default_factory=lambda: UP)
-    direction: FloatArray = field(default_factory=lambda: UP)
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """See :class:`Term`."""
         rotation, _ = configuration.segment_placement(self.segment)
-        axis = rotation @ self.axis
-        return Linearised(
-            axis - self.direction, -skew(axis) @ configuration.segment_jacobian(self.segment)[3:]
-        )
-
-    def describe(self, residual: FloatArray) -> str:
-        """See :class:`Term`."""
-        angle = np.rad2deg(2.0 * np.arcsin(min(1.0, 0.5 * float(np.linalg.norm(residual)))))
-        return f"segment '{self.segment}' is tilted by {angle:.1f} deg"
+        axis = rotation @ UP
+        return Linearised(axis - UP, -skew(axis) @ configuration.segment_jacobian(self.segment)[3:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,17 +203,12 @@ class ReferenceTerm:
         jacobian.setflags(write=False)
         return jacobian
 
-    def describe(self, residual: FloatArray) -> str:
-        """See :class:`Term`."""
-        return f"posture differs from its reference by up to {np.abs(residual).max():.3f} rad"
-
 
 @dataclass(frozen=True, eq=False)
 class LimitTerm:
-    """The hinge ranges: how far each hinge is inside, ``s = min(q - lower, upper - q)`` [rad].
+    """The hinge ranges of a body.
 
     Attributes:
-        body: The body with its ranges.
         margin: Kept from both ends of each range [rad]; at most a quarter of the range.
     """
 
@@ -244,40 +229,11 @@ class LimitTerm:
     def _margins(self) -> FloatArray:
         return np.minimum(self.margin, 0.25 * (self.body.upper - self.body.lower))
 
-    def evaluate(self, configuration: Configuration) -> Linearised:
-        """Slack of each hinge to its nearer end, and its Jacobian."""
+    def at_limit(self, configuration: Configuration) -> tuple[str, ...]:
+        """Names of the hinges within 1e-3 rad of an end of their range."""
         angles = configuration.q[7:]
-        below, above = self.lower - angles, self.upper - angles
-        nearer_lower = -below < above
-        count = len(below)
-        jacobian = np.hstack([np.zeros((count, 6)), np.diag(np.where(nearer_lower, 1.0, -1.0))])
-        return Linearised(np.where(nearer_lower, -below, above), jacobian)
-
-    def at_limit(self, configuration: Configuration, tolerance: float = 1e-3) -> tuple[str, ...]:
-        """Names of the hinges within ``tolerance`` [rad] of an end of their range."""
-        slack = self.evaluate(configuration).residual
-        return tuple(
-            name for name, value in zip(self.body.joint_names, slack, strict=True) if value < tolerance
-        )
-
-    def describe(self, residual: FloatArray) -> str:
-        """See :class:`Term`."""
-        worst = int(np.argmin(residual))
-        return f"hinge '{self.body.joint_names[worst]}' is {-residual[worst]:.4f} rad beyond its range"
-
-
-class Clearances(NamedTuple):
-    """Distances beyond the safety distance, with their gradients.
-
-    Attributes:
-        residual: (k,) distance minus the safety distance [m]; negative is too close.
-        jacobian: (k, nv).
-        pairs: The shapes of each row.
-    """
-
-    residual: FloatArray
-    jacobian: FloatArray
-    pairs: tuple[Pair, ...]
+        slack = np.minimum(angles - self.lower, self.upper - angles)
+        return tuple(name for name, room in zip(self.body.joint_names, slack, strict=True) if room < 1e-3)
 
 
 BESIDE = 5e-4
@@ -304,13 +260,13 @@ class ClearanceTerm:
     ignore: Ignored
     beside: Ignored = NOTHING
 
-    def evaluate(self, configuration: Configuration) -> Clearances:
-        """Distances beyond the safety distance of the pairs that are close."""
+    def evaluate(self, configuration: Configuration) -> tuple[Linearised, tuple[Pair, ...]]:
+        """Distances beyond the safety distance [m] of the pairs of shapes that are close."""
         reach = max(self.safety, self.self_safety) + self.activation
         close = self.proximity.evaluate(configuration.q, reach, self.ignore)
         safety = np.array([self._safety(*pair) for pair in close.pairs])
         gradient = close.gradient.reshape(-1, configuration.body.nv)
-        return Clearances(close.distance - safety, gradient, close.pairs)
+        return Linearised(close.distance - safety, gradient), close.pairs
 
     def describe(self, residual: FloatArray, pairs: tuple[Pair, ...]) -> str:
         """Say which pair is closest to or beyond its safety distance."""

@@ -102,7 +102,6 @@ class ReachBody:
     """What the sampling needs to know of a body: masses, legs, volumes of the other limbs.
 
     Attributes:
-        body: The body.
         legs: Closed form of a human's legs, or None.
         spine: Whether pelvis, lumbar spine and thorax move against each other; otherwise all is one part.
         scale: Size over that of a person of 1.75 m.
@@ -133,18 +132,15 @@ class ReachBody:
         """Reach of the limb of an effector, and the distance to keep inside it [m]."""
         if effector not in self._volumes:
             limb = next((limb for limb in self.body.limbs if limb.effector == effector), None)
-            self._volumes[effector] = self._rigid(effector) if limb is None else self._sampled(limb)
+            if limb is None:  # as the buttocks on a seat, which move with their segment alone
+                own = self.body.effector(effector)
+                limb = Limb(effector, effector, (own.segment,), ContactKind.POINT)
+                volume, margin = rigid_reach(limb, own.segment, own.translation, own.rotation), 0.0
+            else:
+                margin = VOLUME_MARGIN * self.scale if len(LimbKinematics(self.body, limb)) else 0.0
+                volume = reach_volume(self.body, limb, np.random.default_rng(0))
+            self._volumes[effector] = volume, margin
         return self._volumes[effector]
-
-    def _sampled(self, limb: Limb) -> tuple[ReachVolume, float]:
-        margin = VOLUME_MARGIN * self.scale if len(LimbKinematics(self.body, limb)) else 0.0
-        return reach_volume(self.body, limb, np.random.default_rng(0)), margin
-
-    def _rigid(self, effector: str) -> tuple[ReachVolume, float]:
-        """What touches without a limb, as the buttocks on a seat, moves with its segment alone."""
-        own = self.body.effector(effector)
-        limb = Limb(effector, effector, (own.segment,), ContactKind.POINT)
-        return rigid_reach(limb, own.segment, own.translation, own.rotation), 0.0
 
     def trunk(
         self, place: FloatArray, root: FloatArray, spine: FloatArray
@@ -172,7 +168,8 @@ class ReachBody:
         sides = np.array([np.ones(3), REFLECTION])[:, None]
         knee = hips - self.legs.thigh * thigh[..., 2]
         upper, lower = (
-            _applied(turn, com * sides) for turn, com in zip((thigh, shank), self.leg_coms, strict=True)
+            (turn @ (com * sides)[..., None])[..., 0]
+            for turn, com in zip((thigh, shank), self.leg_coms, strict=True)
         )
         return self.leg_masses[0] * (hips + upper) + self.leg_masses[1] * (knee + lower)
 
@@ -433,11 +430,6 @@ class ReachSampler:
     def _placed(self, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
         """Place and axes of a contact, the same for all unknowns or (n, ...)."""
         return contact.position, contact.rotation
-
-
-def _applied(turns: FloatArray, vectors: FloatArray) -> FloatArray:
-    """(2, n, 3) vectors (2, 1, 3) turned by (2, n, 3, 3)."""
-    return (turns @ vectors[..., None])[..., 0]
 
 
 def _bend(flexion: FloatArray, side_bend: FloatArray, twist: FloatArray) -> FloatArray:

@@ -103,7 +103,9 @@ class StepReach:
 
     def room(self, places: ArrayLike, foot: str = "right_foot") -> FloatArray:
         """(k,) least distance of places (k, 4) of a foot to the end of the set [m]; negative outside."""
-        return np.min(self.b - self._of_right(places, foot) @ self.A.T, axis=-1)
+        given = np.asarray(places, dtype=np.float64)
+        of_right = given * [1.0, -1.0, 1.0, -1.0] if foot == "left_foot" else given
+        return np.min(self.b - of_right @ self.A.T, axis=-1)
 
     def contains(self, places: ArrayLike, foot: str = "right_foot", margin: float = 0.0) -> NDArray[np.bool_]:
         """(k,) whether places (k, 4) of a foot are at least ``margin`` [m] inside."""
@@ -117,10 +119,6 @@ class StepReach:
         turns = np.arctan2(np.sin(turns), np.cos(turns))
         foot = "left_foot" if standing.effector == "right_foot" else "right_foot"
         return self.room(np.column_stack([apart @ frame, turns]), foot)
-
-    def _of_right(self, places: ArrayLike, foot: str) -> FloatArray:
-        given = np.asarray(places, dtype=np.float64)
-        return given * [1.0, -1.0, 1.0, -1.0] if foot == "left_foot" else given
 
 
 @lru_cache(maxsize=64)

@@ -30,7 +30,6 @@ def search(
     The n searches do not depend on each other; together they take less time.
 
     Args:
-        cost: Cost of postures.
         starts: (n, nq) postures within the limits.
         wanted: (n, k, 3) positions of the targets [m]; NaN where one is not seen.
         before: (n, nq) postures to stay near.
@@ -141,8 +140,6 @@ def follow(
     are searched so; those between begin on a curve through them and are found together.
 
     Args:
-        body: The body that carries the targets' points.
-        targets: Targets at n instants.
         starts: (n, nq) postures within the limits; the first is where the search begins, the others
             are tried where the search from the frame before leaves a point farther than :data:`POOR`.
         rate: Frames per second [Hz]; None for frames that are far from each other.
@@ -175,8 +172,6 @@ class _Following:
             else:
                 frame = self._together(frame, min(frame + TOGETHER // apart * apart, n))
 
-    # --- frame by frame
-
     def _singly(self, first: int, stop: int) -> int:
         """Search frames one by one; the first one after them."""
         for frame in range(first, min(stop, len(self.q))):
@@ -205,8 +200,6 @@ class _Following:
     def _keep(self, first: int, q: FloatArray) -> None:
         frames = slice(first, first + len(q))
         self.q[frames], self.residual[frames] = q, self._cost.distances(q, self._wanted[frames])
-
-    # --- together
 
     def _together(self, first: int, stop: int) -> int:
         """Find frames at once; the first one after those that are kept."""

@@ -1,9 +1,9 @@
 """A whole-body motion as one clamped B-spline in configuration space.
 
-The control points live in R^nq: pelvis position, four quaternion components and the joint
-angles.  The quaternion part is normalised on evaluation, so the motion is smooth wherever
-the raw quaternion does not vanish, without the singularity of Euler angles.  Velocities and
-accelerations are exact derivatives, in Pinocchio's convention (pelvis frame).
+The control points live in R^nq: pelvis position, four quaternion components and the joint angles. The
+quaternion part is normalised on evaluation, so the motion is smooth wherever the raw quaternion does not
+vanish, without the singularity of Euler angles. Velocities and accelerations are exact derivatives, in
+Pinocchio's convention (pelvis frame).
 """
 
 import itertools
@@ -19,12 +19,9 @@ from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_qua
 
 
 class StateSamples(NamedTuple):
-    """Configurations with their exact derivatives.
+    """Configurations (n, nq) with unit quaternions, and their exact derivatives (n, nq - 1).
 
-    Attributes:
-        q: (n, nq) with unit quaternions.
-        v: (n, nq - 1) velocity, pelvis part in the pelvis frame.
-        a: (n, nq - 1) its time derivative.
+    The pelvis' part of velocity and acceleration is in the pelvis frame.
     """
 
     q: FloatArray
@@ -47,13 +44,12 @@ class ConfigurationSpline:
     degree: int
 
     def __post_init__(self) -> None:
-        knots = frozen_array(self.knots, "configuration spline knots [s]", (None,), SplineError)
-        points = frozen_array(
-            self.control_points, "configuration spline control points", (None, None), SplineError
-        )
+        what = "configuration spline"
+        knots = frozen_array(self.knots, f"{what} knots [s]", (None,), SplineError)
+        points = frozen_array(self.control_points, f"{what} control points", (None, None), SplineError)
         if len(knots) != len(points) + self.degree + 1:
             raise SplineError(
-                f"configuration spline has {len(knots)} knots and {len(points)} control points of degree "
+                f"{what} has {len(knots)} knots and {len(points)} control points of degree "
                 f"{self.degree}; valid: knots = control points + degree + 1"
             )
         object.__setattr__(self, "knots", knots)
@@ -109,14 +105,9 @@ def tangent_map(raw: FloatArray) -> FloatArray:
 
 
 class TurnDerivatives(NamedTuple):
-    """Derivatives of the pelvis' angular velocity and acceleration by the raw quaternion.
+    """(n, 3, 4) derivatives of the pelvis' angular velocity ``omega`` and acceleration ``alpha``.
 
-    Attributes:
-        omega_by_value: (n, 3, 4) derivative of the angular velocity by the raw quaternion.
-        omega_by_rate: (n, 3, 4) by its rate.
-        alpha_by_value: (n, 3, 4) derivative of the angular acceleration by the quaternion.
-        alpha_by_rate: (n, 3, 4) by its rate.
-        alpha_by_second: (n, 3, 4) by its second derivative.
+    By the raw quaternion, its rate and its second derivative.
     """
 
     omega_by_value: FloatArray

@@ -1,8 +1,7 @@
 """Bodies, scenes and contact schedules as plain JSON values, and back.
 
-A motion file carries these so that it can be drawn and measured without the scenario it
-came from.  Numbers are written with Python's shortest exact form: what is read back is
-bit for bit what was written.
+A motion file carries these so that it can be drawn and measured without the scenario it came from. Numbers
+are written with Python's shortest exact form: what is read back is bit for bit what was written.
 """
 
 from collections.abc import Mapping
@@ -73,14 +72,10 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
         KeyError: If a value is missing.
         BodyError: If a value is not usable.
     """
-    effectors = [
-        Effector(e["name"], e["segment"], np.array(e["translation"]), np.array(e["rotation"]))
-        for e in description["effectors"]
-    ]
     return BodyModel(
         name=description["name"],
         segments=tuple(_segment_from(segment) for segment in description["segments"]),
-        effectors={effector.name: effector for effector in effectors},
+        effectors={effector["name"]: Effector(**effector) for effector in description["effectors"]},
         standing_angles=description["standing_angles"],
         soft_pairs=frozenset(frozenset(pair) for pair in description["soft_pairs"]),
         stature=description["stature_m"],
@@ -106,16 +101,8 @@ def _describe_segment(segment: Segment) -> Json:
 
 
 def _segment_from(data: Mapping[str, Any]) -> Segment:
-    return Segment(
-        name=data["name"],
-        parent=data["parent"],
-        origin=np.array(data["origin"]),
-        hinges=tuple(Hinge(**{**hinge, "axis": np.array(hinge["axis"])}) for hinge in data["hinges"]),
-        mass=data["mass"],
-        com=np.array(data["com"]),
-        inertia=np.array(data["inertia"]),
-        shapes=tuple(BodyShape(**shape) for shape in data["shapes"]),
-    )
+    hinges = tuple(Hinge(**hinge) for hinge in data["hinges"])
+    return Segment(**{**data, "hinges": hinges, "shapes": tuple(BodyShape(**one) for one in data["shapes"])})
 
 
 def describe_scene(scene: Scene) -> Json:
@@ -136,8 +123,7 @@ def scene_from(description: Mapping[str, Any]) -> Scene:
         SceneError: If a value is not usable.
     """
     obstacles = [
-        Obstacle(o["name"], _shape_from(o), np.array(o["rotation"]), np.array(o["translation"]))
-        for o in description["obstacles"]
+        Obstacle(o["name"], _shape_from(o), o["rotation"], o["translation"]) for o in description["obstacles"]
     ]
     return Scene(obstacles, description["floor_height"])
 
@@ -157,9 +143,8 @@ def _describe_shape(shape: Shape) -> Json:
 
 def _shape_from(data: Mapping[str, Any]) -> Shape:
     shape_type = _KINDS[data["kind"]]
-    return shape_type(
-        **{item.name: data[item.name] for item in fields(shape_type) if item.name != "dropped_faces"}
-    )
+    names = [item.name for item in fields(shape_type) if item.name != "dropped_faces"]
+    return shape_type(**{name: data[name] for name in names})
 
 
 def describe_schedule(schedule: ContactSchedule) -> Json:
@@ -173,17 +158,15 @@ def describe_schedule(schedule: ContactSchedule) -> Json:
                 "normal_force_cap": phase.stance.normal_force_cap,
                 "friction_model": phase.stance.friction_model,
                 "contacts": [_describe_contact(contact) for contact in phase.stance],
-                **(
-                    {}
-                    if phase.load is None
-                    else {
-                        "load": {"masses_kg": dict(phase.load.masses), "offset": phase.load.offset.tolist()}
-                    }
-                ),
+                **({} if phase.load is None else {"load": _describe_load(phase.load)}),
             }
             for phase in schedule.sequence
         ],
     }
+
+
+def _describe_load(load: CarriedLoad) -> Json:
+    return {"masses_kg": dict(load.masses), "offset": load.offset.tolist()}
 
 
 def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:

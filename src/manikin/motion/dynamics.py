@@ -2,8 +2,7 @@
 
 The rate of the centroidal momentum gives the wrench with the centre of mass and the angular momentum
 (:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of a body without
-contacts (:class:`FreeDynamics`). Both agree to rounding. :class:`MotionSampler` evaluates a whole-body
-spline with exact derivatives by its raw coordinates.
+contacts (:class:`FreeDynamics`). Both agree to rounding.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,6 @@ from manikin.body.strength import with_masses
 from manikin.contact import CarriedLoad, ContactSchedule
 from manikin.motion.configuration_spline import (
     StateSamples,
-    TurnDerivatives,
     states_from_raw,
     tangent_map,
     turn_derivatives,
@@ -31,12 +29,9 @@ from manikin.scene.distance_bounds import PlacedShapes, PlacementReader
 
 @dataclass(frozen=True, eq=False)
 class MomentumRate:
-    """Rate of linear and angular momentum about the centre of mass.
+    """Rate of linear and angular momentum about the centre of mass, (n, 6) [N, N.m], world axes.
 
-    Attributes:
-        value: (n, 6) [N, N.m], world axes.
-        jacobians: Three (n, 6, nq) derivatives, by the raw coordinates, their rates and their
-            second derivatives.
+    Its three Jacobians (n, 6, nq) are by the raw coordinates, their rates and their second derivatives.
     """
 
     value: FloatArray
@@ -70,33 +65,27 @@ class MomentumRateSamples:
     ) -> MomentumRate:
         """Differentiate by raw values, rates and second derivatives (n, nq), with :func:`tangent_map`."""
         turn = turn_derivatives(*(part[:, 3:7] for part in raw))
-        blocks = [np.zeros((*self._by_q.shape[:2], raw[0].shape[1])) for _ in range(3)]
-        for block, joints in zip(blocks, (self._by_q, self._by_v, self._by_a), strict=True):
-            block[:, :, 7:] = joints[:, :, 6:]
-        self._add_pelvis_turn(blocks, states, raw[2], tangent, turn)
-        blocks[2][:, :3, :3] = self._mass * np.eye(3)
-        return MomentumRate(self._value, (blocks[0], blocks[1], blocks[2]))
-
-    def _add_pelvis_turn(
-        self, blocks: list[FloatArray], states: StateSamples, raw_second: FloatArray, tangent: FloatArray,
-        turn: TurnDerivatives,
-    ) -> None:  # fmt: skip
+        by_raw, by_rate, by_second = np.zeros((3, *self._by_q.shape[:2], raw[0].shape[1]))
+        by_raw[:, :, 7:], by_rate[:, :, 7:] = self._by_q[:, :, 6:], self._by_v[:, :, 6:]
+        by_second[:, :, 7:] = self._by_a[:, :, 6:]
         # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
         by_omega = self._by_v[:, :, 3:6] + self._by_a[:, :, :3] @ skew(states.v[:, :3])
         by_alpha = self._by_a[:, :, 3:6]
         # The whole body turns with the pelvis, and with it all of the momentum's rate but the
         # part that the pelvis' world acceleration gives.
         turning = self._value.copy()
-        turning[:, :3] -= self._mass * raw_second[:, :3]
+        turning[:, :3] -= self._mass * raw[2][:, :3]
         pelvis_to_world = tangent[:, :3, :3].transpose(0, 2, 1)
         turned = [
             -skew(part) @ pelvis_to_world @ tangent[:, 3:6, 3:7] for part in (turning[:, :3], turning[:, 3:])
         ]
-        blocks[0][:, :, 3:7] = (
+        by_raw[:, :, 3:7] = (
             np.concatenate(turned, axis=1) + by_omega @ turn.omega_by_value + by_alpha @ turn.alpha_by_value
         )
-        blocks[1][:, :, 3:7] = by_omega @ turn.omega_by_rate + by_alpha @ turn.alpha_by_rate
-        blocks[2][:, :, 3:7] = by_alpha @ turn.alpha_by_second
+        by_rate[:, :, 3:7] = by_omega @ turn.omega_by_rate + by_alpha @ turn.alpha_by_rate
+        by_second[:, :, 3:7] = by_alpha @ turn.alpha_by_second
+        by_second[:, :3, :3] = self._mass * np.eye(3)
+        return MomentumRate(self._value, (by_raw, by_rate, by_second))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +114,7 @@ class MotionSamples:
 
 
 class MotionSampler:
-    """Evaluates splines of one basis, with the frames of some effectors of a body.
-
-    ``loads`` says what is carried at each sample, or None.
-    """
+    """Evaluates splines of one basis with the frames of some effectors, and what is carried at samples."""
 
     def __init__(
         self,
@@ -171,31 +157,19 @@ class MotionSampler:
             self._shape_reader.read(shapes[s])
         rate = momentum.by_raw(states, raw, tangent)
         for loaded, rows in self._loaded:
-            self._replace(rate, loaded, rows, states, raw, tangent)
+            # The rate of body and load, about their common centre, where the load is carried.
+            part, data = StateSamples(*(item[rows] for item in states)), loaded.createData()
+            of_both = MomentumRateSamples(loaded, len(rows))
+            for k in range(len(rows)):
+                of_both.record(k, data, part)
+            own = of_both.by_raw(part, (raw[0][rows], raw[1][rows], raw[2][rows]), tangent[rows])
+            rate.value[rows] = own.value
+            for block, carried in zip(rate.jacobians, own.jacobians, strict=True):
+                block[rows] = carried
         return MotionSamples(
             raw, states, tangent, com, momentum.linear_by_acceleration / self._mass, rate, frames,
             PlacedShapes(shapes, jacobians),
         )  # fmt: skip
-
-    @staticmethod
-    def _replace(
-        rate: MomentumRate,
-        loaded: pin.Model,
-        rows: list[int],
-        states: StateSamples,
-        raw: tuple[FloatArray, FloatArray, FloatArray],
-        tangent: FloatArray,
-    ) -> None:
-        """Put the momentum's rate of body and load, about their common centre, where the load is carried."""
-        part, data = StateSamples(*(item[rows] for item in states)), loaded.createData()
-        momentum = MomentumRateSamples(loaded, len(rows))
-        for k in range(len(rows)):
-            momentum.record(k, data, part)
-        first, second, third = (item[rows] for item in raw)
-        of_both = momentum.by_raw(part, (first, second, third), tangent[rows])
-        rate.value[rows] = of_both.value
-        for own, other in zip(rate.jacobians, of_both.jacobians, strict=True):
-            own[rows] = other
 
     def frame_jacobian(self, motion: MotionSamples, number: int) -> FloatArray:
         """(n, 6, nv) linear, then angular velocity of frame ``number`` in world axes, per ``v``."""
@@ -301,10 +275,7 @@ class CarriedForces:
         Args:
             body: Who moves, without the loads.
             schedule: The contacts in time, with the loads of the phases.
-            time: (n,) [s].
-            q: (n, nq) configurations.
-            v: (n, nv) velocities.
-            a: (n, nv) accelerations.
+            time: (n,) [s]; the others as of :func:`centroidal_motion`.
         """
         if all(phase.load is None for phase in schedule.sequence):
             return None

@@ -68,9 +68,7 @@ class MotionFile(Displayed):
     """Content of a motion file; what it does not hold is None.
 
     Attributes:
-        planned: Motion as planned.
         executed: Motion as simulated.
-        body: The moving body.
         recorded: Motion of a recorded person, reconstructed.
         shifted: The recorded motion after the least shift onto its contacts.
     """
@@ -85,17 +83,14 @@ class MotionFile(Displayed):
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
-        held = ("body", "scene", "schedule")
+        held = [name for name in ("body", "scene", "schedule") if getattr(self, name) is not None]
         motions = {name: f"{motion.duration:.2f} s" for name, motion in self.motions.items()}
-        return motions | {
-            "with": " ".join(name for name in held if getattr(self, name) is not None) or "nothing"
-        }
+        return motions | {"with": " ".join(held) or "nothing"}
 
     @property
     def motions(self) -> dict[str, Motion]:
         """The motions there are, by name, in the order of :data:`GROUPS`."""
-        groups = {name: getattr(self, name) for name in GROUPS}
-        return {name: motion for name, motion in groups.items() if motion is not None}
+        return {name: motion for name in GROUPS if (motion := getattr(self, name)) is not None}
 
 
 def write_motions(path: str | Path, content: MotionFile) -> None:
@@ -124,9 +119,7 @@ def read_motions(path: str | Path) -> MotionFile:
     Raises:
         MotionFileError: If it is missing, damaged, of another kind or of a later version.
     """
-    file_path = Path(path)
-    if file_path.is_dir():
-        file_path = file_path / "motion.h5"
+    file_path = Path(path) / "motion.h5" if Path(path).is_dir() else Path(path)
     if not file_path.is_file():
         raise MotionFileError(
             f"{file_path}: there is no such file; valid: a motion file (.h5) or a run directory"
@@ -145,12 +138,12 @@ def _fill(file: h5py.File, content: MotionFile) -> None:
     for name, motion in content.motions.items():
         _write_motion(file.create_group(name), motion)
         file[f"{name}/margin"].attrs["form"] = margin_form(motion, content.schedule)
-    if content.body is not None:
-        _write_json(file, "body", describe_body(content.body))
-    if content.scene is not None:
-        _write_json(file, "scene", describe_scene(content.scene))
-    if content.schedule is not None:
-        _write_json(file, "schedule", describe_schedule(content.schedule))
+    described = {"body": describe_body, "scene": describe_scene, "schedule": describe_schedule}
+    for name, describe in described.items():
+        if (value := getattr(content, name)) is not None:
+            # A dataset, not an attribute: attributes end at 64 kB and a mesh is larger.
+            text = json.dumps(describe(value))
+            file.create_dataset(name, data=text, dtype=h5py.string_dtype(), track_times=False)
 
 
 def margin_form(motion: Motion, schedule: ContactSchedule | None) -> str:
@@ -175,11 +168,6 @@ def _write_motion(group: h5py.Group, motion: Motion) -> None:
         data = array.astype(np.uint8) if array.dtype == np.bool_ else array
         dataset = group.create_dataset(name, data=data, track_times=False)
         dataset.attrs.update(unit=unit, description=meaning)
-
-
-def _write_json(file: h5py.File, name: str, value: Mapping[str, Any]) -> None:
-    # A dataset, not an attribute: attributes end at 64 kB and a mesh is larger.
-    file.create_dataset(name, data=json.dumps(value), dtype=h5py.string_dtype(), track_times=False)
 
 
 def _content(file: h5py.File, source: str) -> MotionFile:

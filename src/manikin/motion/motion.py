@@ -1,5 +1,6 @@
 """A whole-body motion sampled in time, with its contacts, forces and margin, and what follows from it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -27,20 +28,15 @@ def foot_positions(schedule: ContactSchedule, times: FloatArray) -> dict[str, Fl
     In flight a foot follows the straight line to its next contact with the smootherstep of time,
     lifted along the mean of both normals by ``LIFT sin^2(pi u)``; it has no mass, so any path will
     do. Before its first contact and after its last one it waits at it.
-
-    Args:
-        schedule: Contacts in time.
-        times: (n,) [s].
     """
-    positions = {}
+    positions, phases = {}, schedule.phase_at(times)
     swings = schedule.sequence.swings()
     for name in schedule.sequence.effectors:
         path = np.empty((len(times), 3))
         for number, phase in enumerate(schedule.sequence):
             if name in phase.stance:
-                path[schedule.phase_at(times) == number] = phase.stance[name].position
+                path[phases == number] = phase.stance[name].position
         for swing in (item for item in swings if item.effector == name):
-            phases = schedule.phase_at(times)
             inside = (phases >= swing.first_phase) & (phases <= swing.last_phase)
             first, last = swing.start or swing.end, swing.end or swing.start
             if first is None or last is None:
@@ -197,14 +193,26 @@ def effector_positions(
         if schedule is None:
             return dict.fromkeys(names, motion.com)
         return {name: foot_positions(schedule, motion.time)[name] for name in names}
-    data = body.pinocchio.createData()
-    frames = {name: body.effector_frame(name) for name in names}
-    positions = {name: np.empty((len(motion.time), 3)) for name in names}
-    for index, q in enumerate(motion.q):
-        pin.forwardKinematics(body.pinocchio, data, q)
-        for name, frame in frames.items():
-            positions[name][index] = pin.updateFramePlacement(body.pinocchio, data, frame).translation
-    return positions
+    return dict(zip(names, point_paths(body, motion.q, names), strict=True))
+
+
+def point_paths(body: BodyModel, q: FloatArray, names: Sequence[str]) -> FloatArray:
+    """(k, n, 3) effectors, or else origins of segments, in postures (n, nq) in the world [m].
+
+    Raises:
+        BodyError: If the body has neither of a name.
+    """
+    model, data = body.pinocchio, body.pinocchio.createData()
+    frames = [
+        body.effector_frame(name) if name in body.effectors else body.segment_frame(name) for name in names
+    ]
+    # Views of Pinocchio's memory: they follow whatever is computed in these data.
+    views = [data.oMf[frame].translation for frame in frames]
+    places = np.empty((len(q), len(names), 3))
+    for number, posture in enumerate(q):
+        pin.framesForwardKinematics(model, data, posture)
+        places[number] = views
+    return np.ascontiguousarray(places.transpose(1, 0, 2))
 
 
 def segment_positions(body: BodyModel, q: FloatArray) -> dict[str, FloatArray]:

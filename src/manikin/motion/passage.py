@@ -56,14 +56,11 @@ class Passage:
         cls, time: FloatArray, com: FloatArray, floor: FloatArray | float, *,
         tops: Mapping[str, float] | None = None, room: float | None = None, overhead: float | None = None,
     ) -> "Passage":  # fmt: skip
-        """Measure the path of a centre of mass.
+        """Measure the path of a centre of mass (n, 3) in the world at instants (n,) [m, s].
 
         Args:
-            time: (n,) [s].
-            com: (n, 3) in the world [m].
             floor: (n,) or one height of the floor in the world [m]; NaN where it is not known.
-            tops: See :class:`Passage`.
-            room: See :class:`Passage`.
+            tops: See :class:`Passage`, and so is ``room``.
             overhead: Height above the floor of what is passed [m]; None if nothing is.
         """
         height = com[:, 2] - floor
@@ -120,21 +117,17 @@ def _head_clearance(body: BodyModel, scene: Scene, motion: Motion, padded: Seque
     obstacles = [item for item in scene if item.name != FLOOR and item.name not in padded]
     if not obstacles or HEAD not in body.effectors:
         return None
-    above = head_segments(body)
-    hard = Scene(obstacles, floor_height=None)
-    ignored = frozenset(
-        (segment.name, item.name) for segment in body.segments if segment.name not in above for item in hard
-    )
-    proximity = Proximity(body, hard, self_collision=False)
+    others = {segment.name for segment in body.segments}.difference(head_segments(body))
+    ignored = frozenset((segment, item.name) for segment in others for item in obstacles)
+    proximity = Proximity(body, Scene(obstacles, floor_height=None), self_collision=False)
     return float(proximity.minimum_over(motion.q, ignored, tolerance=1e-5).distance)
 
 
 def head_segments(body: BodyModel) -> tuple[str, ...]:
     """Names of the segments above the shoulders: the head's, and those below it that carry nothing else."""
-    segments = {segment.name: segment for segment in body.segments}
     found = [body.effector(HEAD).segment]
     while True:
-        parent = segments[found[-1]].parent
+        parent = body.segment(found[-1]).parent
         if parent is None or sum(item.parent == parent for item in body.segments) != 1:
             return tuple(found)
         found.append(parent)

@@ -34,25 +34,11 @@ Wide merges alone ("Qx Q12") lose facets, or cut off points, without a word."""
 HULL_TOLERANCE = 1e-6
 """A hull that leaves a point out by more than this, in units of the points' spread, is wrong."""
 
+FLATNESS = 1e-12
+"""Half thickness of a flat polytope, relative to its extent."""
+
 _CHUNK = 4_000_000
 """Entries of one adjacency table (pairs x rays)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Facets:
-    """Facets ``H x <= h`` of a polytope around the origin, with unit rows.
-
-    Attributes:
-        H: (m, d).
-        h: (m,).
-        multipliers: (m, k) part of each offset that each level pays for.
-        flat: (e, d) orthonormal directions across the affine hull (``flat @ x = 0``).
-    """
-
-    H: FloatArray
-    h: FloatArray
-    multipliers: FloatArray
-    flat: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +70,15 @@ class NormalFan:
         """Dimension r of the polytope."""
         return self.basis.shape[1]
 
-    def facets(self) -> "Facets":
-        """Irredundant facets of the polytope, flats as pairs of rows at the end."""
+    def facet_rows(self, extent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Unit rows ``H x <= h`` of the polytope, each facet once, equalities as loosened pairs at the end.
+
+        Args:
+            extent: Size of the polytope, by which :data:`FLATNESS` is measured.
+
+        Returns:
+            H (m, d), h (m,) and the part of each offset that each level pays for (m, k), zero for equalities.
+        """
         real = self._real_facets()
         normals = self.normals[real]
         H = normals[:, : self.rank] @ self.inverse
@@ -96,14 +89,10 @@ class NormalFan:
         if self._coupled:  # the slices of two facets of the cone may coincide
             once = _first_of_each(np.column_stack([H, h / (1.0 + np.abs(h))]))
             H, h, multipliers = H[once], h[once], multipliers[once]
-        return Facets(H, h, multipliers, self._flat_directions())
-
-    def _flat_directions(self) -> FloatArray:
-        """(d - r, d) orthonormal directions across the polytope's affine hull."""
-        d, r = self.basis.shape
-        if r == d:
-            return np.zeros((0, d))
-        return np.linalg.svd(self.basis, full_matrices=True)[0][:, r:].T
+        across = np.linalg.svd(self.basis)[0][:, self.rank :].T
+        slack = np.full(2 * len(across), max(FLATNESS * extent, self.thickness))
+        multipliers = np.vstack([multipliers, np.zeros((len(slack), multipliers.shape[1]))])
+        return np.vstack([H, across, -across]), np.concatenate([h, slack]), multipliers
 
     def _tight_multipliers(self, normals: FloatArray) -> FloatArray:
         """(m, k) level multipliers ``-alpha``, tightened to the generators' exact support."""
@@ -202,15 +191,13 @@ class NormalFan:
         new = along[p, None] * self.normals[q] - along[q, None] * self.normals[p]
         new /= np.linalg.norm(new, axis=1)[:, None]
         inherited = np.where(self.side[p] != 0, self.side[p], self.side[q])
-        side = np.column_stack(
-            [np.vstack([self.side, inherited]), np.concatenate([sign, np.zeros(len(p), dtype=np.int8)])]
-        )
+        across = np.concatenate([sign, np.zeros(len(p), dtype=np.int8)])
         return replace(
             self,
             normals=np.vstack([self.normals, new]),
             on_generator=np.vstack([self.on_generator, self.on_generator[p] & self.on_generator[q]]),
             segments=np.vstack([self.segments, segment]),
-            side=side,
+            side=np.column_stack([np.vstack([self.side, inherited]), across]),
         )
 
     def _crossing_edges(self, plus: NDArray, minus: NDArray) -> tuple[NDArray, NDArray]:
@@ -253,22 +240,25 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     rays = np.vstack([np.hstack([y, levels]), np.hstack([np.zeros((len(slack), r)), slack])])
     cap = y.T @ levels[:, 0] / n if k == 1 and bounded_above[0] and r else None
     if cap is not None and np.abs(y @ cap - levels[:, 0]).max() < INCIDENCE_TOLERANCE:
-        normals = _pyramid_normals(y, cap)
+        # A pyramid with its apex in the origin: one dimension less for Qhull.
+        sides = polar_rays(y, cap)
+        normals = np.vstack([np.column_stack([sides, np.zeros(len(sides))]), np.append(cap, -1.0)])
     else:
         normals = polar_rays(rays, np.append(np.zeros(r), np.ones(k)))
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
     cosine = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T
     on_generator = cosine > -INCIDENCE_TOLERANCE
     once = _without_splinters(on_generator)
+    side = np.zeros((len(once), 0), dtype=np.int8)
     return NormalFan(
-        basis=basis,
-        inverse=inverse,
-        rays=rays,
-        normals=normals[once],
-        on_generator=on_generator[once],
-        segments=np.zeros((0, d)),
-        side=np.zeros((len(once), 0), dtype=np.int8),
-        thickness=max(k, 1) * thickness,
+        basis,
+        inverse,
+        rays,
+        normals[once],
+        on_generator[once],
+        np.zeros((0, d)),
+        side,
+        max(k, 1) * thickness,
     )
 
 
@@ -292,15 +282,6 @@ def polar_rays(rays: FloatArray, section: FloatArray) -> FloatArray:
     equations = _hull_equations((points - centre) @ to_white)
     a = equations[:, :-1] @ to_white.T
     return a + (equations[:, -1] - a @ centre)[:, None] * section
-
-
-def _pyramid_normals(base: FloatArray, cap: FloatArray) -> FloatArray:
-    """Polar rays when the only level is the linear function ``cap`` of the generators.
-
-    The polytope is then a pyramid with its apex in the origin: one dimension less for Qhull.
-    """
-    sides = polar_rays(base, cap)
-    return np.vstack([np.column_stack([sides, np.zeros(len(sides))]), np.append(cap, -1.0)])
 
 
 def _white_coordinates(generators: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:

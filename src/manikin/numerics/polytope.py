@@ -1,7 +1,7 @@
 """Convex polytopes ``{x : H x <= h}`` with unit rows, and hulls that may be flat.
 
 A flat (lower-dimensional) hull carries each equality ``n x = c`` as the pair of rows ``n x <= c`` and
-``-n x <= -c`` at the end, both loosened by :data:`FLATNESS` times the size of the hull, so that the margin of
+``-n x <= -c`` at the end, both loosened by a trillionth of the size of the hull, so that the margin of
 a point on the flat is zero (to that rounding), never negative. The margin of a point off the flat is at most
 its negative distance to the flat, whatever basis the equalities have.
 
@@ -17,11 +17,8 @@ from scipy.optimize import linprog
 from scipy.spatial import HalfspaceIntersection, QhullError
 
 from manikin.errors import InputError, PolytopeError
-from manikin.numerics.facet_enumeration import NormalFan, fan_of_generators
+from manikin.numerics.facet_enumeration import fan_of_generators
 from manikin.numerics.spatial import FloatArray
-
-FLATNESS = 1e-12
-"""Half thickness of a flat polytope, relative to its extent."""
 
 _THIN = 1e-6
 """Thickness, relative to the offsets, below which two opposite rows are an equality."""
@@ -43,7 +40,22 @@ class Polytope:
     h: FloatArray
 
     def __init__(self, H: ArrayLike, h: ArrayLike) -> None:
-        rows, offsets = _unit_rows(H, h)
+        rows, offsets = np.array(H, dtype=np.float64), np.array(h, dtype=np.float64)
+        if rows.ndim != 2 or offsets.shape != rows.shape[:1]:
+            raise PolytopeError(f"H has shape {rows.shape} and h {offsets.shape}; valid: (m, d) and (m,)")
+        if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(offsets))):
+            raise PolytopeError("H or h holds a number that is not finite; valid: finite numbers")
+        length = np.linalg.norm(rows, axis=1)
+        zero = length < 1e-12
+        if np.any(zero):
+            keep = ~zero | (offsets < -_tolerance(offsets))
+            rows, offsets, length, zero = rows[keep], offsets[keep], length[keep], zero[keep]
+            rows[zero] = 0.0
+            length[zero] = 1.0
+        rows /= length[:, None]
+        offsets /= length
+        rows.setflags(write=False)
+        offsets.setflags(write=False)
         object.__setattr__(self, "H", rows)
         object.__setattr__(self, "h", offsets)
 
@@ -161,7 +173,7 @@ def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[F
         raise PolytopeError(f"segments have shape {s.shape}; valid: (q, {v.shape[1]}) finite half segments")
     centre = v.mean(axis=0)
     fan = fan_of_generators(v - centre, np.ones((len(v), 1)), np.array([False])).plus_segments(s)
-    H, h = facet_rows(fan, max(1.0, float(np.abs(v).max())))[:2]
+    H, h, _ = fan.facet_rows(max(1.0, float(np.abs(v).max())))
     return H, h + H @ centre
 
 
@@ -193,39 +205,6 @@ def vertices_around(H: FloatArray, h: FloatArray, interior: FloatArray) -> Float
     if not np.all(np.abs(vertices) < 1e12 * (1.0 + np.abs(h).max())):
         raise PolytopeError("polytope has no vertices; valid: a bounded one of dimension 2 or more")
     return vertices
-
-
-def facet_rows(fan: NormalFan, extent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows ``H x <= h`` of a fan's polytope, equalities as loosened pairs at the end.
-
-    Returns:
-        H (m, d), h (m,) and the level multipliers (m, k), zero for equalities.
-    """
-    facets = fan.facets()
-    across = facets.flat
-    slack = np.full(2 * len(across), max(FLATNESS * extent, fan.thickness))
-    multipliers = np.vstack([facets.multipliers, np.zeros((len(slack), facets.multipliers.shape[1]))])
-    return np.vstack([facets.H, across, -across]), np.concatenate([facets.h, slack]), multipliers
-
-
-def _unit_rows(H: ArrayLike, h: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    rows, offsets = np.array(H, dtype=np.float64), np.array(h, dtype=np.float64)
-    if rows.ndim != 2 or offsets.shape != rows.shape[:1]:
-        raise PolytopeError(f"H has shape {rows.shape} and h {offsets.shape}; valid: (m, d) and (m,)")
-    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(offsets))):
-        raise PolytopeError("H or h holds a number that is not finite; valid: finite numbers")
-    length = np.linalg.norm(rows, axis=1)
-    zero = length < 1e-12
-    if np.any(zero):
-        keep = ~zero | (offsets < -_tolerance(offsets))
-        rows, offsets, length, zero = rows[keep], offsets[keep], length[keep], zero[keep]
-        rows[zero] = 0.0
-        length[zero] = 1.0
-    rows /= length[:, None]
-    offsets /= length
-    rows.setflags(write=False)
-    offsets.setflags(write=False)
-    return rows, offsets
 
 
 def _tolerance(offsets: FloatArray) -> float:
@@ -293,11 +272,17 @@ def chord(polygon: FloatArray, x: float) -> tuple[float, float] | None:
     return float(y.min()), float(y.max())
 
 
-def inset_polygon(polygon: FloatArray, distance: float) -> FloatArray:
-    """(k, 2) what of a convex polygon, counter-clockwise, is at least a distance inside its edges."""
+def walls(polygon: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit outward normals (k, 2) and offsets (k,) of the edges of a polygon (k, 2), counter-clockwise."""
     edge = np.roll(polygon, -1, axis=0) - polygon
     out = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
-    return polygon_of_halfplanes(out, np.einsum("ei,ei->e", out, polygon) - distance)
+    return out, np.einsum("ei,ei->e", out, polygon)
+
+
+def inset_polygon(polygon: FloatArray, distance: float) -> FloatArray:
+    """(k, 2) what of a convex polygon, counter-clockwise, is at least a distance inside its edges."""
+    out, offsets = walls(polygon)
+    return polygon_of_halfplanes(out, offsets - distance)
 
 
 def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
@@ -323,14 +308,13 @@ def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
 def _half_hull(points: FloatArray) -> list[FloatArray]:
     chain: list[FloatArray] = []
     for point in points:
-        while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
+        while len(chain) > 1:
+            a, b = chain[-2:]
+            if (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]) > 0:
+                break
             chain.pop()
         chain.append(point)
     return chain
-
-
-def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def _clipped(polygon: FloatArray, row: FloatArray, offset: float) -> FloatArray:

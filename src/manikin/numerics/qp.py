@@ -81,17 +81,9 @@ def solve_sparse_qp(
     rows_upper: FloatArray, bounds: tuple[FloatArray, FloatArray], *, equalities: int = 0,
     tolerance: float | None = None,
 ) -> QPSolution:  # fmt: skip
-    """Solve one sparse program.
+    """Solve one sparse program, with a positive semidefinite Hessian and otherwise as :func:`solve_qp`.
 
-    Args:
-        hessian: (n, n) positive semidefinite.
-        gradient: (n,).
-        rows: (m, n).
-        rows_lower: (m,); None for no lower bounds.
-        rows_upper: (m,).
-        bounds: (n,) lower and (n,) upper bounds of the unknowns.
-        equalities: Number of leading rows that are equalities.
-        tolerance: Absolute and relative, of residuals; None for PIQP's own.
+    The tolerance is absolute and relative, of residuals; None for PIQP's own.
     """
     solver = piqp.SparseSolver()
     if tolerance is not None:
@@ -109,18 +101,7 @@ def solve_sparse_qp(
 
 @dataclass(frozen=True, eq=False)
 class QuadraticProgram:
-    """A dense program with bounds on rows and unknowns; infinite ones where there are none.
-
-    Attributes:
-        hessian: (n, n) positive definite.
-        gradient: (n,).
-        rows: (m, n).
-        rows_lower: (m,).
-        rows_upper: (m,).
-        lower: (n,).
-        upper: (n,).
-        equalities: Number of leading rows that are equalities.
-    """
+    """A dense program as of :func:`solve_qp`; bounds are infinite where there are none."""
 
     hessian: FloatArray
     gradient: FloatArray

@@ -7,6 +7,7 @@ coordinates in frame *b*.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import ge, gt, le
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,22 +71,13 @@ def finite_number(
     Raises:
         InputError: If the value is not a finite number inside the bounds.
     """
-    bounds = [
-        f"> {above:g}" if above is not None else "",
-        f">= {at_least:g}" if at_least is not None else "",
-        f"<= {at_most:g}" if at_most is not None else "",
-    ]
-    valid = "a finite number " + " and ".join(bound for bound in bounds if bound)
+    all_bounds = ((">", above, gt), (">=", at_least, ge), ("<=", at_most, le))
+    bounds = [(sign, limit, holds) for sign, limit, holds in all_bounds if limit is not None]
+    valid = "a finite number " + " and ".join(f"{sign} {limit:g}" for sign, limit, _ in bounds)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
         raise error(f"{name} is {value!r}; valid: {valid.strip()}")
     number = float(value)
-    inside = (
-        np.isfinite(number)
-        and (above is None or number > above)
-        and (at_least is None or number >= at_least)
-        and (at_most is None or number <= at_most)
-    )
-    if not inside:
+    if not (math.isfinite(number) and all(holds(number, limit) for _, limit, holds in bounds)):
         raise error(f"{name} is {number:g}; valid: {valid.strip()}")
     return number
 
@@ -321,11 +313,7 @@ def rotation_vector_jacobian(vectors: FloatArray) -> FloatArray:
 
 def matrix(rows: list[list[FloatArray]]) -> FloatArray:
     """(..., 3, 3) of nine (...) entries."""
-    result = np.empty((*rows[0][0].shape, 3, 3))
-    for i, row in enumerate(rows):
-        for j, entry in enumerate(row):
-            result[..., i, j] = entry
-    return result
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def rotations(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatArray:

@@ -13,9 +13,11 @@ import time as clock
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from joblib import cpu_count
 
 from manikin.scenarios import Scenario, list_scenarios, list_variants, load_scenario
 
@@ -58,8 +60,7 @@ class Job:
     @property
     def folder(self) -> str:
         """Name of its run directory."""
-        stem = Path(self.scenario).stem
-        return stem if self.variant is None else f"{stem}@{self.variant}"
+        return replace(self, scenario=Path(self.scenario).stem).name
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +128,7 @@ def run_jobs(
     """
     began = clock.perf_counter()
     result: dict[int, dict[str, Any]] = {}
-    with closing(_completed(jobs, command, workers or usable_cores(), time_limit)) as completed:
+    with closing(_completed(jobs, command, workers or cpu_count(), time_limit)) as completed:
         for index, entry in completed:
             result[index] = entry
             if report is not None:
@@ -137,11 +138,7 @@ def run_jobs(
 
 
 def counts(runs: Sequence[Mapping[str, Any]]) -> dict[str, int]:
-    """Number of runs that were planned, proved, fell, succeeded, and ended as their scenario says.
-
-    Args:
-        runs: Entries of a report of :func:`run_jobs`.
-    """
+    """Number of runs that were planned, proved, fell, succeeded, and ended as their scenario says."""
     number = {key: sum(bool(run[key]) for run in runs) for key in ("planned", "proved", "succeeded")}
     fell = sum(bool((run["execution"] or {}).get("fell")) for run in runs)
     right = sum(bool(run["as_expected"]) for run in runs)
@@ -149,13 +146,6 @@ def counts(runs: Sequence[Mapping[str, Any]]) -> dict[str, int]:
         **number, "failed": len(runs) - number["succeeded"], "fell": fell,
         "as_expected": right, "not_as_expected": len(runs) - right,
     }  # fmt: skip
-
-
-def usable_cores() -> int:
-    """Number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _completed(
@@ -186,12 +176,17 @@ def _completed(
         running.discard(process)
         seconds = clock.perf_counter() - began
         summary = None if status is None else _summary(output)
-        explained = summary is not None and status == _EXPLAINED
-        if summary is None:
+        ended = "broken off"
+        if summary is not None:
+            ended = "success" if summary["succeeded"] else "failure" if status == _EXPLAINED else ended
+        else:
             late = f"did not end within {time_limit:g} s"
             ending = late if status is None else f"ended with status {status}"
             summary = _broken_off(job, f"the run {ending}", errors, seconds)
-        return _entry(job, summary, explained=explained)
+        right_stage = job.stage in (None, (summary["failure"] or {}).get("stage"))
+        wanted = {"expected": job.expected, "expected_because": job.because or None}
+        right = {"as_expected": ended == job.expected and right_stage}
+        return summary | {"variant": job.variant} | wanted | right
 
     with ThreadPoolExecutor(workers) as pool:
         futures = {pool.submit(run, job): index for index, job in enumerate(jobs)}
@@ -213,16 +208,6 @@ def _end(process: subprocess.Popen[str]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-
-
-def _entry(job: Job, summary: dict[str, Any], *, explained: bool) -> dict[str, Any]:
-    """Summary of a run with what was expected of it."""
-    ended = "success" if summary["succeeded"] else "failure" if explained else "broken off"
-    right_stage = job.stage in (None, (summary["failure"] or {}).get("stage"))
-    return {
-        **summary, "variant": job.variant, "expected": job.expected, "expected_because": job.because or None,
-        "as_expected": ended == job.expected and right_stage,
-    }  # fmt: skip
 
 
 def _summary(output: str) -> dict[str, Any] | None:

@@ -18,13 +18,14 @@ import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from joblib import cpu_count
 
 from manikin.errors import ManikinError, TimeLimitError
-from manikin.pipeline.batch import usable_cores
 from manikin.pipeline.run_directory import CONTACT_PLAN
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import Report, RunContext
@@ -48,8 +49,9 @@ OUTCOMES = ("proved", "planned", "contacts", "failed")
 """How far a task came, the farthest first."""
 
 StageName = Literal["contacts", "all"]
-STAGES: tuple[StageName, ...] = ("contacts", "all")
 
+SIZES = ("stature_m", "mass_kg", "sex")
+"""Keys of a body that an entry tells."""
 
 _AFTER = {"planned": ("execution",), "contacts": ("centroidal", "wholebody", "execution", "check")}
 """Stages in which a task that is ended has come so far already."""
@@ -98,7 +100,8 @@ def run_task(task: BenchmarkTask) -> dict[str, Any]:
     try:
         with processor_time_limit(task.time_limit):
             scenario = draw_scene(FAMILIES[task.family], task.seed, task.folder)
-            entry |= {"scene": digest(scenario), "body": _body_of(scenario)}
+            body = scenario.file.body.model_dump(mode="json", include={"model", *SIZES}, exclude_none=True)
+            entry |= {"scene": digest(scenario), "body": body}
             summary = _contacts(scenario, stages) if task.stage == "contacts" else _whole(scenario, stages)
             entry |= _outcome(summary, task.stage)
     except TimeLimitError as error:
@@ -168,9 +171,6 @@ def _whole(scenario: Scenario, stages: _StageClock) -> dict[str, Any]:
 def checked_contacts(scenario: Scenario, plan: PlannedContacts | Path) -> dict[str, Any]:
     """Verdict of the independent check of a contact plan.
 
-    Args:
-        plan: In the world, or its file.
-
     Returns:
         ``certified``, ``verdict`` in one line, ``broken`` (keys of the requirements that do not hold) and
         ``room_m`` of the centre of mass.
@@ -206,11 +206,6 @@ def _failure(stage: str, reason: str, where: str = "") -> dict[str, Any]:
     return {"stage": stage, "reason": " ".join(reason.split()), "time_s": 0.0, "where": where}
 
 
-def _body_of(scenario: Scenario) -> dict[str, Any]:
-    body = scenario.file.body.model_dump(mode="json", exclude_none=True)
-    return {key: body[key] for key in ("model", "stature_m", "mass_kg", "sex") if key in body}
-
-
 class BenchmarkDirectory(ResultDirectory):
     """Directory of a benchmark; tasks that are done stay done."""
 
@@ -231,7 +226,6 @@ class BenchmarkDirectory(ResultDirectory):
 
     def keep(self, entry: Mapping[str, Any]) -> None:
         """Write the entry of a task."""
-        self.folder(TASKS)
         self.write(f"{TASKS}/{entry['family']}-{entry['seed']}.json", entry)
 
 
@@ -268,17 +262,16 @@ def run_benchmark(
     if directory is not None:
         directory.write(BENCHMARK, asked)
     with tempfile.TemporaryDirectory() as temporary:
-        folder = (
-            Path(temporary) if directory is None else write_scenes(families, seeds, directory.path / SCENES)
-        )
-        tasks = [
-            BenchmarkTask(family.name, seed, stage, time_limit, folder)
-            for family in families
-            for seed in seeds
-        ]
-        entries = {} if directory is None or fresh else _known(directory, tasks)
+        folder = Path(temporary)
+        if directory is not None:
+            folder = write_scenes(families, seeds, directory.path / SCENES)
+        pairs = product((family.name for family in families), seeds)
+        tasks = [BenchmarkTask(name, seed, stage, time_limit, folder) for name, seed in pairs]
+        entries: dict[str, dict[str, Any]] = {}
+        if directory is not None and not fresh:
+            entries = {task.name: item for task in tasks if (item := directory.known(task)) is not None}
         waiting = [task for task in tasks if task.name not in entries]
-        with closing(side_by_side(run_task, waiting, jobs or usable_cores(), "benchmark")) as results:
+        with closing(side_by_side(run_task, waiting, jobs or cpu_count(), "benchmark")) as results:
             for number, entry in results:
                 entries[waiting[number].name] = entry
                 if directory is not None:
@@ -293,29 +286,17 @@ def run_benchmark(
     return result
 
 
-def _known(directory: BenchmarkDirectory, tasks: Iterable[BenchmarkTask]) -> dict[str, dict[str, Any]]:
-    entries = {task.name: directory.known(task) for task in tasks}
-    return {name: entry for name, entry in entries.items() if entry is not None}
-
-
 def write_scenes(families: Iterable[Family], seeds: Sequence[int], folder: Path) -> Path:
     """Write scenes as scenario files with their meshes, and return the folder.
 
     Raises:
         MotionFileError: If they cannot be written.
     """
-    directory = _SceneDirectory(folder)
-    for family in families:
-        for seed in seeds:
-            scenario = draw_scene(family, seed, folder)
-            directory.write(f"{scenario.name}.yaml", scenario.to_short_yaml())
+    directory = ResultDirectory(folder, "scenes")
+    for family, seed in product(families, seeds):
+        scenario = draw_scene(family, seed, folder)
+        directory.write(f"{scenario.name}.yaml", scenario.to_short_yaml())
     return folder
-
-
-class _SceneDirectory(ResultDirectory):
-    """Directory of scenario files; other files in it are left alone."""
-
-    kind = "scenes"
 
 
 def counted(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from manikin.planning.com import CentroidalProblem, CentroidalTrajectory
 from manikin.planning.com.com_certificate import phase_margins, phase_times
 from manikin.planning.com.feasibility import polytopes_of
 from manikin.runtime.display import Displayed
-from manikin.runtime.files import FIGURES, ResultDirectory, read_json, write_result
+from manikin.runtime.files import FIGURES, ResultDirectory, read_json
 from manikin.scenarios import load_scenario
 from manikin.scene import Scene
 
@@ -143,9 +143,8 @@ class RunRecord(Displayed):
     @property
     def effectors(self) -> tuple[str, ...]:
         """Every effector that is ever in contact, in order of first use."""
-        if self.phases is None:
-            return ()
-        return tuple(dict.fromkeys(name for supports in self.phases.supports for name in supports))
+        phases = () if self.phases is None else self.phases.supports
+        return tuple(dict.fromkeys(name for supports in phases for name in supports))
 
     @cached_property
     def effector_paths(self) -> dict[str, dict[str, FloatArray]]:
@@ -183,12 +182,15 @@ def read_run(directory: str | Path) -> RunRecord:
     summary = read_summary(folder)
     has_motion = (folder / MOTION).is_file()
     content = read_motions(folder / MOTION) if has_motion else MotionFile()
-    planned = folder / STAGES / COM_TRAJECTORY
+    planned, label = folder / STAGES / COM_TRAJECTORY, folder.resolve().name
     if not planned.is_file():
         mass = None if content.body is None else content.body.mass
-        return RunRecord(_label(folder), content, summary, mass, walks=_read_walks(folder))
-    scenario = load_scenario(folder / SCENARIO)
-    trajectory = _trajectory(read_json(planned), scenario.build_sequence(planning=True), folder)
+        return RunRecord(label, content, summary, mass, walks=_read_walks(folder))
+    scenario, data = load_scenario(folder / SCENARIO), read_json(planned)
+    sequence = scenario.build_sequence(planning=True)
+    with _undamaged(planned):
+        stances = _first_phases(sequence, len(data["key_instants_s"]) - 1)
+        trajectory = CentroidalTrajectory.from_dict(data, stances)
     if not has_motion:
         real = _first_phases(scenario.build_sequence(), len(trajectory.schedule.sequence))
         schedule = ContactSchedule(real, trajectory.schedule.instants)
@@ -196,19 +198,13 @@ def read_run(directory: str | Path) -> RunRecord:
     problem = scenario.build_centroidal_problem()
     polytopes = polytopes_of(problem)[: len(trajectory.schedule.sequence)]
     plan = point_mass_track(problem, trajectory, polytopes)
-    return RunRecord(_label(folder), content, summary, trajectory.mass, plan, _read_walks(folder))
+    return RunRecord(label, content, summary, trajectory.mass, plan, _read_walks(folder))
 
 
 def point_mass_track(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> ComTrack:
-    """The planned CoM every millisecond, with its margin.
-
-    Args:
-        problem: What the trajectory was planned for.
-        trajectory: The plan.
-        polytopes: Of the wrenches of each phase.
-    """
+    """The planned CoM every millisecond, with its margin by the polytopes of the wrenches of each phase."""
     time = np.concatenate(phase_times(trajectory))
     derivatives = (trajectory.position, trajectory.velocity, trajectory.acceleration)
     position, velocity, acceleration = (evaluate(time) for evaluate in derivatives)
@@ -216,16 +212,11 @@ def point_mass_track(
     return ComTrack(time, position, velocity, acceleration, margin, problem.margin_unit)
 
 
-def _label(folder: Path) -> str:
-    return folder.resolve().name
-
-
 def _check_is_run(folder: Path) -> None:
     valid = "valid: a directory written by manikin run"
-    if not folder.exists():
-        raise MotionFileError(f"{folder}: there is no such directory; {valid}")
     if not folder.is_dir():
-        raise MotionFileError(f"{folder}: is a file; {valid}")
+        problem = "is a file" if folder.exists() else "there is no such directory"
+        raise MotionFileError(f"{folder}: {problem}; {valid}")
     if not (folder / SCENARIO).is_file():
         raise MotionFileError(f"{folder}: is not a run directory, it has no {SCENARIO}; {valid}")
     if not (folder / SUMMARY).is_file():
@@ -240,12 +231,6 @@ def _read_walks(folder: Path) -> dict[str, FloatArray]:
             name: np.column_stack([item["time_s"], np.reshape(item["place"], (-1, 3))]).astype(np.float64)
             for name, item in (read_json(path) if path.is_file() else {}).items()
         }
-
-
-def _trajectory(data: dict[str, Any], sequence: StanceSequence, folder: Path) -> CentroidalTrajectory:
-    with _undamaged(folder / STAGES / COM_TRAJECTORY):
-        phases = len(data["key_instants_s"]) - 1
-        return CentroidalTrajectory.from_dict(data, _first_phases(sequence, phases))
 
 
 @contextmanager
@@ -306,23 +291,6 @@ class RunDirectory(ResultDirectory):
         self.remove(
             SUMMARY, CONTACT_PLAN, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS
         )
-
-    def write_scenario(self, yaml_text: str) -> Path:
-        """Keep the resolved scenario."""
-        return self.write(SCENARIO, yaml_text)
-
-    def write_stage(self, name: str, result: Mapping[str, Any]) -> Path:
-        """Keep the result of a stage, as soon as it is known.
-
-        Args:
-            name: Of the stage, such as ``"centroidal"``.
-            result: Plain values and arrays.
-        """
-        return write_result(self.folder(STAGES) / f"{name}.json", result)
-
-    def write_summary(self, summary: Mapping[str, Any]) -> Path:
-        """Write the summary; the last thing a run does."""
-        return self.write(SUMMARY, summary)
 
 
 def read_summary(path: str | Path) -> dict[str, Any]:

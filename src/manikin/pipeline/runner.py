@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from manikin.contact import ContactSchedule
@@ -21,7 +22,7 @@ from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_a
 from manikin.pipeline.stages.context import StageFailure
 from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, execute_motion
 from manikin.pipeline.stages.recovery_stage import recover_from_push
-from manikin.pipeline.stages.refinement_stage import KeyedContacts, refine_contacts
+from manikin.pipeline.stages.refinement_stage import refine_contacts
 from manikin.pipeline.stages.walking_stage import walk_on_footprints, walk_to_goal
 from manikin.pipeline.stages.whole_body_stage import (
     follow_centre_of_mass,
@@ -79,9 +80,9 @@ def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequen
 
 def _follow_the_road(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
     """The whole road; contacts are planned where the scenario lists none, and none for a body that stays."""
-    if context.scenario.recovery is not None:
+    if context.scenario.file.recovery is not None:
         return RunResult.of(report, recovery=recover_from_push(context, report))
-    walking = context.scenario.walking
+    walking = context.scenario.file.walking
     if walking is not None and not walking.is_planned(context.scenario.file.supports):
         return RunResult.of(report, planned=walk_to_goal(context, report))
     if walking is not None:
@@ -92,25 +93,19 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     with_contacts = context if context.scenario.file.supports is not None else plan_contacts(context, report)
     if with_contacts is None:
         return RunResult.of(report)
-    if context.scenario.refines:
-        return _refined(with_contacts, report, requirements)
-    if context.scenario.is_point_mass:
-        return _moved_point_mass(with_contacts, report)
-    result, schedule = _followed(with_contacts, report, requirements)
+    if context.scenario.is_point_mass and not context.scenario.refines:  # its centre of mass is all there is
+        centroidal = plan_centre_of_mass(with_contacts, report)
+        return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
+    planned = _refined if context.scenario.refines else _followed
+    result, schedule = planned(with_contacts, report, requirements)
     for _ in range(1, context.scenario.contacts.attempts):
         phase = failed_phase(report.failure, schedule)
         again = None if phase is None else plan_contacts_again(with_contacts, report, phase)
         if again is None:
             break
         with_contacts = again
-        result, schedule = _followed(with_contacts, report, requirements)
+        result, schedule = planned(with_contacts, report, requirements)
     return result()
-
-
-def _moved_point_mass(context: RunContext, report: Report) -> RunResult:
-    """A body without joints: its centre of mass is all there is."""
-    centroidal = plan_centre_of_mass(context, report)
-    return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
 
 
 def _followed(
@@ -150,20 +145,28 @@ def failed_phase(failure: StageFailure | None, schedule: ContactSchedule | None)
     return None if schedule is None else int(schedule.phase_at(failure.time_s))
 
 
-def _refined(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
-    """Key postures of the contact plan, or of the centre of mass on given supports, then the refinement."""
-    centroidal, keyed = None, None
+def _refined(
+    context: RunContext, report: Report, requirements: ExecutionRequirements
+) -> tuple[Callable[[], RunResult], ContactSchedule | None]:
+    """Key postures of the contact plan, or of the centre of mass on given supports, then the refinement.
+
+    Returns:
+        As :func:`_followed`.
+    """
+    centroidal = None
     if context.plan is not None:
-        keyed = KeyedContacts.of_plan(context.plan, context.scenario.contact_model)
+        schedule = context.plan.schedule(context.scenario.contact_model)
+        keys = context.plan.keys(schedule.instants)
     else:
         plan = with_key_postures(context, report, plan_centre_of_mass(context, report))
         centroidal = plan.centroidal
-        if plan.trajectory is not None and plan.postures is not None:
-            keyed = KeyedContacts.of_postures(plan.trajectory.schedule, plan.postures)
-    if keyed is None:
-        return RunResult.of(report, centroidal)
-    refined, execution = refine_contacts(context, report, keyed), None
+        if plan.trajectory is None or plan.postures is None:
+            return partial(RunResult.of, report, centroidal), None
+        schedule = plan.trajectory.schedule
+        keys = schedule.instants, np.array([item.q for item in plan.postures.postures])
+    refined, execution = refine_contacts(context, report, schedule, *keys), None
     if refined.succeeded and context.scenario.execution_required:
         planned = PlannedMotion(refined.schedule, refined.motion)
         execution = execute_motion(context, report, planned, requirements)
-    return RunResult.of(report, centroidal, refined, execution)
+        report.judge()
+    return partial(RunResult.of, report, centroidal, refined, execution), refined.schedule

@@ -1,7 +1,7 @@
 """Alignment of the phases of two runs by their contacts, with their key instants ([Qiu2012]_ Table 7.7)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -12,49 +12,33 @@ _SAME_PLACE = 1e-3
 """Preference of a pair whose contacts are nearer, small against that of one more pair."""
 
 
-@dataclass(frozen=True)
-class PhasePair:
-    """One row of an alignment.
-
-    Attributes:
-        first, second: Phase of each run, or None when it has none like that of the other.
-    """
-
-    first: int | None
-    second: int | None
-
-    @property
-    def matched(self) -> bool:
-        """Whether both runs have this phase."""
-        return self.first is not None and self.second is not None
-
-
-def align_phases(first: Sequence[Stance], second: Sequence[Stance]) -> tuple[PhasePair, ...]:
+def align_phases(first: Sequence[Stance], second: Sequence[Stance]) -> list[tuple[int | None, int | None]]:
     """Align two sequences of stances, in order, so that as many phases as possible are paired.
 
     Two phases can be paired when the same effectors are in contact, wherever; among alignments
     with equally many pairs the one whose contacts are nearest to each other is taken.
 
     Returns:
-        Every phase of both runs once, in order.
+        Every phase of both runs once, in order; None for a phase that has none like it in the other run.
     """
     gain = np.array([[_likeness(a, b) for b in second] for a in first]).reshape(len(first), len(second))
     best = np.zeros((len(first) + 1, len(second) + 1))
     for i in range(len(first) - 1, -1, -1):
         for j in range(len(second) - 1, -1, -1):
             best[i, j] = max(best[i + 1, j], best[i, j + 1], gain[i, j] + best[i + 1, j + 1])
-    rows, i, j = [], 0, 0
+    rows: list[tuple[int | None, int | None]] = []
+    i, j = 0, 0
     while i < len(first) or j < len(second):
         if i < len(first) and j < len(second) and best[i, j] == gain[i, j] + best[i + 1, j + 1]:
-            rows.append(PhasePair(i, j))
+            rows.append((i, j))
             i, j = i + 1, j + 1
         elif j == len(second) or (i < len(first) and best[i, j] == best[i + 1, j]):
-            rows.append(PhasePair(i, None))
+            rows.append((i, None))
             i += 1
         else:
-            rows.append(PhasePair(None, j))
+            rows.append((None, j))
             j += 1
-    return tuple(rows)
+    return rows
 
 
 def _likeness(a: Stance, b: Stance) -> float:
@@ -67,26 +51,20 @@ def _likeness(a: Stance, b: Stance) -> float:
 
 @dataclass(frozen=True)
 class PhaseTime:
-    """When one phase is held.
+    """When a phase, by its index, is held: start and end are key instants [s]."""
 
-    Attributes:
-        index: Of the phase.
-        start_s, end_s: Key instants [s].
-    """
-
-    index: int
+    phase: int
     start_s: float
     end_s: float
+    duration_s: float
 
-    @property
-    def duration_s(self) -> float:
-        """[s]."""
-        return self.end_s - self.start_s
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
-        times = {"start_s": self.start_s, "end_s": self.end_s, "duration_s": self.duration_s}
-        return {"phase": self.index, **times}
+    @classmethod
+    def of(cls, schedule: ContactSchedule, phase: int | None) -> "PhaseTime | None":
+        """Key instants of a phase of a schedule; None of no phase."""
+        if phase is None:
+            return None
+        start, end = (float(instant) for instant in schedule.instants[phase : phase + 2])
+        return cls(phase, start, end, end - start)
 
 
 @dataclass(frozen=True)
@@ -111,12 +89,8 @@ class TimingRow:
 
     def as_dict(self) -> dict[str, Any]:
         """The row as in the JSON of the command line."""
-        return {
-            "supports": list(self.supports),
-            "first": None if self.first is None else self.first.as_dict(),
-            "second": None if self.second is None else self.second.as_dict(),
-            "duration_difference_s": self.duration_difference_s,
-        }
+        difference = self.duration_difference_s
+        return asdict(self) | {"supports": list(self.supports), "duration_difference_s": difference}
 
 
 def matched(rows: Sequence[TimingRow]) -> list[tuple[PhaseTime, PhaseTime]]:
@@ -124,24 +98,11 @@ def matched(rows: Sequence[TimingRow]) -> list[tuple[PhaseTime, PhaseTime]]:
     return [(row.first, row.second) for row in rows if row.first is not None and row.second is not None]
 
 
-def timing_rows(
-    pairs: Sequence[PhasePair], first: ContactSchedule, second: ContactSchedule
-) -> tuple[TimingRow, ...]:
-    """Key instants of aligned phases of two schedules."""
-    return tuple(
-        TimingRow(_supports(pair, first, second), _time(first, pair.first), _time(second, pair.second))
-        for pair in pairs
-    )
-
-
-def _supports(pair: PhasePair, first: ContactSchedule, second: ContactSchedule) -> tuple[str, ...]:
-    if pair.first is not None:
-        return first.sequence[pair.first].stance.effectors
-    return second.sequence[pair.second or 0].stance.effectors
-
-
-def _time(schedule: ContactSchedule, phase: int | None) -> PhaseTime | None:
-    if phase is None:
-        return None
-    start, end = (float(instant) for instant in schedule.instants[phase : phase + 2])
-    return PhaseTime(phase, start, end)
+def timing_rows(first: ContactSchedule, second: ContactSchedule) -> tuple[TimingRow, ...]:
+    """Aligned phases of two schedules with their key instants."""
+    stances = [[phase.stance for phase in schedule.sequence] for schedule in (first, second)]
+    rows = []
+    for i, j in align_phases(*stances):
+        stance = stances[0][i] if i is not None else stances[1][j or 0]
+        rows.append(TimingRow(stance.effectors, PhaseTime.of(first, i), PhaseTime.of(second, j)))
+    return tuple(rows)

@@ -25,9 +25,8 @@ import numpy as np
 from manikin.analysis import Analysis, AnalysisEntry, AnalysisJob, AnalysisOptions, analyze_file
 from manikin.analysis.adaptation import Replan
 from manikin.balance import motion_margin, pseudo_wrench
-from manikin.errors import InputError, ManikinError
+from manikin.errors import ManikinError
 from manikin.motion.file import MotionFile, write_motions
-from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import MOTION, SUMMARY, ComTrack, RunRecord, point_mass_track
 from manikin.reports.analysis_sheet import recording_sheet
 from manikin.reports.comparison import RunComparison, compare_runs
@@ -42,27 +41,21 @@ def analyze_files(
     """Measure files, and write the directory of each as soon as it is known.
 
     Args:
-        jobs: The files.
-        options: The same for all.
         workers: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
 
     Yields:
         Entries in the order in which they are done.
 
     Raises:
-        InputError: If ``workers`` is less than 1.
         ManikinError: If a process ends before its time.
     """
-    if workers < 1:
-        raise InputError(f"workers is {workers}; valid: at least 1")
     # Longest first, so that all processes end together.
     ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)
-    item = partial(analyze_one, options=options)
-    for _, entry in side_by_side(item, ordered, workers, "analysis"):
+    for _, entry in side_by_side(partial(_analyze_one, options=options), ordered, workers, "analysis"):
         yield entry
 
 
-def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:
+def _analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:
     """Measure one file and write its directory."""
     try:
         result = analyze_file(job.path, options)
@@ -95,40 +88,25 @@ def compare_with_recording(found: Replan) -> RunComparison:
     Args:
         found: A plan; of one that failed there is only the recording.
     """
-    schedule = found.recording.schedule
-    first = RunRecord(
-        "recorded", MotionFile(body=found.body, scene=found.scene, schedule=schedule),
-        {"succeeded": True}, found.body.mass, _recorded_track(found),
-    )  # fmt: skip
-    succeeded = found.com.trajectory is not None
-    content = MotionFile(body=found.body, scene=found.scene, schedule=found.schedule if succeeded else None)
-    second = RunRecord(
-        found.method, content, {"succeeded": succeeded}, found.body.mass, _planned_track(found)
-    )  # fmt: skip
+    content = MotionFile(body=found.body, scene=found.scene, schedule=found.recording.schedule)
+    mass, plan, trajectory = found.body.mass, None, found.com.trajectory
+    first = RunRecord("recorded", content, {"succeeded": True}, mass, _recorded_track(found))
+    if trajectory is not None:
+        plan = point_mass_track(found.com.problem, replace(trajectory, turning=None), found.com.polytopes)
+    content = replace(content, schedule=None if plan is None else found.schedule)
+    second = RunRecord(found.method, content, {"succeeded": plan is not None}, mass, plan)
     return compare_runs(first, second)
 
 
 def _recorded_track(found: Replan) -> ComTrack:
-    recording = found.recording
-    time, com = recording.time, recording.com
+    time, com, schedule = found.recording.time, found.recording.com, found.recording.schedule
     velocity = np.gradient(com, time, axis=0, edge_order=2)
     acceleration = np.gradient(velocity, time, axis=0, edge_order=2)
-    return ComTrack(time, com, velocity, acceleration, _margins(found, time, com, acceleration))
-
-
-def _margins(found: Replan, time: FloatArray, com: FloatArray, acceleration: FloatArray) -> FloatArray:
     wrench = pseudo_wrench(found.body.mass, com, acceleration)
-    schedule = found.recording.schedule
     stances = [phase.stance for phase in schedule.sequence]
     known = found.com.polytopes
-    return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=known).margin
-
-
-def _planned_track(found: Replan) -> ComTrack | None:
-    trajectory = found.com.trajectory
-    if trajectory is None:
-        return None
-    return point_mass_track(found.com.problem, replace(trajectory, turning=None), found.com.polytopes)
+    margins = motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=known)
+    return ComTrack(time, com, velocity, acceleration, margins.margin)
 
 
 SHEET = "Postures, supports, forces, margins, height and scores over time"
@@ -237,7 +215,10 @@ def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], d
     Raises:
         MotionFileError: If they cannot be written.
     """
-    rows = [_row(entry) for entry in entries]
+    rows = []
+    for entry in entries:
+        values = {key: _value(entry.summary, path) for key, path, *_ in COLUMNS}
+        rows.append({"file": str(entry.job.path), **values, "refused": entry.refusal})
     write_result(directory / TABLE, csv_text(list(rows[0]), [list(row.values()) for row in rows]))
     write_result(directory / OVERVIEW, _overview_page(entries, rows, overview, directory))
     write_result(directory / ANALYSES, overview)
@@ -260,12 +241,6 @@ def _overview_page(
         })  # fmt: skip
     columns = [{"key": key, "heading": heading, "decimals": digits} for key, _, heading, _, digits in known]
     return render("overview", **overview, folder=shared, columns=columns, rows=shown)
-
-
-def _row(entry: AnalysisEntry) -> dict[str, Any]:
-    """A recording in one line; empty where it was refused."""
-    values = {key: _value(entry.summary, path) for key, path, *_ in COLUMNS}
-    return {"file": str(entry.job.path), **values, "refused": entry.refusal}
 
 
 def _value(summary: Mapping[str, Any] | None, path: str) -> Any:

@@ -14,7 +14,8 @@ import pinocchio as pin
 from manikin.analysis import Analysis
 from manikin.body import BodyModel
 from manikin.body.segments import end_of
-from manikin.numerics.spatial import FloatArray, turned_root
+from manikin.numerics.signals import mask_runs
+from manikin.numerics.spatial import FloatArray, rotation_from_quaternion, turned_root
 from manikin.runtime.display import COLOURS, colours_of, readable, side_colour
 
 TENTHS = 10.0
@@ -22,12 +23,7 @@ TENTHS = 10.0
 
 
 class SvgDrawing:
-    """Collects what is drawn; x goes to the right and y downward, in pixels of the page.
-
-    Attributes:
-        width: Of the drawing [px].
-        height: Of the drawing [px].
-    """
+    """Collects what is drawn; x goes to the right and y downward, in pixels of the page."""
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height
@@ -35,10 +31,8 @@ class SvgDrawing:
 
     def curve(self, x: FloatArray, y: FloatArray, colour: str, width: float) -> None:
         """A line through points (n,) and (n,), broken where one is not finite."""
-        known = np.isfinite(x) & np.isfinite(y)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(np.int8), [0]])))
-        path = [_way(x[first:stop], y[first:stop]) for first, stop in edges.reshape(-1, 2)]
-        self._stroke(path, colour, width)
+        known = mask_runs(np.isfinite(x) & np.isfinite(y))
+        self._stroke([_way(x[first:stop], y[first:stop]) for first, stop in known], colour, width)
 
     def strokes(self, lines: Iterable[FloatArray], colour: str, width: float) -> None:
         """Lines (k, 2) from point to point."""
@@ -52,11 +46,10 @@ class SvgDrawing:
     def text(
         self, x: float, y: float, *parts: tuple[str, str], size: float = 12.0, anchor: str = "start"
     ) -> None:
-        """Words in a row, each with its colour.
+        """Words in a row on the line y, each with its colour.
 
         Args:
             x: Of the ``anchor``.
-            y: Of the line that the words stand on.
             parts: Words and colours.
             size: Of the letters [px].
             anchor: ``"start"``, ``"middle"`` or ``"end"`` of the row.
@@ -68,11 +61,7 @@ class SvgDrawing:
         )
 
     def svg(self, words: str) -> str:
-        """Text of the drawing, an element of a page of HTML.
-
-        Args:
-            words: Alternative text.
-        """
+        """Text of the drawing, an element of a page of HTML; ``words`` are its alternative text."""
         size = f'viewBox="0 0 {_tenths(self.width)} {_tenths(self.height)}"'
         head = f'<svg {size} role="img" aria-label="{escape(words)}"'
         return "\n".join([f'{head} font-family="system-ui, sans-serif">', *self._parts, "</svg>"])
@@ -86,13 +75,7 @@ class SvgDrawing:
 
 
 def round_values(low: float, high: float, most: int) -> FloatArray:
-    """Multiples of 1, 2, 2.5 or 5 times a power of ten from ``low`` to ``high``, at most ``most``.
-
-    Args:
-        low: Lower end.
-        high: Upper end, above it.
-        most: At least 1.
-    """
+    """Multiples of 1, 2, 2.5 or 5 times a power of ten from ``low`` to ``high``, at most ``most``."""
     power = 10.0 ** np.floor(np.log10((high - low) / most))
     for step in (power * factor for factor in (1.0, 2.0, 2.5, 5.0, 10.0, 20.0)):
         first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
@@ -132,14 +115,7 @@ Curves = Mapping[str, tuple[FloatArray, str]]
 
 @dataclass(frozen=True)
 class _Band:
-    """Curves over time on a common scale.
-
-    Attributes:
-        title: What they are, with the unit.
-        curves: Values (n,) and colour by name; the first is drawn last.
-        low: Lower end of the scale.
-        high: Upper end.
-    """
+    """Curves over time on a scale from ``low`` to ``high``: values (n,) and colour by name."""
 
     title: str
     curves: Curves
@@ -148,15 +124,7 @@ class _Band:
 
 
 def recording_sheet(analysis: Analysis, words: str) -> str:
-    """Draw what was measured of a recording over time.
-
-    Args:
-        analysis: The recording.
-        words: Alternative text.
-
-    Returns:
-        An SVG element.
-    """
+    """SVG element of what was measured of a recording over time; ``words`` are its alternative text."""
     figures = _Postures(analysis)
     names, bands = analysis.motion.contact_names, _bands(analysis)
     rows = figures.height + 40.0
@@ -187,13 +155,17 @@ class _Clock:
     def draw(self, sheet: SvgDrawing, level: float) -> None:
         ticks = round_values(self.first, self.last, 10)
         places = self(ticks)
-        ends = [np.array([[LEFT, level], [WIDTH - RIGHT, level]])]
         marks = [np.array([[place, level], [place, level + 5.0]]) for place in places]
-        sheet.strokes(ends + marks, COLOURS["soft"], 1.0)
+        sheet.strokes([_level(level), *marks], COLOURS["soft"], 1.0)
         for tick, place in zip(ticks, places, strict=True):
             sheet.text(place, level + 18.0, (f"{tick:g}", COLOURS["ink"]), size=11.0, anchor="middle")
         middle = 0.5 * (LEFT + WIDTH - RIGHT)
         sheet.text(middle, level + 34.0, ("time [s]", COLOURS["ink"]), anchor="middle")
+
+
+def _level(y: float) -> FloatArray:
+    """(2, 2) ends of a level line across the sheet [px]."""
+    return np.array([[LEFT, y], [WIDTH - RIGHT, y]])
 
 
 def _bands(analysis: Analysis) -> list[_Band]:
@@ -242,7 +214,7 @@ def _draw(sheet: SvgDrawing, x: FloatArray, band: _Band, bottom: float) -> None:
     ticks = round_values(band.low, band.high, 4)
     for tick, level in zip(ticks, placed(ticks), strict=True):
         colour = COLOURS["soft"] if abs(tick) < 1e-9 and band.low < 0.0 else GRID
-        sheet.strokes([np.array([[LEFT, level], [WIDTH - RIGHT, level]])], colour, 0.8)
+        sheet.strokes([_level(level)], colour, 0.8)
         words = f"{0.0 if abs(tick) < 1e-9 else tick:g}"
         sheet.text(LEFT - 8.0, level + 4.0, (words, COLOURS["ink"]), size=11.0, anchor="end")
     sheet.text(LEFT, bottom - BAND - 8.0, (band.title, COLOURS["ink"]))
@@ -266,11 +238,7 @@ def _supports(sheet: SvgDrawing, clock: _Clock, analysis: Analysis, top: float) 
 
 
 class _Postures:
-    """Postures from the right side of where the person goes, or looks at first.
-
-    Attributes:
-        height: That they need [px].
-    """
+    """Postures from the right side of where the person goes, or looks at first; ``height`` is in pixels."""
 
     def __init__(self, analysis: Analysis) -> None:
         frames = np.unique((np.arange(0.5, POSTURES) / POSTURES * len(analysis.time)).astype(np.int64))
@@ -283,16 +251,15 @@ class _Postures:
         widest = float(np.ptp(self._bones[..., 0], axis=(1, 2)).max()) + 0.15
         room = (WIDTH - LEFT - RIGHT) / max(len(frames), 4)
         self._scale = min(LARGEST, room / widest)
-        self._bones[..., 0] -= np.mean(
-            [self._bones[..., 0].min(axis=(1, 2)), self._bones[..., 0].max(axis=(1, 2))], axis=0
-        )[:, None, None]
+        ahead = self._bones[..., 0]
+        ahead -= 0.5 * (ahead.min(axis=(1, 2), keepdims=True) + ahead.max(axis=(1, 2), keepdims=True))
         self._top = max(float(self._bones[..., 1].max()), 0.5)
         self._below = max(-float(self._bones[..., 1].min()), 0.0)
         self.height = self._scale * (self._top + self._below) + 20.0
 
     def draw(self, sheet: SvgDrawing, clock: _Clock) -> None:
         floor = 10.0 + self._scale * self._top
-        sheet.strokes([np.array([[LEFT, floor], [WIDTH - RIGHT, floor]])], COLOURS["soft"], 1.0)
+        sheet.strokes([_level(floor)], COLOURS["soft"], 1.0)
         places = np.stack([clock(self._instants), np.full(len(self._instants), floor)], axis=1)
         bones = places[:, None, None] + self._scale * self._bones * (1.0, -1.0)
         left, trunk, right = (side_colour(name) for name in ("left", "trunk", "right"))
@@ -306,10 +273,8 @@ class _Postures:
 
 def _drawn(body: BodyModel) -> list[str]:
     """Segments whose bones are drawn: from each parent to all, then those without children."""
-    parents = {segment.parent for segment in body.segments}
-    return [item.name for item in body.segments[1:]] + [
-        item.name for item in body.segments[1:] if item.name not in parents
-    ]
+    parents, names = {item.parent for item in body.segments}, [item.name for item in body.segments[1:]]
+    return names + [name for name in names if name not in parents]
 
 
 def _bones(body: BodyModel, q: FloatArray) -> FloatArray:
@@ -324,8 +289,7 @@ def _bones(body: BodyModel, q: FloatArray) -> FloatArray:
     places = {name: frame.translation for name, frame in frames.items()}
     lines = [[places[item.parent or ""], places[item.name]] for item in body.segments[1:]]
     for name in _drawn(body)[len(lines) :]:
-        end = end_of(body.segment(name))
-        lines.append([places[name], frames[name].act(end)])
+        lines.append([places[name], frames[name].act(end_of(body.segment(name)))])
     return np.array(lines)[..., [0, 2]]
 
 
@@ -333,7 +297,6 @@ def _heading(analysis: Analysis) -> float:
     """Heading of the way of the pelvis, or of the pelvis in the middle of the recording if it stays [rad]."""
     q = analysis.motion.q
     way = q[-1, :2] - q[0, :2]
-    if float(np.linalg.norm(way)) > 0.5:
-        return float(np.arctan2(way[1], way[0]))
-    x, y, z, w = q[len(q) // 2, 3:7]
-    return float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+    if float(np.linalg.norm(way)) <= 0.5:
+        way = rotation_from_quaternion(q[None, len(q) // 2, 3:7])[0, :2, 0]
+    return float(np.arctan2(way[1], way[0]))

@@ -1,34 +1,19 @@
 """Comparison of two runs: timing, centre of mass, margins and joint angles, phase by phase."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from manikin.contact import Stance
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.alignment import (
-    PhasePair,
-    PhaseTime,
-    TimingRow,
-    align_phases,
-    matched,
-    timing_rows,
-)
+from manikin.reports.alignment import PhaseTime, TimingRow, matched, timing_rows
 from manikin.runtime.display import Displayed
 
 SAMPLES = 101
 """Instants of each phase at which two centres of mass are compared."""
-
-
-def matched_times(rows: Sequence[TimingRow]) -> tuple[FloatArray, FloatArray]:
-    """(n,) instants of both runs at the same share of each phase that both have [s]."""
-    share, empty = np.linspace(0.0, 1.0, SAMPLES), np.zeros(0)
-    times = [(a.start_s + share * a.duration_s, b.start_s + share * b.duration_s) for a, b in matched(rows)]
-    return np.concatenate([empty, *(a for a, _ in times)]), np.concatenate([empty, *(b for _, b in times)])
 
 
 def com_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTrack) -> dict[str, Any] | None:
@@ -37,9 +22,13 @@ def com_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTrack)
     Returns:
         The ``com`` block of the JSON; None when no phase matches.
     """
-    times_first, times_second = matched_times(rows)
-    if not len(times_first):
+    if not (phases := matched(rows)):
         return None
+    share = np.linspace(0.0, 1.0, SAMPLES)
+    times_first, times_second = (
+        np.concatenate([phase.start_s + share * phase.duration_s for phase in of])
+        for of in zip(*phases, strict=True)
+    )
     gap = second.at(times_second) - first.at(times_first)
     distance = np.linalg.norm(gap, axis=1)
     worst = int(np.argmax(distance))
@@ -108,26 +97,12 @@ LARGEST = 5
 
 @dataclass(frozen=True)
 class JointDifference:
-    """One joint at one key instant.
-
-    Attributes:
-        joint: Name of the hinge.
-        first_deg: Angle in the first run [deg].
-        second_deg: Angle in the second run [deg].
-    """
+    """Angles of one hinge in both runs at one key instant, and second less first [deg]."""
 
     joint: str
     first_deg: float
     second_deg: float
-
-    @property
-    def difference_deg(self) -> float:
-        """Second less first [deg]."""
-        return self.second_deg - self.first_deg
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
-        return asdict(self) | {"difference_deg": self.difference_deg}
+    difference_deg: float
 
 
 @dataclass(frozen=True)
@@ -146,10 +121,6 @@ class PostureDifference:
     rms_deg: float
     largest: tuple[JointDifference, ...]
 
-    def as_dict(self) -> dict[str, Any]:
-        """One entry of the ``postures`` block of the JSON."""
-        return asdict(self) | {"largest": [joint.as_dict() for joint in self.largest]}
-
 
 def key_instants(rows: Sequence[TimingRow]) -> list[tuple[float, float]]:
     """Key instants of both runs [s]: the start of each matched phase, and its end where the next differs."""
@@ -165,37 +136,23 @@ def key_instants(rows: Sequence[TimingRow]) -> list[tuple[float, float]]:
 def posture_differences(
     rows: Sequence[TimingRow], first: Motion, second: Motion
 ) -> tuple[PostureDifference, ...]:
-    """Compare the angles of the joints that both bodies have, at every matching key instant.
-
-    Args:
-        rows: Aligned phases.
-        first: Motion of the first run.
-        second: Motion of the second one.
-    """
+    """Compare the angles of the joints that both bodies have, at every matching key instant."""
     common = [name for name in first.joint_names if name in second.joint_names]
-    if not common:
-        return ()
-    places = [[7 + motion.joint_names.index(name) for name in common] for motion in (first, second)]
-    return tuple(
-        _postures_difference(
-            common, times, _angles(first, places[0], times[0]), _angles(second, places[1], times[1])
-        )
-        for times in key_instants(rows)
-    )
+    instants = key_instants(rows) if common else []
+    postures = []
+    for times in instants:
+        a, b = (_angles(*item, common) for item in zip((first, second), times, strict=True))
+        order = np.argsort(-np.abs(b - a), kind="stable")[:LARGEST]
+        largest = [JointDifference(common[i], float(a[i]), float(b[i]), float(b[i] - a[i])) for i in order]
+        rms = float(np.sqrt(np.mean((b - a) ** 2)))
+        postures.append(PostureDifference(*times, rms, tuple(largest)))
+    return tuple(postures)
 
 
-def _angles(motion: Motion, places: list[int], time: float) -> FloatArray:
-    """(joints,) angles at the sample nearest to ``time`` [deg]."""
+def _angles(motion: Motion, time: float, names: list[str]) -> FloatArray:
+    """(joints,) angles of joints at the sample nearest to ``time`` [deg]."""
+    places = [7 + motion.joint_names.index(name) for name in names]
     return np.rad2deg(motion.q[int(np.argmin(np.abs(motion.time - time)))][places])
-
-
-def _postures_difference(
-    names: list[str], times: tuple[float, float], first: FloatArray, second: FloatArray
-) -> PostureDifference:
-    gap = second - first
-    order = np.argsort(-np.abs(gap), kind="stable")[:LARGEST]
-    largest = tuple(JointDifference(names[i], float(first[i]), float(second[i])) for i in order)
-    return PostureDifference(times[0], times[1], float(np.sqrt(np.mean(gap**2))), largest)
 
 
 STAGES = ("point mass", "planned", "executed")
@@ -208,8 +165,7 @@ class RunComparison(Displayed):
 
     Attributes:
         first, second: The runs.
-        pairs: Their phases, aligned by the effectors in contact; empty without schedules.
-        rows: The same with key instants.
+        rows: Their phases, aligned by the effectors in contact; empty without schedules.
         postures_of: ``"planned"`` or ``"executed"``, whichever motion the postures are of, or None.
         postures: At the matching key instants.
         unmatched: What could not be compared and why, one line each.
@@ -217,7 +173,6 @@ class RunComparison(Displayed):
 
     first: RunRecord
     second: RunRecord
-    pairs: tuple[PhasePair, ...]
     rows: tuple[TimingRow, ...]
     postures_of: str | None
     postures: tuple[PostureDifference, ...]
@@ -240,45 +195,50 @@ class RunComparison(Displayed):
         """Time from the first to the last key instant of each run [s]."""
         return _duration(self.first), _duration(self.second)
 
+    @property
+    def matched_phases(self) -> int:
+        """Number of phases that both runs have."""
+        return len(matched(self.rows))
+
     def as_dict(self) -> dict[str, Any]:
         """The JSON of ``manikin compare``."""
         shared = shared_tracks(*self.runs)
+
+        def by_stage(difference: Callable[..., Any]) -> dict[str, Any]:
+            keys = {stage: stage.replace(" ", "_") for stage in STAGES}
+            return {
+                key: difference(self.rows, *shared[stage]) if stage in shared else None
+                for stage, key in keys.items()
+            }
+
         return {
             "first": _run_block(self.first, self.names[0]),
             "second": _run_block(self.second, self.names[1]),
-            "matched_phases": sum(pair.matched for pair in self.pairs),
+            "matched_phases": self.matched_phases,
             "timing": [row.as_dict() for row in self.rows] or None,
             "duration_difference_s": _difference(*self.durations),
-            "com": {
-                _key(stage): com_difference(self.rows, *shared[stage]) if stage in shared else None
-                for stage in STAGES
-            },
-            "margins": {
-                _key(stage): margin_difference(self.rows, *shared[stage]) if stage in shared else None
-                for stage in STAGES
-            },
+            "com": by_stage(com_difference),
+            "margins": by_stage(margin_difference),
             "postures_of": self.postures_of,
-            "postures": [posture.as_dict() for posture in self.postures] or None,
+            "postures": [asdict(posture) for posture in self.postures] or None,
             "unmatched": list(self.unmatched),
         }
 
 
 def compare_runs(first: RunRecord, second: RunRecord) -> RunComparison:
     """Compare two runs as far as both got."""
-    pairs: tuple[PhasePair, ...] = ()
     rows: tuple[TimingRow, ...] = ()
     if first.schedule is not None and second.schedule is not None:
-        pairs = align_phases(_stances(first), _stances(second))
-        rows = timing_rows(pairs, first.schedule, second.schedule)
+        rows = timing_rows(first.schedule, second.schedule)
     kinds = [kind for kind in ("executed", "planned") if kind in first.motions and kind in second.motions]
-    which = kinds[0] if kinds else None
-    postures = ()
-    if which is not None:
-        postures = posture_differences(rows, first.motions[which], second.motions[which])
     unmatched = [*_missing_stages(first, second), *_missing_phases(first, second, rows)]
-    if which is not None:
-        unmatched += _missing_joints(first, second, which)
-    return RunComparison(first, second, pairs, rows, which, postures, tuple(unmatched))
+    if not kinds:
+        return RunComparison(first, second, rows, None, (), tuple(unmatched))
+    motions = first.motions[kinds[0]], second.motions[kinds[0]]
+    if alone := sorted(set(motions[0].joint_names) ^ set(motions[1].joint_names)):
+        unmatched.append(f"joints of one body only: {', '.join(alone)}")
+    postures = posture_differences(rows, *motions)
+    return RunComparison(first, second, rows, kinds[0], postures, tuple(unmatched))
 
 
 def tracks_of(record: RunRecord) -> dict[str, ComTrack]:
@@ -291,10 +251,6 @@ def shared_tracks(first: RunRecord, second: RunRecord) -> dict[str, tuple[ComTra
     """CoM of both runs for every stage that both reached."""
     item, other = tracks_of(first), tracks_of(second)
     return {stage: (item[stage], other[stage]) for stage in STAGES if stage in item and stage in other}
-
-
-def _stances(record: RunRecord) -> list[Stance]:
-    return [] if record.schedule is None else [phase.stance for phase in record.schedule.sequence]
 
 
 def _missing_stages(first: RunRecord, second: RunRecord) -> list[str]:
@@ -319,22 +275,16 @@ def _missing_phases(first: RunRecord, second: RunRecord, rows: tuple[TimingRow, 
     for row in rows:
         held = ", ".join(row.supports) or "no contact"
         if row.second is None and row.first is not None:
-            lines.append(f"phase {row.first.index} of the first run ({held}) has no match in the second")
+            lines.append(f"phase {row.first.phase} of the first run ({held}) has no match in the second")
         elif row.first is None and row.second is not None:
-            lines.append(f"phase {row.second.index} of the second run ({held}) has no match in the first")
+            lines.append(f"phase {row.second.phase} of the second run ({held}) has no match in the first")
     for place, record in (("first", first), ("second", second)):
         if record.schedule is None:
             lines.append(f"the {place} run has no contact schedule")
     return lines
 
 
-def _missing_joints(first: RunRecord, second: RunRecord, which: str) -> list[str]:
-    names = sorted(set(first.motions[which].joint_names) ^ set(second.motions[which].joint_names))
-    return [f"joints of one body only: {', '.join(names)}"] if names else []
-
-
 def _run_block(record: RunRecord, name: str) -> dict[str, Any]:
-    body = record.body
     return {
         "run": name,
         "scenario": record.scenario,
@@ -342,7 +292,7 @@ def _run_block(record: RunRecord, name: str) -> dict[str, Any]:
         "failure": record.summary.get("failure"),
         "duration_s": _duration(record),
         "mass_kg": record.mass,
-        "stature_m": None if body is None else body.stature,
+        "stature_m": None if record.body is None else record.body.stature,
     }
 
 
@@ -353,8 +303,4 @@ def _duration(record: RunRecord) -> float | None:
 
 
 def _words(stage: str) -> str:
-    return {"point mass": "planned point mass"}.get(stage, f"{stage} motion")
-
-
-def _key(stage: str) -> str:
-    return stage.replace(" ", "_")
+    return "planned point mass" if stage == "point mass" else f"{stage} motion"

@@ -6,12 +6,8 @@ from rich.table import Table
 from rich.text import Text
 
 from manikin.reports.alignment import PhaseTime
-from manikin.reports.comparison import (
-    RunComparison,
-    com_difference,
-    margin_difference,
-    shared_tracks,
-)
+from manikin.reports.comparison import RunComparison, com_difference, margin_difference, shared_tracks
+from manikin.runtime.display import readable
 
 
 def report(comparison: RunComparison) -> Group:
@@ -38,29 +34,25 @@ def report_console() -> Console:
 
 def _timing_table(comparison: RunComparison) -> Table:
     first, second = comparison.names
-    table = _table("Timing [s]")
-    for heading in ("supports", f"{first} phase", "start", "end", "duration"):
-        table.add_column(heading, justify="left" if heading == "supports" else "right")
-    for heading in (f"{second} phase", "start", "end", "duration", "difference"):
-        table.add_column(heading, justify="right")
+    instants = ("start", "end", "duration")
+    table = _table(
+        "Timing [s]", "supports", f"{first} phase", *instants, f"{second} phase", *instants, "difference"
+    )
     for row in comparison.rows:
-        difference = row.duration_difference_s
-        table.add_row(
-            ", ".join(name.replace("_", " ") for name in row.supports) or "flight",
-            *_phase(row.first), *_phase(row.second), _number(difference, "+z.3f"),
-        )  # fmt: skip
-    total = [comparison.durations[0], comparison.durations[1]]
-    gap = None if total[0] is None or total[1] is None else total[1] - total[0]
+        held = ", ".join(map(readable, row.supports)) or "flight"
+        gap = _number(row.duration_difference_s, "+z.3f")
+        table.add_row(held, *_phase(row.first), *_phase(row.second), gap)
+    one, other = comparison.durations
+    gap = None if one is None or other is None else other - one
     table.add_section()
-    table.add_row("whole motion", "", "", "", _number(total[0], ".3f"), "", "", "", _number(total[1], ".3f"),
-                  _number(gap, "+z.3f"))  # fmt: skip
+    cells = "", "", "", _number(one, ".3f"), "", "", "", _number(other, ".3f"), _number(gap, "+z.3f")
+    table.add_row("whole motion", *cells)
     return table
 
 
 def _com_table(comparison: RunComparison) -> Table:
-    table = _table("Centre of mass at equal shares of the matched phases [m]")
-    for heading in ("stage", "RMS distance", "largest", "at [s]", "mean difference x", "y", "z"):
-        table.add_column(escape(heading), justify="left" if heading == "stage" else "right")
+    headings = "stage", "RMS distance", "largest", "at [s]", "mean difference x", "y", "z"
+    table = _table("Centre of mass at equal shares of the matched phases [m]", *headings)
     for stage, tracks in shared_tracks(*comparison.runs).items():
         result = com_difference(comparison.rows, *tracks)
         if result is None:
@@ -74,17 +66,19 @@ def _com_table(comparison: RunComparison) -> Table:
 
 
 def _margin_table(comparison: RunComparison) -> Table:
-    table = _table(f"Smallest margins: {comparison.names[0]} / {comparison.names[1]} (difference)")
     shared = shared_tracks(*comparison.runs)
     result = [margin_difference(comparison.rows, *tracks) for tracks in shared.values()]
-    table.add_column("phase")
+    headings = []
     for stage, margins in zip(shared, result, strict=True):
         unit = margins["unit"] or f"{margins['first_unit']} / {margins['second_unit']}"
-        table.add_column(escape(f"{stage} [{unit}]"), justify="right")
+        headings.append(f"{stage} [{unit}]")
+    title = f"Smallest margins: {comparison.names[0]} / {comparison.names[1]} (difference)"
+    table = _table(title, "phase", *headings)
     for number, row in enumerate(comparison.rows):
         phases = [margins["phases"][number] for margins in result]
         cells = [_pair(item["first"], item["second"], item["difference"]) for item in phases]
-        table.add_row(_phases(row.first, row.second), *cells)
+        one, other = ("-" if phase is None else str(phase.phase) for phase in (row.first, row.second))
+        table.add_row(one if one == other else f"{one} / {other}", *cells)
     table.add_section()
     table.add_row(
         "whole motion", *(_pair(m["min_first"], m["min_second"], m["min_difference"]) for m in result)
@@ -98,33 +92,30 @@ def _pair(first: float | None, second: float | None, difference: float | None) -
 
 def _posture_table(comparison: RunComparison) -> Table:
     first, second = comparison.names
-    table = _table(f"Postures at the key instants, {comparison.postures_of} [deg]")
-    table.add_column(escape(f"{first} at [s]"), justify="right")
-    table.add_column(escape(f"{second} at [s]"), justify="right")
-    table.add_column("RMS", justify="right")
-    table.add_column("largest differences, second less first")
+    title = f"Postures at the key instants, {comparison.postures_of} [deg]"
+    last = "largest differences, second less first"
+    table = _table(title, f"{first} at [s]", f"{second} at [s]", "RMS", last, words=3)
     for posture in comparison.postures:
         joints = [joint for joint in posture.largest[:3] if joint.difference_deg != 0.0]
-        text = ", ".join(f"{j.joint.replace('_', ' ')} {j.difference_deg:+z.1f}" for j in joints)
+        text = ", ".join(f"{readable(j.joint)} {j.difference_deg:+z.1f}" for j in joints)
         table.add_row(
             f"{posture.first_s:.2f}", f"{posture.second_s:.2f}", f"{posture.rms_deg:.2f}", text or "none"
         )
     return table
 
 
-def _table(title: str) -> Table:
-    return Table(title=escape(title), title_justify="left", title_style="bold", header_style="")
+def _table(title: str, *headings: str, words: int = 0) -> Table:
+    """A table of numbers, aligned to the right, but for the column of ``words``."""
+    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="")
+    for number, heading in enumerate(headings):
+        table.add_column(escape(heading), justify="left" if number == words else "right")
+    return table
 
 
 def _phase(phase: PhaseTime | None) -> tuple[str, str, str, str]:
     if phase is None:
         return "-", "-", "-", "-"
-    return str(phase.index), f"{phase.start_s:.3f}", f"{phase.end_s:.3f}", f"{phase.duration_s:.3f}"
-
-
-def _phases(first: PhaseTime | None, second: PhaseTime | None) -> str:
-    item, other = ("-" if phase is None else str(phase.index) for phase in (first, second))
-    return item if item == other else f"{item} / {other}"
+    return str(phase.phase), f"{phase.start_s:.3f}", f"{phase.end_s:.3f}", f"{phase.duration_s:.3f}"
 
 
 def _number(value: float | None, form: str) -> str:

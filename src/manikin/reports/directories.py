@@ -95,9 +95,6 @@ class MapDirectory(ResultDirectory):
     def __init__(self, path: str | Path, asked: Sequence[PushMap]) -> None:
         """Create the directory, or continue the maps of an earlier run.
 
-        Args:
-            asked: Empty maps of what is asked for.
-
         Raises:
             MotionFileError: If it cannot be written, or holds something that is no map.
             InputError: If it holds maps of something else.
@@ -162,22 +159,16 @@ PHASES = "phases.csv"
 HEAD = ("group", "motion", "phase", "effectors", "start_s", "end_s", "duration_s", "whole")
 
 
-class StatisticsDirectory(ResultDirectory):
-    """Directory of statistics; other files in it are left alone."""
-
-    kind = "statistics"
-
-
 def write_statistics(
     directory: str | Path, content: Mapping[str, Any], sequences: Sequence[PhaseSequence],
     figures: Mapping[str, Figure],
 ) -> list[Path]:  # fmt: skip
-    """Write what was measured, and return the files.
+    """Write what was measured, and return the files; others in the directory are left alone.
 
     Raises:
         MotionFileError: If the directory cannot be written to.
     """
-    folder = StatisticsDirectory(directory)
+    folder = ResultDirectory(directory, "statistics")
     files = [folder.write(STATISTICS, content), folder.write(PHASES, phase_table(sequences))]
     for name, figure in figures.items():
         files.append(folder.figures / f"{name}.png")
@@ -195,19 +186,15 @@ def clip_figures(
     height = None if settings.overhead is None else settings.overhead.height
     placed = [clip for clip in clips if clip.name not in found[clip.group].unplaced]
     standing = [clip.standing_com for clip in clips if clip.standing_com is not None]
+    stood = sum(standing) / len(standing) if standing else None
+    lowest = [LowestPoints.of(item, height) for item in found.values()]
+    published, origins = published_distances(), [settings.origin_of(clip) for clip in placed]
     drawn = {
         "phase_durations": lambda: phase_durations_figure([settings.phases_of(clip) for clip in clips], by),
         "placements": lambda: placements_figure({group: item.placements for group, item in found.items()}),
-        "com_paths": lambda: com_paths_figure(
-            placed, [settings.origin_of(clip) for clip in placed], overhead=height
-        ),
-        "com_heights": lambda: com_heights_figure(
-            [LowestPoints.of(item, height) for item in found.values()],
-            sum(standing) / len(standing) if standing else None,
-        ),
-        "com_distances": lambda: com_distances_figure(
-            clips, limit=settings.limit, published=published_distances()
-        ),
+        "com_paths": lambda: com_paths_figure(placed, origins, overhead=height),
+        "com_heights": lambda: com_heights_figure(lowest, stood),
+        "com_distances": lambda: com_distances_figure(clips, limit=settings.limit, published=published),
     }
     figures = {}
     for name, draw in drawn.items():
@@ -286,9 +273,6 @@ class WordsDirectory(ResultDirectory):
     def __init__(self, path: str | Path, grid: WordGrid) -> None:
         """Create the directory, or continue the partition of an earlier run.
 
-        Args:
-            grid: That is asked for.
-
         Raises:
             MotionFileError: If it cannot be written, or holds something that is no partition.
             InputError: If it holds a partition of another grid.
@@ -338,9 +322,8 @@ class WordsDirectory(ResultDirectory):
         chosen = [heading for heading in SHOWN_SLICES if heading in headings] or list(headings[:2])
         slices = [self.slices[heading] for heading in chosen]
         save_figure(words_figure(slices), self.figures / "words.png")
-        borders = ((item, jumps[0]) for item in slices if (jumps := item.jumps()))
-        pairs = [equal_paths(*(item.path(*place) for place in border)) for item, border in borders]
-        if pairs:
+        borders = [(item, jumps[0]) for item in slices if (jumps := item.jumps())]
+        if pairs := [equal_paths(*(item.path(*place) for place in border)) for item, border in borders]:
             save_figure(equal_paths_figure(pairs), self.figures / "equal_paths.png")
 
     def _file(self, heading: int) -> Path:

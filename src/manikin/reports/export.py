@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 from manikin.body import BodyModel, Segment
 from manikin.body.segments import end_of
@@ -28,13 +28,7 @@ from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.pipeline.run_directory import read_run
 from manikin.planning.contacts.single_contact import ContactAnswer
 from manikin.reports.comparison import RunComparison
-from manikin.reports.figures import (
-    ChoicePanel,
-    contact_choice_figure,
-    save_figure,
-    write_comparison,
-    write_figures,
-)
+from manikin.reports.figures import ChoicePanel, contact_choice_figure, save_figure, write_figures
 from manikin.runtime.display import readable
 from manikin.runtime.files import FIGURES, ResultDirectory, columns_csv, make_directory, write_result
 from manikin.scene import Scene
@@ -93,7 +87,10 @@ def resample(motion: Motion, rate: float | None) -> Motion:
         for name, array in motion.arrays().items()
     }
     arrays["time"] = wanted
-    arrays["q"][:, 3:7] = _great_arc(motion.q[:, 3:7], before, share)
+    if len(motion.time) > 1:
+        turns = Slerp(np.arange(len(motion.time)), Rotation.from_quat(motion.q[:, 3:7]))
+        own = arrays["q"][:, 3:7]
+        own[:] = np.where(share[:, None] == 0.0, own, turns(before + share).as_quat())
     return Motion(**arrays, contact_names=motion.contact_names, joint_names=motion.joint_names)
 
 
@@ -111,21 +108,6 @@ def _linear(array: FloatArray, before: np.ndarray, share: FloatArray) -> FloatAr
     after = np.minimum(before + 1, len(array) - 1)
     weight = share.reshape(-1, *(1,) * (array.ndim - 1))
     return np.where(weight == 0.0, array[before], (1.0 - weight) * array[before] + weight * array[after])
-
-
-def _great_arc(quaternion: FloatArray, before: np.ndarray, share: FloatArray) -> FloatArray:
-    first, second = quaternion[before], quaternion[np.minimum(before + 1, len(quaternion) - 1)]
-    cosine = np.sum(first * second, axis=1)
-    second = np.where(cosine[:, None] < 0.0, -second, second)
-    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
-    sine = np.sin(angle)
-    near = sine < 1e-9  # neighbours of a sampled motion are close: the chord is the arc
-    sine = np.where(near, 1.0, sine)
-    a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
-    b = np.where(near, share, np.sin(share * angle) / sine)
-    blended = a[:, None] * first + b[:, None] * second
-    blended /= np.linalg.norm(blended, axis=1, keepdims=True)
-    return np.where(share[:, None] == 0.0, first, blended)
 
 
 TO_BVH: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -167,11 +149,12 @@ def to_bvh(body: BodyModel, motion: Motion) -> str:
     joints = _joints(body)
     text = StringIO()
     text.write("HIERARCHY\n")
-    _write_joint(text, body.segments[0], joints, 0)
+    order = _write_joint(text, body.segments[0], joints, 0)
     text.write(f"MOTION\nFrames: {len(motion.time)}\nFrame Time: {_frame_time(motion):.9g}\n")
-    order = _depth_first(body)
-    frames = np.hstack([_root_channels(motion), *(_angles(joints[s.name], body, motion) for s in order[1:])])
-    np.savetxt(text, frames, fmt="%.7f")
+    position = CENTIMETRES * motion.q[:, :3] @ TO_BVH.T
+    rotation = TO_BVH @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix() @ TO_BVH.T
+    turns = (_angles(joints[segment.name], body, motion) for segment in order[1:])
+    np.savetxt(text, np.hstack([position, _euler(rotation, _ROOT_ORDER), *turns]), fmt="%.7f")
     return text.getvalue()
 
 
@@ -209,16 +192,8 @@ def _joint(segment: Segment, first_column: int) -> _BvhJoint:
     return _BvhJoint(segment, order + "".join(missing), columns, (*signs, *(1.0 for _ in missing)))
 
 
-def _depth_first(body: BodyModel) -> list[Segment]:
-    order, waiting = [], [body.segments[0]]
-    while waiting:
-        segment = waiting.pop(0)
-        order.append(segment)
-        waiting = [child for child in body.segments if child.parent == segment.name] + waiting
-    return order
-
-
-def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _BvhJoint], depth: int) -> None:
+def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _BvhJoint], depth: int) -> list[Segment]:
+    """Write a segment and what hangs on it, and return them in the order of the file."""
     indent, inner = "\t" * depth, "\t" * (depth + 1)
     root = segment.parent is None
     order = _ROOT_ORDER if root else joints[segment.name].order
@@ -226,24 +201,18 @@ def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _BvhJoint],
     offset = np.zeros(3) if root else CENTIMETRES * (TO_BVH @ segment.origin)
     text.write(f"{indent}{'ROOT' if root else 'JOINT'} {segment.name}\n{indent}{{\n")
     text.write(f"{inner}OFFSET {_numbers(offset)}\n{inner}CHANNELS {len(channels)} {' '.join(channels)}\n")
-    children = [joint.segment for joint in joints.values() if joint.segment.parent == segment.name]
-    for child in children:
-        _write_joint(text, child, joints, depth + 1)
-    if not children:
+    order = [segment]
+    for child in (joint.segment for joint in joints.values() if joint.segment.parent == segment.name):
+        order += _write_joint(text, child, joints, depth + 1)
+    if len(order) == 1:
         end = CENTIMETRES * (TO_BVH @ end_of(segment))
         text.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_numbers(end)}\n{inner}}}\n")
     text.write(f"{indent}}}\n")
+    return order
 
 
 def _numbers(values: Sequence[float] | FloatArray) -> str:
     return " ".join(f"{value:.7f}" for value in values)
-
-
-def _root_channels(motion: Motion) -> FloatArray:
-    """(n, 6) position [cm] and angles [deg] of the pelvis."""
-    position = CENTIMETRES * motion.q[:, :3] @ TO_BVH.T
-    rotation = TO_BVH @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix() @ TO_BVH.T
-    return np.hstack([position, _euler(rotation, _ROOT_ORDER)])
 
 
 def _angles(joint: _BvhJoint, body: BodyModel, motion: Motion) -> FloatArray:
@@ -273,18 +242,8 @@ BVH_RATE = 100.0
 """Samples per second of a BVH file unless the caller says otherwise [Hz]."""
 
 
-def check_format(name: str) -> None:
-    """Refuse an unknown format.
-
-    Raises:
-        InputError: If there is no such format.
-    """
-    if name not in FORMATS:
-        raise InputError(f"format is {name!r}; valid: {', '.join(FORMATS)}")
-
-
-def pick_motion(content: MotionFile, which: str | None = None) -> tuple[str, Motion]:
-    """Name and value of the motion wanted; by default the executed one, else the planned one.
+def pick_motion(content: MotionFile, which: str | None = None) -> Motion:
+    """The motion wanted; by default the executed one, else the planned one.
 
     Raises:
         InputError: If the file does not hold it.
@@ -292,7 +251,7 @@ def pick_motion(content: MotionFile, which: str | None = None) -> tuple[str, Mot
     name = which if which is not None else list(content.motions)[-1]
     if name not in content.motions:
         raise InputError(f"motion is {name!r}; valid here: {', '.join(content.motions)}")
-    return name, content.motions[name]
+    return content.motions[name]
 
 
 def export_motion(
@@ -316,8 +275,9 @@ def export_motion(
         InputError: If the format, the motion or the rate is not available.
         MotionFileError: If the file cannot be written, or BVH is wanted without a body.
     """
-    check_format(format_name)
-    _, motion = pick_motion(content, which)
+    if format_name not in FORMATS:
+        raise InputError(f"format is {format_name!r}; valid: {', '.join(FORMATS)}")
+    motion = pick_motion(content, which)
     folder = Path(source) if Path(source).is_dir() else Path(source).parent
     path = Path(out) if out is not None else folder / f"motion.{format_name}"
     if format_name == "csv":
@@ -330,7 +290,9 @@ def export_motion(
 COMPARISON = "comparison.json"
 
 
-def write_outputs(directory: str | Path, progress: Callable[[str, float], None] | None = None) -> list[Path]:
+def write_outputs(
+    directory: str | Path, progress: Callable[[str, float], object] = lambda _stage, _share: None
+) -> list[Path]:
     """Draw the figures and write the BVH file of a run directory; a point mass has no skeleton for BVH.
 
     Args:
@@ -348,45 +310,32 @@ def write_outputs(directory: str | Path, progress: Callable[[str, float], None] 
     if not record.tracks and record.schedule is None:
         return []
     make_directory(folder / FIGURES)
-    report = progress or _silent
-    written = write_figures(record, folder / FIGURES, lambda share: report("figures", 0.9 * share))
+    written = write_figures(record, folder / FIGURES, lambda share: progress("figures", 0.9 * share))
     if record.motions and record.body is not None and not record.body.is_point_mass:
         written.append(export_motion(record.content, folder, "bvh"))
-    report("figures", 1.0)
+    progress("figures", 1.0)
     return written
 
 
-class ComparisonDirectory(ResultDirectory):
-    """Directory of the comparison of two runs; other files in it are left alone."""
-
-    kind = "comparison"
-
-
 def write_comparison_outputs(
-    comparison: RunComparison, directory: str | Path, progress: Callable[[str, float], None] | None = None
-) -> list[Path]:
+    comparison: RunComparison, directory: str | Path, progress: Callable[[str, float], object]
+) -> None:
     """Draw the figures of two runs and write ``comparison.json``.
 
     Args:
-        directory: Created when it is missing.
+        directory: Created when it is missing; other files in it are left alone.
         progress: Told the stage ``"figures"`` and the share that is done.
-
-    Returns:
-        The files written.
 
     Raises:
         MotionFileError: If the directory cannot be written to.
     """
-    folder, report = ComparisonDirectory(directory), progress or _silent
-    file = folder.write(COMPARISON, comparison.as_dict())
-    return [file, *write_comparison(comparison, folder.path, lambda share: report("figures", share))]
+    folder = ResultDirectory(directory, "comparison")
+    folder.write(COMPARISON, comparison.as_dict())
+    write_figures(comparison, folder.path, lambda share: progress("figures", share))
 
 
 def write_contact_figure(body: BodyModel, scene: Scene, answer: ContactAnswer, path: str | Path) -> None:
     """Draw the body before and after it made the contact that was asked for.
-
-    Args:
-        answer: What was found, or not.
 
     Raises:
         MotionFileError: If the file cannot be written.
@@ -398,7 +347,3 @@ def write_contact_figure(body: BodyModel, scene: Scene, answer: ContactAnswer, p
         title = f"{answer.question.heuristic}: {result.obstacle}, EFORT {answer.efort:.2f}"
         panels.append(ChoicePanel(title, result.q, (result.contact,), (result.limb,), task))
     save_figure(contact_choice_figure(body, scene, panels, f"Contact of {readable(result.limb)}"), Path(path))
-
-
-def _silent(_stage: str, _share: float) -> None:
-    """Take a progress report and do nothing."""

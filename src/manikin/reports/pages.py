@@ -44,8 +44,10 @@ def _environment() -> Environment:
     )  # fmt: skip
     environment.globals["version"] = __version__
     environment.filters |= {
-        "readable": readable, "shown": _shown, "fixed": _fixed, "mm": _millimetres, "share": _share,
-        "width": _width, "base64": lambda png: base64.b64encode(png).decode("ascii"),
+        "readable": readable, "shown": _shown, "fixed": _fixed, "width": _width,
+        "mm": lambda value, decimals=1: "-" if value is None else f"{1e3 * value:.{decimals}f}",
+        "share": lambda value: _fixed(value, "%", 100.0),
+        "base64": lambda png: base64.b64encode(png).decode("ascii"),
     }  # fmt: skip
     return environment
 
@@ -65,27 +67,13 @@ def _fixed(value: float | None, unit: str, factor: float = 1.0) -> str | None:
     return None if value is None else f"{factor * value:.1f} {unit}"
 
 
-def _share(value: float | None) -> str | None:
-    return _fixed(value, "%", 100.0)
-
-
-def _millimetres(value: float | None, decimals: int = 1) -> str:
-    return "-" if value is None else f"{1e3 * value:.{decimals}f}"
-
-
 def _width(png: bytes) -> int:
     """Half the pixels across a PNG file; 0 if it does not say."""
     return int.from_bytes(png[16:20], "big") // 2 if png[12:16] == b"IHDR" else 0
 
 
 def write_run_page(directory: str | Path) -> Path:
-    """Write ``report.html`` of a finished run, with every figure that is in its directory.
-
-    Args:
-        directory: Written by ``manikin run``.
-
-    Returns:
-        The file.
+    """Write ``report.html`` of a finished run, with every figure in its directory, and return the file.
 
     Raises:
         MotionFileError: If the summary cannot be read or the page cannot be written.
@@ -95,11 +83,7 @@ def write_run_page(directory: str | Path) -> Path:
 
 
 def run_page(folder: Path, summary: Mapping[str, Any]) -> str:
-    """HTML of a run: verdict, requirements, figures and all numbers.
-
-    Args:
-        folder: Run directory, whose figures are put in.
-    """
+    """HTML of a run in a folder: verdict, requirements, figures and all numbers."""
     files = {file.stem: file for file in sorted((folder / FIGURES).glob("*.png"))}
     names = [*(name for name in FIRST if name in files), *(name for name in files if name not in FIRST)]
     pictures = {readable(name): files[name].read_bytes() for name in names}

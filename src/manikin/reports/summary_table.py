@@ -22,29 +22,23 @@ _YES_OR_NO = {True: "yes", False: "no", None: NOTHING}
 
 
 def result_rows(report: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """One row of texts per run, under :data:`HEADER`.
-
-    Args:
-        report: As :func:`manikin.pipeline.batch.run_jobs` returns it.
-    """
+    """One row of texts per run of :func:`manikin.pipeline.batch.run_jobs`, under :data:`HEADER`."""
     return [_row(run) for run in report["runs"]]
 
 
 def text_table(report: Mapping[str, Any]) -> str:
     """The table in columns of equal width."""
-    return _columns([HEADER, UNITS, *result_rows(report)])
+    return columns([HEADER, UNITS, *result_rows(report)])
 
 
-def _columns(rows: Sequence[tuple[str, ...]], right: Container[int] = ()) -> str:
+def columns(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> str:
     """Rows in columns of equal width, some of them by their numbers aligned to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = (
-        "  ".join(
-            cell.rjust(width) if number in right else cell.ljust(width)
-            for number, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    )
+    lines = []
+    for row in rows:
+        cells = enumerate(zip(row, widths, strict=True))
+        sides = (f"{cell:{'>' if k in right else '<'}{width}}" for k, (cell, width) in cells)
+        lines.append("  ".join(sides).rstrip())
     return "\n".join(lines)
 
 
@@ -149,13 +143,11 @@ def requirement_values(row: Mapping[str, Any]) -> tuple[str, str]:
 
 def counts_line(report: Mapping[str, Any]) -> str:
     """Numbers of runs that were planned, proved, fell, and ended as their scenarios say."""
-    words = (
-        f"{len(report['runs'])} runs: {report['planned']} planned, {report['proved']} proved",
-        f"{report['succeeded']} succeeded, {report['failed']} failed ({report['fell']} fell)",
-        f"{report['as_expected']} as expected, {report['not_as_expected']} not",
-        f"{report['wall_s']:.0f} s",
+    return (
+        f"{len(report['runs'])} runs: {report['planned']} planned, {report['proved']} proved; "
+        f"{report['succeeded']} succeeded, {report['failed']} failed ({report['fell']} fell); "
+        f"{report['as_expected']} as expected, {report['not_as_expected']} not; {report['wall_s']:.0f} s"
     )
-    return "; ".join(words)
 
 
 def number(value: float | None, digits: int, unit: str = "", scale: float = 1.0) -> str:
@@ -171,41 +163,29 @@ FAMILY_HEADER = (
 
 
 def family_rows(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """One row of texts for each family under :data:`FAMILY_HEADER`, all of them together last.
-
-    Args:
-        result: As :func:`manikin.pipeline.benchmark.run_benchmark` returns it.
-    """
-    rows = [*result["families"].items(), ("all", result["total"])]
-    return [_family_row(name, counts, whole=result["stage"] == "all") for name, counts in rows]
-
-
-def _family_row(name: str, counts: Mapping[str, Any], *, whole: bool) -> tuple[str, ...]:
-    seconds = counts["contacts_s"]
-    return (
-        name,
-        str(counts["tasks"]),
-        str(counts["contacts"]),
-        NOTHING if counts["checked"] is None else str(counts["checked"]),
-        *(str(counts[key]) if whole else NOTHING for key in ("planned", "proved")),
-        number(seconds["median"], 2),
-        number(seconds["p95"], 2),
-        number(counts["duration_s"], 1),
-        number(counts["computing_over_motion"], 1),
-        ", ".join(f"{stage} {count}" for stage, count in counts["failures"].items()) or NOTHING,
-    )
+    """One row of texts for each family under :data:`FAMILY_HEADER`, all of them together last."""
+    whole, rows = result["stage"] == "all", []
+    for name, counts in [*result["families"].items(), ("all", result["total"])]:
+        seconds, failures = counts["contacts_s"], counts["failures"].items()
+        found = (number(counts[key], 0) for key in ("tasks", "contacts", "checked"))
+        ended = (number(counts[key] if whole else None, 0) for key in ("planned", "proved"))
+        times = (number(seconds[key], 2) for key in ("median", "p95"))
+        motions = (number(counts[key], 1) for key in ("duration_s", "computing_over_motion"))
+        failed = ", ".join(f"{stage} {count}" for stage, count in failures) or NOTHING
+        rows.append((name, *found, *ended, *times, *motions, failed))
+    return rows
 
 
 def family_table(result: Mapping[str, Any]) -> str:
     """The table in columns of equal width."""
-    return _columns([FAMILY_HEADER, *family_rows(result)], right=range(1, len(FAMILY_HEADER) - 1))
+    return columns([FAMILY_HEADER, *family_rows(result)], right=range(1, len(FAMILY_HEADER) - 1))
 
 
 def failure_lines(result: Mapping[str, Any]) -> Iterator[str]:
     """Every task that failed with its stage and reason, and every one whose contacts the check refuses."""
     for entry in result["tasks"]:
-        if entry["checked"] is not None and not entry["checked"]["certified"]:
-            yield f"{entry['family']}-{entry['seed']} (check): {entry['checked']['verdict']}"
-        if entry["failure"] is not None:
-            failure = entry["failure"]
-            yield f"{entry['family']}-{entry['seed']} ({failure['stage']}): {failure['reason']}"
+        name, checked, failure = f"{entry['family']}-{entry['seed']}", entry["checked"], entry["failure"]
+        if checked is not None and not checked["certified"]:
+            yield f"{name} (check): {checked['verdict']}"
+        if failure is not None:
+            yield f"{name} ({failure['stage']}): {failure['reason']}"

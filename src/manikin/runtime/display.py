@@ -44,16 +44,13 @@ class Displayed:
 
     def facts(self) -> dict[str, str]:
         """Description of the value as labels and short texts in order."""
-        if not is_dataclass(self):
-            return {}
-        return {field.name: _short(getattr(self, field.name)) for field in fields(self)}
+        known = fields(self) if is_dataclass(self) else ()
+        return {field.name: _short(getattr(self, field.name)) for field in known}
 
     def __repr__(self) -> str:
         """``Name(label=text, ...)`` in less than 200 characters."""
         inside = ", ".join(f"{label}={text}" for label, text in self.facts().items())
-        if len(inside) > LONGEST_LINE - len(type(self).__name__):
-            inside = inside[: LONGEST_LINE - len(type(self).__name__) - 3] + "..."
-        return f"{type(self).__name__}({inside})"
+        return f"{type(self).__name__}({_cut(inside, LONGEST_LINE - len(type(self).__name__))})"
 
     def _repr_html_(self) -> str:
         """Table of the facts, as notebooks show it."""
@@ -61,11 +58,7 @@ class Displayed:
 
 
 def html_table(title: str, rows: Mapping[str, str]) -> str:
-    """Two-column HTML table with a title.
-
-    Args:
-        rows: Label and text of each row.
-    """
+    """Two-column HTML table of labels and texts, with a title."""
     lines = "".join(
         f"<tr><th style='text-align:left'>{escape(label)}</th><td>{escape(text)}</td></tr>"
         for label, text in rows.items()
@@ -73,13 +66,16 @@ def html_table(title: str, rows: Mapping[str, str]) -> str:
     return f"<table><caption>{escape(title)}</caption>{lines}</table>"
 
 
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
 def _short(value: Any) -> str:
     """A field in a few characters."""
     if isinstance(value, np.ndarray):
         return f"array{value.shape}".replace(",)", ")")
     if isinstance(value, bool | int | str) or value is None:
-        text = repr(value)
-        return text if len(text) <= _LONGEST_TEXT else f"{text[: _LONGEST_TEXT - 3]}..."
+        return _cut(repr(value), _LONGEST_TEXT)
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, Sized):
@@ -135,7 +131,5 @@ def colours_of(effectors: Iterable[str]) -> dict[str, str]:
 
 def side_colour(name: str) -> str:
     """Colour of the body's side that a segment or effector belongs to."""
-    for side in ("left", "right"):
-        if name.startswith(side):
-            return COLOURS[f"{side}_foot"]
-    return COLOURS["trunk"]
+    side = next((side for side in ("left", "right") if name.startswith(side)), None)
+    return COLOURS["trunk" if side is None else f"{side}_foot"]

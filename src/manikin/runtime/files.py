@@ -37,17 +37,17 @@ class ResultDirectory:
         writer: Command that writes the files, for messages.
     """
 
-    kind: ClassVar[str]
+    kind: str = "result"
     marks: ClassVar[tuple[str, ...]] = ()
     writer: ClassVar[str] = "manikin"
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, kind: str | None = None) -> None:
         """Create the directory, or take over that of an earlier result of the same kind.
 
         Raises:
             MotionFileError: If it cannot be created, or holds something else.
         """
-        self.path = Path(path)
+        self.path, self.kind = Path(path), kind or self.kind
         if self.path.exists() and not self.path.is_dir():
             raise MotionFileError(f"{self.path}: is a file; valid: a directory for the {self.kind}")
         make_directory(self.path)
@@ -77,10 +77,12 @@ class ResultDirectory:
         """Write a file atomically.
 
         Args:
-            name: Of the file, relative to the directory.
+            name: Of the file, relative to the directory; a folder in it is created.
             content: Text, or plain values and arrays that become JSON.
         """
-        return write_result(self.path / name, content)
+        path = self.path / name
+        make_directory(path.parent)
+        return write_result(path, content)
 
     def read(self, name: str) -> dict[str, Any]:
         """JSON object in a file of the directory.
@@ -207,7 +209,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
         yield temporary
-        _flush(temporary)
+        with temporary.open("rb+") as file:
+            os.fsync(file.fileno())
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
@@ -221,8 +224,3 @@ def write_text(path: str | Path, text: str) -> None:
     """
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-
-
-def _flush(path: Path) -> None:
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())

@@ -87,8 +87,7 @@ def processor_time_limit(seconds: float) -> Iterator[None]:
     Raises:
         TimeLimitError: If the time is over.
     """
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    if not in_main_thread or not hasattr(signal, "ITIMER_PROF"):
+    if not hasattr(signal, "ITIMER_PROF") or threading.current_thread() is not threading.main_thread():
         yield
         return
 

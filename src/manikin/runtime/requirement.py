@@ -56,22 +56,14 @@ class Requirement:
         return f"{what} is {self.measured:.4g}{unit}; allowed {self.sense} {self.limit:.4g}{unit}"
 
     def as_dict(self, stage: str) -> dict[str, Any]:
-        """Plain values for ``summary.json``.
-
-        Args:
-            stage: Stage whose result was measured, such as ``"wholebody"``.
-        """
+        """Plain values for ``summary.json``, with the stage whose result was measured."""
         values = {name: value for name, value in asdict(self).items() if name != "tolerance"}
         return {"stage": stage, **values, "held": self.held}
 
 
 @dataclass(frozen=True)
 class RequirementTable:
-    """All requirements of one result, in the order in which they are reported.
-
-    Attributes:
-        rows: The requirements.
-    """
+    """All requirements of one result, in the order in which they are reported."""
 
     rows: tuple[Requirement, ...]
 
@@ -108,11 +100,7 @@ class RequirementTable:
 
 
 def requirement_table(rows: Iterable[Requirement | None]) -> RequirementTable:
-    """Make a table, without the entries that are None or have an infinite limit.
-
-    Args:
-        rows: Requirements; None for a quantity that the result does not have.
-    """
+    """Make a table, without the entries that are None or have an infinite limit."""
     return RequirementTable(tuple(row for row in rows if row is not None and math.isfinite(row.limit)))
 
 
@@ -144,10 +132,8 @@ class Worst:
 
     def take(self, value: float, where: str) -> None:
         """Take one measurement; a NaN is worse than any number."""
-        worse = self.value is None or value != value
-        if not worse and self.value is not None:
-            worse = value > self.value if self.sense == "<=" else value < self.value
-        if worse:
+        sign = 1.0 if self.sense == "<=" else -1.0
+        if self.value is None or value != value or sign * value > sign * self.value:
             self.value, self.where = float(value), where
 
     @property
@@ -157,6 +143,5 @@ class Worst:
             return None
         ending = self.key.rpartition("_")[2]
         unit = ending if ending in ("m", "deg", "N") else ""
-        return Requirement(
-            self.key, self.name, unit, self.value, self.sense, self.limit, None, self.where, self.tolerance
-        )
+        limits = self.sense, self.limit, None, self.where, self.tolerance
+        return Requirement(self.key, self.name, unit, self.value, *limits)

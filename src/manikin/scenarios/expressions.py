@@ -107,24 +107,21 @@ def _depth(node: ast.AST) -> int:
 
 
 def _build(node: ast.AST, text: str) -> _Evaluator:
+    number = CONSTANTS.get(node.id) if isinstance(node, ast.Name) else None
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        number = str(node.value)
+    if number is not None:
         # A numpy float: overflow and division by zero give inf, which the caller can refuse with a place.
-        number = np.float64(str(node.value))
-        return lambda _values, _functions: number
-    if isinstance(node, ast.Name) and node.id in CONSTANTS:
-        constant = np.float64(CONSTANTS[node.id])
+        constant = np.float64(number)
         return lambda _values, _functions: constant
     if isinstance(node, ast.Name) and node.id in _VARIABLES:
         name = node.id
         return lambda values, _functions: values[name]
-    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+    if isinstance(node, ast.BinOp | ast.UnaryOp) and type(node.op) in _OPERATORS:
         apply = _OPERATORS[type(node.op)]
-        left, right = _build(node.left, text), _build(node.right, text)
-        return lambda values, functions: apply(left(values, functions), right(values, functions))
-    if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
-        apply = _OPERATORS[type(node.op)]
-        operand = _build(node.operand, text)
-        return lambda values, functions: apply(operand(values, functions))
+        sides = (node.left, node.right) if isinstance(node, ast.BinOp) else (node.operand,)
+        operands = [_build(side, text) for side in sides]
+        return lambda values, functions: apply(*(operand(values, functions) for operand in operands))
     if isinstance(node, ast.Call):
         return _build_call(node, text)
     shown = ast.get_source_segment(text.strip(), node) if isinstance(node, ast.expr) else None
@@ -186,8 +183,7 @@ class HeightBand:
     """Lower and upper bound of the CoM's height, scaled to the body.
 
     Attributes:
-        lower_expression: Lowest height for the reference stature.
-        upper_expression: Greatest height for the reference stature.
+        lower_expression, upper_expression: Heights for the reference stature.
         level: Height of the supports.
         scale: Stature over reference stature.
         transform_expressions_to_world: Where the expressions' x and y are measured.
@@ -220,17 +216,12 @@ class HeightBand:
         return np.maximum(self.lower(x, y, z) - z, z - self.upper(x, y, z))
 
     def _scaled(self, expression: Expression, x: Any, y: Any, z: Any) -> Any:
-        own_x, own_y = self._in_frame(x, y)
+        frame, own_x, own_y = self.transform_expressions_to_world, x, y
+        if not frame.is_identity:
+            cosine, sine, _ = frame.rotation[:, 0].tolist()
+            along, aside = x - frame.x, y - frame.y
+            own_x, own_y = cosine * along + sine * aside, cosine * aside - sine * along
         if self.scale == 1.0:
             return expression(own_x, own_y, z)
         base = self.level(x, y)
         return base + self.scale * (expression(own_x, own_y, base + (z - base) / self.scale) - base)
-
-    def _in_frame(self, x: Any, y: Any) -> tuple[Any, Any]:
-        """Horizontal position in the frame of the expressions."""
-        frame = self.transform_expressions_to_world
-        if frame.is_identity:
-            return x, y
-        cosine, sine, _ = frame.rotation[:, 0].tolist()
-        x, y = x - frame.x, y - frame.y
-        return cosine * x + sine * y, cosine * y - sine * x

@@ -57,17 +57,13 @@ def _with_absolute_meshes(data: Any, folder: Path) -> Any:
     if not isinstance(data, Mapping):
         return data
     changed = dict(data)
+    if isinstance(data.get("mesh"), str):
+        changed["mesh"] = str((folder / data["mesh"]).resolve())
     if isinstance(data.get("scene"), list):
-        changed["scene"] = [_with_absolute_mesh(entry, folder) for entry in data["scene"]]
+        changed["scene"] = [_with_absolute_meshes(entry, folder) for entry in data["scene"]]
     if isinstance(data.get(VARIANTS), Mapping):
         changed[VARIANTS] = {k: _with_absolute_meshes(v, folder) for k, v in data[VARIANTS].items()}
     return changed
-
-
-def _with_absolute_mesh(entry: Any, folder: Path) -> Any:
-    if isinstance(entry, Mapping) and isinstance(entry.get("mesh"), str):
-        return {**entry, "mesh": str((folder / entry["mesh"]).resolve())}
-    return entry
 
 
 _NOT_IN_A_VARIANT = ("extends", VARIANTS)
@@ -107,15 +103,18 @@ def apply_variant(tree: Tree, variant: str, source: str) -> Tree:
     """
     known = variants_of(tree, source)
     if variant not in known:
-        close = difflib.get_close_matches(variant, known, n=1)
-        hint = f"did you mean {close[0]!r}? " if close else ""
         valid = ", ".join(known) or "none, the scenario has no variants"
-        raise ScenarioError(f"{source}: has no variant {variant!r}; {hint}valid: {valid}")
+        raise ScenarioError(f"{source}: has no variant {variant!r}; {_hint(variant, known)}valid: {valid}")
     change = known[variant]
     merged = merge(tree, change)
     if "name" in change.data or not isinstance(tree.data.get("name"), str):
         return merged
     return Tree({**merged.data, "name": f"{tree.data['name']}@{variant}"}, merged.lines)
+
+
+def _hint(given: str, known: Mapping[str, object]) -> str:
+    close = difflib.get_close_matches(given, known, n=1)
+    return f"did you mean {close[0]!r}? " if close else ""
 
 
 SUFFIXES = (".yaml", ".yml")
@@ -159,9 +158,7 @@ def _find(name_or_path: str | Path, folder: Path, known: dict[str, Path]) -> Pat
     if path.is_dir():
         raise ScenarioError(f"{path}: is a directory; {valid}")
     if not path.is_file():
-        close = difflib.get_close_matches(str(name_or_path), known, n=1)
-        hint = f"did you mean {close[0]!r}? " if close else ""
-        raise ScenarioError(f"{path}: there is no such file; {hint}{valid}")
+        raise ScenarioError(f"{path}: there is no such file; {_hint(str(name_or_path), known)}{valid}")
     if path.suffix.lower() not in SUFFIXES:
         raise ScenarioError(f"{path}: is not a scenario file by its name; {valid}")
     return path
@@ -169,7 +166,7 @@ def _find(name_or_path: str | Path, folder: Path, known: dict[str, Path]) -> Pat
 
 def list_scenarios() -> dict[str, str]:
     """Names of the built-in scenarios with a one-line description each, sorted by name."""
-    return {name: load_scenario(path).description for name, path in built_in().items()}
+    return {name: load_scenario(path).file.description for name, path in built_in().items()}
 
 
 def list_variants(name_or_path: str | Path) -> dict[str, str]:
@@ -180,7 +177,7 @@ def list_variants(name_or_path: str | Path) -> dict[str, str]:
     """
     path, _ = find_scenario(name_or_path)
     return {
-        variant: load_scenario(path, variant).description
+        variant: load_scenario(path, variant).file.description
         for variant in variants_of(read_extended(path), str(path))
     }
 
@@ -204,13 +201,10 @@ def load_scenario(
     path, named = find_scenario(name_or_path)
     if variant is not None and named is not None:
         raise ScenarioError(f"{name_or_path}: names a variant, and so does {variant!r}; valid: one of them")
-    wanted = named if variant is None else variant
-    tree = read_extended(path)
-    plain = _build(tree, path)
-    variants = {name: _build_variant(tree, name, path) for name in variants_of(tree, str(path))}
-    scenario = plain
-    if wanted is not None:
-        scenario = variants.get(wanted) or _build_variant(tree, wanted, path)
+    wanted, tree = named if variant is None else variant, read_extended(path)
+    built = {None: _build(tree, path)}
+    built |= {name: _build_variant(tree, name, path) for name in variants_of(tree, str(path))}
+    scenario = built.get(wanted) or _build_variant(tree, wanted or "", path)
     return scenario.with_overrides(overrides)
 
 

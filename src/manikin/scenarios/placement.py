@@ -49,19 +49,15 @@ def start_heading_deg(start: StateSection, contacts: Mapping[str, ContactSection
     """
     if contacts is None or start.heading_deg is not None:
         return IDENTITY.turned(start.heading_deg or 0.0)
-    headings = [item.yaw_deg for name, item in contacts.items() if "foot" in name]
-    headings = headings or [_heading_deg(name, item) for name, item in contacts.items()]
+    headings = [item.yaw_deg for name, item in contacts.items() if "foot" in name] or [
+        item.rpy_deg[2] if item.kind_for(name) == "grasp" and item.rpy_deg is not None else item.yaw_deg
+        for name, item in contacts.items()
+    ]
     first = headings[0]
     # Relative to the first, so that feet that are parallel have their own heading to the last bit.
     turns = np.exp(1j * np.deg2rad([heading - first for heading in headings])).sum()
     mean = 0.0 if abs(turns) < 1e-6 else float(np.angle(turns, deg=True))
     return PlanarTransform(yaw_deg=first).turned(mean)
-
-
-def _heading_deg(effector: str, contact: ContactSection) -> float:
-    if contact.kind_for(effector) == "grasp" and contact.rpy_deg is not None:
-        return contact.rpy_deg[2]
-    return contact.yaw_deg
 
 
 def moved_data(
@@ -72,7 +68,6 @@ def moved_data(
     Which values are coordinates, and of which kind, the sections' fields say (:class:`FrameMoves`).
 
     Args:
-        section: Checked.
         data: Its values as a file holds them; not changed.
         transform: From the frame of the coordinates to the other frame.
         decimals: Of metres and degrees in the other frame.
@@ -111,21 +106,14 @@ def _direction(value: Any, transform: PlanarTransform, decimals: int, _section: 
 
 def _heading(value: float, transform: PlanarTransform, decimals: int, section: Section) -> float:
     # On a surface that faces down, the heading turns the other way.
-    down = isinstance(section, ContactSection) and _faces_down(section)
-    turn = transform.inverse if down else transform
-    return _angle(turn.turned(value), decimals)
+    normal = np.array(getattr(section, "normal", None) or (0.0, 0.0, 1.0))
+    down = normal[2] < (-1.0 + 1e-12) * np.linalg.norm(normal)
+    return _angle((transform.inverse if down else transform).turned(value), decimals)
 
 
 def _orientation(value: Any, transform: PlanarTransform, decimals: int, _section: Section) -> list[float]:
     roll, pitch, yaw = value
     return [*_rounded([roll, pitch], decimals), _angle(transform.turned(yaw), decimals)]
-
-
-def _faces_down(contact: ContactSection) -> bool:
-    if contact.normal is None:
-        return False
-    normal = np.array(contact.normal)
-    return bool(normal[2] < (-1.0 + 1e-12) * np.linalg.norm(normal))
 
 
 def _angle(degrees: float, decimals: int) -> float:

@@ -114,20 +114,19 @@ def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
         start[2] = scenario.start_level + (start[2] - scenario.start_level) / scenario.stature_scale
     phases = [phase.model_dump(mode="json", exclude_none=True) for phase in own.phases]
     task = scenario.file.task.model_dump(mode="json", exclude_none=True)
-    planning = scenario.planning.model_dump(mode="json", exclude_none=True)
+    planning = scenario.file.planning.model_dump(mode="json", exclude_none=True)
     planning.pop("max_duration_s", None)
     # The stance at the seam is the last of the walk; its places are those of the plan.
     walked = _phases(footprints)
     walked[-1]["min_duration_s"] = max(walked[-1]["min_duration_s"], phases[0]["min_duration_s"])
-    seam = {foot: phases[0][foot] for foot in FEET}
+    for foot in FEET:
+        landing = [phase for phase in walked if phase.get(foot) not in (None, "same")][-1]
+        landing[foot] = phases[0][foot]
+    margin = min(scenario.file.planning.min_margin, _margin(scenario))
     return scenario.replaced(
-        supports=_settings(scenario) | {"phases": [*_ending_on(seam, walked), *phases[1:]]},
+        supports=_settings(scenario) | {"phases": [*walked, *phases[1:]]},
         task={**task, "start": {"com": start.tolist()}},
-        planning={
-            **planning,
-            **WALKED_PLANNING,
-            "min_margin": min(scenario.planning.min_margin, _margin(scenario)),
-        },
+        planning={**planning, **WALKED_PLANNING, "min_margin": margin},
         manner="walking",
     )
 
@@ -155,25 +154,13 @@ def _phases(footprints: Footprints) -> list[dict[str, Any]]:
     phases: list[dict[str, Any]] = []
     before: dict[str, Footprint] = {}
     for held, seconds in footprints.phases():
-        phase: dict[str, Any] = {
-            foot: "same" if before.get(foot) is step else _walked_entry(step) for foot, step in held.items()
-        }
-        phase["min_duration_s"] = max(LEAST[len(held)], seconds)
-        phases.append(phase)
+        phase: dict[str, Any] = {}
+        for foot, step in held.items():
+            entry = {"position": step.position.tolist(), "yaw_deg": math.degrees(step.yaw)}
+            phase[foot] = "same" if before.get(foot) is step else entry
+        phases.append(phase | {"min_duration_s": max(LEAST[len(held)], seconds)})
         before = held
     phases[0]["min_duration_s"] = phases[-1]["min_duration_s"] = STANDING
-    return phases
-
-
-def _walked_entry(step: Footprint) -> dict[str, Any]:
-    return {"position": step.position.tolist(), "yaw_deg": math.degrees(step.yaw)}
-
-
-def _ending_on(seam: Mapping[str, Any], phases: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The phases with the last place of each foot replaced by that at the seam."""
-    for foot in FEET:
-        landing = max(number for number, phase in enumerate(phases) if phase.get(foot) not in (None, "same"))
-        phases[landing][foot] = seam[foot]
     return phases
 
 
@@ -219,10 +206,11 @@ def walk_task(
         ScenarioError: If a value is out of its range.
     """
     given = {"max_speed_m_s": max_speed, "weights": weights}
+    ends = {"start": start, "goal": to}
     data: dict[str, Any] = {
         "name": "walk-to-" + "-".join(f"{value:g}" for value in to),
         "walking": {key: value for key, value in given.items() if value is not None},
-        "task": {"start": _state(start), "goal": _state(to)},
+        "task": {end: {"at": list(place[:2]), "heading_deg": place[2]} for end, place in ends.items()},
     }
     if body is not None:
         data["body"] = dict(body)
@@ -263,10 +251,6 @@ def push_task(
     }  # fmt: skip
     names = dict(where or {})
     return Scenario(validate(ScenarioFile, data, "push", names), "push", Path.cwd(), names)
-
-
-def _state(place: Place) -> dict[str, Any]:
-    return {"at": list(place[:2]), "heading_deg": place[2]}
 
 
 MAX_SUPPORT_DISTANCE = 1.08
@@ -317,10 +301,6 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
 
     The centre of mass starts and ends where it is in the plan's first and last posture, and is near that of
     each posture in between when its phase begins. Constraints that the file gives are kept.
-
-    Args:
-        scenario: Without supports.
-        plan: For its body and scene.
     """
     friction = scenario.contacts.friction
     # Rising legs are soon at full length: there is less room above such postures than below them.
@@ -360,10 +340,10 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     if touch is not None:
         speed = np.zeros(3) if touch.momentum is None else touch.momentum.velocity
         task["goal"]["velocity_m_s"] = [float(x) for x in speed]
-    if scenario.act is not None:
-        task["act"] = scenario.act.model_dump(mode="json")
-    planning = scenario.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.planning == type(scenario.planning)() and not sits:
+    if scenario.file.task.act is not None:
+        task["act"] = scenario.file.task.act.model_dump(mode="json")
+    planning = scenario.file.planning.model_dump(mode="json", exclude_none=True)
+    if scenario.file.planning == type(scenario.file.planning)() and not sits:
         planning = PLANNING_RISING if rises else PLANNING
     constraints = _constraints(scenario, plan)
     return scenario.replaced(
@@ -396,9 +376,8 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
 def _sole_size(scenario: Scenario, plan: ContactPlan) -> tuple[float, float]:
     """Length and width of a whole sole: one of the plan, or the body's where all hang over edges [m]."""
     feet = (c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
-    for contact in feet:
-        if not contact.hangs_over:
-            return contact.length, contact.width
+    if (whole := next((contact for contact in feet if not contact.hangs_over), None)) is not None:
+        return whole.length, whole.width
     body = build_body(scenario)
     return float(body.sole_length or 0.0), float(body.sole_width or 0.0)
 
@@ -409,7 +388,7 @@ def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, An
     keys = {key for item in given for key in item}
     if "max_support_distance_m" not in keys:
         given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
-    if values.act is not None and "height_band" not in keys:
+    if values.file.task.act is not None and "height_band" not in keys:
         given.append({"height_band": _below_postures(plan)})
     elif "buttocks" in plan.stages[0].contacts and "height_band" not in keys:
         # Who has left a seat does not go down again: the pelvis would meet it.

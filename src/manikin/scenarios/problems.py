@@ -59,30 +59,27 @@ def overhead_constraints(
         names: Of the obstacles to pass below; when omitted, all that hover over the way from the
             start by the middles of the stances to the goal.
     """
-    soles = _soles(sequence)
-    finite = [item for item in scene if not isinstance(item.shape, (Plane, HalfSpace))]
-    if names is None:
-        way = _way(sequence, ends)
-        chosen = [item for item in finite if _hovers(item, soles) and _over(item, way)]
-    else:
-        chosen = [item for item in finite if item.name in names]
-    result = (_constraint(body, obstacle, soles) for obstacle in chosen)
+    stances = [[c for c in phase.stance if c.kind is ContactKind.SOLE] for phase in sequence]
+    soles = [contact for stance in stances for contact in stance]
+    middles = [np.mean([c.position[:2] for c in stance], axis=0) for stance in stances if stance]
+    way = list(itertools.pairwise([ends[0][:2], *middles, ends[1][:2]]))
+    result = []
+    for obstacle in scene:
+        if not isinstance(obstacle.shape, (Plane, HalfSpace)):
+            passed = _passed_below(obstacle, soles, way) if names is None else obstacle.name in names
+            result.append(_constraint(body, obstacle, soles) if passed else None)
     return tuple(constraint for constraint in result if constraint is not None)
 
 
-def _way(sequence: StanceSequence, ends: tuple[FloatArray, FloatArray]) -> list[FloatArray]:
-    """Points (2,) of a coarse way of the CoM."""
-    stances = [[c.position[:2] for c in phase.stance if c.kind is ContactKind.SOLE] for phase in sequence]
-    return [ends[0][:2], *(np.mean(soles, axis=0) for soles in stances if soles), ends[1][:2]]
-
-
-def _over(obstacle: Obstacle, way: Sequence[FloatArray]) -> bool:
-    zone = Zone.below(_outline(obstacle), (), ONSET)
-    return any(zone.crosses(a, b) for a, b in itertools.pairwise(way))
-
-
-def _hovers(obstacle: Obstacle, soles: Sequence[Contact]) -> bool:
-    return float(obstacle.bounds[0][2]) - _level(soles, _outline(obstacle)) >= HOVERING
+def _passed_below(
+    obstacle: Obstacle, soles: Sequence[Contact], way: Sequence[tuple[FloatArray, FloatArray]]
+) -> bool:
+    """Whether an obstacle hovers over a coarse way of the CoM, in pieces between points (2,)."""
+    outline = _outline(obstacle)
+    if float(obstacle.bounds[0][2]) - _level(soles, outline) < HOVERING:
+        return False
+    zone = Zone.below(outline, (), ONSET)
+    return any(zone.crosses(a, b) for a, b in way)
 
 
 def _constraint(body: BodyModel, obstacle: Obstacle, soles: Sequence[Contact]) -> GeometricConstraint | None:
@@ -107,10 +104,6 @@ def _constraint(body: BodyModel, obstacle: Obstacle, soles: Sequence[Contact]) -
         )
         return keep_out(obstacle.name, zone, reason)
     return height_below(obstacle.name, CeilingHeight(zone, top, level + fold.com_height))
-
-
-def _soles(sequence: StanceSequence) -> list[Contact]:
-    return [contact for phase in sequence for contact in phase.stance if contact.kind is ContactKind.SOLE]
 
 
 def _level(soles: Sequence[Contact], outline: FloatArray) -> float:
@@ -198,10 +191,10 @@ def _check_places(
         for contact in phase.stance:
             place = transform.points(recorded.stance[contact.effector].position)
             if np.linalg.norm(place - contact.position) > SAME_PLACE:
+                there, here = (np.round(item, 3).tolist() for item in (place, contact.position))
                 raise InputError(
-                    f"{path}: {contact.effector} was recorded at {np.round(place, 3).tolist()} in phase "
-                    f"{number}, the scenario has it at {np.round(contact.position, 3).tolist()}; "
-                    "valid: a motion on the scenario's supports"
+                    f"{path}: {contact.effector} was recorded at {there} in phase {number}, the scenario has "
+                    f"it at {here}; valid: a motion on the scenario's supports"
                 )
 
 
@@ -230,7 +223,7 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
     Raises:
         ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
     """
-    options, seat = values.planning, values.seated_from
+    options, seat = values.file.planning, values.seated_from
     rest = np.zeros(3) if options.zero_end_accelerations else None
     velocity = (0.0, 0.0, 0.0) if seat is None else values.file.task.goal.velocity_m_s
     given: dict[str, Any] = {"degree": options.degree, "samples": options.samples}
@@ -264,7 +257,7 @@ def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
     Raises:
         ScenarioError: If the recording cannot be read or was made on other supports.
     """
-    options = values.planning
+    options = values.file.planning
     if options.method != "keyframes" or options.recording is None:
         return None
     path, sequence = values.find_file(options.recording), stance_sequence(values, planning=True)

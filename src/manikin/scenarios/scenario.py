@@ -5,25 +5,20 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
-from manikin.contact import StanceSequence
 from manikin.errors import ScenarioError
 from manikin.numerics.spatial import PlanarTransform, finite_number
 from manikin.runtime.display import Displayed
 from manikin.scenarios.placement import FILE_GRID, TASK_GRID, moved_data
+from manikin.scenarios.problems import centroidal_problem, keyframe_problem
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.validation import validate
-from manikin.scenarios.values import ScenarioValues
+from manikin.scenarios.values import ScenarioValues, build_body
+from manikin.scenarios.world import build_scene, check_contacts, stance_sequence
 from manikin.scenarios.yaml_reader import NULL_IS_A_VALUE, VARIANTS, KeyPath, Tree, parse_value
-
-if TYPE_CHECKING:
-    from manikin.body import BodyModel
-    from manikin.planning.com import CentroidalProblem, KeyframeProblem
-    from manikin.scene import Scene
-
 
 RESOLVED = ("extends", VARIANTS)
 """Keys that a scenario no longer has when it is loaded."""
@@ -45,10 +40,10 @@ def override(tree: Tree, settings: Sequence[str]) -> Tree:
     Raises:
         ScenarioError: One line, if a key leads nowhere or a value is not YAML.
     """
-    changed = Tree(copy.deepcopy(tree.data), dict(tree.lines))
+    tree = Tree(copy.deepcopy(tree.data), dict(tree.lines))
     for setting in settings:
-        changed = _set(changed, setting)
-    return changed
+        tree = _set(tree, setting)
+    return tree
 
 
 def _set(tree: Tree, setting: str) -> Tree:
@@ -104,6 +99,13 @@ def _step(place: Any, part: str, before: Sequence[str], source: str) -> str | in
 class Scenario(Displayed, ScenarioValues):
     """One job for the pipeline: the values of a scenario file and what is built from them."""
 
+    build_body = build_body
+    build_scene = build_scene
+    build_sequence = stance_sequence
+    build_centroidal_problem = centroidal_problem
+    build_keyframe_problem = keyframe_problem
+    check_contacts = check_contacts
+
     def facts(self) -> dict[str, str]:
         """Labels and texts of the value."""
         model, mass = self.file.body.model, f"{self.mass:.1f} kg"
@@ -145,8 +147,7 @@ class Scenario(Displayed, ScenarioValues):
         if not settings:
             return self
         changed = override(Tree(self._data(), self.lines), settings)
-        file = validate(ScenarioFile, changed.data, self.source, changed.lines)
-        return Scenario(file, self.source, self.folder, changed.lines)
+        return self._with(changed.data, changed.lines, changed.lines)
 
     def moved(self, x: float, y: float, yaw_deg: float) -> Scenario:
         """Return the same scenario at another place in the world, with its coordinates there.
@@ -185,46 +186,7 @@ class Scenario(Displayed, ScenarioValues):
         data = {key: value for key, value in {**self._data(), **sections}.items() if value is not None}
         if self.file.floor_height_m is None:
             data["floor_height_m"] = None
-        return Scenario(validate(ScenarioFile, data, self.source), self.source, self.folder, {})
-
-    def build_body(self) -> BodyModel:
-        """Build the body, see :func:`manikin.scenarios.values.build_body`."""
-        from manikin.scenarios.values import build_body
-
-        return build_body(self)
-
-    def build_scene(self) -> Scene:
-        """Build the obstacles and the floor, see :func:`manikin.scenarios.world.build_scene`."""
-        from manikin.scenarios.world import build_scene
-
-        return build_scene(self)
-
-    def build_sequence(self, *, planning: bool = False) -> StanceSequence:
-        """Build the stances of the supports, see :func:`manikin.scenarios.world.stance_sequence`."""
-        from manikin.scenarios.world import stance_sequence
-
-        return stance_sequence(self, planning=planning)
-
-    def build_centroidal_problem(self, *, upright: bool = True) -> CentroidalProblem:
-        """Build the problem of the centre-of-mass planner, see :mod:`manikin.scenarios.problems`."""
-        from manikin.scenarios.problems import centroidal_problem
-
-        return centroidal_problem(self, upright=upright)
-
-    def build_keyframe_problem(self) -> KeyframeProblem | None:
-        """Build the problem of the keyframe-based planner, see :mod:`manikin.scenarios.problems`.
-
-        None when the file asks for another planner.
-        """
-        from manikin.scenarios.problems import keyframe_problem
-
-        return keyframe_problem(self)
-
-    def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
-        """Check that contacts lie on surfaces, see :func:`manikin.scenarios.world.check_contacts`."""
-        from manikin.scenarios.world import check_contacts
-
-        check_contacts(self, scene, tolerance)
+        return self._with(data, {})
 
     def check_push(self, duration: float) -> None:
         """Check that the push begins during the motion.
@@ -235,9 +197,10 @@ class Scenario(Displayed, ScenarioValues):
         Raises:
             ScenarioError: If it begins later.
         """
-        if self.push is not None and self.push.at_s >= duration:
+        push = self.file.push
+        if push is not None and push.at_s >= duration:
             raise self.error(
-                ("push", "at_s"), f"is {self.push.at_s:g}; valid: before the motion ends at {duration:.3f} s"
+                ("push", "at_s"), f"is {push.at_s:g}; valid: before the motion ends at {duration:.3f} s"
             )
 
     def to_yaml(self) -> str:
@@ -261,12 +224,17 @@ class Scenario(Displayed, ScenarioValues):
         data = self._data()
         for key, change in changes.items():
             data[key] = {**data[key], **change} if isinstance(change, dict) else change
-        file = validate(ScenarioFile, data, self.source)
-        return Scenario(file, self.source, self.folder, self.lines)
+        return self._with(data, self.lines)
 
     def _in_frame(self, transform: PlanarTransform, decimals: int) -> Scenario:
-        data = moved_data(self.file, self._data(), transform, decimals)
-        return Scenario(validate(ScenarioFile, data, self.source), self.source, self.folder, self.lines)
+        return self._with(moved_data(self.file, self._data(), transform, decimals), self.lines)
+
+    def _with(
+        self, data: Any, lines: Mapping[KeyPath, str], named: Mapping[KeyPath, str] | None = None
+    ) -> Scenario:
+        """The scenario of other content; messages name the places ``named`` of its keys."""
+        file = validate(ScenarioFile, data, self.source, named)
+        return Scenario(file, self.source, self.folder, lines)
 
     def _data(self) -> dict[str, Any]:
         """Content of the file in plain values, with every default."""

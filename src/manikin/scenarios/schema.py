@@ -37,6 +37,8 @@ from manikin.scenarios.validation import (
     optional,
     preset,
     refuse,
+    refuse_if,
+    refuse_repeated,
     required,
 )
 
@@ -124,20 +126,17 @@ class ScenarioFile(Section):
     @model_validator(mode="after")
     def _check(self) -> Self:
         names = [obstacle.name for obstacle in self.scene]
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                raise refuse(f"scene[{index}].name", f"is {name!r} again; valid: a unique name")
+        refuse_repeated(names, "scene[{}].name")
         one_of = f"the name of an obstacle of the scene ({', '.join(names) or 'it has none'})"
         for index, constraint in enumerate(self.com_constraints):
             wanted = constraint.overhead if isinstance(constraint.overhead, list) else []
             for number, name in enumerate(wanted):
-                if name not in names:
-                    key = f"com_constraints[{index}].overhead[{number}]"
-                    raise refuse(key, f"is {name!r}; valid: automatic, or {one_of}")
-        if self.task.act is not None and self.task.act.on not in names:
-            raise refuse("task.act.on", f"is {self.task.act.on!r}; valid: {one_of}")
-        if self.task.act is not None and self.contacts is not None and self.contacts.limbs:
-            raise refuse("contacts.limbs", "are given beside task.act; valid: one of them")
+                key = f"com_constraints[{index}].overhead[{number}]"
+                refuse_if(name not in names, key, f"is {name!r}; valid: automatic, or {one_of}")
+        if self.task.act is not None:
+            act, limbs = self.task.act, self.contacts is not None and self.contacts.limbs
+            refuse_if(act.on not in names, "task.act.on", f"is {act.on!r}; valid: {one_of}")
+            refuse_if(limbs, "contacts.limbs", "are given beside task.act; valid: one of them")
         self._check_execution()
         self._check_recovery()
         self._check_walking()
@@ -146,23 +145,18 @@ class ScenarioFile(Section):
         self._check_wholebody()
         if self.supports is None:
             self._check_planned()
-        elif self.contacts is not None:
-            raise refuse("contacts", "is given beside supports; valid: one of them")
+        else:
+            refuse_if(self.contacts is not None, "contacts", "is given beside supports; valid: one of them")
         for key in type(self.com_constraints[0])._keys() if self.com_constraints else ():
-            if sum(getattr(c, key) is not None for c in self.com_constraints) > 1:
-                raise refuse("com_constraints", f"holds {key} twice; valid: at most once")
+            count = sum(getattr(c, key) is not None for c in self.com_constraints)
+            refuse_if(count > 1, "com_constraints", f"holds {key} twice; valid: at most once")
         for end in ("start", "goal") if self.supports is not None else ():
-            state = getattr(self.task, end)
-            if state.com is None:
-                raise refuse(
-                    f"task.{end}.com", "is missing; valid: [x, y, z] in metres when supports are given"
-                )
+            state, problem = getattr(self.task, end), "has no meaning beside explicit supports"
+            wanted = "[x, y, z] in metres when supports are given"
+            refuse_if(state.com is None, f"task.{end}.com", f"is missing; valid: {wanted}")
             for key in ("at", "heading_deg", "height_m", "posture"):
-                if getattr(state, key) is not None:
-                    raise refuse(
-                        f"task.{end}.{key}",
-                        "has no meaning beside explicit supports; valid: only com, [x, y, z]",
-                    )
+                given = getattr(state, key) is not None
+                refuse_if(given, f"task.{end}.{key}", f"{problem}; valid: only com, [x, y, z]")
         return self
 
     def _inapplicable(self, key: str) -> PydanticCustomError:
@@ -170,27 +164,24 @@ class ScenarioFile(Section):
 
     def _refuse_given(self, keys: Sequence[str], problem: str) -> None:
         for key in keys:
-            if getattr(self, key) is not None:
-                raise refuse(key, problem)
+            refuse_if(getattr(self, key) is not None, key, problem)
 
     def _check_execution(self) -> None:
         """Refuse an execution of what cannot be executed, and none of what is nothing else."""
         if self.execution == "required":
-            if self.body.model == "point_mass":
-                raise refuse("execution", "is required; valid: none for a point mass, which has no joints")
-            if self.walking is not None and not self.walking.is_planned(self.supports):
-                raise refuse(
-                    "execution",
-                    "is required; valid: none for a recorded walk, or walking.whole_body: planned",
-                )
+            recorded = self.walking is not None and not self.walking.is_planned(self.supports)
+            problem = "is required; valid: none for"
+            point_mass = self.body.model == "point_mass"
+            refuse_if(point_mass, "execution", f"{problem} a point mass, which has no joints")
+            refuse_if(recorded, "execution", f"{problem} a recorded walk, or walking.whole_body: planned")
         elif self.recovery is not None:
             raise refuse("execution", "is none; valid: required beside recovery, which is an execution")
 
     def _check_recovery(self) -> None:
         """Refuse a recovery without a push, or with what belongs to a way."""
-        if self.recovery is None:
-            if self.body.model == "kudoh":
-                raise refuse("recovery", "is missing; valid: a recovery, for the body of Kudoh")
+        recovery, kudoh = self.recovery, self.body.model == "kudoh"
+        if recovery is None:
+            refuse_if(kudoh, "recovery", "is missing; valid: a recovery, for the body of Kudoh")
             return
         if self.push is None:
             raise refuse("push", "is missing; valid: force_N, direction_deg, duration_s, at_s")
@@ -199,120 +190,101 @@ class ScenarioFile(Section):
         self._refuse_given(("supports", "contacts"), "is given beside recovery; valid: one of them")
         for key in ("posture", "height_m"):
             value = getattr(self.task.start, key)
-            if value not in (None, 0.0, "standing"):
-                raise refuse(f"task.start.{key}", f"is {value}; valid in a recovery: leave it out")
-        if self.task.act is not None:
-            raise refuse("task.act", "is given beside recovery; valid: one of them")
-        if self.floor_height_m != 0.0:
-            raise refuse("floor_height_m", f"is {self.floor_height_m}; valid in a recovery: 0")
-        if self.recovery.steps and self.recovery.feet == "held":
-            raise refuse("recovery.steps", f"is {self.recovery.steps} of held feet; valid: 0, or free feet")
-        if self.recovery.steps and self.recovery.support != "both":
-            raise refuse("recovery.steps", f"is {self.recovery.steps} on one foot; valid: 0, or both feet")
-        if self.recovery.feet_apart_m is not None and self.recovery.support != "both":
-            raise refuse(
-                "recovery.feet_apart_m",
-                f"is {self.recovery.feet_apart_m:g} on one foot; valid: leave it out, or both feet",
-            )
-        if self.push.at_s >= self.recovery.duration_s:
-            raise refuse(
-                "push.at_s",
-                f"is {self.push.at_s:g}; valid: before the run ends at {self.recovery.duration_s:g} s",
-            )
+            given = value not in (None, 0.0, "standing")
+            refuse_if(given, f"task.start.{key}", f"is {value}; valid in a recovery: leave it out")
+        act, steps, apart = self.task.act, recovery.steps, recovery.feet_apart_m
+        refuse_if(act is not None, "task.act", "is given beside recovery; valid: one of them")
+        floor = self.floor_height_m
+        refuse_if(floor != 0.0, "floor_height_m", f"is {floor}; valid in a recovery: 0")
+        held, single = recovery.feet == "held", recovery.support != "both"
+        refuse_if(steps and held, "recovery.steps", f"is {steps} of held feet; valid: 0, or free feet")
+        refuse_if(steps and single, "recovery.steps", f"is {steps} on one foot; valid: 0, or both feet")
+        if apart is not None and single:
+            problem = f"is {apart:g} on one foot; valid: leave it out, or both feet"
+            raise refuse("recovery.feet_apart_m", problem)
+        begins, ends = self.push.at_s, recovery.duration_s
+        refuse_if(begins >= ends, "push.at_s", f"is {begins:g}; valid: before the run ends at {ends:g} s")
 
     def _check_walking(self) -> None:
         """Refuse a walk beside other ways to go, or of a body that has no recorded walks."""
-        if self.walking is None:
+        walking, floor = self.walking, self.floor_height_m
+        if walking is None:
             return
         if self.body.model != "human":
             raise self._inapplicable("walking")
-        if self.floor_height_m is None:
+        if floor is None:
             raise refuse("floor_height_m", "is null; valid in a walk: the height of a floor")
-        others = ("contacts", "recovery", *(() if self.walking.is_planned(self.supports) else ("push",)))
+        planned, alone = walking.is_planned(self.supports), self.supports is None
+        others = ("contacts", "recovery", *(() if planned else ("push",)))
         self._refuse_given(others, "is given beside walking; valid: one of them")
-        if (self.supports is None) != (self.walking.start is None):
-            raise refuse("walking.start", "goes with supports, which it leads to; valid: both or neither")
-        if self.walking.is_planned(self.supports):
-            for key in ("via", "others", "wait_s"):
-                if value := getattr(self.walking, key):
-                    given = f"is {value:g}" if key == "wait_s" else "are given"
-                    raise refuse(f"walking.{key}", f"{given} in a planned walk; valid there: leave it out")
-        if self.walking.footprints == "library" and (
-            self.supports is not None or self.walking.whole_body != "planned"
-        ):
-            raise refuse(
-                "walking.footprints", "is library; valid: in a planned walk (whole_body) without supports"
-            )
-        if self.supports is not None:
+        problem = "goes with supports, which it leads to; valid: both or neither"
+        refuse_if(alone != (walking.start is None), "walking.start", problem)
+        for key in ("via", "others", "wait_s") if planned else ():
+            if value := getattr(walking, key):
+                given = f"is {value:g}" if key == "wait_s" else "are given"
+                raise refuse(f"walking.{key}", f"{given} in a planned walk; valid there: leave it out")
+        if walking.footprints == "library" and not (alone and walking.whole_body == "planned"):
+            problem = "is library; valid: in a planned walk (whole_body) without supports"
+            raise refuse("walking.footprints", problem)
+        if not alone:
             return
-        if self.task.act is not None:
-            raise refuse("task.act", "is given beside walking; valid: one of them")
+        refuse_if(self.task.act is not None, "task.act", "is given beside walking; valid: one of them")
         for end in ("start", "goal"):
             state = getattr(self.task, end)
-            if state.posture not in (None, "standing"):
-                raise refuse(f"task.{end}.posture", f"is {state.posture}; valid in a walk: standing")
-            if state.height_m is not None and state.height_m != self.floor_height_m:
-                raise refuse(
-                    f"task.{end}.height_m",
-                    f"is {state.height_m:g}; valid in a walk: that of the floor, {self.floor_height_m:g}",
-                )
+            sits = state.posture not in (None, "standing")
+            refuse_if(sits, f"task.{end}.posture", f"is {state.posture}; valid in a walk: standing")
+            if state.height_m not in (None, floor):
+                problem = f"is {state.height_m:g}; valid in a walk: that of the floor, {floor:g}"
+                raise refuse(f"task.{end}.height_m", problem)
 
     def _check_load(self) -> None:
         """Refuse a load of some phases where there are none, or that a planner would not feel."""
         load = self.body.load
         if load is None or load.lasts:
             return
-        key = "body.load.from_phase" if load.from_phase is not None else "body.load.until_phase"
-        if self.supports is None:
-            raise refuse(
-                key, "is given without supports; valid: a load of the whole motion, or phases of supports"
-            )
-        if self.body.model != "human":
-            raise refuse(
-                key, f"does not apply to {WORDS[self.body.model]}; valid: a load of the whole motion"
-            )
-        if self.wholebody.method == "refine" or self.planning.method == "keyframes":
-            raise refuse(key, "is given for a refined or recorded motion; valid: a load of the whole motion")
+        key = f"body.load.{'until' if load.from_phase is None else 'from'}_phase"
+        lasting = "valid: a load of the whole motion"
+        alone = self.supports is None
+        refuse_if(alone, key, f"is given without supports; {lasting}, or phases of supports")
+        kind = WORDS[self.body.model]
+        refuse_if(self.body.model != "human", key, f"does not apply to {kind}; {lasting}")
+        unfelt = self.wholebody.method == "refine" or self.planning.method == "keyframes"
+        refuse_if(unfelt, key, f"is given for a refined or recorded motion; {lasting}")
 
     def _check_wholebody(self) -> None:
         """Refuse what cannot be refined."""
         if self.wholebody.method != "refine":
             return
-        if self.body.model == "point_mass":
-            raise refuse("wholebody.method", "is refine; valid: follow for a point mass, which has no joints")
-        if self.supports is not None and self.supports.foot != "flat":
-            raise refuse("wholebody.method", "is refine; valid: follow for feet that roll, or flat ones")
-        if self.task.act is not None:
-            raise refuse("wholebody.method", "is refine; valid: follow for a task with an act")
+        rolls = self.supports is not None and self.supports.foot != "flat"
+        for bad, what in (
+            (self.body.model == "point_mass", "a point mass, which has no joints"),
+            (rolls, "feet that roll, or flat ones"),
+            (self.task.act is not None, "a task with an act"),
+        ):
+            refuse_if(bad, "wholebody.method", f"is refine; valid: follow for {what}")
 
     def _check_planned(self) -> None:
         """Refuse what contacts cannot be planned for."""
-        if self.body.model == "point_mass":
-            raise refuse("supports", "is missing; valid: explicit supports for a point mass")
+        point_mass = self.body.model == "point_mass"
+        refuse_if(point_mass, "supports", "is missing; valid: explicit supports for a point mass")
+        holds = self.contacts is not None and self.contacts.limbs is not None
         for end in ("start", "goal"):
-            state = getattr(self.task, end)
+            state, problem = getattr(self.task, end), "has no meaning without explicit supports"
             for key in ("com", "velocity_m_s"):
-                if getattr(state, key) is not None:
-                    raise refuse(
-                        f"task.{end}.{key}",
-                        "has no meaning without explicit supports; valid: at, heading_deg, height_m, posture",
-                    )
-            if state.posture == "climbing" and (self.contacts is None or self.contacts.limbs is None):
-                raise refuse(
-                    f"task.{end}.posture", "is climbing; valid: beside contacts.limbs, the limbs that hold on"
-                )
-        if self.task.goal.posture == "seated" and self.wholebody.method == "refine":
-            raise refuse("task.goal.posture", "is seated; valid: standing or crouched for a refined motion")
+                given = getattr(state, key) is not None
+                refuse_if(given, f"task.{end}.{key}", f"{problem}; valid: at, heading_deg, height_m, posture")
+            problem = "is climbing; valid: beside contacts.limbs, the limbs that hold on"
+            refuse_if(state.posture == "climbing" and not holds, f"task.{end}.posture", problem)
+        seated = self.task.goal.posture == "seated" and self.wholebody.method == "refine"
+        problem = "is seated; valid: standing or crouched for a refined motion"
+        refuse_if(seated, "task.goal.posture", problem)
 
     def _check_body(self) -> None:
         if self.body.model == "human":
+            problem = f"is no part of a human; valid: {', '.join(EFFECTORS)}, or a point_mass"
             for number, phase in enumerate(self.supports.phases if self.supports is not None else ()):
                 for name in phase.entries():
-                    if name in MASSLESS_FEET:
-                        raise refuse(
-                            f"supports.phases[{number}].{name}",
-                            f"is no part of a human; valid: {', '.join(EFFECTORS)}, or a point_mass",
-                        )
+                    refuse_if(name in MASSLESS_FEET, f"supports.phases[{number}].{name}", problem)
             return
         if self.task.act is not None:
             raise self._inapplicable("task.act")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from manikin.balance import BalanceReport, evaluate_balance
 from manikin.contact import Stance, default_normal_force_cap
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.sections.planning_sections import FRICTION_MODEL_TEXT, FrictionModelName
@@ -20,15 +20,12 @@ from manikin.scenarios.validation import (
     optional,
     place,
     preset,
-    refuse,
+    refuse_repeated,
     required,
     validate,
 )
 from manikin.scenarios.world import build_contact
 from manikin.scenarios.yaml_reader import read_yaml
-
-if TYPE_CHECKING:
-    from manikin.balance import BalanceReport
 
 
 class NamedContactSection(ContactSection):
@@ -58,70 +55,28 @@ class StanceFile(Section):
     @model_validator(mode="after")
     def _check(self) -> Self:
         names = [contact.effector for contact in self.contacts]
+        refuse_repeated(names, "contacts[{}].effector", "one contact each")
         for index, contact in enumerate(self.contacts):
-            if contact.effector in names[:index]:
-                raise refuse(
-                    f"contacts[{index}].effector", f"is {contact.effector!r} again; valid: one contact each"
-                )
             contact.check_for(contact.effector, f"contacts[{index}].")
         return self
 
-    def build_stance(self) -> Stance:
-        """Build the stance.
 
-        Raises:
-            ContactError: If a contact is not usable.
-        """
-        contacts = [build_contact(entry.effector, entry, self.friction, self.sole) for entry in self.contacts]
-        cap = self.normal_force_cap_N or default_normal_force_cap(self.mass_kg)
-        return Stance(contacts, cap, self.friction_model)
-
-
-@dataclass(frozen=True, eq=False)
-class BalanceQuestion:
-    """A checked stance file.
-
-    Attributes:
-        file: Its content.
-        source: Its name, for messages.
-    """
-
-    file: StanceFile
-    source: str
-
-    def evaluate(self) -> BalanceReport:
-        """Judge the stance by its wrench polytope and by the classical criteria.
-
-        Raises:
-            ScenarioError: If the contacts or the state are not usable.
-        """
-        from manikin.balance import evaluate_balance
-
-        file = self.file
-        try:
-            return evaluate_balance(
-                file.build_stance(), file.mass_kg, file.com, file.acceleration, file.angular_momentum_rate,
-                reference=file.reference,
-            )  # fmt: skip
-        except InputError as error:
-            raise ScenarioError(f"{self.source}: {error}") from None
-
-
-def load_stance_file(path: str | Path) -> BalanceQuestion:
-    """Read a stance file.
+def judge_stance_file(path: Path) -> BalanceReport:
+    """Judge the stance of a file by its wrench polytope and by the classical criteria.
 
     Raises:
         ScenarioError: One line that names the file, the key, what was wrong and what is valid.
     """
-    file_path = Path(path)
-    if file_path.is_dir():
-        raise ScenarioError(f"{file_path}: is a directory; valid: a stance file (.yaml)")
-    if not file_path.is_file():
-        raise ScenarioError(f"{file_path}: there is no such file; valid: a stance file (.yaml)")
-    data, lines = read_yaml(file_path)
-    file = validate(StanceFile, data, str(file_path), lines)
+    if not path.is_file():
+        problem = "is a directory" if path.is_dir() else "there is no such file"
+        raise ScenarioError(f"{path}: {problem}; valid: a stance file (.yaml)")
+    data, lines = read_yaml(path)
+    file, where = validate(StanceFile, data, str(path), lines), place(str(path), ("contacts",), lines)
     try:
-        file.build_stance()
+        contacts = [build_contact(entry.effector, entry, file.friction, file.sole) for entry in file.contacts]
+        cap = file.normal_force_cap_N or default_normal_force_cap(file.mass_kg)
+        stance, where = Stance(contacts, cap, file.friction_model), str(path)
+        state = file.com, file.acceleration, file.angular_momentum_rate
+        return evaluate_balance(stance, file.mass_kg, *state, reference=file.reference)
     except InputError as error:
-        raise ScenarioError(f"{place(str(file_path), ('contacts',), lines)}: {error}") from None
-    return BalanceQuestion(file, str(file_path))
+        raise ScenarioError(f"{where}: {error}") from None

@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Annotated, Any, TypeVar, get_args
 
@@ -69,18 +69,15 @@ def _unknown_key(key: Any, keys: Sequence[str]) -> dict[str, Any]:
     return {"key": str(key), "rule": f"{hint}valid: {', '.join(keys)}"}
 
 
-def _vector(length: int, meaning: str) -> Callable[[Any], Any]:
+def _vector(length: int, meaning: str) -> BeforeValidator:
     def check(value: Any) -> Any:
-        good = (
-            isinstance(value, (list, tuple))
-            and len(value) == length
-            and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
-        )
-        if not good:
+        items = value if isinstance(value, list | tuple) else ()
+        numbers = [item for item in items if isinstance(item, int | float) and not isinstance(item, bool)]
+        if not len(items) == len(numbers) == length:
             raise PydanticCustomError("vector", "{rule}", {"rule": meaning})
         return value
 
-    return check
+    return BeforeValidator(check)
 
 
 LARGEST = 1e6
@@ -117,15 +114,10 @@ Duration = Annotated[
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Name = Annotated[Text, AfterValidator(_file_name)]
 """A name that can also be that of a directory."""
-Vector2 = Annotated[tuple[Number, Number], BeforeValidator(_vector(2, "two numbers [x, y]"))]
-Vector3 = Annotated[tuple[Number, Number, Number], BeforeValidator(_vector(3, "three numbers [x, y, z]"))]
-Size3 = Annotated[
-    tuple[Positive, Positive, Positive], BeforeValidator(_vector(3, "three numbers > 0 [x, y, z]"))
-]
-
-Weights3 = Annotated[
-    tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_vector(3, "three numbers >= 0 [x, y, z]"))
-]
+Vector2 = Annotated[tuple[Number, Number], _vector(2, "two numbers [x, y]")]
+Vector3 = Annotated[tuple[Number, Number, Number], _vector(3, "three numbers [x, y, z]")]
+Size3 = Annotated[tuple[Positive, Positive, Positive], _vector(3, "three numbers > 0 [x, y, z]")]
+Weights3 = Annotated[tuple[NonNegative, NonNegative, NonNegative], _vector(3, "three numbers >= 0 [x, y, z]")]
 
 
 def required(meaning: str) -> Any:
@@ -153,18 +145,25 @@ def refuse(key: str, problem: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{problem}", {"key": key, "problem": problem})
 
 
+def refuse_if(wrong: object, key: str, problem: str) -> None:
+    """Refuse one key of a section if something is wrong with it, see :func:`refuse`."""
+    if wrong:
+        raise refuse(key, problem)
+
+
+def refuse_repeated(names: Sequence[str], key: str, valid: str = "a unique name") -> None:
+    """Refuse a name that stands twice in a list; ``key`` is that of an entry, with {} for its number."""
+    for index, name in enumerate(names):
+        refuse_if(name in names[:index], key.format(index), f"is {name!r} again; valid: {valid}")
+
+
 _Section = TypeVar("_Section", bound=Section)
 
 
 def validate(
     model: type[_Section], data: Any, source: str, lines: Mapping[Path, str] | None = None
 ) -> _Section:
-    """Check ``data`` against ``model``.
-
-    Args:
-        model: The section at the root of the file.
-        data: What the YAML reader returned.
-        lines: Place (file and line) of each key, from the YAML reader.
+    """Check what a YAML reader returned, with the place of each key, against the section of a whole file.
 
     Raises:
         ScenarioError: One line: file, key path, what was wrong, what is valid.
@@ -172,16 +171,10 @@ def validate(
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(_first_problem(error, data, model, source, lines or {})) from None
-
-
-def _first_problem(
-    error: ValidationError, data: Any, model: type[Section], source: str, lines: Mapping[Path, str]
-) -> str:
-    problems = error.errors(include_url=False)
+        problems = error.errors(include_url=False)
     path, text = _describe(problems[0], data, model)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return f"{place(source, path, lines)} {text}{more}".replace("\n", " ")
+    raise ScenarioError(f"{place(source, path, lines or {})} {text}{more}".replace("\n", " "))
 
 
 def place(source: str, path: Path, lines: Mapping[Path, str]) -> str:
@@ -201,16 +194,19 @@ def path_text(path: Path) -> str:
 
 def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[Path, str]:
     path, context, kind = _real_path(problem["loc"], data), problem.get("ctx", {}), problem["type"]
-    value = _shown(problem["input"])
+    value = "empty" if problem["input"] is None else repr(problem["input"])
+    value = value if len(value) <= 60 else value[:57] + "..."
     if kind == "unknown_key":
         return (*path, context["key"]), f"is not a known key; {context['rule']}"
     if kind == "missing":
         return (*path, str(problem["loc"][-1])), f"is missing; valid: {_meaning(model, problem['loc'])}"
     if kind == "refused":
-        return (*path, *_key_path(context["key"])), context["problem"]
+        parts = re.findall(r"[^.\[\]]+", context["key"])  # the inverse of path_text
+        return (*path, *(int(part) if part.isdigit() else part for part in parts)), context["problem"]
     if kind in ("rule", "section", "vector"):
         return path, f"is {value}; valid: {context['rule']}"
-    return path, f"is {value}; valid: {_rule(kind, context, problem['msg'])}"
+    rule = _RULES[kind].format(**context) if kind in _RULES else problem["msg"]
+    return path, f"is {value}; valid: {rule}"
 
 
 def _meaning(model: type[Section], location: tuple[str | int, ...]) -> str:
@@ -229,12 +225,6 @@ def _section_of(annotation: Any) -> Any:
     return next((result for part in get_args(annotation) if (result := _section_of(part)) is not None), None)
 
 
-def _key_path(key: str) -> Path:
-    """Inverse of :func:`path_text`."""
-    parts = re.findall(r"[^.\[\]]+", key)
-    return tuple(int(part) if part.isdigit() else part for part in parts)
-
-
 def _real_path(location: tuple[str | int, ...], data: Any) -> Path:
     """Keep the parts of pydantic's location that are in the file; it adds names of union members."""
     path: list[str | int] = []
@@ -248,31 +238,25 @@ def _real_path(location: tuple[str | int, ...], data: Any) -> Path:
 def _holds(data: Any, part: str | int) -> bool:
     if isinstance(data, Mapping):
         return part in data
-    return isinstance(data, (list, tuple)) and isinstance(part, int) and part < len(data)
+    return isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
 
 
-def _rule(kind: str, context: Mapping[str, Any], message: str) -> str:
-    bounds = {
-        "greater_than": "a number > {gt:g}",
-        "greater_than_equal": "a number >= {ge:g}",
-        "less_than": "a number < {lt:g}",
-        "less_than_equal": "a number <= {le:g}",
-        "literal_error": "{expected}",
-        "too_short": "at least {min_length} entries",
-        "string_too_short": "a text that is not empty",
-        "finite_number": "a finite number",
-        "float_type": "a number",
-        "int_type": "a whole number",
-        "int_from_float": "a whole number",
-        "string_type": "a text",
-        "bool_type": "true or false",
-        "list_type": "a list",
-        "tuple_type": "a list",
-        "dict_type": "a mapping",
-    }
-    return bounds[kind].format(**context) if kind in bounds else message
-
-
-def _shown(value: Any) -> str:
-    text = "empty" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+_RULES = {
+    "greater_than": "a number > {gt:g}",
+    "greater_than_equal": "a number >= {ge:g}",
+    "less_than": "a number < {lt:g}",
+    "less_than_equal": "a number <= {le:g}",
+    "literal_error": "{expected}",
+    "too_short": "at least {min_length} entries",
+    "string_too_short": "a text that is not empty",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a mapping",
+}
+"""What is valid, by the kind of pydantic's error."""

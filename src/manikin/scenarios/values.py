@@ -28,13 +28,8 @@ from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, froz
 from manikin.scenarios.expressions import Expression, HeightBand, SupportLevel
 from manikin.scenarios.placement import start_heading_deg, task_frame
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.sections.planning_sections import (
-    ComConstraintSection,
-    ContactsSection,
-    PlanningSection,
-)
+from manikin.scenarios.sections.planning_sections import ComConstraintSection, ContactsSection
 from manikin.scenarios.sections.support_sections import ContactSection, SoleSection, SupportsSection
-from manikin.scenarios.sections.task_sections import ActSection, PushSection, RecoverySection, WalkingSection
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.validation import place
 
@@ -62,11 +57,6 @@ class ScenarioValues:
     def name(self) -> str:
         """Short name."""
         return self.file.name
-
-    @property
-    def description(self) -> str:
-        """One line about it."""
-        return self.file.description
 
     @property
     def seed(self) -> int:
@@ -99,12 +89,7 @@ class ScenarioValues:
     @property
     def contact_model(self) -> ContactModel:
         """Friction model of the file and the default cap of the body, for every stance of every stage."""
-        return ContactModel.of_body(self.moved_mass, self.planning.friction_model)
-
-    @property
-    def planning(self) -> PlanningSection:
-        """Options of the centre-of-mass planner."""
-        return self.file.planning
+        return ContactModel.of_body(self.moved_mass, self.file.planning.friction_model)
 
     @property
     def refines(self) -> bool:
@@ -117,31 +102,6 @@ class ScenarioValues:
         return self.file.execution == "required"
 
     @property
-    def manner(self) -> str:
-        """Style of the postures where the task leaves freedom."""
-        return self.file.manner
-
-    @property
-    def push(self) -> PushSection | None:
-        """Disturbance during the execution, or None."""
-        return self.file.push
-
-    @property
-    def recovery(self) -> RecoverySection | None:
-        """Recovery of a standing body from its push, or None."""
-        return self.file.recovery
-
-    @property
-    def walking(self) -> WalkingSection | None:
-        """Walk from start to goal, or None."""
-        return self.file.walking
-
-    @property
-    def act(self) -> ActSection | None:
-        """Act of the hands on an object at the end, or None."""
-        return self.file.task.act
-
-    @property
     def stature_scale(self) -> float:
         """Stature over the reference stature of the task's heights."""
         reference = self.file.reference_stature_m
@@ -149,20 +109,12 @@ class ScenarioValues:
 
     @property
     def start_com(self) -> FloatArray:
-        """(3,) centre of mass at the start, scaled to the body [m].
-
-        Raises:
-            ScenarioError: If the file gives no CoM.
-        """
+        """(3,) centre of mass at the start, scaled to the body [m]; an error where the file gives none."""
         return self._scaled_com("start")
 
     @property
     def goal_com(self) -> FloatArray:
-        """(3,) centre of mass at the goal, scaled to the body [m].
-
-        Raises:
-            ScenarioError: If the file gives no CoM.
-        """
+        """(3,) centre of mass at the goal, scaled to the body [m]; an error where the file gives none."""
         return self._scaled_com("goal")
 
     @property
@@ -190,8 +142,8 @@ class ScenarioValues:
         """Smallest margin allowed, scaled to the body like a weight times a length [N.m] or [N]."""
         reference = self.file.reference_mass_kg
         mass_scale = 1.0 if reference is None else self.mass / reference
-        length_scale = self.stature_scale if self.planning.margin_space == "wrench" else 1.0
-        return self.planning.min_margin * mass_scale * length_scale
+        length_scale = self.stature_scale if self.file.planning.margin_space == "wrench" else 1.0
+        return self.file.planning.min_margin * mass_scale * length_scale
 
     @property
     def contacts(self) -> ContactsSection:
@@ -229,12 +181,10 @@ class ScenarioValues:
     @property
     def seated_from(self) -> int | None:
         """First phase of those, up to the last, in which the body sits; None when it ends on its feet."""
-        if self.file.supports is None:
-            return None
-        sits = ["buttocks" in contacts for contacts in self.file.supports.resolved_phases()]
-        if not sits[-1]:
-            return None
-        return len(sits) - next((k for k, held in enumerate(reversed(sits)) if not held), len(sits))
+        phases = [] if self.file.supports is None else self.file.supports.resolved_phases()
+        on_feet = [number for number, held in enumerate(phases) if "buttocks" not in held]
+        first = max(on_feet, default=-1) + 1
+        return first if first < len(phases) else None
 
     def find_file(self, name: str) -> Path:
         """Path of a file that the scenario names: in its folder, or else from the current one."""
@@ -244,9 +194,8 @@ class ScenarioValues:
     @property
     def start_level(self) -> float:
         """Height of the supports at the start, or of the floor; 0 without either [m]."""
-        if self.file.supports is None:
-            return self.file.floor_height_m or 0.0
-        return _level(self.explicit_supports().resolved_phases()[0])
+        contacts = self._first_contacts
+        return self.file.floor_height_m or 0.0 if contacts is None else _level(contacts)
 
     @property
     def start_heading_deg(self) -> float:
@@ -264,12 +213,11 @@ class ScenarioValues:
 
     def support_level(self) -> SupportLevel:
         """Height of the supports below the CoM, from the start to the goal."""
-        ends = [np.array(self._com(end)[:2]) for end in ("start", "goal")]
-        if self.file.supports is None:
-            floor = self.file.floor_height_m or 0.0
-            return SupportLevel(ends[0], ends[1], floor, floor)
-        phases = self.explicit_supports().resolved_phases()
-        return SupportLevel(ends[0], ends[1], _level(phases[0]), _level(phases[-1]))
+        start, goal = (np.array(self._com(end)[:2]) for end in ("start", "goal"))
+        last = self.start_level
+        if self.file.supports is not None:
+            last = _level(self.file.supports.resolved_phases()[-1])
+        return SupportLevel(start, goal, self.start_level, last)
 
     def explicit_supports(self) -> SupportsSection:
         """The sequence of supports that the file lists.
@@ -318,12 +266,10 @@ class ScenarioValues:
         return frozen_array([x, y, z], f"{end} com [m]", (3,))
 
     def _check_numbers_of_band(self) -> None:
-        index = next((i for i, c in enumerate(self.file.com_constraints) if c.height_band is not None), None)
-        if index is None or self.file.supports is None:
-            return
-        band = self.height_band
+        band = self.height_band if self.file.supports is not None else None
         if band is None:
             return
+        index = [c.height_band is not None for c in self.file.com_constraints].index(True)
         path: KeyPath = ("com_constraints", index, "height_band")
         for end in ("start", "goal"):
             x, y, z = (np.float64(value) for value in self._scaled_com(end))

@@ -39,7 +39,8 @@ from manikin.planning.whole_body.posture_style import READY, posture_style_of
 from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
 from manikin.scenarios.sections.task_sections import ObstacleSection
 from manikin.scenarios.values import ScenarioValues, build_body
-from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere, load_mesh
+from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Scene, Sphere, load_mesh
+from manikin.scene.obstacle import Shape
 
 
 def build_contact(
@@ -64,14 +65,10 @@ def build_contact(
     """
     kind = entry.kind_for(effector)
     if kind == "grasp":
-        rpy = None if entry.rpy_deg is None else np.radians(entry.rpy_deg)
-        return grasp(
-            effector,
-            entry.position,
-            max_force=(planning and entry.planning_max_force_N) or entry.max_force_N or 0.0,
-            max_moment=entry.max_moment_Nm or 0.0,
-            rotation=None if rpy is None else rotation_from_rpy(*rpy),
-        )
+        turn = None if entry.rpy_deg is None else rotation_from_rpy(*np.radians(entry.rpy_deg))
+        force = (planning and entry.planning_max_force_N) or entry.max_force_N or 0.0
+        moment = entry.max_moment_Nm or 0.0
+        return grasp(effector, entry.position, max_force=force, max_moment=moment, rotation=turn)
     friction = entry.friction or friction
     force_cap = entry.normal_force_cap_N or force_cap
     if kind == "point":
@@ -80,14 +77,13 @@ def build_contact(
             rotation=rotation_from_normal(entry.normal or (0.0, 0.0, 1.0), math.radians(entry.yaw_deg)),
             normal_force_cap=force_cap,
         )  # fmt: skip
-    own = entry.sole or default_sole
-    shrink = planning and entry.sole is not None
+    sizes = [entry.sole or default_sole, *([default_sole] if planning else [])]
     made = sole(
         effector,
         entry.position,
         math.radians(entry.yaw_deg),
-        length=min(own.length_m, default_sole.length_m) if shrink else own.length_m,
-        width=min(own.width_m, default_sole.width_m) if shrink else own.width_m,
+        length=min(size.length_m for size in sizes),
+        width=min(size.width_m for size in sizes),
         polygon=entry.polygon,
         friction=friction,
         normal=entry.normal,
@@ -113,7 +109,12 @@ def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
     """
     options, patch, end = values.contacts, None, None
     if body.sole_length and body.sole_width and body.stature is not None:
-        end = _toe_hinge(body) - HINGE_ROOM
+        foot = body.effector("left_foot")
+        toes = [item for item in body.segments if item.parent == foot.segment and item.hinges]
+        hinge = 0.5 * body.sole_length  # the tip, without a hinge of the toes
+        if toes:
+            hinge = float((foot.rotation.T @ (toes[0].origin - foot.translation))[0])
+        end = hinge - HINGE_ROOM
         if options.forefoot_m is not None:
             patch = (end - options.forefoot_m, end, PATCH_WIDTH * body.sole_width)
     return ContactRules(friction_of(values), options.grasp_force_N, 0.0, patch, end)
@@ -123,14 +124,6 @@ def friction_of(values: ScenarioValues) -> float:
     """Coulomb coefficient of the file's supports, or of its contacts where those are found."""
     supports = values.file.supports
     return values.contacts.friction if supports is None else supports.friction
-
-
-def _toe_hinge(body: BodyModel) -> float:
-    """Place of the hinge of the toes on the sole's x axis; its tip without such a hinge [m]."""
-    foot = body.effector("left_foot")
-    toes = [segment for segment in body.segments if segment.parent == foot.segment and segment.hinges]
-    own = foot.rotation.T @ (toes[0].origin - foot.translation) if toes else None
-    return 0.5 * (body.sole_length or 0.0) if own is None else float(own[0])
 
 
 def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
@@ -192,7 +185,7 @@ def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
     return [carried if first <= number <= last else None for number in range(len(phases))]
 
 
-def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> None:
+def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float = 0.005) -> None:
     """Check that every contact of the supports lies on a surface of the scene.
 
     Args:
@@ -233,35 +226,15 @@ def _contact(values: ScenarioValues, effector: str, entry: ContactSection, plann
     return replace(made, points=frozen_array(points, "points of a sole [m]", (None, 3)))
 
 
-def build_obstacle(entry: ObstacleSection, folder: Path) -> Obstacle:
-    """Build one obstacle.
-
-    Args:
-        entry: Its section of the file.
-        folder: Folder that a relative mesh path starts from.
-
-    Raises:
-        SceneError: If the mesh cannot be read or the shape is degenerate.
-    """
-    rotation = rotation_from_rpy(*np.radians(entry.rpy_deg))
-    return Obstacle(entry.name, _shape(entry, folder), rotation, entry.position)
-
-
-def _shape(
-    entry: ObstacleSection, folder: Path
-) -> Box | Capsule | Cylinder | HalfSpace | Mesh | Plane | Sphere:
-    if entry.box is not None:
-        return Box(entry.box)
-    if entry.cylinder is not None:
-        return Cylinder(entry.cylinder.radius_m, entry.cylinder.length_m)
-    if entry.capsule is not None:
-        return Capsule(entry.capsule.radius_m, entry.capsule.length_m)
+def _shape(entry: ObstacleSection, folder: Path) -> Shape:
+    for given, kind in ((entry.box, Box), (entry.plane, Plane), (entry.half_space, HalfSpace)):
+        if given is not None:
+            return kind(given)
+    for given, kind in ((entry.cylinder, Cylinder), (entry.capsule, Capsule)):
+        if given is not None:
+            return kind(given.radius_m, given.length_m)
     if entry.sphere is not None:
         return Sphere(entry.sphere.radius_m)
-    if entry.plane is not None:
-        return Plane(entry.plane)
-    if entry.half_space is not None:
-        return HalfSpace(entry.half_space)
     path = folder / str(entry.mesh)
     return load_mesh(path, unit=entry.unit, scale=entry.scale or 1.0, convex=entry.convex or "no")
 
@@ -304,15 +277,14 @@ def start_posture(
     at = None if at is None else (finite_number(at[0], "at x [m]"), finite_number(at[1], "at y [m]"))
     yaw = float(np.deg2rad(values.start_heading_deg if heading_deg is None else heading_deg))
     place = at or start.at
-    if name == CLIMBING:
-        spot = values.start_com[:2] if place is None else place
-        level = values.start_level if start.height_m is None else start.height_m
-        return carried_to(posture_style_of(CLIMBING).posture(body), spot, yaw, level)
     if name != Habit.STANDING:
         spot = np.array(values.start_com[:2] if place is None else place)
-        result = Endpoints(
-            body, scene, friction_of(values), friction_model=values.contact_model.friction
-        ).find(spot, yaw, Habit(name), start.height_m)
+        if name == CLIMBING:
+            level = values.start_level if start.height_m is None else start.height_m
+            return carried_to(posture_style_of(CLIMBING).posture(body), spot, yaw, level)
+        model = values.contact_model.friction
+        endpoints = Endpoints(body, scene, friction_of(values), friction_model=model)
+        result = endpoints.find(spot, yaw, Habit(name), start.height_m)
         if result.stage is None:
             raise ScenarioError(f"{values.source}: {result.failure}; valid: another place or posture")
         return np.array(result.stage.q)
@@ -339,5 +311,7 @@ def build_scene(values: ScenarioValues) -> Scene:
     obstacles = []
     for index, entry in enumerate(values.file.scene):
         with values.refusing(("scene", index)):
-            obstacles.append(build_obstacle(entry, values.folder))
+            rotation = rotation_from_rpy(*np.radians(entry.rpy_deg))
+            shape = _shape(entry, values.folder)
+            obstacles.append(Obstacle(entry.name, shape, rotation, entry.position))
     return Scene(obstacles, floor_height=values.file.floor_height_m)

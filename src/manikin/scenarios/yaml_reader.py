@@ -50,20 +50,13 @@ _Loader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith(_REPLACED)]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:int", re.compile(r"^[-+]?(0|[1-9][0-9]*)$"), list("-+0123456789")
-)
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(
-        r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$"
-        r"|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"
-    ),
-    list("-+0123456789."),
-)
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:bool", re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), list("tTfF")
-)
+_FLOAT = r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"
+for _kind, _pattern, _first in (
+    ("int", r"^[-+]?(0|[1-9][0-9]*)$", "-+0123456789"),
+    ("float", _FLOAT, "-+0123456789."),
+    ("bool", r"^(true|True|TRUE|false|False|FALSE)$", "tTfF"),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), list(_first))
 
 
 def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
@@ -76,15 +69,10 @@ def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
     Raises:
         ScenarioError: If the file cannot be read, is not YAML or is empty.
     """
-    return parse_yaml(_read_text(path), str(path))
-
-
-def parse_yaml(text: str, source: str) -> tuple[Any, dict[KeyPath, str]]:
-    """Parse YAML ``text``; ``source`` names it in messages.  See :func:`read_yaml`."""
-    data, lines = _parse(text, source, "key: value lines")
+    data, lines = _parse(_read_text(path), str(path), "key: value lines")
     if data is None:
-        raise ScenarioError(f"{source}: is empty; valid: a YAML mapping, see 'manikin scenarios'")
-    return data, {path: f"{source}:{line}" for path, line in lines.items()}
+        raise ScenarioError(f"{path}: is empty; valid: a YAML mapping, see 'manikin scenarios'")
+    return data, {key: f"{path}:{line}" for key, line in lines.items()}
 
 
 def parse_value(text: str, source: str) -> Any:
@@ -110,14 +98,14 @@ def _parse(text: str, source: str, valid: str) -> tuple[Any, dict[KeyPath, int]]
             data = None if node is None else loader.construct_document(node)
         finally:
             loader.dispose()
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line = f":{mark.line + 1}" if mark is not None else ""
-        problem = " ".join(str(error.problem or error.context).split())
-        raise ScenarioError(f"{source}{line}: is not valid YAML ({problem}); valid: {valid}") from None
     except (yaml.YAMLError, ValueError, TypeError) as error:
-        problem = " ".join(str(error).split())[:120]
-        raise ScenarioError(f"{source}: is not valid YAML ({problem}); valid: {valid}") from None
+        line, problem = "", str(error)[:120]
+        if isinstance(error, yaml.MarkedYAMLError):
+            mark = error.problem_mark or error.context_mark
+            line = f":{mark.line + 1}" if mark is not None else ""
+            problem = str(error.problem or error.context)
+        problem = " ".join(problem.split())
+        raise ScenarioError(f"{source}{line}: is not valid YAML ({problem}); valid: {valid}") from None
     return data, lines
 
 
@@ -225,16 +213,13 @@ def _merged(
     merged = dict(below)
     for key, value in above.items():
         here = (*path, key)
-        if value is None and not _null_stays(here):
+        is_change = here[0] == VARIANTS and len(here) > 2
+        if value is None and not (is_change or here in NULL_IS_A_VALUE):
             merged.pop(key, None)
             _forget(lines, here)
         else:
             merged[key] = _merged(merged.get(key), value, here, lines, new)
     return merged
-
-
-def _null_stays(path: KeyPath) -> bool:
-    return path in NULL_IS_A_VALUE or (path[0] == VARIANTS and len(path) > 2)
 
 
 def _forget(lines: dict[KeyPath, str], path: KeyPath) -> None:

@@ -1,9 +1,9 @@
 """Obstacles as Coal geometries (exact primitives, convex and triangle pieces), and distances of pairs."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import coal
 import numpy as np
@@ -11,7 +11,7 @@ import trimesh
 
 import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
 from manikin.numerics.spatial import FloatArray, axes_of_normal
-from manikin.scene.mesh import IntArray, Mesh, MeshPiece
+from manikin.scene.mesh import IntArray, Mesh, MeshPiece, as_trimesh
 from manikin.scene.obstacle import (
     Box,
     Capsule,
@@ -59,20 +59,15 @@ def collision_parts(obstacle: Obstacle) -> tuple[CollisionPart, ...]:
         return tuple(_mesh_part(obstacle, piece) for piece in _merged_open_pieces(shape))
     if isinstance(shape, (Plane, HalfSpace)):
         return (_endless_part(obstacle, shape),)
-    low, high = local_bounds(shape)
-    return (
-        CollisionPart(obstacle.name, _primitive(shape), obstacle.rotation, obstacle.translation, low, high),
-    )
-
-
-def _primitive(shape: Box | Sphere | Cylinder | Capsule) -> coal.CollisionGeometry:
-    """Coal geometry of a primitive in its own frame."""
     if isinstance(shape, Box):
-        return coal.Box(*shape.size)
-    if isinstance(shape, Sphere):
-        return coal.Sphere(shape.radius)
-    kind = coal.Cylinder if isinstance(shape, Cylinder) else coal.Capsule
-    return kind(shape.radius, shape.length)
+        geometry = coal.Box(*shape.size)
+    elif isinstance(shape, Sphere):
+        geometry = coal.Sphere(shape.radius)
+    else:
+        kind = coal.Cylinder if isinstance(shape, Cylinder) else coal.Capsule
+        geometry = kind(shape.radius, shape.length)
+    place = obstacle.rotation, obstacle.translation
+    return (CollisionPart(obstacle.name, geometry, *place, *local_bounds(shape)),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,39 +101,23 @@ class ClosedSurface:
         weights = np.linalg.solve(gram, np.array([away @ first, away @ second]))
         shares = np.array([1.0 - weights.sum(), *weights])
         zero = shares < 1e-6
+        of_faces, of_edges, of_vertices = self._normals
         if not zero.any():
-            return self._face_normals[face]
+            return of_faces[face]
         if zero.sum() == 1:
-            return self._edge_normals[face, int(np.argmax(zero))]
-        return self._vertex_normals[self.faces[face, int(np.argmax(shares))]]
+            return of_edges[face, int(np.argmax(zero))]
+        return of_vertices[self.faces[face, int(np.argmax(shares))]]
 
     @cached_property
-    def _face_normals(self) -> FloatArray:
-        corners = self.vertices[self.faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
-
-    @cached_property
-    def _edge_normals(self) -> FloatArray:
-        """(m, 3, 3): sum of the two faces' normals at the edge opposite to each corner."""
+    def _normals(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of faces (m, 3), of the edges opposite to their corners (m, 3, 3) and of vertices (n, 3)."""
+        mesh = as_trimesh(self.vertices, self.faces)
+        of_faces = np.asarray(mesh.face_normals)
         edges = np.sort(self.faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
         _, index = np.unique(edges, axis=0, return_inverse=True)
         sums = np.zeros((index.max() + 1, 3))
-        np.add.at(sums, index.reshape(-1), np.repeat(self._face_normals, 3, axis=0))
-        return sums[index.reshape(-1)].reshape(-1, 3, 3)
-
-    @cached_property
-    def _vertex_normals(self) -> FloatArray:
-        corners = self.vertices[self.faces]
-        ahead = np.roll(corners, -1, axis=1) - corners
-        back = np.roll(corners, 1, axis=1) - corners
-        cosine = np.einsum("fki,fki->fk", ahead, back)
-        angle = np.arccos(
-            np.clip(cosine / (np.linalg.norm(ahead, axis=2) * np.linalg.norm(back, axis=2)), -1.0, 1.0)
-        )
-        sums = np.zeros_like(self.vertices)
-        np.add.at(sums, self.faces, angle[..., None] * self._face_normals[:, None])
-        return sums
+        np.add.at(sums, index.reshape(-1), np.repeat(of_faces, 3, axis=0))
+        return of_faces, sums[index.reshape(-1)].reshape(-1, 3, 3), np.asarray(mesh.vertex_normals)
 
 
 _REQUEST = coal.DistanceRequest()
@@ -166,18 +145,12 @@ def convex_geometry(vertices: FloatArray) -> coal.CollisionGeometry:
 
 def _endless_part(obstacle: Obstacle, shape: Plane | HalfSpace) -> CollisionPart:
     """Part whose frame has z along the normal, so that its bounds are tight."""
-    normal = shape.normal
-    endless = np.full(2, np.inf)
-    up = np.array([0.0, 0.0, 1.0])
-    solid = isinstance(shape, HalfSpace)
-    return CollisionPart(
-        obstacle=obstacle.name,
-        geometry=coal.Halfspace(up, 0.0) if solid else coal.Plane(up, 0.0),
-        rotation=obstacle.rotation @ axes_of_normal(normal),
-        translation=obstacle.translation + obstacle.rotation @ (normal * shape.offset),
-        low=np.append(-endless, -np.inf if solid else 0.0),
-        high=np.append(endless, 0.0),
-    )
+    normal, solid = shape.normal, isinstance(shape, HalfSpace)
+    geometry = (coal.Halfspace if solid else coal.Plane)(np.array([0.0, 0.0, 1.0]), 0.0)
+    turn = obstacle.rotation @ axes_of_normal(normal)
+    origin = obstacle.translation + obstacle.rotation @ (normal * shape.offset)
+    low, high = np.array([-np.inf, -np.inf, -np.inf if solid else 0.0]), np.array([np.inf, np.inf, 0.0])
+    return CollisionPart(obstacle.name, geometry, turn, origin, low, high)
 
 
 def _mesh_part(obstacle: Obstacle, piece: MeshPiece) -> CollisionPart:
@@ -243,15 +216,12 @@ _BEYOND: FloatArray = np.full(3, np.nan)
 _BEYOND.setflags(write=False)
 
 
-class Meter(Protocol):
-    """Measures one pair at the placements of both."""
+Meter = Callable[[coal.Transform3s, coal.Transform3s, float], Measured]
+"""Measures one pair at its two geometry-to-world placements.
 
-    def __call__(
-        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
-    ) -> Measured:
-        """Distance, normal and nearest points; see :class:`PairMeter`."""
-        ...
-
+It gives the distance, negative in penetration; the normal; and the nearest points. From the given distance
+[m] on the vectors may be NaN, as reading them takes longer than many a distance.
+"""
 
 _FINE = 1e-8
 _SAFE = 1e-6
@@ -272,15 +242,8 @@ class PairMeter:
         self._request = _request(_SAFE if round_edged else _FINE)
         self._result = coal.DistanceResult()
 
-    def __call__(
-        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
-    ) -> Measured:
-        """Measure at the two geometry-to-world placements.
-
-        Returns:
-            Distance, negative in penetration; normal; nearest points. From a distance of ``within`` [m] on
-            the vectors are NaN, as reading them takes longer than many a distance.
-        """
+    def __call__(self, place: coal.Transform3s, other: coal.Transform3s, within: float) -> Measured:
+        """See :data:`Meter`."""
         result = self._result
         result.clear()
         distance = self._compute(place, other, self._request, result)
@@ -291,7 +254,7 @@ class PairMeter:
             return distance, _BEYOND, _BEYOND, _BEYOND
         normal = result.normal
         if not math.isfinite(normal[0]):
-            normal = _fallback_normal(place, other)
+            normal = direction(other.getTranslation() - place.getTranslation())
         return distance, normal, result.getNearestPoint1(), result.getNearestPoint2()
 
 
@@ -306,11 +269,8 @@ class BallCylinderMeter:
         self._ball_radius = float(ball.radius)
         self._radius, self._half_length = float(cylinder.radius), float(cylinder.halfLength)
 
-    def __call__(
-        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
-    ) -> Measured:
-        """Distance, normal and nearest points; see :class:`PairMeter`."""
-        del within
+    def __call__(self, place: coal.Transform3s, other: coal.Transform3s, within: float) -> Measured:  # noqa: ARG002
+        """See :data:`Meter`."""
         rotation, origin = other.getRotation(), other.getTranslation()
         centre = place.getTranslation()
         nearest, outward, height = self._nearest(rotation.T @ (centre - origin))
@@ -333,25 +293,18 @@ class BallCylinderMeter:
         return point - gap, gap / height, height
 
 
-class _Swapped:
-    """A meter of the same pair in the other order."""
-
-    def __init__(self, meter: Meter) -> None:
-        self._meter = meter
-
-    def __call__(
-        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
-    ) -> Measured:
-        distance, normal, on_second, on_first = self._meter(other, place, within)
-        return distance, -normal, on_first, on_second
-
-
 def pair_meter(first: coal.CollisionGeometry, second: coal.CollisionGeometry) -> Meter:
     """Measuring function of two geometries."""
     if isinstance(first, coal.Sphere) and isinstance(second, coal.Cylinder):
         return BallCylinderMeter(first, second)
     if isinstance(first, coal.Cylinder) and isinstance(second, coal.Sphere):
-        return _Swapped(BallCylinderMeter(second, first))
+        meter = BallCylinderMeter(second, first)
+
+        def swapped(place: coal.Transform3s, other: coal.Transform3s, within: float) -> Measured:
+            distance, normal, on_second, on_first = meter(other, place, within)
+            return distance, -normal, on_first, on_second
+
+        return swapped
     return PairMeter(first, second)
 
 
@@ -362,11 +315,10 @@ def _request(tolerance: float) -> coal.DistanceRequest:
     return request
 
 
-def _fallback_normal(place: coal.Transform3s, other: coal.Transform3s) -> FloatArray:
-    """Direction between the centres, or up where they coincide."""
-    between = other.getTranslation() - place.getTranslation()
-    length = float(np.linalg.norm(between))
-    return between / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
+def direction(vector: FloatArray) -> FloatArray:
+    """Unit vector (3,); up where it has no length, which leaves a usable way out."""
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
 
 
 _SPACING = 0.02
@@ -387,26 +339,15 @@ class ClosedMeshMeter:
         self._low, self._high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
         self._points, self._radius = _sample(geometry)
 
-    def __call__(
-        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
-    ) -> Measured:
-        """Distance, normal and nearest points; see :class:`PairMeter`."""
-        del within
-        outside = self._outside(place, other)
+    def __call__(self, place: coal.Transform3s, other: coal.Transform3s, within: float) -> Measured:  # noqa: ARG002
+        """See :data:`Meter`."""
+        outside = self._outside(place, other, math.inf)
         rotation, translation = other.getRotation(), other.getTranslation()
         points = self._points @ place.getRotation().T + place.getTranslation()
         points = (points - translation) @ rotation
-        if outside[0] > 0.0 and not self._may_be_inside(points[0]):
+        boxed = np.all((points[0] >= self._low) & (points[0] <= self._high))
+        if outside[0] > 0.0 and not (boxed and self._surface.signed(points[0])[0] < 0.0):
             return outside
-        return self._deepest(points, rotation, translation, outside)
-
-    def _may_be_inside(self, point: FloatArray) -> bool:
-        within = np.all((point >= self._low) & (point <= self._high))
-        return bool(within) and self._surface.signed(point)[0] < 0.0
-
-    def _deepest(
-        self, points: FloatArray, rotation: FloatArray, translation: FloatArray, outside: Measured
-    ) -> Measured:
         measured = [self._surface.signed(point) for point in points]
         lowest = int(np.argmin([height for height, _ in measured]))
         height, nearest = measured[lowest]

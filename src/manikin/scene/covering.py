@@ -7,12 +7,9 @@ import numpy as np
 import trimesh
 
 from manikin.errors import SceneError
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.scene.mesh import Mesh, MeshPiece, as_trimesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere
-
-_DEFAULT_COUNT = 8
-_LARGEST_COUNT = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,48 +30,14 @@ class SphereCover:
         return len(self.radii)
 
 
-def cover(shape: Shape, *, count: int | None = None, radius: float | None = None) -> SphereCover:
-    """Cover a shape, or the surface of a mesh that is not closed, with spheres.
-
-    Args:
-        shape: Any shape with an end; planes and half-spaces need no spheres.
-        count: Largest number of spheres; 8 when neither is given.
-        radius: Largest sphere radius [m]; as many spheres as it takes are used.
+def cover(shape: Shape, *, count: int = 8) -> SphereCover:
+    """Cover a shape, or the surface of a mesh that is not closed, with at most so many spheres.
 
     Raises:
-        SceneError: If the shape is endless, a limit is not usable, or the radius too small for the shape.
+        SceneError: If the shape is endless, as planes and half-spaces are, or the count no positive integer.
     """
-    if count is not None and radius is not None:
-        raise SceneError(f"cover was given count {count} and radius {radius:g} m; valid: one of them")
-    if radius is not None:
-        return _cover_to_radius(shape, finite_number(radius, "cover radius [m]", above=0.0, error=SceneError))
-    count = _DEFAULT_COUNT if count is None else count
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
         raise SceneError(f"cover count is {count!r}; valid: a whole number >= 1")
-    return _cover_with(shape, int(count))
-
-
-def _cover_to_radius(shape: Shape, radius: float) -> SphereCover:
-    """Double the count until the spheres are small enough, then bisect."""
-    low, high = 0, 1
-    while (best := _cover_with(shape, high)).radii.max() > radius:
-        low, high = high, 2 * high
-        if high > _LARGEST_COUNT:
-            raise SceneError(
-                f"cover radius is {radius:g} m, which needs more than {_LARGEST_COUNT} spheres for this "
-                f"{type(shape).__name__}; valid: about {best.radii.max():.3g} m or more"
-            )
-    while high - low > 1:
-        middle = (low + high) // 2
-        trial = _cover_with(shape, middle)
-        if trial.radii.max() <= radius:
-            best, high = trial, middle
-        else:
-            low = middle
-    return best
-
-
-def _cover_with(shape: Shape, count: int) -> SphereCover:
     if isinstance(shape, (Plane, HalfSpace)):
         raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
     if isinstance(shape, Sphere):

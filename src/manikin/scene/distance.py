@@ -93,7 +93,51 @@ class Clearance:
     sample: int = 0
 
 
-class Proximity:
+class BodyPairs:
+    """Pairs of a body's shapes with something else, and what follows from their distances.
+
+    Attributes:
+        pairs: (body shape, obstacle or other body shape) of every pair checked.
+    """
+
+    pairs: tuple[Pair, ...]
+    _sensitivity: FloatArray  # (pairs, nv)
+
+    def __init__(self, body: BodyGeometry) -> None:
+        self._model, self._shapes = body.pinocchio, body.geometry
+        self._data = self._model.createData()
+        self._geometry_data = pin.GeometryData(self._shapes)
+        self._masks: dict[Ignored, NDArray[np.bool_]] = {}
+
+    @property
+    def nv(self) -> int:
+        """Dimension of the gradients."""
+        return int(self._model.nv)
+
+    def _jacobian(self, q: FloatArray) -> FloatArray:
+        """(6, nv) joint Jacobian at a configuration, to which the shapes are moved."""
+        jacobian = pin.computeJointJacobians(self._model, self._data, checked_configuration(self._model, q))
+        pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
+        return jacobian
+
+    def _result(
+        self, rows: NDArray[np.int64], jacobian: FloatArray, distance: FloatArray,
+        vectors: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> ProximityResult:  # fmt: skip
+        """Distances (k,) of pairs with their normals and nearest points (k, 3), and their gradients."""
+        normal, on_body, on_other = vectors
+        wrench = np.hstack([normal, np.cross(on_body, normal)])
+        gradient = (wrench @ jacobian) * self._sensitivity[rows]
+        names = tuple(self.pairs[row] for row in rows)
+        return ProximityResult(distance, gradient, names, on_body, on_other, normal)
+
+    def _considered(self, ignore: Ignored) -> NDArray[np.bool_]:
+        if ignore not in self._masks:
+            self._masks[ignore] = considered(self.pairs, ignore)
+        return self._masks[ignore]
+
+
+class Proximity(BodyPairs):
     """Distances of every body shape to every obstacle and to other body shapes.
 
     Distances are exact for primitives and convex mesh pieces, negative by the penetration depth. Closed mesh
@@ -115,13 +159,13 @@ class Proximity:
         Raises:
             SceneError: If a collision pair names no shape of the body.
         """
-        self._model, self._shapes = body.pinocchio, body.geometry
-        self._data = self._model.createData()
-        self._geometry_data = pin.GeometryData(self._shapes)
+        super().__init__(body)
         self._reader = PlacementReader(self._geometry_data.oMg)
         self._count = len(self._shapes.geometryObjects)
         parts = tuple(part for obstacle in scene for part in collision_parts(obstacle))
-        first, second = _pair_table(self._count, len(parts), self_pairs(body) if self_collision else [])
+        outer = [(shape, self._count + part) for part in range(len(parts)) for shape in range(self._count)]
+        inner = self_pairs(body) if self_collision else []
+        first, second = np.array(outer + inner, dtype=np.int64).reshape(-1, 2).T
         self._bounds = PairBounds(self._shapes, parts, first, second)
         self._meters = _meters(self._shapes, parts, first, second)
         names = [item.name for item in self._shapes.geometryObjects] + [part.obstacle for part in parts]
@@ -134,12 +178,6 @@ class Proximity:
         }
         self._moving = [coal.Transform3s() for _ in range(self._count)]
         self._first, self._second = first.tolist(), second.tolist()
-        self._masks: dict[Ignored, NDArray[np.bool_]] = {}
-
-    @property
-    def nv(self) -> int:
-        """Dimension of the gradients."""
-        return int(self._model.nv)
 
     def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
         """Measure every pair closer than ``activation``, in the order of :attr:`pairs`.
@@ -156,21 +194,16 @@ class Proximity:
         Raises:
             SceneError: If ``q`` is not a finite vector of the body's size.
         """
-        jacobian = pin.computeJointJacobians(self._model, self._data, checked_configuration(self._model, q))
-        pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
+        jacobian = self._jacobian(q)
         placements = self._placements()
         near = np.flatnonzero((self._lower(placements) < activation) & self._considered(ignore))
         measured = self._measure(near.tolist(), *_split(placements), activation)
         kept = [row for row, item in enumerate(measured) if item[0] < activation]
-        rows = near[kept]
         distance = np.array([measured[row][0] for row in kept])
         normal, on_body, on_other = (
             np.array([measured[row][part] for row in kept]).reshape(-1, 3) for part in (1, 2, 3)
         )
-        wrench = np.hstack([normal, np.cross(on_body, normal)])
-        gradient = (wrench @ jacobian) * self._sensitivity[rows]
-        names = tuple(self.pairs[row] for row in rows)
-        return ProximityResult(distance, gradient, names, on_body, on_other, normal)
+        return self._result(near[kept], jacobian, distance, (normal, on_body, on_other))
 
     def evaluate_over(
         self, q_samples: FloatArray, activation: float = 0.1, ignore: Ignored | Sequence[Ignored] = NOTHING
@@ -291,10 +324,7 @@ class Proximity:
         jacobians = np.empty((len(q_samples), 6, self.nv))
         placements = np.empty((len(q_samples), self._count, 4, 4))
         for sample, q in enumerate(q_samples):
-            jacobians[sample] = pin.computeJointJacobians(
-                self._model, self._data, checked_configuration(self._model, q)
-            )
-            pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
+            jacobians[sample] = self._jacobian(q)
             self._reader.read(placements[sample])
         return PlacedShapes(placements, jacobians)
 
@@ -310,11 +340,6 @@ class Proximity:
 
     def _lower(self, placements: FloatArray) -> FloatArray:
         return self._bounds.lower(placements[None, :, :3, :3], placements[None, :, :3, 3])[0]
-
-    def _considered(self, ignore: Ignored) -> NDArray[np.bool_]:
-        if ignore not in self._masks:
-            self._masks[ignore] = considered(self.pairs, ignore)
-        return self._masks[ignore]
 
     def _considered_over(self, ignore: Ignored | Sequence[Ignored], number: int) -> NDArray[np.bool_]:
         if isinstance(ignore, (frozenset, set)):
@@ -376,13 +401,6 @@ def considered(pairs: Sequence[Pair], ignore: Ignored) -> NDArray[np.bool_]:
         return any((a, b) in ignore or (b, a) in ignore for a in first for b in second)
 
     return np.array([not is_ignored(pair) for pair in pairs], dtype=bool)
-
-
-def _pair_table(shapes: int, parts: int, inner: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    """First and second index of every pair: parts first, numbered behind the shapes."""
-    both = [(shape, shapes + part) for part in range(parts) for shape in range(shapes)] + inner
-    table = np.array(both, dtype=np.int64).reshape(-1, 2)
-    return table[:, 0], table[:, 1]
 
 
 def _meters(

@@ -6,7 +6,6 @@ They only tell which pairs are worth measuring: normals and nearest points are C
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -15,47 +14,13 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from manikin.errors import SceneError
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, dot
 from manikin.scene.collision import CollisionPart, local_box, shape_of
 from manikin.scene.covering import cover
+from manikin.scene.mesh import IntArray
 
 _PARALLEL = 1e-12
 """Squared sine of the angle below which two axes count as parallel."""
-
-
-class ShapeAxes(NamedTuple):
-    """The axes of capsules, and of balls as capsules without length.
-
-    Attributes:
-        round: (shapes,) whether a shape is a capsule or a ball; the others have no axis.
-        half: (shapes,) half the length of the axis, which lies along the shape's own z [m].
-        radius: (shapes,) [m].
-    """
-
-    round: NDArray[np.bool_]
-    half: FloatArray
-    radius: FloatArray
-
-    @classmethod
-    def of(cls, geometries: Sequence[coal.CollisionGeometry]) -> "ShapeAxes":
-        """Axes of Coal geometries."""
-        rows = [_axis(item) for item in geometries]
-        half, radius = np.array(rows, dtype=np.float64).reshape(-1, 2).T
-        return cls(radius > 0.0, half, radius)
-
-    def distances(
-        self, first: NDArray[np.int64], second: NDArray[np.int64], places: tuple[FloatArray, ...]
-    ) -> FloatArray:
-        """(k,) distances [m] of round shapes, negative where the axes are closer than the radii.
-
-        Args:
-            first: (k,) index of a shape.
-            second: (k,) index of another.
-            places: Axes' directions and centres of the first shapes, then of the second, (k, 3) each.
-        """
-        direction, centre, other_direction, other_centre = places
-        a, b = self.half[first, None] * direction, self.half[second, None] * other_direction
-        return segment_distances(centre, a, other_centre, b) - self.radius[first] - self.radius[second]
 
 
 def segment_distances(
@@ -66,26 +31,21 @@ def segment_distances(
     The nearest points of the lines, cut to the segments one after the other ([Ericson2005]_ 5.1.9).
     """
     apart = first - second
-    aa, bb, ab = (_dot(u, v) for u, v in ((first_half, first_half), (second_half, second_half),
-                                          (first_half, second_half)))  # fmt: skip
-    along_first, along_second = _dot(first_half, apart), _dot(second_half, apart)
+    aa, bb, ab = dot(first_half, first_half), dot(second_half, second_half), dot(first_half, second_half)
+    along_first, along_second = dot(first_half, apart), dot(second_half, apart)
     skewness = aa * bb - ab**2
     on_first = _cut(ab * along_second - along_first * bb, skewness, _PARALLEL * aa * bb)
     on_second = _cut(ab * on_first + along_second, bb)
     on_first = _cut(ab * on_second - along_first, aa)
     between = apart + on_first[:, None] * first_half - on_second[:, None] * second_half
-    return np.sqrt(_dot(between, between))
+    return np.sqrt(dot(between, between))
 
 
 def _axis(geometry: coal.CollisionGeometry) -> tuple[float, float]:
-    """Half length and radius; zeros for a shape that is not round."""
+    """Half length of the axis, along z, and radius of a capsule or a ball; zeros for any other shape."""
     if isinstance(geometry, coal.Capsule):
         return geometry.halfLength, geometry.radius
     return (0.0, geometry.radius) if isinstance(geometry, coal.Sphere) else (0.0, 0.0)
-
-
-def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
-    return np.einsum("ki,ki->k", u, v)
 
 
 def _cut(numerator: FloatArray, denominator: FloatArray, least: FloatArray | float = 0.0) -> FloatArray:
@@ -109,11 +69,7 @@ class PairBounds:
     """
 
     def __init__(
-        self,
-        shapes: pin.GeometryModel,
-        parts: Sequence[CollisionPart],
-        first: NDArray[np.int64],
-        second: NDArray[np.int64],
+        self, shapes: pin.GeometryModel, parts: Sequence[CollisionPart], first: IntArray, second: IntArray
     ) -> None:
         objects = list(shapes.geometryObjects)
         self._count = len(objects)
@@ -126,8 +82,8 @@ class PairBounds:
         self.first, self.second = first, second
         self._cells = first * (self._count + len(parts)) + second  # of the pairs in the flat table
         self._self_pair = second < self._count
-        self._axes = ShapeAxes.of([item.geometry for item in objects])
-        has_axis = np.append(self._axes.round, np.zeros(len(parts), dtype=bool))
+        self._axes = np.array([_axis(item.geometry) for item in objects], dtype=np.float64).reshape(-1, 2)
+        has_axis = np.append(self._axes[:, 1] > 0.0, np.zeros(len(parts), dtype=bool))
         self._round = has_axis[first] & has_axis[second]
         axes = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
         origins = np.array([part.rotation.T @ part.translation for part in parts]).reshape(-1, 3)
@@ -183,12 +139,14 @@ class PairBounds:
             translations: (n, shapes, 3) [m].
         """
         sample, pair = np.nonzero(wanted & self._round)
-        first, second = self.first[pair], self.second[pair]
-        places = (
-            rotations[sample, first, :, 2], translations[sample, first],
-            rotations[sample, second, :, 2], translations[sample, second],
-        )  # fmt: skip
-        lower[sample, pair] = self._axes.distances(first, second, places) - _NEARLY_PARALLEL
+        shapes = self.first[pair], self.second[pair]
+        (half, radius), (other_half, other_radius) = (self._axes[shape].T for shape in shapes)
+        (along, centre), (other_along, other_centre) = (
+            (rotations[sample, shape, :, 2], translations[sample, shape]) for shape in shapes
+        )
+        a, b = half[:, None] * along, other_half[:, None] * other_along
+        apart = segment_distances(centre, a, other_centre, b) - radius - other_radius
+        lower[sample, pair] = apart - _NEARLY_PARALLEL
 
     def displacement(
         self, pair: int, sample: int, rotations: FloatArray, translations: FloatArray

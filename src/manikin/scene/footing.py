@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.contact.contact import MOST_CORNERS
-from manikin.numerics.polytope import convex_polygon, fewer_corners
+from manikin.numerics.polytope import convex_polygon, fewer_corners, walls
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.scene.surface import Surface
 
@@ -21,6 +21,8 @@ WHOLE = 1.0 - 1e-6
 """Share from which on a sole lies on its surface with all of it."""
 
 IntArray = NDArray[np.int64]
+_Clipped = tuple[NDArray[np.bool_], FloatArray, FloatArray]
+"""Of each edge whether a part is inside a sole (p,), and where that begins and ends (p, 2) [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +139,7 @@ class FootingTable:
         pair, start, end = self._edges(rings, positions[rows], rotations[rows])
         near = _any(pair, _distance(start, end) < sole.radius, len(rows))
         # A ring that no edge of comes near a sole has all of it inside or nothing, as its middle.
-        around = _inside(pair, start, end, len(rows))
+        around = _crossings(pair, start, end, len(rows)) % 2 == 1
         covered = np.bincount(rows, self._sign[rings] * around, count)
         share, stands = (covered > 0.5).astype(np.float64), covered > 0.5
         hanging = np.flatnonzero(_any(rows, near, count))
@@ -189,12 +191,12 @@ class FootingTable:
         return pair, flat[0], flat[1]
 
     def _spanning(
-        self, of: IntArray, clipped: "_Clipped", own: NDArray[np.bool_], hanging: IntArray
+        self, of: IntArray, clipped: _Clipped, own: NDArray[np.bool_], hanging: IntArray
     ) -> tuple[IntArray, FloatArray]:
         """Points that span the contact polygons: corners on the surface, and ends of edges in the sole."""
-        row, corner = own.nonzero()
-        crossing = np.flatnonzero(clipped.inside)
-        points = np.concatenate([self.footprint[corner], clipped.first[crossing], clipped.last[crossing]])
+        (inside, first, last), (row, corner) = clipped, own.nonzero()
+        crossing = np.flatnonzero(inside)
+        points = np.concatenate([self.footprint[corner], first[crossing], last[crossing]])
         rows = np.concatenate([hanging[row], of[crossing], of[crossing]])
         order = np.argsort(rows, kind="stable")
         return rows[order], points[order]
@@ -214,21 +216,6 @@ class _Ranges:
         return owner, np.arange(len(owner)) - np.repeat(np.cumsum(size) - size - self._first[groups], size)
 
 
-@dataclass(frozen=True, eq=False)
-class _Clipped:
-    """Parts of edges inside a sole.
-
-    Attributes:
-        inside: (p,) whether there is one.
-        first: (p, 2) where it begins [m]; meaningless where there is none.
-        last: (p, 2) where it ends.
-    """
-
-    inside: NDArray[np.bool_]
-    first: FloatArray
-    last: FloatArray
-
-
 class _Sole:
     """A convex polygon about the origin, and how edges of other polygons lie to it."""
 
@@ -236,9 +223,7 @@ class _Sole:
         hull = convex_polygon(corners)
         angle = np.arctan2(hull[:, 1], hull[:, 0])
         hull, angle = np.roll(hull, -int(np.argmin(angle)), axis=0), np.sort(angle)
-        edge = np.roll(hull, -1, axis=0) - hull
-        self._walls = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
-        self._offsets = np.einsum("ei,ei->e", self._walls, hull)
+        self._walls, self._offsets = walls(hull)
         self.radius = float(np.linalg.norm(hull, axis=1).max())
         doubled = hull[:, 0] * np.roll(hull[:, 1], -1) - hull[:, 1] * np.roll(hull[:, 0], -1)
         self.area = float(0.5 * doubled.sum())
@@ -255,7 +240,7 @@ class _Sole:
         enters = np.where(~level & (rise < 0.0), share, 0.0).max(axis=1).clip(0.0)
         leaves = np.where(~level & (rise > 0.0), share, 1.0).min(axis=1).clip(max=1.0)
         inside = (enters < leaves) & ~(level & (room < 0.0)).any(axis=1)
-        return _Clipped(inside, start + enters[:, None] * edge, start + leaves[:, None] * edge)
+        return inside, start + enters[:, None] * edge, start + leaves[:, None] * edge
 
     def fan(self, start: FloatArray, end: FloatArray, clipped: _Clipped) -> FloatArray:
         """(p,) signed area of the sole within the triangle of each edge and the origin [m^2].
@@ -264,8 +249,8 @@ class _Sole:
         """
         begin, stop = self._swept_to(start), self._swept_to(end)
         area = self._wedge(begin, stop)
-        some = clipped.inside
-        first, last = clipped.first[some], clipped.last[some]
+        some = clipped[0]
+        first, last = clipped[1][some], clipped[2][some]
         enters, leaves = self._swept_to(first), self._swept_to(last)
         area[some] = self._wedge(begin[:, some], enters) + self._wedge(leaves, stop[:, some])
         area[some] += 0.5 * (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0])
@@ -309,11 +294,6 @@ def _crossings(groups: IntArray, start: FloatArray, end: FloatArray, count: int)
     start, end = start[straddles], end[straddles]
     crossing = start[:, 0] - start[:, 1] / (end[:, 1] - start[:, 1]) * (end[:, 0] - start[:, 0])
     return np.bincount(groups[straddles][crossing > 0.0], minlength=count)
-
-
-def _inside(groups: IntArray, start: FloatArray, end: FloatArray, count: int) -> NDArray[np.bool_]:
-    """(count,) whether the origin is inside the ring of edges (p, 2) of each group."""
-    return _crossings(groups, start, end, count) % 2 == 1
 
 
 def _around_origin(of: IntArray, points: FloatArray, rows: IntArray) -> NDArray[np.bool_]:

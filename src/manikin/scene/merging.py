@@ -80,7 +80,8 @@ def _coplanar(faces: Sequence[Surface]) -> Iterator[list[int]]:
 def _joined(members: Sequence[Surface], solids: "Sequence[_Solid]") -> list[tuple[int, Surface]]:
     """Surfaces that coplanar faces make, each with the first of the faces that it is made of."""
     frame = _frame(members)
-    around = _around(frame, members, solids)
+    flat = np.concatenate([(face.polygon - frame.origin) @ frame.rotation[:, :2] for face in members])
+    around = [solid for solid in solids if solid.meets(frame, flat.min(axis=0), flat.max(axis=0))]
     if len(members) == 1 and not around:
         return [(0, members[0])]
     shapes = [frame.flat(face.polygon, face.holes) for face in members]
@@ -138,13 +139,6 @@ def _union(shapes: Sequence[Geometry]) -> Geometry:
         return union
     wider = union.buffer(0.51 * COPLANAR, join_style="mitre")
     return shapely.union_all([union, wider.buffer(-0.51 * COPLANAR, join_style="mitre")], grid_size=GRID)
-
-
-def _around(frame: PlaneFrame, members: Sequence[Surface], solids: "Sequence[_Solid]") -> "list[_Solid]":
-    """Solids that may cover something of faces of a plane."""
-    flat = np.concatenate([(face.polygon - frame.origin) @ frame.rotation[:, :2] for face in members])
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    return [solid for solid in solids if solid.meets(frame, low, high)]
 
 
 @dataclass(frozen=True, eq=False)

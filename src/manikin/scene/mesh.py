@@ -67,9 +67,6 @@ class Mesh:
         """Check and clean a mesh.
 
         Args:
-            vertices: (n, 3) [m].
-            faces: (m, 3) vertex indices.
-            source: Name for messages.
             convex: ``"hull"`` replaces the mesh by its convex hull, ``"parts"`` each
                 connected piece by its own hull; both are larger than the mesh, hence safe.
             max_faces: More triangles than this (after hulls) are refused.
@@ -82,7 +79,12 @@ class Mesh:
         points, triangles, dropped = _cleaned(points, triangles)
         if not len(triangles):
             raise SceneError(f"mesh {source!r} has no triangle with an area; valid: at least one")
-        _check_extent(points, source)
+        extent = float(np.ptp(points, axis=0).max())
+        if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
+            raise SceneError(
+                f"mesh {source!r} extends over {extent:.4g} m, which suggests a mistaken unit; valid: "
+                f"{SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m, so set unit ({', '.join(UNITS)}) or scale"
+            )
         if convex != "no":
             points, triangles = _hulls(points, triangles, convex, source)
         if len(triangles) > max_faces:
@@ -128,7 +130,6 @@ def load_mesh(
     up: str | None = None,
     scale: float = 1.0,
     convex: Convexity = "no",
-    max_faces: int = MAX_FACES,
 ) -> Mesh:
     """Read an STL, OBJ, PLY or DAE file into metres.
 
@@ -140,7 +141,6 @@ def load_mesh(
             turned so that it is z. When omitted, a DAE file's own, and z otherwise.
         scale: Further factor on every coordinate, > 0.
         convex: As for :class:`Mesh`.
-        max_faces: As for :class:`Mesh`.
 
     Raises:
         SceneError: If the file is missing, of another format, unreadable, or no usable mesh.
@@ -160,7 +160,7 @@ def load_mesh(
     own_up, own_metres = _collada_asset(file) if extension == "dae" else ("z", 1.0)
     metres = own_metres if unit is None else UNITS[unit]
     vertices = np.asarray(loaded.vertices, dtype=np.float64) @ _UP_TO_Z[up or own_up].T
-    return Mesh(vertices * (metres * factor), loaded.faces, str(file), convex=convex, max_faces=max_faces)
+    return Mesh(vertices * (metres * factor), loaded.faces, str(file), convex=convex)
 
 
 def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:
@@ -227,15 +227,6 @@ def _cleaned(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntAr
     clean = faces[good][np.sort(kept)]
     used, renumbered = np.unique(clean, return_inverse=True)
     return merged[used], renumbered.reshape(-1, 3).astype(np.int64), len(triangles) - len(clean)
-
-
-def _check_extent(points: FloatArray, source: str) -> None:
-    extent = float(np.ptp(points, axis=0).max())
-    if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
-        raise SceneError(
-            f"mesh {source!r} extends over {extent:.4g} m, which suggests a mistaken unit; "
-            f"valid: {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m, so set unit ({', '.join(UNITS)}) or scale"
-        )
 
 
 def _connected(vertices: FloatArray, faces: IntArray) -> list[IntArray]:

@@ -99,17 +99,19 @@ def local_bounds(shape: Shape) -> tuple[FloatArray, FloatArray]:
         return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     if isinstance(shape, (Plane, HalfSpace)):
         return np.full(3, -np.inf), np.full(3, np.inf)
-    half = _half_size(shape)
+    half = _reach(shape, np.eye(3))
     return -half, half
 
 
-def _half_size(shape: Box | Sphere | Cylinder | Capsule) -> FloatArray:
+def _reach(shape: Box | Sphere | Cylinder | Capsule, rotation: FloatArray) -> FloatArray:
+    """(3,) half size of the axis-aligned box around a shape that is turned [m]."""
     if isinstance(shape, Box):
-        return shape.size / 2
+        return np.abs(rotation) @ (shape.size / 2)
     if isinstance(shape, Sphere):
         return np.full(3, shape.radius)
-    ends = shape.radius if isinstance(shape, Capsule) else 0.0
-    return np.array([shape.radius, shape.radius, shape.length / 2 + ends])
+    axis = np.abs(rotation[:, 2])
+    across = 1.0 if isinstance(shape, Capsule) else np.sqrt(np.maximum(1.0 - axis**2, 0.0))
+    return shape.length / 2 * axis + shape.radius * across
 
 
 def _length(value: object, name: str) -> float:
@@ -177,12 +179,7 @@ class Obstacle(Displayed):
             return placed.min(axis=0), placed.max(axis=0)
         if isinstance(self.shape, (Plane, HalfSpace)):
             return local_bounds(self.shape)
-        if isinstance(self.shape, Sphere):
-            reach = np.full(3, self.shape.radius)
-        elif isinstance(self.shape, Box):
-            reach = np.abs(self.rotation) @ (self.shape.size / 2)
-        else:
-            reach = self._round_reach(self.shape)
+        reach = _reach(self.shape, self.rotation)
         return self.translation - reach, self.translation + reach
 
     def to_world(self, points: ArrayLike) -> FloatArray:
@@ -206,11 +203,6 @@ class Obstacle(Displayed):
         local = _triangles(self.shape)
         return as_trimesh(self.to_world(local.vertices), np.asarray(local.faces, dtype=np.int64))
 
-    def _round_reach(self, shape: Cylinder | Capsule) -> FloatArray:
-        axis = np.abs(self.rotation[:, 2])
-        across = 1.0 if isinstance(shape, Capsule) else np.sqrt(np.maximum(1.0 - axis**2, 0.0))
-        return shape.length / 2 * axis + shape.radius * across
-
 
 def _triangles(shape: Shape) -> trimesh.Trimesh:
     if isinstance(shape, Mesh):
@@ -225,10 +217,6 @@ def _triangles(shape: Shape) -> trimesh.Trimesh:
         capsule = trimesh.creation.capsule(height=shape.length, radius=shape.radius)
         capsule.apply_translation([0.0, 0.0, -capsule.bounds.mean(axis=0)[2]])
         return capsule
-    return _square(shape)
-
-
-def _square(shape: Plane | HalfSpace) -> trimesh.Trimesh:
     axes = DRAWN_HALF_SIZE * axes_of_normal(shape.normal)[:, :2].T
     corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int64)

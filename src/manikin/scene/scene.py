@@ -121,19 +121,17 @@ class Scene(Displayed):
         limit = np.cos(max_angle)
         return tuple(surface for surface in self.surfaces if surface.normal @ unit >= limit)
 
-    def supporting_surface(
-        self, contact: Contact, tolerance: float = 0.005, max_angle: float | None = None
-    ) -> Surface:
+    def supporting_surface(self, contact: Contact, tolerance: float = 0.005) -> Surface:
         """Closest surface on which every point of a contact rests.
 
         Each point must be within ``tolerance`` [m] of the surface, above or below it, and at most that far
-        beyond its edge; normals may differ by ``max_angle`` [rad], 2 degrees when omitted. A grasp needs only
-        a surface near its point, whatever its normal; round obstacles have none, see :meth:`nearest`.
+        beyond its edge; normals may differ by 2 degrees. A grasp needs only a surface near its point,
+        whatever its normal; round obstacles have none, see :meth:`nearest`.
 
         Raises:
             ContactError: If there is none; the message says how far the nearest one is.
         """
-        aligned = self._aligned(contact, _ALIGNED if max_angle is None else float(np.cos(max_angle)))
+        aligned = self._aligned(contact)
         points = contact.points_in_world
         worst = [_misfit(surface, points, tolerance) for surface in aligned]
         if worst and min(worst) <= tolerance:
@@ -154,7 +152,7 @@ class Scene(Displayed):
             stand there; the share.
         """
         surfaces = [
-            surface for surface in self._aligned(contact, _ALIGNED)
+            surface for surface in self._aligned(contact)
             if abs(float(surface.height(contact.position[None])[0])) <= tolerance
         ]  # fmt: skip
         if not surfaces:
@@ -171,8 +169,7 @@ class Scene(Displayed):
     def nearest(self, point: ArrayLike) -> tuple[str, float]:
         """Name of the obstacle nearest to a (3,) world point, and its signed distance [m].
 
-        Raises:
-            SceneError: If the scene is empty.
+        SceneError if the scene is empty.
         """
         if not self.obstacles:
             raise SceneError("scene is empty, so nothing is nearest; valid: at least one obstacle")
@@ -204,7 +201,7 @@ class Scene(Displayed):
         """Signed distance [m] of a (3,) world point to each obstacle, and its name; the nearest first."""
         place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
         distances = [
-            (min(meter(place, other)[0] for meter, other in meters), name)
+            (min(meter(place, other, np.inf)[0] for meter, other in meters), name)
             for name, meters in self._point_meters.items()
         ]
         return sorted(distances, key=lambda item: item[0])
@@ -220,11 +217,11 @@ class Scene(Displayed):
             for item in self.obstacles
         }
 
-    def _aligned(self, contact: Contact, limit: float) -> list[Surface]:
+    def _aligned(self, contact: Contact) -> list[Surface]:
         if contact.kind is ContactKind.GRASP:
             return list(self.surfaces)
         tops = self.bar_tops if contact.kind is ContactKind.SOLE else ()
-        return [item for item in (*self.surfaces, *tops) if item.normal @ contact.normal >= limit]
+        return [item for item in (*self.surfaces, *tops) if item.normal @ contact.normal >= _ALIGNED]
 
     def _off_surface(self, contact: Contact, aligned: list[Surface], tolerance: float) -> str:
         where = f"contact '{contact.effector}' at {np.round(contact.position, 4).tolist()} m"

@@ -7,17 +7,17 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.collision import shape_of
+from manikin.scene.collision import direction, shape_of
 from manikin.scene.covering import SphereCover, cover
 from manikin.scene.distance import (
     NOTHING,
     BodyGeometry,
+    BodyPairs,
     Clearance,
     Ignored,
     Pair,
     ProximityResult,
     checked_configuration,
-    considered,
     moves_by_shape,
     self_pairs,
 )
@@ -31,7 +31,7 @@ OBSTACLE_SPHERES = 20
 """Spheres per obstacle when nothing else is said ([Qiu2012]_ Table 7.2 uses 10 to 21)."""
 
 
-class SphereProximity:
+class SphereProximity(BodyPairs):
     """Distances of the closest two spheres of each pair.
 
     Its interface is that of :class:`manikin.scene.Proximity`; its gradient is continuous as long as the same
@@ -65,9 +65,7 @@ class SphereProximity:
         Raises:
             SceneError: If a count is not a whole number >= 1.
         """
-        self._model, self._shapes = body.pinocchio, body.geometry
-        self._data = self._model.createData()
-        self._geometry_data = pin.GeometryData(self._shapes)
+        super().__init__(body)
         objects = list(self._shapes.geometryObjects)
         flats = [item for item in scene if isinstance(item.shape, (Plane, HalfSpace))]
         solids = [item for item in scene if not isinstance(item.shape, (Plane, HalfSpace))]
@@ -93,12 +91,6 @@ class SphereProximity:
         moves = moves_by_shape(self._model, self._shapes, 0)
         fixed = np.zeros((len(flats) + len(solids), self._model.nv))
         self._sensitivity = np.vstack([fixed, moves])[self._second] - moves[self._first]
-        self._masks: dict[Ignored, np.ndarray] = {}
-
-    @property
-    def nv(self) -> int:
-        """Dimension of the gradients."""
-        return int(self._model.nv)
 
     def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
         """Measure the closest two spheres of every pair, as :meth:`manikin.scene.Proximity.evaluate`.
@@ -106,16 +98,12 @@ class SphereProximity:
         The gradient is ``(J_i - J_j)^T D / |D|`` with ``D = p_i - p_j`` between the centres
         ([Qiu2012]_ F.4), and ``J_i^T D / |D|`` for an obstacle (F.5).
         """
-        jacobian = pin.computeJointJacobians(self._model, self._data, checked_configuration(self._model, q))
-        pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
+        jacobian = self._jacobian(q)
         centres, gaps, least = self._gaps()
         rows = np.flatnonzero((least < activation) & self._considered(ignore))
         ends = [self._closest(int(row), centres, gaps) for row in rows]
         normal, on_body, on_other = (np.array([end[i] for end in ends]).reshape(-1, 3) for i in range(3))
-        wrench = np.hstack([normal, np.cross(on_body, normal)])
-        gradient = (wrench @ jacobian) * self._sensitivity[rows]
-        names = tuple(self.pairs[row] for row in rows)
-        return ProximityResult(least[rows], gradient, names, on_body, on_other, normal)
+        return self._result(rows, jacobian, least[rows], (normal, on_body, on_other))
 
     def minimum(self, q: FloatArray, ignore: Ignored = NOTHING) -> Clearance:
         """Smallest sphere distance of all pairs at ``q``."""
@@ -126,11 +114,6 @@ class SphereProximity:
             return Clearance(np.inf, None)
         row = int(np.argmin(least))
         return Clearance(float(least[row]), self.pairs[row])
-
-    def _considered(self, ignore: Ignored) -> np.ndarray:
-        if ignore not in self._masks:
-            self._masks[ignore] = considered(self.pairs, ignore)
-        return self._masks[ignore]
 
     def _gaps(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Body centres, gaps of every body sphere to every target, and the least per pair."""
@@ -161,7 +144,7 @@ class SphereProximity:
             normal, on_other = self._targets.toward(target, centre)
         else:
             other = target - self._targets.size
-            normal = _direction(centres[other] - centre)
+            normal = direction(centres[other] - centre)
             on_other = centres[other] - self._spheres.radii[other] * normal
         return normal, centre + radius * normal, on_other
 
@@ -220,7 +203,7 @@ class _Targets(_Groups):
         """Direction from a centre to the target, and the target's nearest point."""
         if target >= self._flat_count:
             sphere = target - self._flat_count
-            normal = _direction(self._centres[sphere] - centre)
+            normal = direction(self._centres[sphere] - centre)
             return normal, self._centres[sphere] - self._radii[sphere] * normal
         height = float(self._normals[target] @ centre - self._offsets[target])
         side = -1.0 if self._two_sided[target] and height < 0.0 else 1.0
@@ -237,12 +220,6 @@ def _sphere_gaps(
     gaps = np.sqrt(squared, out=squared)
     gaps -= np.add.outer(radii, other_radii)
     return gaps
-
-
-def _direction(vector: FloatArray) -> FloatArray:
-    """Unit vector; up where it has no length, which leaves a usable way out."""
-    length = float(np.linalg.norm(vector))
-    return vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
 
 
 def _shape_cover(geometry: coal.CollisionGeometry, count: int) -> SphereCover:

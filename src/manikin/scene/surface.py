@@ -14,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Geometry
 
+from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array, skew
 from manikin.scene.mesh import Mesh, as_trimesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane
@@ -108,21 +109,16 @@ def faces_of(obstacle: Obstacle) -> tuple[Surface, ...]:
         return _caps(obstacle, shape)
     if isinstance(shape, (Plane, HalfSpace)):
         return _endless(obstacle, shape)
-    if isinstance(shape, Mesh):
-        return _facets(obstacle, shape)
-    return ()
+    return _facets(obstacle, shape) if isinstance(shape, Mesh) else ()
 
 
 def _surface(obstacle: Obstacle, polygon: FloatArray, normal: FloatArray) -> Surface:
-    return _in_world(obstacle, obstacle.to_world(polygon), obstacle.rotation @ normal)
+    return _in_world(obstacle.name, obstacle.to_world(polygon), obstacle.rotation @ normal)
 
 
-def _in_world(obstacle: Obstacle, polygon: FloatArray, normal: FloatArray) -> Surface:
-    return Surface(
-        (obstacle.name,),
-        frozen_array(polygon, "polygon", (None, 3)),
-        frozen_array(normal / np.linalg.norm(normal), "normal", (3,)),
-    )
+def _in_world(name: str, polygon: FloatArray | list[FloatArray], normal: FloatArray) -> Surface:
+    unit = frozen_array(normal / np.linalg.norm(normal), "normal", (3,))
+    return Surface((name,), frozen_array(polygon, "polygon", (None, 3)), unit)
 
 
 def _box_faces(obstacle: Obstacle, box: Box) -> tuple[Surface, ...]:
@@ -176,7 +172,7 @@ def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
                 normal = np.einsum("i,ij->j", whole.area_faces[group], whole.face_normals[group])
                 triangles = whole.triangles[group]
                 if len(group) == 1:
-                    surfaces.append(_in_world(obstacle, triangles[0], normal))
+                    surfaces.append(_in_world(obstacle.name, triangles[0], normal))
                     continue
                 frame = PlaneFrame.of(normal / np.linalg.norm(normal), triangles[0])
                 union = shapely.union_all([frame.flat(ring) for ring in triangles], grid_size=GRID)
@@ -393,5 +389,4 @@ def _free(
         all(away >= radius + FINGER_ROOM for away, other in distances(place) if other != name)
         for place in places
     ]
-    bounds = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(np.int8)))
-    return [(places[first], places[stop - 1]) for first, stop in bounds.reshape(-1, 2).tolist()]
+    return [(places[first], places[stop - 1]) for first, stop in mask_runs(np.array(free))]

@@ -1,9 +1,8 @@
 """Physics: the body and the scene in MuJoCo."""
 
-from manikin.simulation.carrying import Touch
-from manikin.simulation.compile import PhysicsOptions, SimulationModel, compile_model
+from manikin.simulation.compile import PhysicsOptions, compile_model
 from manikin.simulation.execute import default_physics, execute
-from manikin.simulation.execution import Execution, PushOutcome
+from manikin.simulation.execution import Execution
 from manikin.simulation.push_force import Push, push_impulse, push_near_com, push_on_the_way
 from manikin.simulation.push_map import PushMap, equal_directions, search_directions
 from manikin.simulation.push_search import (
@@ -19,8 +18,8 @@ from manikin.simulation.recovery import Recovery
 from manikin.simulation.world import World
 
 __all__ = [
-    "DirectionSearch", "Execution", "Feet", "HeldImpulse", "PhysicsOptions", "Push", "PushMap", "PushOutcome",
-    "PushTrials", "Recovery", "RecoveryTask", "SimulationModel", "Touch", "World", "compile_model",
-    "default_physics", "equal_directions", "execute", "feet_apart_posture", "largest_held",
+    "DirectionSearch", "Execution", "Feet", "HeldImpulse", "PhysicsOptions", "Push", "PushMap",
+    "PushTrials", "Recovery", "RecoveryTask", "World", "compile_model", "default_physics",
+    "equal_directions", "execute", "feet_apart_posture", "largest_held",
     "one_foot_posture", "push_impulse", "push_near_com", "push_on_the_way", "recover", "search_directions",
 ]  # fmt: skip

@@ -83,11 +83,9 @@ class Sensed:
     grips: Mapping[str, FloatArray]
 
     def wrench(self, about: FloatArray, segments: Sequence[str] | None = None) -> FloatArray:
-        """(6,) force and moment of the scene, grips apart.
+        """(6,) force and moment of the scene about a point (3,) [m], grips apart.
 
-        Args:
-            about: (3,) point of the moments [m].
-            segments: Names of the segments to count; the whole body when omitted.
+        Only some segments count if they are named.
         """
         chosen = self.on_scene
         if segments is not None:
@@ -141,11 +139,9 @@ class CarryingContacts:
     """Turns carried points into stances, sample after sample; a contact that stays is the same object."""
 
     def __init__(self, segments: Mapping[str, Sequence[str]], mass: float) -> None:
-        """Start without contacts.
+        """Start without contacts, with the names of the segments with which each effector touches.
 
-        Args:
-            segments: Names of the segments with which each effector touches.
-            mass: Mass of the body [kg]; bounds the forces of a stance without caps.
+        The mass [kg] bounds the forces of a stance without caps.
         """
         self._segments = dict(segments)
         self._mass = mass

@@ -19,14 +19,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Hinge, Segment, Shape, ShapeKind
-from manikin.errors import InputError, SceneError
+from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray, cross, finite_number, rotation_from_normal
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.scene.mesh import MeshPiece
@@ -42,12 +42,8 @@ class PhysicsOptions:
         contact_friction: Pairs of a segment and a larger coefficient between it and the scene.
         segment_friction: Pairs of a segment and the coefficient between it and whatever it touches; such a
             segment is soft, see ``soft_time_constant``.
-        cone: Shape of the friction cones.
-        impratio: Stiffness of friction relative to the normal direction; above 1 holds feet still under
-            sideways load.
         contact_time_constant: How fast a contact pushes penetration out [s]; at least two time steps.
         soft_time_constant: The same for segments with their own friction: flesh on a cushion [s].
-        contact_damping_ratio: 1 is critically damped.
         joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
         armature: Inertia added to the axis of each hinge [kg.m^2]; 0 keeps the mass matrix of the planning
             model.
@@ -59,26 +55,20 @@ class PhysicsOptions:
     friction: float = 0.7
     contact_friction: tuple[tuple[str, float], ...] = ()
     segment_friction: tuple[tuple[str, float], ...] = ()
-    cone: Literal["elliptic", "pyramidal"] = "elliptic"
-    impratio: float = 10.0
     contact_time_constant: float = 5e-3
     soft_time_constant: float = 0.012
-    contact_damping_ratio: float = 1.0
     joint_damping: float = 0.0
     armature: float = 0.0
     joint_limits: bool = True
     self_collision: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("timestep", "friction", "impratio", "contact_time_constant", "soft_time_constant",
-                     "contact_damping_ratio"):  # fmt: skip
+        for name in ("timestep", "friction", "contact_time_constant", "soft_time_constant"):
             finite_number(getattr(self, name), f"physics {name}", above=0.0)
         for segment, value in (*self.contact_friction, *self.segment_friction):
             finite_number(value, f"physics friction of {segment}", above=0.0)
         for name in ("joint_damping", "armature"):
             finite_number(getattr(self, name), f"physics {name}", at_least=0.0)
-        if self.cone not in ("elliptic", "pyramidal"):
-            raise InputError(f"physics cone is {self.cone!r}; valid: elliptic, pyramidal")
 
 
 _TURNING_FRICTION = (0.005, 0.0001)
@@ -296,8 +286,8 @@ def _set_options(spec: Any, options: PhysicsOptions) -> None:
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     spec.option.timestep = options.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{options.cone.upper()}")
-    spec.option.impratio = options.impratio
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10.0  # friction that stiff, against the normal direction, holds loaded feet still
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
 
 
@@ -306,7 +296,7 @@ def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:
     return {
         "friction": [options.friction, *_TURNING_FRICTION],
         "condim": 3,
-        "solref": [options.contact_time_constant, options.contact_damping_ratio],
+        "solref": [options.contact_time_constant, 1.0],  # critically damped
         "contype": 2 if scenery else 1,
         "conaffinity": 1 if scenery else (3 if options.self_collision else 2),
     }
@@ -319,7 +309,8 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
         parent = spec.worldbody if segment.parent is None else made[segment.parent]
         item = parent.add_body(name=segment.name, pos=segment.origin)
         made[segment.name] = item
-        _set_inertia(item, segment)
+        item.explicitinertial, item.mass, item.ipos = True, segment.mass, segment.com
+        item.fullinertia = segment.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         if segment.parent is None:
             item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
         for hinge in segment.hinges:
@@ -347,15 +338,10 @@ def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
     """Contact settings of soft flesh, which count before those of what it touches."""
     return {
         "friction": [friction, *_TURNING_FRICTION],
-        "solref": [options.soft_time_constant, options.contact_damping_ratio],
+        "solref": [options.soft_time_constant, 1.0],
         "priority": 1,
         "solimp": [*SOFT_IMPEDANCE, 0.5, 2.0],
     }
-
-
-def _set_inertia(item: Any, segment: Segment) -> None:
-    item.explicitinertial, item.mass, item.ipos = True, segment.mass, segment.com
-    item.fullinertia = segment.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
 def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions) -> None:

@@ -133,7 +133,7 @@ class _Run:
         self.world = World(compile_model(body, scene, physics), padded)
         self.pushes = tuple(pushes)
         for push in pushes:
-            self.world.apply_push(**vars(push))
+            self.world.apply_push(push)
         segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, segments)
         self.failure, self.failure_time = "", None
@@ -178,8 +178,7 @@ class _Run:
 
     def _switch(self, time: float) -> None:
         """Set the touches planned at a time of the plan, and hold on to grasps."""
-        load = self.schedule.sequence[int(self.schedule.phase_at(time))].load
-        self.world.carry({} if load is None else load.masses)
+        self.world.carry(self.controller.carried_at(time))
         now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
         if now != self._planned_now:
             planned = [(self.holds[i].lying, name) for i in now for name in self.holds[i].obstacles]
@@ -193,15 +192,15 @@ class _Run:
         for effector in {item.contact.effector for item in grasps} - held.keys():
             self.world.release(effector)
         for effector in leaving:  # its fingers are still about what it held
-            self.world.open_hand(effector)
+            self.world.collide(effector, False)
         for effector in self._leaving - leaving - held.keys():
-            self.world.close_hand(effector)
+            self.world.collide(effector, True)
         self._leaving = leaving
         for contact in held.values():
             self.world.grip(Grip(contact.effector, contact.position, contact.max_force))
         for item in grasps:
             if item.start - GRASPING <= time < item.start and item.contact.effector not in held:
-                self.world.open_hand(item.contact.effector)
+                self.world.collide(item.contact.effector, False)
 
     def _touching(self, time: float) -> dict[str, bool]:
         """Whether each effector touches the support it holds or is about to make."""
@@ -217,20 +216,18 @@ class _Run:
         time, state = self.world.time, output.state
         offset = float(np.linalg.norm(state.com - output.reference.com))
         if self.world.divergence or not np.all(np.isfinite(state.com)):
-            self._fail(f"the simulation diverged ({self.world.divergence}) at {time:.3f} s", time)
+            self.failure = f"the simulation diverged ({self.world.divergence}) at {time:.3f} s"
         elif offset > FALL_DISTANCE:
-            self._fail(f"fell: the CoM is {offset:.2f} m from its plan at {time:.3f} s", time)
+            self.failure = f"fell: the CoM is {offset:.2f} m from its plan at {time:.3f} s"
+        self.failure_time = time if self.failure else None
         return bool(self.failure)
-
-    def _fail(self, reason: str, time: float) -> None:
-        self.failure, self.failure_time = reason, time
 
     def _report(self, wall: float, control: float) -> Execution:
         recorder, world = self.recorder, self.world
         fell = self.failure.startswith("fell")
         touches = self._counted_touches()
         if not self.failure and touches:
-            self._fail(f"unplanned touch: {touches[0]}", touches[0].time)
+            self.failure, self.failure_time = f"unplanned touch: {touches[0]}", touches[0].time
         balance = recorder.margins(self.body.mass)
         executed = recorder.motion(self.body.joint_names, balance.margin)
         com = recorder.com_errors()

@@ -44,10 +44,6 @@ class PushOutcome:
     waited_s: float
     max_foot_deviation_m: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """The ``push`` block of the execution's summary."""
-        return asdict(self)
-
 
 def push_outcome(pushes: Sequence[Push], recorder: Recorder, failure: str) -> PushOutcome | None:
     """Outcome of the pushes of a recorded execution, None without one; ``failure`` is empty for a success."""
@@ -163,5 +159,5 @@ class Execution(Displayed):
         block = {name: getattr(self, name) for name in names}
         block["friction"] = None if self.friction is None else self.friction.summary()
         block["unplanned_touches"] = [touch.as_dict() for touch in self.touches]
-        block["push"] = None if self.push is None else self.push.as_dict()
+        block["push"] = None if self.push is None else asdict(self.push)
         return block

@@ -9,7 +9,13 @@ from manikin.body import BodyModel, Configuration
 from manikin.control.recovery import joint_groups
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_quaternion, rotation_from_yaw
+from manikin.numerics.spatial import (
+    FloatArray,
+    finite_number,
+    frozen_array,
+    rotation_from_quaternion,
+    rotation_from_yaw,
+)
 
 STRONGEST = 5000.0
 """Largest force of a push [N]: some seven body weights, and far beyond what can be held."""
@@ -26,6 +32,9 @@ class Push:
         duration: [s].
         point: (3,) where it acts in the segment's frame [m]; None for the segment's centre of mass.
         frequency: Frequency of the sine that begins with the push [Hz]; 0 for a constant force.
+
+    Raises:
+        InputError: If a number is not usable.
     """
 
     segment: str
@@ -34,6 +43,14 @@ class Push:
     duration: float
     point: FloatArray | None = None
     frequency: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "force", frozen_array(self.force, "push force [N]", (3,)))
+        finite_number(self.start, "push start [s]", at_least=0.0)
+        finite_number(self.duration, "push duration [s]", above=0.0)
+        finite_number(self.frequency, "push frequency [Hz]", at_least=0.0)
+        if self.point is not None:
+            object.__setattr__(self, "point", frozen_array(self.point, "push point [m]", (3,)))
 
     def active(self, time: float) -> bool:
         """Whether the force acts in the step that begins at ``time``."""
@@ -70,14 +87,9 @@ def push_near_com(
     Raises:
         InputError: If the force is not finite or beyond :data:`STRONGEST`, or a time is not usable.
     """
-    strength = np.asarray(force, dtype=np.float64)
-    if strength.shape != (3,) or not np.all(np.isfinite(strength)):
-        raise InputError(f"push force is {strength.tolist()} N; valid: three finite numbers")
+    strength = frozen_array(force, "push force [N]", (3,))
     if np.linalg.norm(strength) > STRONGEST:
         raise InputError(f"push force is {np.linalg.norm(strength):g} N; valid: at most {STRONGEST:g} N")
-    begin = finite_number(start, "push start [s]", at_least=0.0)
-    lasting = finite_number(duration, "push duration [s]", above=0.0)
-    wave = finite_number(frequency, "push frequency [Hz]", at_least=0.0)
     state = Configuration(body, body.standing_posture() if q is None else q)
     # The segment of the trunk whose centre is nearest to the centre of mass.
     segment = min(
@@ -85,7 +97,7 @@ def push_near_com(
         key=lambda name: float(np.linalg.norm(state.point(name, body.segment(name).com) - state.com)),
     )
     rotation, position = state.segment_placement(segment)
-    return Push(segment, strength, begin, lasting, rotation.T @ (state.com - position), wave)
+    return Push(segment, strength, start, duration, rotation.T @ (state.com - position), frequency)
 
 
 def push_on_the_way(

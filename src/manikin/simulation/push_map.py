@@ -22,14 +22,10 @@ USUAL = {
 
 
 def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
-    """Conditions that maps have in common, and a name for each that tells it from the others.
+    """Words for the conditions that maps have in common, and for each map those that tell it from the others.
 
-    Args:
-        maps: Conditions of each, as in its JSON.
-
-    Returns:
-        Words for the common conditions that are not usual, and for each map those for the conditions that
-        differ; empty where none does.
+    The conditions of each are as in its JSON; usual common ones are left out, and the words of a map are
+    empty where none differs.
     """
     lists = [_words(conditions) for conditions in maps]
     differ = [len(set(words)) > 1 for words in zip(*lists, strict=True)]
@@ -64,11 +60,8 @@ def search_directions(
 ) -> Generator[tuple[int, HeldImpulse]]:
     """Search directions, of one map or several, side by side.
 
-    Each search depends on nothing but itself, so the result is the same for any number of jobs.
-
-    Args:
-        searches: Directions to search.
-        jobs: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
+    Each search depends on nothing but itself, so the result is the same for any number of jobs
+    (:func:`manikin.runtime.parallel.side_by_side`).
 
     Returns:
         Index of each search and its result, in the order in which they end; closing it ends the rest.

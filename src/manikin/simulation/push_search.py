@@ -54,8 +54,7 @@ def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
 def feet_apart_posture(body: BodyModel, distance: float) -> FloatArray:
     """(nq,) posture on both feet of a body with two legs, the centre of mass between them.
 
-    Args:
-        distance: Distance between the middles of the soles, sideways [m].
+    The middles of the soles are a distance [m] apart, sideways.
 
     Raises:
         InputError: If the soles would overlap, or the body cannot stand like that.
@@ -125,17 +124,14 @@ class PushTrials:
 
     def soles(self) -> tuple[FloatArray, ...]:
         """(4, 2) corners of each sole from the centre of mass, x ahead [m]."""
-        controller = self._controller()
-        return tuple(sole.points_in_world[:, :2] - controller.com[:2] for sole in controller.soles)
+        standing = self._controller().standing
+        return tuple(sole.points_in_world[:, :2] - standing.com[:2] for sole in standing.soles)
 
     def bound(self, directions_deg: Sequence[float]) -> tuple[float, ...] | None:
-        """(n,) upper bound of the impulse that is held without a step [N.s].
+        """(n,) upper bounds of the impulse held without a step [N.s], by direction as of :meth:`push` [deg].
 
-        It is that of a pendulum with a flywheel, see
+        They are those of a pendulum with a flywheel, see
         :func:`~manikin.control.recovery.edge_limits`; None for feet that are held.
-
-        Args:
-            directions_deg: (n,) of the force, counter-clockwise from the body's forward axis [deg].
         """
         if self.task.feet is Feet.HELD:
             return None
@@ -192,7 +188,7 @@ class HeldImpulse:
 
 
 def largest_held(
-    holds: Callable[[float], bool], *, tolerance: float, first: float = FIRST, strongest: float = math.inf
+    holds: Callable[[float], bool], *, tolerance: float, strongest: float = math.inf
 ) -> HeldImpulse:
     """Search the largest impulse that is held, by bisection.
 
@@ -204,28 +200,26 @@ def largest_held(
     Args:
         holds: Whether an impulse [N.s] is held.
         tolerance: Largest gap between the two impulses [N.s].
-        first: Impulse to begin with [N.s].
         strongest: Largest impulse that is tried [N.s].
 
     Raises:
         InputError: If the tolerance is not positive.
     """
     finite_number(tolerance, "tolerance [N.s]", above=0.0)
-    trials = 0
+    trials: list[float] = []
 
     def tried(impulse: float) -> bool:
-        nonlocal trials
-        trials += 1
+        trials.append(impulse)
         return holds(impulse)
 
-    held, beyond = _bracket(tried, tolerance, min(first, strongest), strongest)
+    held, beyond = _bracket(tried, tolerance, min(FIRST, strongest), strongest)
     while held is not None and beyond is not None and beyond - held > tolerance:
         middle = 0.5 * (held + beyond)
         if tried(middle):
             held = middle
         else:
             beyond = middle
-    return HeldImpulse(held, beyond, trials)
+    return HeldImpulse(held, beyond, len(trials))
 
 
 def _bracket(

@@ -48,12 +48,7 @@ class Recorder:
     """Keeps every control step of an execution."""
 
     def __init__(self, schedule: ContactSchedule, segments: dict[str, tuple[str, ...]]) -> None:
-        """Start empty.
-
-        Args:
-            schedule: Planned contacts.
-            segments: Names of the segments with which each effector of the schedule touches.
-        """
+        """Start empty, with the names of the segments with which each effector of the schedule touches."""
         self._schedule = schedule
         self._segments = segments
         self.effectors = schedule.sequence.effectors
@@ -65,11 +60,9 @@ class Recorder:
     def record(
         self, sensed: Sensed, output: ControlOutput, total: FloatArray, carried: CarriedPoints
     ) -> None:
-        """Add one control step.
+        """Add one control step with the measurements of its first engine step.
 
         Args:
-            sensed: Measurements of its first engine step.
-            output: Decision of the controller.
             total: (6,) mean wrench of all contacts over the whole step.
             carried: Contact points that carried it.
         """
@@ -181,10 +174,8 @@ class Recorder:
         """Margins of the mean measured wrenches, about the centre of mass.
 
         The stance is that of the contacts that really carry, see :mod:`manikin.simulation.carrying`, and
-        not the one that was planned: a foot that is late does not count, and one that is early does.
-
-        Args:
-            mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
+        not the one that was planned: a foot that is late does not count, and one that is early does. The mass
+        [kg] closes the polytope of a stance without force limits.
         """
         carrying = CarryingContacts(self._segments, mass)
         return carried_margin(

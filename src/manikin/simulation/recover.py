@@ -137,13 +137,13 @@ class _RecoveryRun:
             body, self.q, settings, support=task.support, friction=task.friction, joint_damping=damping,
         )  # fmt: skip
         _check_standing(self.controller, self.q)
-        held = None
+        held, standing = None, self.controller.standing
         if welded:
-            held = {c.effector: (c.rotation_contact_to_world, c.position) for c in self.controller.soles}
-        ground = scene or Scene([], floor_height=self.controller.area.height)
+            held = {c.effector: (c.rotation_contact_to_world, c.position) for c in standing.soles}
+        ground = scene or Scene([], floor_height=standing.area.height)
         self.world = World(compile_model(body, ground, physics, held))
         for push in task.pushes:
-            self.world.apply_push(**vars(push))
+            self.world.apply_push(push)
         self.substeps = max(1, round(settings.period / physics.timestep))
         feet = [name for foot in self.controller.groups.feet for name in end_segments(body, foot)]
         self.world.plan_touches([(feet, obstacle.name) for obstacle in ground])
@@ -159,7 +159,7 @@ class _RecoveryRun:
         period = self.substeps * self.world.model.options.timestep
         settle, count = round(STANDING / period), math.ceil(self.task.duration / period)
         self.world.reset(self.q, None, -settle * period)
-        lowest = FALLEN * (self.controller.com[2] - self.controller.area.height)
+        lowest = FALLEN * self.controller.standing.height
         fallen = ""
         for number in range(-settle, count + 1):
             time = number * period
@@ -227,17 +227,17 @@ class _RecoveryRun:
     def _fallen(self, state: DynamicsState, lowest: float, time: float) -> str:
         if self.world.divergence or not np.all(np.isfinite(state.com)):
             return f"the simulation diverged ({self.world.divergence}) at {time:.3f} s"
-        if state.com[2] - self.controller.area.height < lowest:
+        if state.com[2] - self.controller.standing.area.height < lowest:
             return f"fell: the centre of mass is {state.com[2]:.2f} m high at {time:.3f} s"
         return ""
 
 
 def _check_standing(controller: BalanceRecovery, q: FloatArray) -> None:
     """Refuse a body that lies, leans or is about to fall over."""
-    com = controller.com[:2]
-    if controller.area.reach(com) >= 1.0:
+    standing = controller.standing
+    if standing.area.reach(standing.com[:2]) >= 1.0:
         raise InputError(
-            f"the body does not stand: its centre of mass is over {np.round(com, 3).tolist()}, "
+            f"the body does not stand: its centre of mass is over {np.round(standing.com[:2], 3).tolist()}, "
             "outside its soles; valid: a posture that stands on both feet"
         )
     lean = trunk_lean(Configuration(controller.body, q), controller.groups)

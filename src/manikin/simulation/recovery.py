@@ -132,18 +132,14 @@ def judge(
     """Outcome of a push.
 
     Args:
-        controller: Controller of the body.
-        trace: Every control step.
-        pushes: Pushes that disturbed it.
         feet: How its feet were on the ground.
         fallen: Why the run was ended before its time; empty when it was not.
         touches: Unplanned touches; those of the body with itself, as hand and thigh, are no support.
         wall: Wall time [s].
-        steps: Steps that were taken.
         refused: Why a step that was needed was not taken.
     """
-    motion, area = trace.motion, controller.area
-    ahead = capture_point(motion.com, trace.com_velocity, controller.com[2] - area.height)
+    motion, standing = trace.motion, controller.standing
+    ahead = capture_point(motion.com, trace.com_velocity, standing.height)
     start = min((push.start for push in pushes), default=0.0)
     control_from = start + controller.settings.delay
     level = [push.force[:2] for push in pushes if np.linalg.norm(push.force[:2]) > 0.0]
@@ -162,11 +158,11 @@ def judge(
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
         time_to_rest=None if rests_from is None else max(0.0, rests_from - start),
-        final_height=float(motion.com[-1, 2] - area.height),
+        final_height=float(motion.com[-1, 2] - standing.area.height),
         capture_point=max(s.area.reach(point) for s, point in zip(trace.standings, ahead, strict=True)),
         foot_motion=moved,
         control_from=control_from,
-        soles=controller.soles,
+        soles=standing.soles,
         steps=steps,
         wall=wall,
         requirements=_requirements(motion, fallen, propped, rests_from, moved, most),
@@ -200,18 +196,14 @@ def at_rest(
 ) -> bool:
     """Whether a body stands at rest: high, upright and slow, its centre of mass over its soles.
 
-    Args:
-        state: State of the body; it is moved to ``q`` where the trunk has to be measured.
-        controller: Controller of the body.
-        q: (nq,) configuration.
-        com: (3,) centre of mass [m].
-        velocity: (3,) of the centre of mass [m/s].
+    ``state`` is moved to ``q`` (nq,) where the trunk has to be measured; centre of mass (3,) [m] and its
+    velocity (3,) [m/s] are those there.
     """
-    height = controller.area.height
+    standing = controller.standing
     return bool(
-        com[2] - height >= STANDS_HEIGHT * (controller.com[2] - height)
+        com[2] - standing.area.height >= STANDS_HEIGHT * standing.height
         and np.linalg.norm(velocity) <= STANDS_SPEED
-        and controller.area.inside(com[:2]) > 0.0
+        and standing.area.inside(com[:2]) > 0.0
         and trunk_lean(state.update(q), controller.groups) <= STANDS_LEAN
     )
 
@@ -245,19 +237,17 @@ def _explained(
         return ""
     if refused:
         fault = f"{fault}; no step: {refused}"
-    height = controller.com[2] - controller.area.height
     first = min(int(np.searchsorted(trace.motion.time, control_from - 1e-9)), len(trace.motion.time) - 1)
-    point = capture_point(trace.motion.com[first], trace.com_velocity[first], height)
+    point = capture_point(trace.motion.com[first], trace.com_velocity[first], controller.standing.height)
     outside = -float(trace.standings[0].area.inside(point))
-    if outside <= 0.0:
-        return fault
-    return f"{fault}; the capture point was {outside:.3f} m beyond the soles when the control began"
+    told = f"; the capture point was {outside:.3f} m beyond the soles when the control began"
+    return fault + told * (outside > 0.0)
 
 
 def _foot_motion(controller: BalanceRecovery, motion: Motion, steps: Sequence[StepTaken]) -> float:
     """Farthest that a foot is in the end from where it was put down, or where it was in the beginning [m]."""
     first, last = (Configuration(controller.body, motion.q[row]) for row in (0, -1))
-    places = {sole.effector: first.effector_placement(sole.effector)[1] for sole in controller.soles}
+    places = {sole.effector: first.effector_placement(sole.effector)[1] for sole in controller.standing.soles}
     places |= {step.foot: step.position for step in steps}
     return max(
         float(np.linalg.norm(last.effector_placement(name)[1] - place)) for name, place in places.items()

@@ -84,12 +84,9 @@ class RecoveryRecorder:
         self, time: float, output: RecoveryOutput, sensed: Sensed, wrench: FloatArray, carried: CarriedPoints,
         *, held: bool = False,
     ) -> None:  # fmt: skip
-        """Add a step.
+        """Add a step that begins at a time [s], with what is sensed in the first engine step after it.
 
         Args:
-            time: Beginning of the step [s].
-            output: Decision of the controller then.
-            sensed: Measurements of the first engine step after it.
             wrench: (6,) mean force and moment of the ground about the world's origin.
             carried: Contact points of the scene that carried that wrench.
             held: Whether the feet are welded to the ground, which is no touch.
@@ -110,7 +107,7 @@ class RecoveryRecorder:
         """Equal share of a foot that is held in the wrench of the ground, about its sole's middle."""
         if not carries:
             return np.zeros(6)
-        share = wrench / len(self._controller.soles)
+        share = wrench / len(self._controller.standing.soles)
         return np.concatenate((share[:3], share[3:] - skew(position) @ share[:3]))
 
     def trace(self, control_ms: float) -> RecoveryTrace:
@@ -119,7 +116,7 @@ class RecoveryRecorder:
         states = [output.state for output in outputs]
         torque = np.array([output.tau for output in outputs])
         speed = np.array([state.v[6:] for state in states])
-        joints, height = self._controller.groups.joints, self._controller.area.height
+        joints, height = self._controller.groups.joints, self._controller.standing.area.height
         wrenches = np.array([wrench for *_, wrench in self._rows])
         # About the origin instead of the centre of mass: the formula holds for any point.
         zmp = np.array([zmp_of(wrench[:3], wrench[3:], np.zeros(3), height) for wrench in wrenches])
@@ -155,7 +152,7 @@ class RecoveryRecorder:
     def _carrying_stance(self, output: RecoveryOutput, carried: CarriedPoints) -> Stance:
         """Stance of the contacts that really carry: soles as far as they touch, and anything else."""
         frames = output.state.frames
-        soles = {sole.effector: sole for sole in (*self._controller.soles, *output.standing.soles)}
+        soles = {sole.effector: sole for sole in (*self._controller.standing.soles, *output.standing.soles)}
         return self._carrying.stance(
             carried, lambda name: (frames[name].position, frames[name].rotation), soles, model=self._model
         )
@@ -174,13 +171,7 @@ class SegmentMomenta:
         }
 
     def at(self, q: FloatArray, v: FloatArray, com: FloatArray) -> dict[str, FloatArray]:
-        """(3,) by group, in world axes [kg.m^2/s]; their sum is that of the body.
-
-        Args:
-            q: (nq,) configuration.
-            v: (nv,) velocity.
-            com: (3,) centre of mass [m].
-        """
+        """(3,) by group, in world axes [kg.m^2/s], at a state with its CoM [m]; the sum is the body's."""
         pin.forwardKinematics(self._model, self._data, q, v)
         # The velocity of the centre of mass is taken off, so that no group's share depends on it.
         momentum = pin.computeCentroidalMomentum(self._model, self._data).linear

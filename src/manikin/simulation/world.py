@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.body.strength import with_masses
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, cross
 from manikin.simulation.carrying import CarriedPoints, Sensed, Touch
 from manikin.simulation.compile import SimulationModel, compile_model, obstacle_of, root_rotation
 from manikin.simulation.push_force import Push
@@ -78,7 +78,6 @@ class World:
         self.penetration, self.padding_compression = 0.0, 0.0
         self._total, self._steps = np.zeros(6), 0
         self._carried: list[tuple[NDArray, ...]] = []
-        self._elliptic = self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
         self._is_segment = np.array([segment for _, segment in self._owners], dtype=bool)
 
     # --- state -----------------------------------------------------------------------------
@@ -99,12 +98,9 @@ class World:
         return self.model.v_from_mujoco(self._data.qpos, self._data.qvel)
 
     def reset(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> None:
-        """Put the body into a state and forget all measurements; pushes and grips stay.
+        """Put the body into a state, at rest without ``v``, and a time [s] and forget all measurements.
 
-        Args:
-            q: (nq,) configuration.
-            v: (nv,) velocity; at rest when omitted.
-            time: Simulated time to begin with [s].
+        Pushes and grips stay.
         """
         mujoco.mj_resetData(self._model, self._data)
         self._data.time = time
@@ -132,27 +128,10 @@ class World:
             getattr(self._model, name)[:] = getattr(loaded, name)
         self._load = dict(masses)
 
-    def apply_push(
-        self, segment: str, force: ArrayLike, start: float, duration: float, *,
-        point: ArrayLike | None = None, frequency: float = 0.0,
-    ) -> None:  # fmt: skip
-        """Push a segment; the arguments are those of :class:`~manikin.simulation.push_force.Push`.
-
-        Raises:
-            BodyError: If there is no such segment.
-            InputError: If a number is not usable.
-        """
-        self.model.body_id(segment)
-        self._pushes.append(
-            Push(
-                segment,
-                frozen_array(force, "push force [N]", (3,)),
-                finite_number(start, "push start [s]", at_least=0.0),
-                finite_number(duration, "push duration [s]", above=0.0),
-                None if point is None else frozen_array(point, "push point [m]", (3,)),
-                finite_number(frequency, "push frequency [Hz]", at_least=0.0),
-            )
-        )
+    def apply_push(self, push: Push) -> None:
+        """Push a segment; one that the body does not have is a BodyError."""
+        self.model.body_id(push.segment)
+        self._pushes.append(push)
 
     def grip(self, grip: Grip) -> None:
         """Let an effector hold on; replaces what it held.
@@ -161,27 +140,19 @@ class World:
         """
         self.model.site_id(grip.effector)
         self._grips[grip.effector] = grip
-        self._set_scene_contact(grip.effector, False)
-
-    def open_hand(self, effector: str) -> None:
-        """Let the segment of an effector pass through the scene until it has gripped and let go.
-
-        A rigid hand cannot open its fingers around what it is about to hold.
-        """
-        self._set_scene_contact(effector, False)
+        self.collide(grip.effector, False)
 
     def release(self, effector: str) -> None:
         """Let go; nothing happens where nothing was held."""
         if self._grips.pop(effector, None) is not None:
             self._grip_forces.pop(effector, None)
-            self._set_scene_contact(effector, True)
+            self.collide(effector, True)
 
-    def close_hand(self, effector: str) -> None:
-        """Let the segment of an effector collide with the scene again."""
-        self._set_scene_contact(effector, True)
+    def collide(self, effector: str, enabled: bool) -> None:
+        """Let the segment of an effector collide with obstacles or not; with the body it does.
 
-    def _set_scene_contact(self, effector: str, enabled: bool) -> None:
-        """Let the segment of an effector collide with obstacles or not; with the body it does."""
+        A rigid hand cannot open its fingers around what it is about to hold: it passes through the scene.
+        """
         mask = self._mask((self.model.body.effector(effector).segment,), True)
         bits, affinity = self.model.mujoco.geom_contype[mask], self.model.mujoco.geom_conaffinity[mask]
         # Obstacles do not answer to the bit 4; segments do through their affinity.
@@ -193,9 +164,7 @@ class World:
     ) -> None:
         """Set which touches are planned from now on; all others are reported.
 
-        Args:
-            pairs: Segments and the obstacle that they are supported by.
-            leaning: Segments and an obstacle that they may lean on besides.
+        Pairs are of segments and the obstacle that they are supported by, or that they may lean on besides.
 
         Raises:
             InputError: If an obstacle is not in the scene.
@@ -218,12 +187,7 @@ class World:
     # --- time ------------------------------------------------------------------------------
 
     def advance(self, tau: ArrayLike, steps: int = 1) -> None:
-        """Hold joint torques for a number of engine steps.
-
-        Args:
-            tau: (nv - 6,) [N.m].
-            steps: Number of steps.
-        """
+        """Hold joint torques (nv - 6,) [N.m] for a number of engine steps."""
         self._data.ctrl[:] = tau
         for _ in range(steps):
             self._before = (self._data.qpos.copy(), self._data.qvel.copy(), self.time)
@@ -266,9 +230,7 @@ class World:
     def _normal_forces(self) -> FloatArray:
         """(ncon,) normal force of each contact of the last step [N]."""
         address = self._data.contact.efc_address
-        if self._elliptic:
-            return np.where(address >= 0, self._data.efc_force[np.maximum(address, 0)], 0.0)
-        return self._contact_forces()[:, 0]
+        return np.where(address >= 0, self._data.efc_force[np.maximum(address, 0)], 0.0)
 
     def _contact_forces(self) -> FloatArray:
         """(ncon, 6) force and torque of each contact of the last step in its frame [N, N.m]."""
@@ -417,18 +379,10 @@ class World:
     @property
     def divergence(self) -> str:
         """Fatal warning of the engine, such as ``"BADQACC"``; empty without one."""
-        for kind in _FATAL:
-            if self._data.warning[kind].number:
-                return kind.name.removeprefix("mjWARN_")
-        return ""
-
-
-_FATAL = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-    mujoco.mjtWarning.mjWARN_BADCTRL,
-)
+        kinds = ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
+        numbers = (getattr(mujoco.mjtWarning, f"mjWARN_{kind}") for kind in kinds)
+        told = zip(kinds, numbers, strict=True)
+        return next((kind for kind, number in told if self._data.warning[number].number), "")
 
 
 def _owner(model: SimulationModel, geom: int) -> tuple[str, bool]:

@@ -70,11 +70,8 @@ class ContactPlanCheck(Displayed):
         broken = self.requirements.first_broken
         if broken is not None:
             return f"refused: {broken.reason}"
-        return (
-            "certified"
-            if self.complete
-            else "certified without postures: contacts, reach, balance and order alone"
-        )
+        alone = "" if self.complete else " without postures: contacts, reach, balance and order alone"
+        return f"certified{alone}"
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
@@ -145,11 +142,9 @@ class _Check:
         self._kinematics = Kinematics(self._body)
         self._changes = list(self._at_changes())
         self._reach = ReachBounds(self._body)
-        act = scenario.act
         self._act: HandForce | None = None
-        if act is not None:
-            direction = np.array(act.direction) / np.linalg.norm(act.direction)
-            self._act = HandForce(direction, act.force_N)
+        if (act := scenario.file.task.act) is not None:
+            self._act = HandForce(np.array(act.direction) / np.linalg.norm(act.direction), act.force_N)
 
     def run(self) -> ContactPlanCheck:
         touching, postures = self._contacts(), list(self._postures())
@@ -168,15 +163,10 @@ class _Check:
 
     def _at_changes(self) -> Iterator[_Change]:
         stages, plan = self._plan.stages, self._plan
-        for number, stage in enumerate(stages):
-            before = stages[number - 1] if number else None
-            yield _Change(
-                before, stage, stage.posture, self._com(stage.posture, stage.com), f"stages[{number}]"
-            )
-        yield _Change(stages[-1], None, plan.goal, self._com(plan.goal, plan.goal_com), "goal")
-
-    def _com(self, q: FloatArray | None, given: FloatArray | None) -> FloatArray | None:
-        return given if q is None else self._kinematics.com(q)
+        for number, (before, after) in enumerate(pairwise((None, *stages, None))):
+            q, com = (plan.goal, plan.goal_com) if after is None else (after.posture, after.com)
+            com = com if q is None else self._kinematics.com(q)
+            yield _Change(before, after, q, com, "goal" if after is None else f"stages[{number}]")
 
     def _contacts(self) -> ContactRows:
         values = self._scenario.contacts
@@ -206,21 +196,16 @@ class _Check:
             "max_com_difference_m", "difference between the centre of mass given and the posture's", 1e-3
         )
         for number, (before, after) in enumerate(pairwise(self._plan.stages), start=1):
-            kept = sum(before.contacts.get(name) is c for name, c in after.contacts.items())
-            changed = len(before.contacts) + len(after.contacts) - 2 * kept
-            names = sorted(
-                {n for n, c in after.contacts.items() if before.contacts.get(n) is not c}
-                | {n for n, c in before.contacts.items() if after.contacts.get(n) is not c}
-            )
+            kept = {name for name, c in after.contacts.items() if before.contacts.get(name) is c}
+            changed = len(before.contacts) + len(after.contacts) - 2 * len(kept)
+            names = sorted({*before.contacts, *after.contacts} - kept)
             if self._scenario.file.task.act is not None and all("hand" in name for name in names):
                 changed = min(changed, 1)
             most.take(changed, f"{' and '.join(names)}, stages[{number}]" if names else f"stages[{number}]")
-        given = [(stage.posture, stage.com) for stage in self._plan.stages] + [
-            (self._plan.goal, self._plan.goal_com)
-        ]
-        for (q, com), change in zip(given, self._changes, strict=True):
-            if q is not None and com is not None:
-                said.take(float(np.linalg.norm(self._kinematics.com(q) - com)), change.where)
+        given = [*(stage.com for stage in self._plan.stages), self._plan.goal_com]
+        for com, change in zip(given, self._changes, strict=True):
+            if change.q is not None and change.com is not None and com is not None:
+                said.take(float(np.linalg.norm(change.com - com)), change.where)
         for number, stage in enumerate(self._plan.stages):
             least.take(len(stage.contacts), f"stages[{number}]")
         return [least.row, most.row, said.row]
@@ -263,20 +248,18 @@ class _Check:
                 continue
             contacts, com, within = change.carrying, change.com, None
             if com is None:
-                within = {
-                    number: self._reach.to_com(contact.effector) for number, contact in enumerate(contacts)
-                }
+                within = {number: self._reach.to_com(item.effector) for number, item in enumerate(contacts)}
             guess = com if com is not None else _middle(change.held)
             act = self._act if change.after is None else None
             result = rest(contacts, self._mass, self._cap, guess, within, act)
             shift = result.shift if com is not None or result.place is None else 0.0
             names = ", ".join(contact.effector for contact in contacts) or "no contact"
-            off.take(shift, f"{change.where} on {names}")
+            where = f"{change.where} on {names}"
+            off.take(shift, where)
             if com is not None:
                 room = min(room, result.room)
             if change.q is not None and result.shift <= BALANCE:
-                share = torque_share(self._body, change.q, contacts, self._cap)
-                effort.take(share, f"{change.where} on {names}")
+                effort.take(torque_share(self._body, change.q, contacts, self._cap), where)
         for number, stage in enumerate(self._plan.stages):
             if stage.dynamic:
                 lacking.take(self._shortfall(number, stage), f"stages[{number}]")
@@ -310,19 +293,13 @@ LEVEL = 0.05
 
 
 def task_rows(scenario: Scenario, plan: PlannedContacts) -> list[Requirement | None]:
-    """Requirements of both ends; of an act, whose end the planner chooses, that the hands are on its object.
-
-    Args:
-        scenario: With a task.
-        plan: In the world.
-    """
+    """Requirements of both ends; of an act, whose end the planner chooses, that hands are on its object."""
     task, first, last = scenario.file.task, plan.stages[0], plan.stages[-1]
     rows = _end_rows("start", task.start, dict(first.contacts), first.posture)
     if task.act is None:
         return rows + _end_rows("goal", task.goal, dict(last.contacts), plan.goal)
-    hands = sum("hand" in name for name in last.contacts)
     row = Worst("goal_hands", f"hands on {task.act.on}", 1.0, sense=">=")
-    row.take(hands, "goal")
+    row.take(sum("hand" in name for name in last.contacts), "goal")
     return [*rows, row.row]
 
 

@@ -5,8 +5,8 @@ convex function along the segment, found by ternary search, which is exact outsi
 tested for a separating axis, which finds every overlap and gives no more than the distance outside.
 """
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -46,10 +46,7 @@ class Placed:
 
     def rows(self, chosen: np.ndarray) -> "Placed":
         """Some of the rows."""
-        return Placed(
-            self.posture[chosen], self.shape[chosen], self.position[chosen], self.rotation[chosen],
-            self.size[chosen], self.radius[chosen],
-        )  # fmt: skip
+        return Placed(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     @cached_property
     def ends(self) -> tuple[FloatArray, FloatArray]:
@@ -116,6 +113,7 @@ class BodyShapes:
     def to_itself(self, postures: FloatArray) -> FloatArray:
         """(p, c) clearance of each of the body's collision pairs in each posture [m]."""
         index = {name: number for number, name in enumerate(self.names)}
+        is_box = [shape.kind is ShapeKind.BOX for shape in self.shapes]
         result = np.full((len(postures), len(self.body.collision_pairs)), np.inf)
         rounds, boxes = self.placed(postures)
         row = np.zeros((len(postures), len(self.shapes)), dtype=np.int64)
@@ -124,18 +122,15 @@ class BodyShapes:
         # By kind, with the box last where there is one: number of the pair, first and second shape.
         pairs: dict[int, list[tuple[int, int, int]]] = {0: [], 1: [], 2: []}
         for number, names in enumerate(self.body.collision_pairs):
-            ordered = sorted((index[name] for name in names), key=self._is_box)
-            pairs[sum(map(self._is_box, ordered))].append((number, ordered[0], ordered[1]))
+            a, b = sorted((index[name] for name in names), key=is_box.__getitem__)
+            pairs[is_box[a] + is_box[b]].append((number, a, b))
         for kind, numbers in pairs.items():
             if numbers:
                 which, a, b = np.array(numbers).T
                 first = (boxes if kind == 2 else rounds).rows(row[:, a].ravel())
                 second = (boxes if kind else rounds).rows(row[:, b].ravel())
-                result[:, which] = _PAIRS[kind](first, second).reshape(len(postures), -1)
+                result[:, which] = _between(first, second, kind).reshape(len(postures), -1)
         return result
-
-    def _is_box(self, shape: int) -> bool:
-        return self.shapes[shape].kind is ShapeKind.BOX
 
 
 def _extent(shape: Shape) -> FloatArray:
@@ -183,17 +178,14 @@ def _rounds_to_solid(rounds: Placed, solid: Solid) -> FloatArray:
 
 def _boxes_to_solid(boxes: Placed, solid: Solid) -> FloatArray:
     shape, place = solid.obstacle.shape, solid.obstacle
-    if isinstance(shape, HalfSpace):
-        normal, offset = place.world_plane
-        return (boxes.corners @ normal - offset).min(axis=1)
-    if isinstance(shape, Plane):
+    if isinstance(shape, (HalfSpace, Plane)):
         normal, offset = place.world_plane
         height = boxes.corners @ normal - offset
-        return np.maximum(height.min(axis=1), -height.max(axis=1))
+        above = height.min(axis=1)
+        return np.maximum(above, -height.max(axis=1)) if isinstance(shape, Plane) else above
     if isinstance(shape, Sphere):
-        return (
-            _distance_to_boxes(boxes)(np.broadcast_to(place.translation, boxes.position.shape)) - shape.radius
-        )
+        middle = np.broadcast_to(place.translation, boxes.position.shape)
+        return _distance_to_boxes(boxes)(middle) - shape.radius
     if isinstance(shape, Capsule):
         count = len(boxes.shape)
         axis = Placed(
@@ -219,9 +211,8 @@ def _polytope(solid: Solid) -> tuple[FloatArray, FloatArray, FloatArray]:
     if not isinstance(shape, Cylinder):
         raise TypeError(f"obstacle {solid.name!r} is neither box nor cylinder")
     angle = (np.arange(_PRISM) + 0.5) * 2.0 * np.pi / _PRISM
-    ring = (
-        shape.radius / np.cos(np.pi / _PRISM) * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
-    )
+    circle = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    ring = shape.radius / np.cos(np.pi / _PRISM) * circle
     up = np.array([0.0, 0.0, 0.5 * shape.length])
     sides = np.roll(ring, -1, axis=0) - ring
     edges = np.vstack([sides[: _PRISM // 2] / np.linalg.norm(sides[0]), [0.0, 0.0, 1.0]])
@@ -261,35 +252,21 @@ def separation(first: FloatArray, second: FloatArray, axes: FloatArray) -> Float
     return np.where(length > 1e-9, gap, -np.inf).max(axis=1)
 
 
-def _axes(first: Placed, second: Placed) -> FloatArray:
+def _between(first: Placed, second: Placed, boxes: int) -> FloatArray:
+    """Clearances (n,) of pairs of shapes with so many boxes among them, which stand last [m]."""
+    if boxes == 0:
+        return segment_segment(*first.ends, *second.ends) - first.radius - second.radius
+    if boxes == 1:
+        return _least_along(first, _distance_to_boxes(second)) - first.radius
     own, other = first.rotation.transpose(0, 2, 1), second.rotation.transpose(0, 2, 1)
     crossed = np.cross(own[:, :, None], other[:, None]).reshape(len(own), 9, 3)
-    return np.concatenate([own, other, crossed], axis=1)
-
-
-def _two_rounds(first: Placed, second: Placed) -> FloatArray:
-    return segment_segment(*first.ends, *second.ends) - first.radius - second.radius
-
-
-def _round_and_box(first: Placed, second: Placed) -> FloatArray:
-    return _least_along(first, _distance_to_boxes(second)) - first.radius
-
-
-def _two_boxes(first: Placed, second: Placed) -> FloatArray:
-    return separation(first.corners, second.corners, _axes(first, second))
-
-
-_PAIRS = (_two_rounds, _round_and_box, _two_boxes)
-"""Clearances (n,) of pairs of shapes, by the number of boxes among them."""
+    return separation(first.corners, second.corners, np.concatenate([own, other, crossed], axis=1))
 
 
 def worst(clearance: FloatArray, allowed: np.ndarray) -> tuple[float, tuple[int, ...]]:
     """Least clearance among allowed entries and its place; infinite where there is none."""
     masked = np.where(allowed, clearance, np.inf)
-    place = np.unravel_index(int(np.argmin(masked)), masked.shape) if masked.size else (0, 0)
-    return float(masked[place]) if masked.size else float(np.inf), tuple(int(k) for k in place)
-
-
-def shape_rows(shapes: BodyShapes, segments: Collection[str]) -> np.ndarray:
-    """(s,) whether each shape belongs to one of some segments."""
-    return np.array([name in segments for name in shapes.segments], dtype=bool)
+    if not masked.size:
+        return np.inf, (0, 0)
+    place = np.unravel_index(int(np.argmin(masked)), masked.shape)
+    return float(masked[place]), tuple(int(k) for k in place)

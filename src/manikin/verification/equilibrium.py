@@ -188,10 +188,9 @@ def rest(
         limits.append(reach + sides @ (contacts[number].position[:2] - com[:2]))
     lower = np.concatenate([forces.lower / weight, [-np.inf, -np.inf, 0.0]])
     upper = np.concatenate([forces.upper / weight, [np.inf, np.inf, np.inf]])
-    cost = np.zeros(count + 3)
-    cost[-1] = 1.0
     solved = linprog(
-        cost, A_ub=np.vstack(rows), b_ub=np.concatenate(limits), A_eq=equality, b_eq=target,
+        np.append(np.zeros(count + 2), 1.0),
+        A_ub=np.vstack(rows), b_ub=np.concatenate(limits), A_eq=equality, b_eq=target,
         bounds=np.column_stack([lower, upper]), method="highs",
     )  # fmt: skip
     if solved.x is None:
@@ -217,14 +216,12 @@ def _room(forces: Forces, weight: float, sides: FloatArray) -> float:
     for number, (x, y) in enumerate(sides):
         moment[6 * number + 3], moment[6 * number + 4] = -y, x
     limits = block_diag([csr_array(forces.rows)] * copies)
-    cost = np.zeros(count * copies + 1)
-    cost[-1] = -1.0
     bounds = np.column_stack([
         np.append(np.tile(forces.lower / weight, copies), 0.0),
         np.append(np.tile(forces.upper / weight, copies), 10.0),
     ])  # fmt: skip
     solved = linprog(
-        cost,
+        np.append(np.zeros(count * copies), -1.0),
         A_ub=hstack([limits, csr_array((len(forces.rows) * copies, 1))]),
         b_ub=np.tile(forces.limits / weight, copies),
         A_eq=hstack([blocks, csr_array(moment)]),
@@ -310,7 +307,7 @@ def dynamic_shortfall(
     ends[2] = 0.0
     equality, target, limits, bound = [], [], [], []
     for number, share in enumerate(np.linspace(0.0, 1.0, SAMPLES)):
-        weights, second = _bernstein(share), _bernstein_second(share) / duration**2
+        weights, second = _bernstein(4, share), _bernstein_second(share) / duration**2
         # c = base + w u and c'' = a + s u: without u x u the moment c x (c'' + g) is linear in u.
         base, acceleration = weights @ ends, second @ ends
         pull = acceleration + np.array([0.0, 0.0, GRAVITY])
@@ -338,11 +335,8 @@ def _least_violation(
     rows, bound = csr_array(np.vstack(limits[0])), np.concatenate(limits[1])
     width = equality.shape[-1]
     matrix, wanted = equality.reshape(-1, width), target.ravel()
-    slack = np.zeros(width)
-    slack[3] = GRAVITY
-    upper = csr_array(np.vstack([matrix - slack, -matrix - slack]))
-    cost = np.zeros(width)
-    cost[3] = 1.0
+    cost = np.eye(1, width, 3)[0]
+    upper = csr_array(np.vstack([matrix - GRAVITY * cost, -matrix - GRAVITY * cost]))
     low = np.concatenate([[-np.inf] * 3, [0.0], np.tile(forces.lower / weight, SAMPLES)])
     high = np.concatenate([[np.inf] * 4, np.tile(forces.upper / weight, SAMPLES)])
     solved = linprog(
@@ -352,12 +346,11 @@ def _least_violation(
     return 1.0 if solved.x is None else float(solved.x[3])
 
 
-def _bernstein(share: float) -> FloatArray:
-    return np.array([comb(4, k) * share**k * (1.0 - share) ** (4 - k) for k in range(5)])
+def _bernstein(degree: int, share: float) -> FloatArray:
+    powers = range(degree + 1)
+    return np.array([comb(degree, k) * share**k * (1.0 - share) ** (degree - k) for k in powers])
 
 
 def _bernstein_second(share: float) -> FloatArray:
     """Second derivatives of the five Bernstein polynomials of degree four."""
-    quadratic = np.array([comb(2, k) * share**k * (1.0 - share) ** (2 - k) for k in range(3)])
-    padded = np.concatenate([[0.0, 0.0], quadratic, [0.0, 0.0]])
-    return 12.0 * np.array([padded[k] - 2.0 * padded[k + 1] + padded[k + 2] for k in range(5)])
+    return 12.0 * np.diff(np.pad(_bernstein(2, share), 2), n=2)

@@ -13,7 +13,7 @@ from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import FloatArray, turned_root
 from manikin.runtime.requirement import Requirement, Worst
-from manikin.verification.clearance import BodyShapes, shape_rows, worst
+from manikin.verification.clearance import BodyShapes, worst
 from manikin.verification.solids import REACH, Solid
 
 CONTACT_ERROR = 1e-3
@@ -71,9 +71,8 @@ class HoldingRows:
 
     def __init__(self, body: BodyModel, solids: Sequence[Solid], kinematics: Kinematics) -> None:
         self._body, self._solids, self._kinematics = body, solids, kinematics
-        self._error = Worst(
-            "max_contact_error_m", "distance of an effector from its contact", CONTACT_ERROR, 1e-9
-        )
+        error = "distance of an effector from its contact"
+        self._error = Worst("max_contact_error_m", error, CONTACT_ERROR, 1e-9)
         self._turn = Worst("max_contact_turn_deg", "angle of a sole from its contact", CONTACT_TURN_DEG, 1e-9)
         self._range = Worst("max_range_violation_deg", "joint range violation", 0.0, np.rad2deg(1e-6))
         self._clearance = Worst("min_clearance_m", "clearance", 0.0, ROUNDING)
@@ -84,24 +83,15 @@ class HoldingRows:
 
     @property
     def rows(self) -> list[Requirement | None]:
-        """The requirements."""
-        quantities = (
-            self._error, self._turn, self._range, self._clearance, self._sinking, self._flesh, self._grasped,
-            self._self,
-        )  # fmt: skip
-        return [item.row for item in quantities]
+        """The requirements in the order of their attributes."""
+        return [item.row for item in vars(self).values() if isinstance(item, Worst)]
 
     def measure(self, postures: Sequence[HeldPosture], touched: Mapping[int, frozenset[str]]) -> None:
-        """Measure postures.
-
-        Args:
-            touched: Names of the obstacles on which each contact lies, by its id.
-        """
-        if not postures:
-            return
+        """Measure postures; ``touched`` names the obstacles on which each contact lies, by its id."""
         for item in postures:
             self._holds(item)
-        self._clear(postures, touched)
+        if postures:
+            self._clear(postures, touched)
 
     def _holds(self, item: HeldPosture) -> None:
         places = self._kinematics.placements(item.q, [contact.effector for contact in item.held])
@@ -134,7 +124,7 @@ class HoldingRows:
             for number, item in enumerate(postures):
                 for contact in item.held:
                     if solid.name in touched[id(contact)]:
-                        rows = shape_rows(shapes, self._touching(contact))
+                        rows = np.isin(shapes.segments, self._touching(contact))
                         way[number, rows] = np.maximum(way[number, rows], self._way(contact))
             for index, quantity in enumerate(ways):
                 value, (posture, shape) = worst(clearance, way == index)
@@ -147,10 +137,10 @@ class HoldingRows:
             names = " and ".join(name.partition("/")[0] for name in self._body.collision_pairs[pair])
             self._self.take(value, f"{names}, {postures[posture].where}")
 
-    def _touching(self, contact: Contact) -> set[str]:
+    def _touching(self, contact: Contact) -> list[str]:
         """Segments with which a contact is made: the effector's own, and those that hang on it."""
         own = self._body.effector(contact.effector).segment
-        return {own} | {segment.name for segment in self._body.segments if segment.parent == own}
+        return [segment.name for segment in self._body.segments if own in (segment.name, segment.parent)]
 
     def _way(self, contact: Contact) -> int:
         """Way in which a contact's segments touch: firmly (1), with flesh (2), as a hand that grasps (3)."""

@@ -25,7 +25,7 @@ from manikin.runtime import __version__
 from manikin.runtime.files import read_json
 from manikin.scenarios import Scenario, ScenarioFile, load_scenario
 from manikin.scenarios.sections.planning_sections import BodySection
-from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
+from manikin.scenarios.sections.support_sections import ContactSection, SoleSection, contact_tag
 from manikin.scenarios.validation import (
     Duration,
     Number,
@@ -35,6 +35,7 @@ from manikin.scenarios.validation import (
     optional,
     preset,
     refuse,
+    refuse_if,
     required,
     validate,
 )
@@ -66,13 +67,9 @@ class PlannedContactSection(ContactSection):
         return self
 
 
-def _kept_or_given(value: Any) -> str:
-    return "same" if isinstance(value, str) else "contact"
-
-
 PlannedContactEntry = Annotated[
     Annotated[Literal["same"], Tag("same")] | Annotated[PlannedContactSection, Tag("contact")],
-    Discriminator(_kept_or_given),
+    Discriminator(contact_tag),
 ]
 """A contact, or the word ``same`` for the one of the stage before."""
 
@@ -106,8 +103,8 @@ class StageSection(Section):
 
     @model_validator(mode="after")
     def _timed(self) -> Self:
-        if self.dynamic and self.duration_s is None:
-            raise refuse("duration_s", "is missing; valid: a number > 0 [s] for a dynamic stage")
+        missing = self.dynamic and self.duration_s is None
+        refuse_if(missing, "duration_s", "is missing; valid: a number > 0 [s] for a dynamic stage")
         return self
 
 
@@ -138,10 +135,8 @@ class ContactPlanFile(Section):
             for effector, entry in stage.contacts.items():
                 key = f"stages[{number}].contacts.{effector}"
                 if isinstance(entry, str):
-                    if effector not in before:
-                        raise refuse(
-                            key, "is 'same' but the stage before has no such contact; valid: a contact"
-                        )
+                    problem = "is 'same' but the stage before has no such contact; valid: a contact"
+                    refuse_if(effector not in before, key, problem)
                 else:
                     entry.check_for(effector, f"{key}.")
             before = set(stage.contacts)
@@ -199,13 +194,12 @@ class PlannedContacts:
         for number, stage in enumerate(self.stages):
             for key in ("posture", "com", "com_velocity", "via"):
                 _check_finite(getattr(stage, key), f"stages[{number}].{key}")
+            contacts = dict(stage.contacts)
             for name, contact in stage.contacts.items():
                 for values in (contact.position, contact.rotation_contact_to_world, contact.points):
                     _check_finite(values, f"stages[{number}].contacts.{name}")
-            contacts = {
-                name: kept[name] if name in kept and _is_kept(contact, kept[name]) else contact
-                for name, contact in stage.contacts.items()
-            }
+                if name in kept and _is_kept(contact, kept[name]):
+                    contacts[name] = kept[name]
             kept = contacts
             stages.append(replace(stage, contacts=MappingProxyType(contacts)))
         object.__setattr__(self, "stages", tuple(stages))
@@ -261,22 +255,18 @@ def load_contact_plan(path: str | Path, scenario: Scenario | None = None) -> tup
 def parse_contact_plan(
     content: Mapping[str, Any], source: str, scenario: Scenario | None = None, folder: Path | None = None
 ) -> tuple[Scenario, PlannedContacts]:
-    """The same from the content of a file.
+    """The same as :func:`load_contact_plan` from the content of a file.
 
     Args:
         content: Plain values, as of :meth:`PlannedContacts.to_dict`.
         source: Name of the file, for messages.
         folder: Folder that relative paths start from; the current one when omitted.
-
-    Raises:
-        ScenarioError: One line that names the file, the key, what was wrong and what is valid.
     """
     file = validate(ContactPlanFile, json.loads(json.dumps(content)), source)
     scenario = scenario or _own_scenario(file, source, folder or Path())
     if file.body is not None and file.body != scenario.file.body:
-        raise ScenarioError(
-            f"{source}: body is not that of scenario {scenario.name!r}; valid: the same, or none"
-        )
+        problem = f"body is not that of scenario {scenario.name!r}"
+        raise ScenarioError(f"{source}: {problem}; valid: the same, or none")
     body = scenario.build_body()
     stages, before = [], {}
     for number, section in enumerate(file.stages):
@@ -297,9 +287,8 @@ def parse_contact_plan(
 
 def _own_scenario(file: ContactPlanFile, source: str, folder: Path) -> Scenario:
     if file.scenario is None:
-        raise ScenarioError(
-            f"{source}: scenario is missing; valid: a name, a file, or what a scenario file holds"
-        )
+        valid = "a name, a file, or what a scenario file holds"
+        raise ScenarioError(f"{source}: scenario is missing; valid: {valid}")
     if isinstance(file.scenario, str):
         beside = folder / file.scenario
         return load_scenario(str(beside) if beside.is_file() else file.scenario)
@@ -314,7 +303,9 @@ def _contact(
         valid = ", ".join(body.effectors) or "none, the body has no effectors"
         raise ScenarioError(f"{where}.contacts.{effector} is no effector of the body; valid: {valid}")
     try:
-        contact = build_contact(effector, entry, friction_of(scenario), _whole_sole(body, effector))
+        length, width = nominal_size(body, effector) or (0.01, 0.01)
+        whole = SoleSection(length_m=length, width_m=width)
+        contact = build_contact(effector, entry, friction_of(scenario), whole)
         if entry.rotation is not None:
             rotation = check_rotation(entry.rotation, "rotation")
             oriented = contact.kind is ContactKind.GRASP
@@ -331,19 +322,9 @@ def nominal_size(body: BodyModel, effector: str) -> tuple[float, float] | None:
     limb = next((limb for limb in body.limbs if limb.effector == effector), None)
     if limb is not None and limb.patch is not None:
         return limb.patch
-    if (
-        limb is None
-        or limb.kind is not ContactKind.SOLE
-        or body.sole_length is None
-        or body.sole_width is None
-    ):
+    if limb is None or limb.kind is not ContactKind.SOLE or not body.sole_length or not body.sole_width:
         return None
     return body.sole_length, body.sole_width
-
-
-def _whole_sole(body: BodyModel, effector: str) -> SoleSection:
-    length, width = nominal_size(body, effector) or (0.01, 0.01)
-    return SoleSection(length_m=length, width_m=width)
 
 
 def _posture(section: PostureSection | None, body: BodyModel, where: str) -> FloatArray | None:

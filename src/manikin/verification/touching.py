@@ -70,27 +70,20 @@ class ContactRows:
         self._touched: dict[int, frozenset[str]] = {}
         self._kept: list[Contact] = []
         share = 0.0 if rules.forefoot else LEAST_SHARE
-        self._angle = Worst("max_contact_angle_deg", "angle between contact and surface", ALIGNED_DEG, 1e-9)
-        self._point_angle = Worst(
-            "max_point_angle_deg", "angle between a point's normal and the surface", POINT_ALIGNED_DEG, 1e-9
-        )
-        self._distance = Worst(
-            "max_contact_distance_m", "distance between contact and surface", ON_SURFACE, 1e-9
-        )
+        angle, between = "angle between a point's normal and the surface", "between contact and surface"
+        self._angle = Worst("max_contact_angle_deg", f"angle {between}", ALIGNED_DEG, 1e-9)
+        self._point_angle = Worst("max_point_angle_deg", angle, POINT_ALIGNED_DEG, 1e-9)
+        self._distance = Worst("max_contact_distance_m", f"distance {between}", ON_SURFACE, 1e-9)
         self._grasp = Worst("max_grasp_distance_m", "distance between palm and what it grasps", GRASP_REACH)
         self._hidden = Worst("max_hidden_depth_m", "depth inside a solid", HIDDEN, 1e-9)
+        self._beyond = Worst("max_beyond_sole_m", "distance of contact points beyond the sole", 1e-3, 1e-9)
         self._share = Worst("min_sole_share", "part of the sole in contact", share, 1e-6)
         self._across = Worst("min_rung_share", "part of the sole's width on a rung", LEAST_ACROSS, 1e-6)
-        self._beyond = Worst("max_beyond_sole_m", "distance of contact points beyond the sole", 1e-3, 1e-9)
         self._friction = Worst("max_friction", "coefficient of friction", rules.friction, 1e-9)
         self._force = Worst("max_grasp_force_N", "force limit of a grasp", rules.grasp_force, 1e-9)
 
     def measure(self, contacts: Mapping[str, Contact], where: str) -> None:
-        """Measure the contacts of a stage that were not yet.
-
-        Args:
-            where: Of the stage.
-        """
+        """Measure the contacts of a stage that were not yet."""
         for name, contact in contacts.items():
             if id(contact) not in self._touched:
                 self._kept.append(contact)  # so that no other contact gets its id
@@ -102,12 +95,8 @@ class ContactRows:
 
     @property
     def rows(self) -> list[Requirement | None]:
-        """The requirements, those whose failure explains others first."""
-        quantities = (
-            self._angle, self._point_angle, self._distance, self._grasp, self._hidden, self._beyond,
-            self._share, self._across, self._friction, self._force,
-        )  # fmt: skip
-        return [item.row for item in quantities]
+        """The requirements in the order of their attributes: those whose failure explains others first."""
+        return [item.row for item in vars(self).values() if isinstance(item, Worst)]
 
     def _measured(self, contact: Contact, where: str) -> frozenset[str]:
         if contact.kind is ContactKind.GRASP:
@@ -163,9 +152,8 @@ class ContactRows:
             distance = abs(distances[near]) if distances else np.inf
             self._distance.take(distance, where)
             if distance <= ON_SURFACE:
-                touched.update(
-                    s.name for s, d in zip(self._solids, distances, strict=True) if abs(d) <= ON_SURFACE
-                )
+                measured = zip(self._solids, distances, strict=True)
+                touched |= {solid.name for solid, distance in measured if abs(distance) <= ON_SURFACE}
                 away = self._solids[near].distance((point + _RAISED * contact.normal)[None])[0]
                 rise = np.clip((away - distances[near]) / _RAISED, -1.0, 1.0)
                 self._point_angle.take(float(np.rad2deg(np.arccos(rise))), where)
@@ -183,9 +171,8 @@ class ContactRows:
         local, hull = contact.points, outline(contact.points)
         if hull is not None:
             middle = hull.mean(axis=0)
-            local = middle + (1.0 - 2e-3 / max(np.abs(hull - middle).max(), 2e-3)) * (
-                polygon_samples(hull) - middle
-            )
+            share = 1.0 - 2e-3 / max(np.abs(hull - middle).max(), 2e-3)
+            local = middle + share * (polygon_samples(hull) - middle)
         above = local + np.array([0.0, 0.0, _RAISED])
         points = contact.position + above @ contact.rotation_contact_to_world.T
         deepest, place = 0.0, where

@@ -25,6 +25,8 @@ def serve(
 ) -> None:
     """Show a motion file in the browser until Ctrl-C, on this computer only.
 
+    This and the other pages raise :class:`~manikin.errors.InputError` if the port is taken.
+
     Args:
         content: At least one motion, and the body.
         port: Port to listen on; 0 picks a free one.
@@ -32,7 +34,7 @@ def serve(
         others: Motions of others who are there, by name.
 
     Raises:
-        InputError: If the file holds no body or the port is taken.
+        InputError: If the file holds no body.
     """
     from manikin.viewer.session import ViewerSession
 
@@ -42,14 +44,7 @@ def serve(
 def serve_contacts(
     live: LiveContacts, port: int = 8080, announce: Callable[[str], None] | None = None
 ) -> None:
-    """Let the user drag a body through its scene and watch the contacts of its limbs, until Ctrl-C.
-
-    Args:
-        live: The body, its scene and where it begins; the others as of :func:`serve`.
-
-    Raises:
-        InputError: If the port is taken.
-    """
+    """Let the user drag a body through its scene and watch the contacts of its limbs, until Ctrl-C."""
     from manikin.viewer.drive import ContactViewer
 
     _run(ContactViewer(live, port), announce)
@@ -64,10 +59,7 @@ def serve_drive(
     """Let the user steer a walker with keys and sliders, in real time, until Ctrl-C.
 
     Args:
-        scene: Drawn around the walker, but not seen by it; ``port`` and ``announce`` as of :func:`serve`.
-
-    Raises:
-        InputError: If the port is taken.
+        scene: Drawn around the walker, but not seen by it.
     """
     from manikin.viewer.drive import WalkViewer
 

@@ -17,6 +17,9 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import HalfSpace, Plane, Scene
 
+HOST = "127.0.0.1"
+"""The viewer listens to this computer only."""
+
 
 class Page(ABC):
     """Serves one page until it is closed.
@@ -26,10 +29,7 @@ class Page(ABC):
     """
 
     def __init__(self, port: int, frame_rate: float) -> None:
-        """Start the server.
-
-        Args:
-            frame_rate: Largest number of pictures per second.
+        """Start the server, which makes at most ``frame_rate`` pictures per second.
 
         Raises:
             InputError: If the port is taken.
@@ -72,9 +72,6 @@ class Page(ABC):
                 self.server.stop()
 
 
-HOST = "127.0.0.1"
-"""The viewer listens to this computer only."""
-
 COLOURS = {
     "recorded": (106, 81, 163),
     "planned": (0, 114, 178),
@@ -83,7 +80,6 @@ COLOURS = {
     "right": (204, 121, 167),
     "trunk": (150, 156, 166),
     "obstacle": (186, 192, 202),
-    "floor": (236, 238, 241),
     "force": (230, 159, 0),
 }
 
@@ -130,9 +126,9 @@ def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) ->
         middle: (3,) the point [m].
         size: Of what is to be seen, a body aside: from farther away the larger it is [m].
     """
-    server.initial_camera.look_at = middle
-    server.initial_camera.position = middle + max(1.0, size / WHOLE) * VIEW
-    server.initial_camera.up = (0.0, 0.0, 1.0)
+    camera = server.initial_camera
+    camera.look_at, camera.up = middle, (0.0, 0.0, 1.0)
+    camera.position = middle + max(1.0, size / WHOLE) * VIEW
 
 
 class BodyShapes:
@@ -146,12 +142,7 @@ class BodyShapes:
     def __init__(
         self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7, root: str = "/body"
     ) -> None:
-        """Draw the body; what is inside it stays visible.
-
-        Args:
-            opacity: In [0, 1].
-            root: Name of the body on the page.
-        """
+        """Draw the body, called ``root`` on the page, with an opacity in [0, 1]."""
         self._body = body
         self.data = body.pinocchio.createData()
         self.frames: dict[str, viser.FrameHandle] = {}
@@ -160,10 +151,10 @@ class BodyShapes:
             triangles = segment_triangles(segment)
             if triangles is None:
                 continue
-            self.frames[segment.name] = server.scene.add_frame(f"{root}/{segment.name}", show_axes=False)
-            mesh = server.scene.add_mesh_simple(
-                f"{root}/{segment.name}/shape", *triangles, color=side_colour(segment.name), opacity=opacity
-            )
+            name = f"{root}/{segment.name}"
+            self.frames[segment.name] = server.scene.add_frame(name, show_axes=False)
+            colour = side_colour(segment.name)
+            mesh = server.scene.add_mesh_simple(f"{name}/shape", *triangles, color=colour, opacity=opacity)
             self._meshes.append(mesh)
 
     def paint(self, colour: tuple[int, int, int]) -> None:

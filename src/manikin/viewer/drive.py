@@ -3,7 +3,6 @@
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import HEURISTICS
 from manikin.planning.contacts.single_contact import LiveAnswer, LiveContacts, Role
+from manikin.runtime.display import readable
 from manikin.scene import Scene
 from manikin.viewer.canvas import COLOURS, VIEW, BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
 from manikin.walking import WalkController, WalkFrame
@@ -139,11 +139,11 @@ class WalkViewer(Page):
     def _build_controls(self) -> None:
         gui = self.server.gui
         with gui.add_folder("Directive"):
-            self._sliders = (
-                gui.add_slider("forward [m/s]", float(LOWEST[0]), float(HIGHEST[0]), 0.05, 0.0),
-                gui.add_slider("left [m/s]", float(LOWEST[1]), float(HIGHEST[1]), 0.05, 0.0),
-                gui.add_slider("turn left [rad/s]", float(LOWEST[2]), float(HIGHEST[2]), 0.05, 0.0),
-            )
+            labels = "forward [m/s]", "left [m/s]", "turn left [rad/s]"
+            self._sliders = [
+                gui.add_slider(label, float(low), float(high), 0.05, 0.0)
+                for label, low, high in zip(labels, LOWEST, HIGHEST, strict=True)
+            ]
             self._follow = gui.add_checkbox("camera follows", initial_value=True)
         with gui.add_folder("Keys"):
             gui.add_markdown("\n".join(f"- **{key.shown}**: {key.label.lower()}" for key in KEYS))
@@ -152,10 +152,7 @@ class WalkViewer(Page):
         for handle in self._sliders:
             handle.on_update(self._slid)
         for key in KEYS:
-            gui.add_command(key.label, hotkey=key.hotkey).on_trigger(partial(self._pressed, key))
-
-    def _pressed(self, key: Key, _event: object) -> None:
-        self.press(key)
+            gui.add_command(key.label, hotkey=key.hotkey).on_trigger(lambda _, key=key: self.press(key))
 
     def _welcome(self, client: "ClientHandle") -> None:
         """Point the camera of a new visitor at the walker."""
@@ -191,17 +188,11 @@ class WalkViewer(Page):
                     # What the page last said of its camera may be late, but not how it looks at the walker.
                     view = client.camera.position - client.camera.look_at
                     client.camera.position, client.camera.look_at = middle + view, middle
-        self._text.content = _lines(frame)
-
-
-def _lines(frame: WalkFrame) -> str:
-    forward, left, angular = frame.velocity
-    standing = [name for name, on in zip(("left", "right"), frame.support, strict=True) if on]
-    lines = [
-        f"- forward {forward:.2f} m/s, left {left:.2f} m/s, turning {angular:.2f} rad/s",
-        f"- standing on: {', '.join(standing) or 'nothing'}",
-    ]
-    return "\n".join([*lines, *([f"- {frame.notice}"] if frame.notice else [])])
+        forward, left, angular = frame.velocity
+        standing = [name for name, on in zip(("left", "right"), frame.support, strict=True) if on]
+        lines = [f"forward {forward:.2f} m/s, left {left:.2f} m/s, turning {angular:.2f} rad/s"]
+        lines += [f"standing on: {', '.join(standing) or 'nothing'}", frame.notice or ""]
+        self._text.content = "\n".join(f"- {line}" for line in lines if line)
 
 
 NORMAL = 0.2
@@ -224,9 +215,6 @@ class ContactViewer(Page):
 
     def __init__(self, live: LiveContacts, port: int = 8080) -> None:
         """Start the server and show the first contacts.
-
-        Args:
-            live: The body, its scene and where it begins.
 
         Raises:
             InputError: If the port is taken.
@@ -309,10 +297,7 @@ class ContactViewer(Page):
             self.pulling = gui.add_checkbox("hold on and pull", initial_value=self.live.pulling)
         with gui.add_folder("Contacts"):
             self.heuristic = gui.add_dropdown("heuristic", HEURISTICS, initial_value=self.live.heuristic)
-            self.limbs = {
-                name: gui.add_checkbox(name.replace("_", " "), initial_value=name in self.live.limbs)
-                for name in names
-            }
+            self.limbs = {name: gui.add_checkbox(readable(name), name in self.live.limbs) for name in names}
         with gui.add_folder("Now"):
             self._text = gui.add_markdown("")
         for handle in (self.azimuth, self.elevation):
@@ -335,16 +320,11 @@ class ContactViewer(Page):
                 if contact is not None:
                     arrow.points = _arrow(contact.position, NORMAL * contact.normal)
                 arrow.visible = contact is not None
-        self._text.content = "\n".join([f"**{1e3 * answer.wall_s:.1f} ms**", "", *_results(answer)])
-
-
-def _results(answer: LiveAnswer) -> list[str]:
-    """Result of each limb, in one line each."""
-    lines = []
-    for name, result in answer.answers.items():
-        words = f"{result.obstacle}, EFORT {answer.efforts[name]:.2f}" if result.found else result.message
-        lines.append(f"- {name.replace('_', ' ')}: {words}")
-    return lines
+        lines = [f"**{1e3 * answer.wall_s:.1f} ms**", ""]
+        for name, result in answer.answers.items():
+            words = f"{result.obstacle}, EFORT {answer.efforts[name]:.2f}" if result.found else result.message
+            lines.append(f"- {readable(name)}: {words}")
+        self._text.content = "\n".join(lines)
 
 
 def _arrow(start: FloatArray, vector: FloatArray) -> FloatArray:

@@ -73,7 +73,11 @@ class ViewerSession(Page):
         self.time = float(self.motion.time[0])
         self._build_scene()
         self._build_body()
-        self._build_others(others or {})
+        self._others = [
+            (BodyShapes(self.server, other.body, 0.35, f"/others/{name}"), list(other.motions.values())[-1])
+            for name, other in (others or {}).items()
+            if other.body is not None
+        ]
         self._build_controls()
         self.put_beside(self.beside)
 
@@ -93,7 +97,8 @@ class ViewerSession(Page):
                 self._place_legs(motion, index)
                 self._place_forces(motion, index)
                 self._com.position = motion.com[index]
-                self._place_others()
+                for shapes, other in self._others:
+                    shapes.place(other.q[self._sample(other)])
                 self._place_beside()
             self._show_numbers(motion, index)
 
@@ -103,11 +108,15 @@ class ViewerSession(Page):
         Raises:
             InputError: If the file does not hold it.
         """
-        if name not in self.content.motions:
-            raise InputError(f"motion is {name!r}; valid here: {', '.join(self.content.motions)}")
+        self._check(name, *self.content.motions)
         with self._lock:
             self.chosen = name
             self.show(self.time)
+
+    @staticmethod
+    def _check(name: str, *valid: str) -> None:
+        if name not in valid:
+            raise InputError(f"motion is {name!r}; valid here: {', '.join(valid)}")
 
     def put_beside(self, name: str) -> None:
         """Show a motion of the file beside the chosen one, at the same instant.
@@ -118,8 +127,7 @@ class ViewerSession(Page):
         Raises:
             InputError: If the file does not hold it.
         """
-        if name not in (NOTHING, *self.content.motions):
-            raise InputError(f"motion is {name!r}; valid here: {NOTHING}, {', '.join(self.content.motions)}")
+        self._check(name, NOTHING, *self.content.motions)
         with self._lock:
             self.beside = name
             if name != NOTHING:
@@ -192,20 +200,9 @@ class ViewerSession(Page):
         )
         self._arrows = {name: add_arrow(self.server, f"/forces/{name}", COLOURS["force"]) for name in names}
 
-    def _build_others(self, others: Mapping[str, MotionFile]) -> None:
-        self._others: list[tuple[BodyShapes, Motion]] = []
-        for name, content in others.items():
-            assert content.body is not None
-            shapes = BodyShapes(self.server, content.body, 0.35, f"/others/{name}")
-            self._others.append((shapes, list(content.motions.values())[-1]))
-
     def _sample(self, motion: Motion) -> int:
         """Sample of a motion at the instant shown."""
         return int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))
-
-    def _place_others(self) -> None:
-        for shapes, motion in self._others:
-            shapes.place(motion.q[self._sample(motion)])
 
     def _place_beside(self) -> None:
         together = self.beside != NOTHING
@@ -218,24 +215,21 @@ class ViewerSession(Page):
         q = np.array(motion.q[self._sample(motion)])
         q[:2] += self._aside
         self._second.place(q)
-        for label, name, shapes in zip(
-            self._names, (self.chosen, self.beside), (self._shapes, self._second), strict=True
-        ):
+        bodies = (self.chosen, self._shapes), (self.beside, self._second)
+        for label, (name, shapes) in zip(self._names, bodies, strict=True):
             label.text, label.position = name, shapes.top()
 
     def _place_forces(self, motion: Motion, index: int) -> None:
         for number, name in enumerate(motion.contact_names):
             force = motion.contact_force[index, number, :3]
-            drawn = bool(np.linalg.norm(force) >= SMALLEST_FORCE) and self._forces_wanted()
+            drawn = bool(np.linalg.norm(force) >= SMALLEST_FORCE) and self._forces.value
             if drawn:
-                start = self._effector_place(name, index)
+                if name in self._feet:
+                    start = self._feet[name][index]
+                else:
+                    start = self._shapes.data.oMf[self._body.effector_frame(name)].translation
                 self._arrows[name].points = np.array([[start, start + METRES_PER_NEWTON * force]])
             self._arrows[name].visible = drawn
-
-    def _effector_place(self, name: str, index: int) -> FloatArray:
-        if name in self._feet:
-            return self._feet[name][index]
-        return self._shapes.data.oMf[self._body.effector_frame(name)].translation
 
     def _place_legs(self, motion: Motion, index: int) -> None:
         """Draw the massless legs of a point mass as lines, those in contact thicker."""
@@ -250,9 +244,6 @@ class ViewerSession(Page):
         self.server.scene.add_line_segments(
             path, lines, colour, thickness=thickness, thickness_units="screen"
         )
-
-    def _forces_wanted(self) -> bool:
-        return not hasattr(self, "_forces") or self._forces.value
 
     # --- controls ------------------------------------------------------------------------
 
@@ -270,27 +261,23 @@ class ViewerSession(Page):
             self._text = gui.add_markdown("")
         with gui.add_folder("Margin"):
             self._build_plot()
-        self._slider.on_update(lambda event: self._scrubbed(event.client is not None))
+        # The slider is followed unless it was this session that moved it.
+        self._slider.on_update(lambda event: None if event.client is None else self.show(self._slider.value))
         self._button.on_click(lambda _: self.pause() if self.playing else self.play())
         speed.on_update(lambda _: setattr(self, "speed", float(speed.value)))
         motions.on_update(lambda _: self.choose(motions.value))
         beside.on_update(lambda _: self.put_beside(beside.value))
         self._forces.on_update(lambda _: self.show(self.time))
 
-    def _scrubbed(self, by_hand: bool) -> None:
-        """Follow the slider, unless it was this session that moved it."""
-        if by_hand:
-            self.show(self._slider.value)
-
     def _build_plot(self) -> None:
-        start = min(float(motion.time[0]) for motion in self.content.motions.values())
-        end = max(float(motion.time[-1]) for motion in self.content.motions.values())
+        motions = self.content.motions.values()
+        start, end = min(motion.time[0] for motion in motions), max(motion.time[-1] for motion in motions)
         self._plot_time = np.linspace(start, end, PLOT_POINTS)
         self._plot_margins = [
             np.interp(self._plot_time, motion.time, motion.margin, left=np.nan, right=np.nan)
-            for motion in self.content.motions.values()
+            for motion in motions
         ]
-        known = np.concatenate([motion.margin for motion in self.content.motions.values()])
+        known = np.concatenate([motion.margin for motion in motions])
         known = known[np.isfinite(known)]
         low, high = float(known.min(initial=0.0)), float(known.max(initial=1.0))
         self._plot_range = (low - 0.05 * (high - low), high + 0.05 * (high - low))

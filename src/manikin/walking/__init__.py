@@ -23,11 +23,10 @@ from manikin.walking.path.walking_model import (
     RECORDED_TURNS,
     RECORDED_WALKS,
     START,
-    TEST_TARGETS,
     WalkObjective,
     experiment_targets,
 )
-from manikin.walking.path.walking_path import WalkingPath, walked
+from manikin.walking.path.walking_path import WalkingPath
 from manikin.walking.segmentation import (
     HOLONOMIC,
     KINDS,
@@ -42,11 +41,11 @@ from manikin.walking.stepper import StepRule, place_footprints, walked_footprint
 
 __all__ = [
     "HOLONOMIC", "KINDS", "LITERAL_ORDER", "NONHOLONOMIC", "PROSE_ORDER", "RECORDED_TURNS",
-    "RECORDED_WALKS", "STANDING", "START", "TEST_TARGETS", "CategorySpread", "CategoryStatistics",
+    "RECORDED_WALKS", "STANDING", "START", "CategorySpread", "CategoryStatistics",
     "Footprints", "HolonomicZone", "PathSegments", "SegmentationRule", "ShoulderPaths", "StepRule",
     "Walk", "WalkController", "WalkFrame", "WalkObjective", "WalkObstacle", "WalkRoute", "Walker",
     "WalkingPath", "Waypoint", "category_goals", "category_of", "category_statistics",
     "experiment_targets", "floor_plan", "holonomic_ends", "holonomic_zone", "load_library",
-    "path_deviation", "place_footprints", "save_library", "segment_path", "walk_along", "walked",
+    "path_deviation", "place_footprints", "save_library", "segment_path", "walk_along",
     "walked_footprints", "walking_path", "walking_route",
 ]  # fmt: skip

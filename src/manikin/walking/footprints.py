@@ -1,15 +1,11 @@
-"""Footprints of a walk in time, and the stances they make."""
-
-from __future__ import annotations
+"""Footprints of a walk in time."""
 
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 
@@ -53,14 +49,6 @@ class Footprint:
             leaves=finite_number(leaves, f"footprint of {effector} leaves [s]", above=lands),
         )
 
-    def placed(self, place: ArrayLike, height: float = 0.0) -> Footprint:
-        """The same in a frame that stands at ``place``: x, y [m] and yaw [rad], at a height [m]."""
-        x, y, turn = (float(value) for value in frozen_array(place, "place [m, m, rad]", (3,)))
-        c, s = np.cos(turn), np.sin(turn)
-        ahead, left, above = self.position
-        position = [x + c * ahead - s * left, y + s * ahead + c * left, above + height]
-        return Footprint(self.effector, position, self.yaw + turn, self.lands, self.leaves)
-
 
 @dataclass(frozen=True, eq=False)
 class Footprints:
@@ -96,11 +84,6 @@ class Footprints:
         return max(step.leaves for step in self.steps)
 
     @property
-    def duration(self) -> float:
-        """Duration of the walk [s]."""
-        return self.end - self.start
-
-    @property
     def count(self) -> int:
         """Number of steps, the two supports at the start not counted."""
         return len(self.steps) - len(FEET)
@@ -121,56 +104,6 @@ class Footprints:
         """Double and single supports in order: footprints by foot, and duration [s]."""
         for begin, end, held in self._intervals():
             yield held, end - begin
-
-    def schedule(
-        self, *, length: float, width: float, friction: float, normal_force_cap: float
-    ) -> ContactSchedule:
-        """Stances of the walk with full soles, at the times of the walk.
-
-        Args:
-            length: Length of the soles [m].
-            width: Width of the soles [m].
-            friction: Coulomb coefficient [-].
-            normal_force_cap: Largest sum of the normal forces of each stance [N].
-        """
-        made: dict[Footprint, Contact] = {
-            step: sole(step.effector, step.position, step.yaw, length=length, width=width, friction=friction)
-            for step in self.steps
-        }
-        phases = [
-            Phase(Stance([made[step] for step in held.values()], normal_force_cap), seconds, seconds)
-            for held, seconds in self.phases()
-        ]
-        instants = np.cumsum([0.0, *(phase.min_duration for phase in phases)])
-        return ContactSchedule(StanceSequence(phases), instants)
-
-    def followed_by(self, other: Footprints) -> Footprints:
-        """Another walk after this one, which begins on the footprints on which this one ends.
-
-        Raises:
-            InputError: If it begins elsewhere.
-        """
-        last, first = self.last(), other.first()
-        shift = self.end - other.start
-        for foot in FEET:
-            gap = float(np.abs(last[foot].position - first[foot].position).max())
-            turn = abs(float(np.angle(np.exp(1j * (last[foot].yaw - first[foot].yaw)))))
-            if max(gap, turn) > 1e-6:
-                raise InputError(
-                    f"footprints that follow begin {gap:.3g} m and {turn:.3g} rad from where {foot} stands; "
-                    "valid: on the same places"
-                )
-        joined = [step for step in self.steps if step is not last[step.effector]]
-        for foot in FEET:
-            step = last[foot]
-            leaves = first[foot].leaves + shift
-            joined.append(Footprint(foot, step.position, step.yaw, step.lands, leaves))
-        for step in other.steps:
-            if step is not first[step.effector]:
-                joined.append(
-                    Footprint(step.effector, step.position, step.yaw, step.lands + shift, step.leaves + shift)
-                )
-        return Footprints(joined)
 
     def _check(self, foot: str) -> None:
         steps = self.of(foot)

@@ -18,7 +18,6 @@ from manikin.walking.segmentation import (
     NONHOLONOMIC,
     THESIS_RULE,
     PathSegments,
-    SegmentationRule,
     ShoulderPaths,
     segment_path,
 )
@@ -44,10 +43,7 @@ def holonomic_ends(walk: PathSegments) -> HolonomicEnds:
 
     The print's sum (4.10) counts its points otherwise than its step; this is the trapezoidal rule between all
     instants. Standing before and after the walk belongs to its ends. Without any nonholonomic frame, both
-    lengths are that of the whole way.
-
-    Args:
-        walk: A segmented walk, better off-line: a single nonholonomic frame ends the first part.
+    lengths are that of the whole way; a single one ends the first part, so walks are better cut off-line.
     """
     paths = walk.paths
     rates = np.asarray(np.gradient(paths.middle, 1.0 / paths.rate, axis=0))
@@ -89,13 +85,10 @@ class PathDeviation:
 
 
 def path_deviation(walks: Sequence[ShoulderPaths]) -> PathDeviation:
-    """Mean path of several walks and how far they are from it ([Truong2010]_ 4.4).
+    """Mean path of several walks to one goal and how far they are from it ([Truong2010]_ 4.4).
 
     All are rescaled in time to the shortest one and interpolated linearly at as many instants as it has.
     The thesis calls TD a sum of distances; its formula, used here, is their root mean square.
-
-    Args:
-        walks: At least two, from the same start to the same goal.
 
     Raises:
         InputError: If there are fewer than two walks.
@@ -169,7 +162,6 @@ class HolonomicZone:
 def holonomic_zone(
     goals: ArrayLike,
     walks: Sequence[PathSegments],
-    start: ArrayLike = START,
     *,
     largest_turn: float = HALF_EIGHTH,
 ) -> HolonomicZone:
@@ -181,21 +173,16 @@ def holonomic_zone(
 
     Args:
         goals: (k, 3) x, y [m], heading [rad] of every walk's goal.
-        walks: (k) segmented walks, better off-line.
-        start: (3,) of all walks.
+        walks: (k) segmented walks from :data:`START`, better off-line.
         largest_turn: Goals with a larger turn are left out [rad].
 
     Raises:
         InputError: If there are not as many goals as walks.
     """
-    begin = frozen_array(start, "start [m, m, rad]", (3,))
-    seen = seen_from(goals, begin)
+    seen = seen_from(goals)
     if len(seen) != len(walks):
         raise InputError(f"{len(seen)} goals of {len(walks)} walks; valid: one goal of each walk")
-    shares = []
-    for walk in walks:
-        aside, ahead = walk.share(HOLONOMIC), walk.share(NONHOLONOMIC)
-        shares.append(1.0 if ahead == 0.0 and aside > 0.0 else aside / max(1e-9, aside + ahead))
+    shares = [_holonomic_share(walk) for walk in walks]
     angle = np.abs(np.arctan2(seen[:, 1], seen[:, 0]))
     considered = (
         (angle >= HALF_EIGHTH - 1e-9) & (angle <= np.pi / 2 + 1e-9) & (np.abs(seen[:, 2]) <= largest_turn)
@@ -203,6 +190,12 @@ def holonomic_zone(
     return HolonomicZone(
         frozen_array(seen, "goals of the zone"), frozen_array(shares, "shares of the zone"), considered
     )
+
+
+def _holonomic_share(walk: PathSegments) -> float:
+    """Holonomic share of the moving frames [-]."""
+    aside, ahead = walk.share(HOLONOMIC), walk.share(NONHOLONOMIC)
+    return aside / max(1e-9, aside + ahead)
 
 
 HEADINGS_DEG = {
@@ -217,15 +210,7 @@ BESIDE = 0.25
 
 
 def seen_from(goals: ArrayLike, start: ArrayLike = START) -> FloatArray:
-    """Goals in the frame of a start: x ahead, y to the left.
-
-    Args:
-        goals: (k, 3) x, y [m], heading [rad] in the world.
-        start: (3,) the same.
-
-    Returns:
-        (k, 3) ahead, left [m], turn in (-pi, pi] [rad].
-    """
+    """(k, 3) ahead, left [m], turn in (-pi, pi] [rad] from a start to goals, x, y [m], heading [rad]."""
     begin = frozen_array(start, "start [m, m, rad]", (3,))
     ends = frozen_array(goals, "goals [m, m, rad]", (None, 3))
     way, (sine, cosine) = ends[:, :2] - begin[:2], (np.sin(begin[2]), np.cos(begin[2]))
@@ -234,16 +219,12 @@ def seen_from(goals: ArrayLike, start: ArrayLike = START) -> FloatArray:
 
 
 def category_of(goal: ArrayLike, start: ArrayLike = START) -> str | None:
-    """Category of a goal, or None if its heading is that of no category of its zone.
+    """Category of a goal (3,) seen from a start (3,), or None if its heading is that of none of its zone.
 
     F is in front, S at the side, B behind. LC, MC, HC are low, medium and high curvature of the way: it is
     bent least by a final heading in its own direction. The thesis gives the headings once, which makes sense
     for goals to the right; for goals to the left they are mirrored here. Goals straight ahead or behind count
     as being to the right.
-
-    Args:
-        goal: (3,) x, y [m], heading [rad].
-        start: (3,) the same.
     """
     ahead, left, turn = seen_from([frozen_array(goal, "goal [m, m, rad]", (3,))], start)[0].tolist()
     zone = "F" if ahead >= BESIDE else "B" if ahead <= -BESIDE else "S"
@@ -255,16 +236,11 @@ def category_of(goal: ArrayLike, start: ArrayLike = START) -> str | None:
 
 
 def category_goals(distance: float) -> list[tuple[str, FloatArray]]:
-    """Goals of the nine categories at one distance to the right of :data:`START`; mirrored ones are alike.
+    """21 goals, (3,) x, y [m], heading [rad], of the nine categories at one distance [m], at least 0.5.
 
-    The thesis shows the places of its goals in a drawing only (Fig. 4.14). Here they are 30, 45 and 60
-    degrees from straight ahead, aside, and 30, 45 and 60 degrees from straight behind.
-
-    Args:
-        distance: From the start [m], at least 0.5.
-
-    Returns:
-        21 names of categories with goals, (3,) x, y [m], heading [rad].
+    They are to the right of :data:`START`; mirrored ones are alike. The thesis shows their places in a
+    drawing only (Fig. 4.14). Here they are 30, 45 and 60 degrees from straight ahead, aside, and 30, 45 and
+    60 degrees from straight behind.
     """
     radius = finite_number(distance, "distance of the goals [m]", at_least=2.0 * BESIDE)
     goals = []
@@ -323,18 +299,11 @@ class CategoryStatistics:
 
 def category_statistics(
     walks: Iterable[tuple[ArrayLike, Sequence[ShoulderPaths]]],
-    start: ArrayLike = START,
-    rule: SegmentationRule = THESIS_RULE,
 ) -> dict[str, CategoryStatistics]:
-    """Statistics by category of walks from one start; goals of no category are left out.
+    """Statistics of walks from :data:`START` by the names of :data:`HEADINGS_DEG` that occur, in order.
 
-    Args:
-        walks: Every goal, (3,) x, y [m], heading [rad], with the walks to it.
-        start: (3,) of all walks.
-        rule: By which the walks are cut into segments, off-line.
-
-    Returns:
-        Statistics by the names of :data:`HEADINGS_DEG`, in their order, of the categories that occur.
+    Given is every goal, (3,) x, y [m], heading [rad], with the walks to it; goals of no category are left
+    out.
 
     Raises:
         InputError: If a goal has no walk.
@@ -343,17 +312,15 @@ def category_statistics(
     for goal, several in walks:
         if not several:
             raise InputError(f"goal {np.asarray(goal).tolist()} has no walk; valid: at least one")
-        name = category_of(goal, start)
+        name = category_of(goal)
         if name is not None:
             groups[name].append(several)
-    return {name: _statistics(group, rule) for name, group in groups.items() if group}
+    return {name: _statistics(group) for name, group in groups.items() if group}
 
 
-def _statistics(group: Sequence[Sequence[ShoulderPaths]], rule: SegmentationRule) -> CategoryStatistics:
-    segmented = [segment_path(walk, rule) for walks in group for walk in walks]
+def _statistics(group: Sequence[Sequence[ShoulderPaths]]) -> CategoryStatistics:
+    segmented = [segment_path(walk) for walks in group for walk in walks]
     ends = [holonomic_ends(walk) for walk in segmented]
-    aside, ahead = ([walk.share(kind) for walk in segmented] for kind in (HOLONOMIC, NONHOLONOMIC))
-    shares = [a / max(1e-9, a + b) for a, b in zip(aside, ahead, strict=True)]
     spreads = [path_deviation(walks) for walks in group if len(walks) > 1]
     return CategoryStatistics(
         goals=len(group),
@@ -361,7 +328,7 @@ def _statistics(group: Sequence[Sequence[ShoulderPaths]], rule: SegmentationRule
         from_origin=CategorySpread.of([item.from_origin for item in ends]),
         to_goal=CategorySpread.of([item.to_goal for item in ends]),
         patterned=float(np.mean([walk.pattern == "H-N-H" for walk in segmented])),
-        holonomic=float(np.mean(shares)),
+        holonomic=float(np.mean([_holonomic_share(walk) for walk in segmented])),
         average_deviation=float(np.mean([item.average for item in spreads])) if spreads else None,
         largest_deviation=max(item.largest for item in spreads) if spreads else None,
     )

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.errors import InputError
 from manikin.numerics.signals import SHARES, low_passed
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.recordings.readers.marker_sets import SIDES, segment_joint
+from manikin.recordings.readers.marker_sets import SIDES, joint_of
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.walking.path.walking_path import SampledWalk
 
@@ -74,31 +74,23 @@ class ShoulderPaths:
         Raises:
             InputError: If the recording has no such joints, or fewer than three frames.
         """
-        left, right = (
-            recording.positions[:, segment_joint(recording, f"{side}_upper_arm"), :2] for side in SIDES
-        )
+        left, right = (recording.positions[:, joint_of(recording, f"{side}_upper_arm"), :2] for side in SIDES)
         return cls(left, right, recording.rate)
 
     @classmethod
-    def of_walk(cls, path: SampledWalk, breadth: float = BREADTH) -> Self:
-        """Shoulders on both sides of a path, ``breadth`` [m] apart, see :meth:`of_places`."""
-        return cls.of_places(path.place, (len(path.time) - 1) / path.duration, breadth)
+    def of_walk(cls, path: SampledWalk) -> Self:
+        """Shoulders on both sides of a path, see :meth:`of_places`."""
+        return cls.of_places(path.place, (len(path.time) - 1) / path.duration)
 
     @classmethod
-    def of_places(cls, place: ArrayLike, rate: float, breadth: float = BREADTH) -> Self:
-        """Shoulders on both sides of places.
-
-        Args:
-            place: (n, 3) x, y [m], heading [rad].
-            rate: Places per second [Hz].
-            breadth: Distance between the shoulders [m].
+    def of_places(cls, place: ArrayLike, rate: float) -> Self:
+        """Shoulders on both sides of places (n, 3) x, y [m], heading [rad] at a rate [Hz].
 
         Raises:
-            InputError: If the breadth is not positive, or there are fewer than three places.
+            InputError: If there are fewer than three places.
         """
-        half = finite_number(breadth, "breadth of the shoulders [m]", at_least=LEAST_DISTANCE) / 2
         places = frozen_array(place, "places [m, m, rad]", (None, 3))
-        left = half * np.column_stack([-np.sin(places[:, 2]), np.cos(places[:, 2])])
+        left = 0.5 * BREADTH * np.column_stack([-np.sin(places[:, 2]), np.cos(places[:, 2])])
         return cls(places[:, :2] + left, places[:, :2] - left, rate)
 
     def __len__(self) -> int:
@@ -128,8 +120,7 @@ class ShoulderPaths:
     def velocities(self, frames: int = 1) -> FloatArray:
         """(n, 2, 2) of the left and the right shoulder, by central differences [m/s] ([Truong2010]_ 4.6).
 
-        Args:
-            frames: From a frame to either neighbour. Near the ends the missing neighbour is the end itself.
+        They are over some frames to either side. Near the ends the missing neighbour is the end itself.
         """
         index = np.arange(len(self))
         before, after = np.maximum(index - frames, 0), np.minimum(index + frames, len(self) - 1)
@@ -138,11 +129,8 @@ class ShoulderPaths:
     def low_passed(self, cutoff: float) -> "ShoulderPaths":
         """The paths without fast changes: Butterworth of second order, forward and backward.
 
-        [Truong2010]_ 4.3.4 filters with a "normalized cutoff frequency 0.5 Hz"; read as a share of the
-        Nyquist frequency, 25 Hz at its 100 Hz. The order is not given there.
-
-        Args:
-            cutoff: As a share of half the rate, between 0 and 1 [-].
+        The cutoff is a share of half the rate [-]. [Truong2010]_ 4.3.4 filters with a "normalized cutoff
+        frequency 0.5 Hz"; read as a share of the Nyquist frequency, 25 Hz at its 100 Hz. It gives no order.
         """
         padding = max(9, int(np.ceil(2.0 / cutoff)))
         left, right = (low_passed(path, cutoff, SHARES, padding) for path in (self.left, self.right))
@@ -161,9 +149,7 @@ def heading_of(points: FloatArray) -> FloatArray:
 def deviations(points: FloatArray, velocities: FloatArray) -> FloatArray:
     """(..., 2) body heading less direction of each shoulder's motion, within pi of zero [rad]; NaN at rest.
 
-    Args:
-        points: (..., 2, 2) left and right shoulder [m].
-        velocities: (..., 2, 2) of both [m/s].
+    Left and right shoulder are (..., 2, 2) [m], their velocities (..., 2, 2) [m/s].
     """
     tangent = np.arctan2(velocities[..., 1], velocities[..., 0])
     difference = heading_of(points)[..., None] - tangent

@@ -188,16 +188,9 @@ def _steps(
 
 
 def within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepRule) -> FloatArray:
-    """The nearest place that the hips allow a foot beside the other one.
+    """(3,) x, y [m], yaw [rad] nearest to the wanted ones that the hips allow a foot beside the other one.
 
-    Args:
-        wanted: (3,) x, y [m] and yaw [rad] of the foot.
-        other: (3,) the same of the one that stands.
-        side: Side of the foot, from :data:`SIDE`.
-        rule: Limits of the hips.
-
-    Returns:
-        (3,) x, y [m] and yaw [rad].
+    The other foot stands at ``other`` (3,); the side of the foot is from :data:`SIDE`.
     """
     outwards = np.clip(side * (wanted[2] - other[2]), -rule.toes_in, rule.toes_out)
     yaw = other[2] + side * outwards

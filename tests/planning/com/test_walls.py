@@ -116,7 +116,7 @@ def test_a_body_that_may_end_falling_needs_no_lift():
 
 def test_the_trials_have_the_weights_of_table_5_1():
     weights = {
-        name: load_scenario("walls", name).planning.weights
+        name: load_scenario("walls", name).file.planning.weights
         for name in list_variants("walls")
         if "trial" in name
     }

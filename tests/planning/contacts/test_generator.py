@@ -522,7 +522,7 @@ def test_a_sample_is_deep_where_a_ball_along_its_limb_is(person, person_samples)
             for share in (0.0, 0.5):
                 centre = capsule.translation + share * capsule.size[1] * capsule.rotation[:, 2]
                 ball = coal.Transform3s(np.eye(3), place + turn @ centre)
-                depths.append(-measure(ball, there)[0])
+                depths.append(-measure(ball, there, np.inf)[0])
         if abs(max(depths) - depth) > 1e-5:
             assert (pair >= 0) == (max(depths) > depth)
         if pair >= 0:

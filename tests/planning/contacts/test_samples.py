@@ -97,12 +97,12 @@ def test_natural_samples_keep_to_the_learnt_ranges(person, creature):
     )
     assert natural.natural
     assert not plain.natural
-    assert reach.contains(natural.angles).all()
-    assert 0.15 < reach.contains(plain.angles).mean() < 0.45
+    assert reach.normalised(natural.angles).min() >= 0.0
+    assert 0.15 < (reach.normalised(plain.angles) >= 0.0).mean() < 0.45
     for name in ("left_knee", "left_leg"):
         limb = limb_named(person, name)
         samples = sample_limb(person, limb, np.random.default_rng(1), 500, natural=True)
-        assert NaturalRange(person, limb).contains(samples.angles).all()
+        assert NaturalRange(person, limb).normalised(samples.angles).min() >= 0.0
     same = [
         sample_limb(creature, leg, np.random.default_rng(1), 300, natural=f).angles for f in (False, True)
     ]
@@ -113,4 +113,4 @@ def test_mirrored_natural_samples_are_natural(person):
     samples = sample_limbs(person, np.random.default_rng(0), 500, natural=True)
     right = samples["right_leg"]
     assert right.natural
-    assert NaturalRange(person, right.limb).contains(right.angles).all()
+    assert NaturalRange(person, right.limb).normalised(right.angles).min() >= 0.0

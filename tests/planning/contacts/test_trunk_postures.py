@@ -78,6 +78,7 @@ def test_quick_test_agrees_with_measured_distances(postures: TrunkPostures) -> N
                 part_meter(shape, part)(
                     coal.Transform3s(turn @ rotation, turn @ centre + place[:3]),
                     coal.Transform3s(part.rotation, part.translation),
+                    np.inf,
                 )[0]
                 for shape, rotation, centre in shapes
                 for part in parts

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
-from manikin.planning.guide import Condition, ReachabilityChecker, root_pose
-from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, SamplingRegion
+from manikin.planning.guide import Condition, ReachabilityChecker
+from manikin.planning.guide.sampler import PoseSampler, SamplingRegion
 from manikin.scene import Box, Obstacle, Scene
 
 SCENE = Scene(
@@ -25,8 +25,8 @@ def checker(bug):
     return ReachabilityChecker(bug, SCENE, Condition.limbs(at_least=2))
 
 
-def drawn(checker, seed, count=40, settings=None):
-    sampler, rng = PoseSampler(checker, REGION, settings), np.random.default_rng(seed)
+def drawn(checker, seed, count=40):
+    sampler, rng = PoseSampler(checker, REGION), np.random.default_rng(seed)
     return [sampler.draw(rng) for _ in range(count)]
 
 
@@ -51,7 +51,7 @@ def test_same_seed_same_bits(checker):
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_triangles_are_drawn_in_the_wanted_mixture(checker, share):
     """A share uniformly, the others by area; a thousand-fold draw leaves 5 standard errors."""
-    sampler = PoseSampler(checker, REGION, SamplerSettings(uniform_share=share))
+    sampler = PoseSampler(checker, REGION, share)
     edges = sampler.corners[:, 1:] - sampler.corners[:, :1]
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     count = 50_000
@@ -83,8 +83,3 @@ def test_misuse_is_told(checker):
     with pytest.raises(InputError, match="no surface within reach"):
         PoseSampler(ReachabilityChecker(checker.abstraction, Scene([SCENE["hold"]], None)),
                     SamplingRegion((50, 50, 50), (51, 51, 51)))  # fmt: skip
-    with pytest.raises(InputError, match="nothing to lie around"):
-        SamplingRegion.around(Scene([]))
-    around = SamplingRegion.around(SCENE, [root_pose((3.0, 0.0, 0.5))])
-    assert around.lower == pytest.approx([-1.5, -1.5, -1.0])
-    assert around.upper == pytest.approx([4.0, 1.5, 2.05])

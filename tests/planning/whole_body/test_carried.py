@@ -67,9 +67,9 @@ def test_the_load_is_in_the_torques_of_the_legs_too(standing):
     """Forces of the loaded body balance it: nothing is left at the root."""
     schedule, motion = standing
     loaded, found = carried_motion(BODY, motion, schedule, LOAD, "both")
-    direct = plan_forces(carrying(BODY, LOAD), schedule, motion.time, motion.q, motion.v, motion.a)
-    np.testing.assert_array_equal(found.tau, direct.tau)
-    assert direct.missing_wrench.max() < 2e-2
+    tau, _ = plan_forces(carrying(BODY, LOAD), schedule, motion.time, motion.q, motion.v, motion.a)
+    np.testing.assert_array_equal(found.tau, tau)
+    assert np.linalg.norm(tau[:, :6], axis=1).max() < 2e-2
     gravity = pin.computeGeneralizedGravity(loaded.pinocchio, loaded.pinocchio.createData(), motion.q[0])
     assert gravity[2] == pytest.approx((BODY.mass + LOAD) * GRAVITY)
 

@@ -16,7 +16,7 @@ from manikin.pipeline.run_directory import ComTrack, RunRecord
 from manikin.reports.alignment import align_phases, timing_rows
 from manikin.reports.comparison import compare_runs
 from manikin.reports.comparison_tables import report
-from manikin.reports.figures import COMPARISONS, write_comparison
+from manikin.reports.figures import COMPARISONS, write_figures
 
 LEFT, RIGHT = point("left_foot", (0, 0.1, 0), friction=0.7), point("right_foot", (0, -0.1, 0), friction=0.7)
 KINDS = {"l": [LEFT], "r": [RIGHT], "b": [LEFT, RIGHT], "-": []}
@@ -145,7 +145,7 @@ def test_other_scenarios_are_matched_by_their_supports(run):
 
 def test_phases_are_aligned_in_order_and_as_many_as_possible():
     pairs = align_phases(stances("blbrb"), stances("brb"))
-    matched = [(pair.first, pair.second) for pair in pairs if pair.matched]
+    matched = [pair for pair in pairs if None not in pair]
     assert [number for _, number in matched] == [0, 1, 2]
     assert matched[1:] == [(3, 1), (4, 2)]
 
@@ -154,16 +154,17 @@ def test_between_two_matches_the_nearer_contacts_decide():
     far = Stance([point("left_foot", (2.0, 0.1, 0), friction=0.7)], 1000.0)
     near = stances("l")[0]
     pairs = align_phases([far, near], [near])
-    assert [(pair.first, pair.second) for pair in pairs] == [(0, None), (1, 0)]
+    assert pairs == [(0, None), (1, 0)]
 
 
 @given(st.text("lrb-", max_size=7), st.text("lrb-", max_size=7))
 def test_an_alignment_holds_every_phase_once_in_order(one, other):
     pairs = align_phases(stances(one), stances(other))
-    assert [pair.first for pair in pairs if pair.first is not None] == list(range(len(one)))
-    assert [pair.second for pair in pairs if pair.second is not None] == list(range(len(other)))
-    assert all(one[p.first] == other[p.second] for p in pairs if p.first is not None and p.second is not None)
-    assert sum(p.matched for p in pairs) == longest_common(one, other)
+    assert [first for first, _ in pairs if first is not None] == list(range(len(one)))
+    assert [second for _, second in pairs if second is not None] == list(range(len(other)))
+    matched = [pair for pair in pairs if None not in pair]
+    assert all(one[first] == other[second] for first, second in matched)
+    assert len(matched) == longest_common(one, other)
 
 
 def longest_common(one, other):
@@ -177,13 +178,13 @@ def longest_common(one, other):
 
 def test_timing_rows_hold_the_key_instants(run):
     schedule = run.schedule
-    rows = timing_rows(align_phases(*[[p.stance for p in schedule.sequence]] * 2), schedule, schedule)
+    rows = timing_rows(schedule, schedule)
     np.testing.assert_array_equal([row.first.start_s for row in rows], schedule.instants[:-1])
     np.testing.assert_array_equal([row.second.end_s for row in rows], schedule.instants[1:])
 
 
 def test_figures_of_two_runs(run, tmp_path):
-    written = write_comparison(compare_runs(run, slowed(run, 1.5)), tmp_path)
+    written = write_figures(compare_runs(run, slowed(run, 1.5)), tmp_path)
     assert [path.stem for path in written] == list(COMPARISONS)
     bars = COMPARISONS["compare_timing"](compare_runs(run, slowed(run, 1.5))).axes[1].patches
     heights = [bar.get_height() for bar in bars]
@@ -195,7 +196,7 @@ def test_figures_of_two_runs(run, tmp_path):
 
 def test_figures_that_two_runs_do_not_allow_are_left_out(run, tmp_path):
     nothing = RunRecord("nothing", MotionFile(), {})
-    assert write_comparison(compare_runs(run, nothing), tmp_path) == []
+    assert write_figures(compare_runs(run, nothing), tmp_path) == []
     for draw in COMPARISONS.values():
         with pytest.raises(FigureError, match="this figure needs"):
             draw(compare_runs(nothing, run))

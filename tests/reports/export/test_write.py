@@ -31,9 +31,9 @@ def test_csv_holds_every_number_under_its_name(finished_run):
 
 
 def test_executed_motion_is_the_default_and_others_can_be_asked_for(finished_run):
-    assert pick_motion(finished_run)[0] == "executed"
-    assert pick_motion(finished_run, "planned")[1] is finished_run.planned
-    assert pick_motion(replace(finished_run, executed=None))[0] == "planned"
+    assert pick_motion(finished_run) is finished_run.executed
+    assert pick_motion(finished_run, "planned") is finished_run.planned
+    assert pick_motion(replace(finished_run, executed=None)) is finished_run.planned
     with pytest.raises(InputError, match="valid here: planned, executed"):
         pick_motion(finished_run, "recorded")
 

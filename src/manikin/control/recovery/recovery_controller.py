@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments
-from manikin.contact import Contact
 from manikin.control.build_qp import JointBounds, force_variables
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import (
@@ -36,10 +35,8 @@ from manikin.control.recovery.standing import (
     JointGroups,
     LinearMap,
     Standing,
-    SupportArea,
     close_loop,
     joint_groups,
-    load_row,
     zmp_rows,
 )
 from manikin.control.recovery.strategy import (
@@ -65,18 +62,12 @@ def held_posture(
     state: DynamicsState, standing: Standing, groups: JointGroups, settings: RecoverySettings,
     resting: FloatArray,
 ) -> FloatArray:  # fmt: skip
-    """(nv - 6,) joint torques that hold a posture, whatever the ground can give [N.m].
+    """(nv - 6,) joint torques that hold the posture of a way to stand, whatever the ground can give [N.m].
 
     A spring has the gains of :attr:`RecoverySettings.stiffness` on the inertia of what hangs on its joint;
     hips and knees have :data:`LEG_STIFFNESS` at least, ankles :attr:`RecoverySettings.ankle_stiffness`. The
     springs act on the state at the end of the period, so that stiff ones on light segments do not swing up
-    ("stable PD", Tan et al. 2011).
-
-    Args:
-        standing: Whose posture is held.
-        groups: Of the joints.
-        settings: Stiffnesses and the period.
-        resting: (nv - 6,) torques at rest [N.m].
+    ("stable PD", Tan et al. 2011), beside the torques at rest (nv - 6,) [N.m].
     """
     period, joints = settings.period, groups.joints
     inertia = np.diag(state.mass_matrix)[6:]
@@ -158,6 +149,8 @@ class BalanceRecovery:
         for name in feet:
             if name not in self.groups.feet:
                 raise InputError(f"support has {name!r}; valid: {', '.join(self.groups.feet)}")
+        strength = self.settings.strength
+        self._torque_limits = strength * body.torque_lower, strength * body.torque_upper
         self._dynamics = Dynamics(body, _frames(body, self.groups.feet))
         self._solvers = {name: WarmQPSolver() for name in ("full", "relaxed", "loose")}
         self._previous = self._resting = np.zeros(joints)
@@ -183,31 +176,6 @@ class BalanceRecovery:
             if len(standing.soles) > 1 and abs(standing.posture[left] - standing.posture[right]) < ALIKE
         ]
 
-    @property
-    def posture(self) -> FloatArray:
-        """(nv - 6,) joint angles that are kept [rad]."""
-        return self.standing.posture
-
-    @property
-    def com(self) -> FloatArray:
-        """(3,) centre of mass that is kept [m]."""
-        return self.standing.com
-
-    @property
-    def soles(self) -> tuple[Contact, ...]:
-        """Soles that carry."""
-        return self.standing.soles
-
-    @property
-    def area(self) -> SupportArea:
-        """Where the ZMP may be."""
-        return self.standing.area
-
-    @property
-    def locked(self) -> NDArray[np.int64]:
-        """Hinges that hold the posture whatever happens."""
-        return self._objectives.locked
-
     def evaluate(self, q: FloatArray, v: FloatArray) -> DynamicsState:
         """Dynamics at a configuration (nq,) and velocity (nv,)."""
         return self._dynamics.evaluate(q, v)
@@ -216,9 +184,9 @@ class BalanceRecovery:
         """The program of a step at a state, with nothing pushing and an objective of no use."""
         felt = FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt)
-        rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
-        law = com_law(state, self.com, self.area, self.settings, self._turned)
-        objective = self._objectives.balancing(state, self.posture, law, self._time)
+        rows = zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
+        law = com_law(state, self.standing.com, self.standing.area, self.settings, self._turned)
+        objective = self._objectives.balancing(state, self.standing.posture, law, self._time)
         return build_recovery_qp(
             state, loop, self._contacts(state), felt, self._bounds(state), rows,
             LinearMap.none(loop.size), objective,
@@ -245,28 +213,35 @@ class BalanceRecovery:
         felt = push if push is not None else FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
         law = self._law(state, may_turn=swing is None)
-        strategy = self._switch.choose(state.com, law.settled, self.area)
-        rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
+        strategy = self._switch.choose(state.com, law.settled, self.standing.area)
+        rows = zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
         share, leaving = 0.0, False
         objective: Objective | None = None
         if swing is not None:
-            strategy, objective = Strategy.STEP, self._objectives.stepping(state, self.posture, law, *swing)
+            strategy = Strategy.STEP
+            objective = self._objectives.stepping(state, self.standing.posture, law, *swing)
         elif strategy is Strategy.POSTURE:
             control = self._posture_control(state, loop)
             if control is not None:
-                objective = self._objectives.held(state, self.posture, control.joints)
+                objective = self._objectives.held(state, self.standing.posture, control.joints)
                 share, leaving = control.share, not control.inside
                 self._arms.reset()
         if objective is None:
             strategy = Strategy.PROGRAM
-            objective = self._objectives.balancing(state, self.posture, law, self._time)
+            objective = self._objectives.balancing(state, self.standing.posture, law, self._time)
         contacts = self._contacts(state)
+        alike = leg_symmetry(loop, state.q[7:], self._alike, ALIKE)
+        # The ground carries at least a share of the weight; not in the thesis.
+        least = self.settings.least_load * state.mass * GRAVITY
+        loaded = LinearMap(-loop.force.matrix[2:], least - loop.force.offset[2:])
         problem = build_recovery_qp(
             state, loop, contacts, felt, self._bounds(state), LinearMap.none(loop.size) if leaving else rows,
-            self._wished(state, loop), objective, pulling=leaving,
+            alike.joined(loaded), objective, pulling=leaving,
         )  # fmt: skip
         solution, fallback = self._solve(problem)
-        tau = self._previous if solution is None else self._torque(problem, solution, state)
+        tau = self._previous
+        if solution is not None:  # with what overcomes the passive damping
+            tau = np.clip(problem.torque(solution.x) + self._damping * state.v[6:], *self._torque_limits)
         self._resting = self._previous = tau
         wrenches = dict(zip(self.standing.feet, _wrenches(contacts, solution, loop.size), strict=True))
         return RecoveryOutput(tau, strategy, share, wrenches, fallback, state, problem, self.standing)
@@ -275,29 +250,26 @@ class BalanceRecovery:
         """The law of the centre of mass one period later, with what has been turned meanwhile."""
         self._time += self.settings.period
         self._turned = self._turned + self.settings.period * fall_momentum(state)
-        law = com_law(state, self.com, self.area, self.settings, self._turned, may_turn=may_turn)
+        law = com_law(
+            state, self.standing.com, self.standing.area, self.settings, self._turned, may_turn=may_turn
+        )
         if law.need > 0.0:
-            self._arms.begin(self._time, law.settled - self.area.centre, law.reach, self._ahead)
+            self._arms.begin(self._time, law.settled - self.standing.area.centre, law.reach, self._ahead)
         return law
 
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave."""
         calm = zmp_rows(self._calm, loop, state.com, 0.0)
         gains = self.settings.posture
-        stiff = gains.stiffness * (self.posture - state.q[7:])
+        stiff = gains.stiffness * (self.standing.posture - state.q[7:])
         damped = -gains.damping * state.v[6:]
         return posture_control(loop, calm, stiff, damped, always=self.settings.posture_control_only)
-
-    def _wished(self, state: DynamicsState, loop: ClosedLoop) -> LinearMap:
-        """Rows that hold where they can: alike legs and a loaded ground."""
-        alike = leg_symmetry(loop, state.q[7:], self._alike, ALIKE)
-        return alike.joined(load_row(loop, self.settings.least_load * state.mass * GRAVITY))
 
     def _contacts(self, state: DynamicsState) -> list[ContactForceBasis]:
         share, model = self.settings.friction_share, inside_the_cone(self.settings.friction_model)
         return [
             contact_force_basis(contact, geometry, state, friction_share=share, friction_model=model)
-            for contact, geometry in zip(self.soles, self._geometry, strict=True)
+            for contact, geometry in zip(self.standing.soles, self._geometry, strict=True)
         ]
 
     def _bounds(self, state: DynamicsState) -> JointBounds:
@@ -305,16 +277,6 @@ class BalanceRecovery:
         return JointBounds.of(
             self.body, state, settings.joint_limit_horizon, settings.max_joint_acceleration, settings.strength
         )
-
-    @property
-    def _torque_limits(self) -> tuple[FloatArray, FloatArray]:
-        """(nv - 6,) most negative and largest joint torques [N.m]."""
-        strength = self.settings.strength
-        return strength * self.body.torque_lower, strength * self.body.torque_upper
-
-    def _torque(self, problem: RecoveryProblem, solution: QPSolution, state: DynamicsState) -> FloatArray:
-        """Torques of the solution, with what overcomes the passive damping."""
-        return np.clip(problem.torque(solution.x) + self._damping * state.v[6:], *self._torque_limits)
 
     def _solve(self, problem: RecoveryProblem) -> tuple[QPSolution | None, str]:
         solution = self._solvers["full"].solve(problem.program)

@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.control.build_qp import JointBounds
@@ -70,23 +69,15 @@ class ArmSwing:
             for end in ("shoulder_flexion", "shoulder_abduction", "elbow_flexion")
         )
         whole = len(flexion) == len(abduction) == len(elbow)
-        self._joints = np.array(flexion + abduction + elbow if whole else [], dtype=np.int64)
+        # Hinge indices: flexion, then abduction of the shoulders, then elbows.
+        self.joints = np.array(flexion + abduction + elbow if whole else [], dtype=np.int64)
         self._arms = len(flexion)
         self._began: float | None = None
-
-    @property
-    def joints(self) -> NDArray[np.int64]:
-        """Hinge indices: flexion, then abduction of the shoulders, then elbows."""
-        return self._joints
 
     def begin(self, time: float, fall: FloatArray, reach: float, ahead: FloatArray) -> None:
         """Begin at a time [s] where the body falls far ahead, unless the arms have been swung already.
 
-        Args:
-            time: Of the control.
-            fall: (2,) direction of the fall, of any length.
-            reach: Of the settled point over the soles.
-            ahead: (2,) unit vector of the body's heading.
+        The fall (2,) has any length, ``reach`` is that of the settled point, ``ahead`` (2,) the unit heading.
         """
         if self._began is None and reach > FAR and fall @ ahead > AHEAD * np.linalg.norm(fall):
             self._began = time
@@ -101,8 +92,8 @@ class ArmSwing:
         if since >= SWUNG:
             return None
         angles = (UP, SIDEWAYS if since < APART else 0.0, BENT) if since < RAISED else (DOWN, CLEAR, 0.0)
-        error = np.repeat(angles, self._arms) - state.q[7 + self._joints]
-        pull = PULL.stiffness * error - PULL.damping * state.v[6 + self._joints]
+        error = np.repeat(angles, self._arms) - state.q[7 + self.joints]
+        pull = PULL.stiffness * error - PULL.damping * state.v[6 + self.joints]
         return pull, RAISING if since < RAISED else SWINGING
 
 
@@ -220,13 +211,8 @@ def leg_symmetry(
     """Rows that let no pair of joints grow less alike ([Kudoh2002]_ 2.49-2.53).
 
     Where the right angle is the larger one its acceleration is at most the left one's, and the other way
-    round (the print has lost the signs of one of the two branches).
-
-    Args:
-        loop: Maps of the accelerations.
-        angles: (nv - 6,) [rad].
-        pairs: Indices of a left and a right hinge each.
-        tolerance: Angles that differ by less count as equal, which leaves the pair free [rad].
+    round (the print has lost the signs of one of the two branches). Of the angles (nv - 6,) [rad], those of
+    a pair, left and right, that differ by less than the tolerance [rad] count as equal: the pair is free.
     """
     rows, offsets = [], []
     for left, right in pairs:
@@ -276,11 +262,6 @@ class Objectives:
         """Keep weights, joints, the swing of the arms, and how the pelvis is kept while a foot steps."""
         self._settings, self._groups, self._arms, self._upright = settings, groups, arms, upright
         self._locked = groups.locked(settings.locked)
-
-    @property
-    def locked(self) -> NDArray[np.int64]:
-        """Hinges that hold the posture whatever happens."""
-        return self._locked
 
     def held(self, state: DynamicsState, posture: FloatArray, wanted: FloatArray) -> Objective:
         """Joint accelerations as wanted, and of locked joints what holds them."""

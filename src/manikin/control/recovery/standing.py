@@ -151,13 +151,9 @@ class FeltPush:
 def close_loop(
     state: DynamicsState, feet: tuple[str, ...], push: FeltPush, *, settling: float = 0.0
 ) -> ClosedLoop:
-    """Find the linear maps of the accelerations at a state.
+    """Find the linear maps of the accelerations at a state with a frame for each foot.
 
-    Args:
-        state: With a frame for each foot.
-        feet: Effectors that do not move.
-        push: What pushes besides the ground.
-        settling: Rate at which what the feet move all the same is damped [1/s].
+    The feet do not move; what they move all the same is damped at the rate ``settling`` [1/s].
     """
     frames = [state.frames[name] for name in feet]
     jacobian = np.concatenate([frame.jacobian for frame in frames])
@@ -276,13 +272,7 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
     With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` on
     the ground at the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and
     ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right
-    where ``f_z > 0``.
-
-    Args:
-        area: Where it may be.
-        loop: Maps of the force and the moment.
-        com: (3,) [m].
-        inset: Kept from the edge [m].
+    where ``f_z > 0``. The ZMP is kept ``inset`` [m] from the edge.
     """
     normals, offsets = area.half_planes(inset)
     moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)
@@ -291,11 +281,6 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
         normals @ moments - offsets[:, None] * loop.force.matrix[2],
         normals @ constant - offsets * loop.force.offset[2],
     )
-
-
-def load_row(loop: ClosedLoop, least: float) -> LinearMap:
-    """Row that is not positive when the ground carries at least a vertical force [N]; not in the thesis."""
-    return LinearMap(-loop.force.matrix[2:], least - loop.force.offset[2:])
 
 
 def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:

@@ -54,9 +54,7 @@ class Turning:
     def excess(self, weight: float, frequency: float) -> float:
         """Farthest that a capture point outside the soles can be brought back from [m].
 
-        Args:
-            weight: Of the body [N].
-            frequency: ``w`` [1/s].
+        For a body of a weight [N] whose pendulum has the frequency ``w`` [1/s].
         """
         if self.moment <= 0.0 or self.range <= 0.0:
             return 0.0
@@ -99,7 +97,7 @@ def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArr
     if not result.success:
         return 0.0
     height = controller.standing.height
-    ahead = float(np.max((controller.area.corners - state.com[:2]) @ towards))
+    ahead = float(np.max((controller.standing.area.corners - state.com[:2]) @ towards))
     by_zmp = GRAVITY / height * ahead
     return max(
         0.0, state.mass * height * (-float(result.fun) - float(towards @ loop.com.offset[:2]) - by_zmp)
@@ -110,7 +108,7 @@ def _turned(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> 
     """Largest angular momentum on the way to the ends of the ranges, and its integral."""
     body, axis = controller.body, np.array([-towards[1], towards[0], 0.0])
     speed = controller.settings.strength * body.velocity_limit
-    speed[controller.locked] = 0.0
+    speed[controller.groups.locked(controller.settings.locked)] = 0.0
     momentum = travel = 0.0
     for _ in range(round(LONGEST_TURN / TURN_STEP)):
         state = controller.evaluate(q, np.zeros(body.nv))
@@ -158,28 +156,23 @@ def held_impulse(limits: Sequence[EdgeLimit], direction: float) -> float:
 
 
 def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> tuple[EdgeLimit, ...]:
-    """Upper bounds of what is held without a step, by edge of the support area.
+    """Upper bounds of what a posture (nq,) holds of a push of a duration [s] without a step, by support edge.
 
     The pendulum is pushed with a constant force. Until it reacts it has the spring of its ankles. Over the
     side of two feet it has the stiffness of both legs, with which the ZMP can be at the edge at once, as with
     ankles of more than ``m g h`` per radian. Then its ZMP is at the edge and its flywheel turns. The mass
     stays as high as in the posture: the bound leaves out that a bent body is lower, and that trunk and arms
     which turn down unload the ground. A body holds less.
-
-    Args:
-        controller: Of the balance.
-        q: (nq,) the posture.
-        duration: Of the push [s].
     """
     posture = np.array(q, dtype=np.float64)
     weight = controller.body.mass * GRAVITY
     frequency = float(np.sqrt(GRAVITY / controller.standing.height))
-    normals, offsets = controller.area.half_planes()
+    normals, offsets = controller.standing.area.half_planes()
     limits = []
     for normal, offset in zip(normals, offsets, strict=True):
         turning = available_turning(controller, posture, normal)
         excess = turning.excess(weight, frequency)
-        room = float(offset - normal @ controller.com[:2])
+        room = float(offset - normal @ controller.standing.com[:2])
         impulse = _impulse(controller, normal, room, excess, duration)
         limits.append(EdgeLimit(normal, turning, excess, impulse))
     return tuple(limits)
@@ -189,7 +182,7 @@ def _impulse(
     controller: BalanceRecovery, normal: FloatArray, room: float, excess: float, duration: float
 ) -> float:
     """Impulse that puts the capture point at an excess over an edge when the control begins [N.s]."""
-    settings, feet = controller.settings, controller.soles
+    settings, feet = controller.settings, controller.standing.soles
     frequency = float(np.sqrt(GRAVITY / controller.standing.height))
     pull = 1.0 / (duration * controller.body.mass)
     pushed = min(duration, settings.delay)

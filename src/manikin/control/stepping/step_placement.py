@@ -88,14 +88,10 @@ FIRST_OF_TWO = 60
 def capture_after(
     capture: FloatArray, area: SupportArea, frequency: float, time: float, inset: float
 ) -> FloatArray:
-    """(2,) capture point after a time, with the ZMP as near to it as the support area allows [m].
+    """(2,) capture point after a time [s], with the ZMP as near to it as the support area allows [m].
 
-    Args:
-        capture: (2,) now [m].
-        area: Support area.
-        frequency: Of the pendulum [1/s].
-        time: [s].
-        inset: Of the ZMP from the edge [m].
+    ``capture`` (2,) is the one now [m], the frequency that of the pendulum [1/s], ``inset`` the distance of
+    the ZMP from the edge [m].
     """
     zmp = area.closest(capture, inset)
     return zmp + (capture - zmp) * np.exp(frequency * time)
@@ -106,14 +102,8 @@ def step_goals(
 ) -> Iterator[StepGoal]:
     """Steps that capture the body, the shortest in time first, then the shortest in space.
 
-    Where no single step does and two may be taken, those follow from which a second one does.
-
-    Args:
-        soles: Both feet on the ground, the left one first.
-        capture: (2,) capture point [m].
-        frequency: Of the pendulum [1/s].
-        settings: Limits.
-        steps: How many may be taken.
+    Where no single step does and two may be taken, those follow from which a second one does. Both feet are
+    on the ground, the left one first; capture point (2,) [m] and frequency [1/s] are those of the pendulum.
     """
     tried = [
         _reachable(soles, moving, capture, frequency, float(duration), settings)

@@ -1,5 +1,6 @@
 """Balance recovery with steps: where there is room for a foot, and how it gets there."""
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -81,13 +82,9 @@ class SwingFoot:
 
 
 def _ahead(state: FloatArray, goal: FloatArray, remaining: float, time: float) -> FloatArray:
-    """State after a time on the fifth-degree polynomial that comes to rest at a goal.
+    """State (3, 2) after a time [s] on the fifth-degree polynomial that rests at a goal (2,) [m].
 
-    Args:
-        state: (3, 2) position, velocity and acceleration.
-        goal: (2,) [m].
-        remaining: Time to the goal [s].
-        time: Time to go on [s].
+    The state is position, velocity and acceleration; the goal is reached in the remaining time [s].
     """
     if remaining <= time + 1e-9:
         return np.array([goal, np.zeros(2), np.zeros(2)])
@@ -133,17 +130,11 @@ class StepCheck:
     ) -> StepGoal | None:
         """First goal at which the foot lies on a surface and the body, there and half way, in nothing.
 
-        Args:
-            goals: Best first.
-            soles: Both feet before the step.
-            q: (nq,) present configuration.
-            clearance: Height of the foot half way [m].
+        Soles and configuration (nq,) are those before the step; half way the foot has a clearance [m].
         """
         self.refusal = "no step can be reached in time"
         before = {contact.effector: contact for contact in soles}
-        for number, goal in enumerate(goals):
-            if number == TRIED:
-                break
+        for goal in itertools.islice(goals, TRIED):
             moved = sole_at(self._body, goal.foot, goal.rotation, goal.position, self._friction)
             stays = next(contact for name, contact in before.items() if name != goal.foot)
             if not self.free(moved):
@@ -249,6 +240,7 @@ class SteppingRecovery:
         self.steps: list[StepTaken] = []
         self.refused = ""
         self._home = balance.standing
+        self._frequency = float(np.sqrt(GRAVITY / self._home.height))
         self._swing: SwingFoot | None = None
         self._from: Contact | None = None
         self._look_again = -np.inf
@@ -261,10 +253,6 @@ class SteppingRecovery:
 
         Args:
             time: Of the run [s].
-            q: (nq,) measured configuration.
-            v: (nv,) measured velocity.
-            push: Push that is felt.
-            reacting: Whether the reaction delay is over.
             touching: Whether each foot touches the ground.
         """
         swing = self._swing
@@ -282,21 +270,18 @@ class SteppingRecovery:
         return output
 
     def _must_step(self, time: float, state: DynamicsState) -> bool:
-        if len(self.steps) >= self.settings.most or len(self.balance.soles) != 2 or time < self._look_again:
+        standing = self.balance.standing
+        if len(self.steps) >= self.settings.most or len(standing.soles) != 2 or time < self._look_again:
             return False
-        room = float(self.balance.area.inside(self._capture(state)))
+        room = float(standing.area.inside(self._capture(state)))
         return room < (self.settings.again if self.steps else -self.settings.beyond)
 
     def _capture(self, state: DynamicsState) -> FloatArray:
         return capture_point(state.com, state.momentum[:3] / state.mass, self._home.height)
 
-    @property
-    def _frequency(self) -> float:
-        return float(np.sqrt(GRAVITY / self._home.height))
-
     def _lift(self, time: float, state: DynamicsState) -> None:
         """Begin the first step that the scene allows."""
-        soles = {contact.effector: contact for contact in self.balance.soles}
+        soles = {contact.effector: contact for contact in self.balance.standing.soles}
         left, right = (soles[name] for name in self.balance.groups.feet)
         left_over = self.settings.most - len(self.steps)
         goals = step_goals((left, right), self._capture(state), self._frequency, self.settings, left_over)
@@ -322,12 +307,12 @@ class SteppingRecovery:
         if remaining < self.settings.aim_until:
             return
         landing = capture_after(
-            self._capture(state), self.balance.area, self._frequency, remaining, self.settings.inset
+            self._capture(state), self.balance.standing.area, self._frequency, remaining, self.settings.inset
         )
         wanted = self._goal.position[:2] + landing - self._goal.capture
         goal = np.array([*wanted, self._goal.position[2]])
         moved = sole_at(self.body, swing.foot, swing.rotation, goal, self.balance.friction)
-        near = np.linalg.norm(goal - self.balance.soles[0].position) <= self.settings.reach
+        near = np.linalg.norm(goal - self.balance.standing.soles[0].position) <= self.settings.reach
         if near and self.check.free(moved):
             swing.goal = goal
 
@@ -335,7 +320,7 @@ class SteppingRecovery:
         """Both feet carry from now on, where they are."""
         assert self._from is not None
         state = Configuration(self.body, q)
-        stays = self.balance.soles[0]
+        stays = self.balance.standing.soles[0]
         _, position = state.effector_placement(swing.foot)
         middle = np.array([*position[:2], stays.position[2]])
         landed = sole_at(self.body, swing.foot, swing.rotation, middle, self.balance.friction)

@@ -17,13 +17,7 @@ from manikin.scenarios import Scenario
 
 
 def stage_at(endpoints: Endpoints, scenario: Scenario, end: str) -> Stage | str:
-    """Contacts and posture at the start or the goal of a scenario, or the reason why there are none.
-
-    Args:
-        endpoints: Finds them.
-        scenario: With start and goal.
-        end: ``"start"`` or ``"goal"``.
-    """
+    """Contacts and posture at the ``"start"`` or ``"goal"`` of a scenario, or why there are none."""
     state = getattr(scenario.file.task, end)
     heading, habit = float(np.deg2rad(state.heading_deg or 0.0)), Habit(state.posture or "standing")
     result = endpoints.find(np.array(state.at), heading, habit, state.height_m)
@@ -69,7 +63,7 @@ def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) ->
     result = plan_guide(world, GuideTask(*ends), rng)
     path = result.path
     places = None if path is None else path.poses(np.linspace(0.0, 1.0, GUIDE_PLACES))[:, :3]
-    return RootGuide(places, result.statistics.samples, clock.perf_counter() - began)
+    return RootGuide(places, result.samples, clock.perf_counter() - began)
 
 
 def _sunk(pose: FloatArray, checker: ReachabilityChecker) -> FloatArray | None:
@@ -119,8 +113,10 @@ class SearchTally:
         guide: (n, 3) places of the root on its guide, if one is needed [m].
     """
 
+    guide: FloatArray | None = None
+
     def __init__(self) -> None:
-        self._began, self.guide = clock.perf_counter(), None
+        self._began = clock.perf_counter()
         self.summary: dict[str, Any] = {
             "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
             "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,

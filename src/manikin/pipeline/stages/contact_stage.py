@@ -19,6 +19,7 @@ from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.execution_stage import act_of
 from manikin.planning.contacts import (
     ContactPlan,
+    CrawlSearch,
     Endpoint,
     Endpoints,
     Extension,
@@ -48,6 +49,7 @@ from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_brace
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import with_supports
+from manikin.scenarios.sections.task_sections import StateSection
 from manikin.scenarios.world import CLIMBING, carried_to, contact_rules
 from manikin.scene import Scene
 
@@ -82,6 +84,10 @@ class _ContactSearch:
         """The plan with what ends it, or why it cannot; the scenario with supports that a file can list."""
         return plan, None
 
+    def _asked(self) -> PostureFinderSettings:
+        model = self._scenario.contact_model.friction
+        return PostureFinderSettings(natural=self._natural, friction_model=model)
+
     def _endpoints(self, reference: FloatArray | None = None) -> Endpoints:
         return Endpoints(
             self._body, self._scene, self._scenario.contacts.friction, reference,
@@ -95,7 +101,7 @@ class _FootSearch(_ContactSearch):
 
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
         super().__init__(scenario, body, scene, rng)
-        self._reference = posture_style_of(scenario.manner).posture(body)
+        self._reference = posture_style_of(scenario.file.manner).posture(body)
         self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
         self._seat: Stage | None = None
@@ -112,28 +118,35 @@ class _FootSearch(_ContactSearch):
             if before.stage is None:
                 return self._tally.failed(f"the goal: {before.failure}", "goal")
             goal = before.stage
-        self._search = self._searched(start, goal)
-        return self._result(self._search.run())
+        walk = self._search = self._searched(start, goal)
+        found = walk.run()
+        if found.plan is None and walk.search.walled_off() is not None:
+            self._search, crawl = None, self._crawl(walk, start, goal)
+            found = replace(crawl, failure=f"{found.failure}; {crawl.failure}")
+        return self._result(found)
+
+    def _crawl(self, walk: WalkSearch, start: Stage, goal: Stage) -> Extension:
+        """The way on hands and knees below what is too low to walk under."""
+        return CrawlSearch(
+            walk.poser, self._places, start, goal, self._scenario.contacts.friction,
+            lambda first, last: self._searched(first, last).run(), walk.settings,
+        ).run()  # fmt: skip
 
     def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
-        whole = self._acting(plan) if self._seat is None else self._sitting(plan, self._seat)
+        whole = plan
+        if self._seat is not None:
+            whole = take_seat(self._poser(), plan, self._seat)
+        elif self._brace is not None:
+            whole = with_hands(self._body, plan, self._brace)
         return whole if isinstance(whole, str) else (whole, with_supports(self._scenario, whole))
 
     def _searched(self, start: Stage, goal: Stage) -> WalkSearch:
         options = self._scenario.contacts
-        asked = PostureFinderSettings(
-            natural=self._natural, friction_model=self._scenario.contact_model.friction
-        )
-        poser = PostureFinder(self._body, self._scene, self._reference, asked)
         settings = WalkSettings(stride=options.stride_m, grasp_force=options.grasp_force_N)
-        return WalkSearch(poser, start, goal, options.friction, settings)
+        return WalkSearch(self._poser(), start, goal, options.friction, settings)
 
-    def _sitting(self, way: ContactPlan, seat: Stage) -> ContactPlan | str:
-        """The way, and the body sits down at its end; or why it cannot."""
-        asked = PostureFinderSettings(
-            natural=self._natural, friction_model=self._scenario.contact_model.friction
-        )
-        return take_seat(PostureFinder(self._body, self._scene, self._reference, asked), way, seat)
+    def _poser(self) -> PostureFinder:
+        return PostureFinder(self._body, self._scene, self._reference, self._asked())
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""
@@ -152,10 +165,6 @@ class _FootSearch(_ContactSearch):
             return result.failure or ""
         self._brace = result.brace
         return arrival(self._body, result.brace)
-
-    def _acting(self, way: ContactPlan) -> ContactPlan:
-        """The way, and the hands on the object where there is an act."""
-        return way if self._brace is None else with_hands(self._body, way, self._brace)
 
 
 STANDING_HEIGHT = 0.92
@@ -188,16 +197,14 @@ class _LimbSearch(_ContactSearch):
 
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
         super().__init__(scenario, body, scene, rng)
-        self._limbs = _limbs(body, scenario.contact_limbs or ())
+        names = scenario.contact_limbs
+        self._limbs = tuple(limb_named(body, name) for name in names) if names else body.limbs
         self._kinds = {limb.name: _kind(body, limb) for limb in self._limbs}
         self._size = float(body.standing_posture()[2]) / STANDING_HEIGHT
         safe = max(self._size, SMALLEST)
-        style = None if body.stature is None else posture_style_of(scenario.manner)
+        style = None if body.stature is None else posture_style_of(scenario.file.manner)
         self._reference = np.array(body.standing_posture() if style is None else style.posture(body))
-        settings = PostureFinderSettings(
-            natural=self._natural, friction_model=scenario.contact_model.friction
-        )
-        self._poser = PostureFinder(body, scene, self._reference, settings.scaled(safe))
+        self._poser = PostureFinder(body, scene, self._reference, self._asked().scaled(safe))
         self._samples = samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
         ends = [limb for limb in self._limbs if not is_further(body, limb)] or self._limbs
         self._reach = float(np.mean([samples[limb.name].hull[1] for limb in ends]))
@@ -274,11 +281,10 @@ class _LimbSearch(_ContactSearch):
             result = stage_at(self._endpoints(), self._scenario, "start")
             yield Endpoint(None, result) if isinstance(result, str) else Endpoint(result)
             return
-        at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
-        q = self._standing(at, yaw, state.height_m)
+        q = self._standing(state)
         holds = self._holds(q[:7], goal)
         for result in starts_on_limbs(self._poser, holds, q, self._settings().shift_duration):
-            where = f"the start: no posture at {at.round(3).tolist()} m: "
+            where = f"the start: no posture at {np.array(state.at).round(3).tolist()} m: "
             yield result if result.stage is not None else Endpoint(None, f"{where}{result.failure}")
 
     def _goal(self) -> FloatArray | str:
@@ -286,13 +292,12 @@ class _LimbSearch(_ContactSearch):
         if self._body.stature is not None and not self._climbs:
             result = stage_at(self._endpoints(), self._scenario, "goal")
             return result if isinstance(result, str) else result.q[:7]
-        state = self._scenario.file.task.goal
-        yaw = float(np.deg2rad(state.heading_deg or 0.0))
-        return self._standing(np.array(state.at), yaw, state.height_m)[:7]
+        return self._standing(self._scenario.file.task.goal)[:7]
 
-    def _standing(self, at: FloatArray, yaw: float, height: float | None) -> FloatArray:
+    def _standing(self, state: StateSection) -> FloatArray:
         """(nq,) reference posture at a place, as high as if it stood there."""
-        level = self._level(at) if height is None else height
+        at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
+        level = self._level(at) if state.height_m is None else state.height_m
         return carried_to(self._reference, at, yaw, level)
 
     def _level(self, at: FloatArray) -> float:
@@ -306,8 +311,7 @@ class _LimbSearch(_ContactSearch):
 
     def _guide(self, start: FloatArray, goal: FloatArray) -> RootGuide:
         ends = np.array([start, goal])
-        volumes = [self._samples[limb.name].reach for limb in self._limbs]
-        abstraction = abstraction_of(self._body, volumes)
+        abstraction = abstraction_of(self._body, [self._samples[limb.name].reach for limb in self._limbs])
         world = GuideWorld(self._scene, abstraction, self._region(ends), self._condition())
         return guide_root(world, ends, self._rng)
 
@@ -315,11 +319,9 @@ class _LimbSearch(_ContactSearch):
         """Box around start and goal; headings between theirs, and a little beyond."""
         room = AROUND_LIMBS * STANDING_HEIGHT * self._size
         headings = np.unwrap([heading_of(pose) for pose in ends])
-        yaw = (headings.min() - LEAN, headings.max() + LEAN)
-        lean = (-LEAN, LEAN)
-        return SamplingRegion(
-            ends[:, :3].min(axis=0) - room, ends[:, :3].max(axis=0) + room, yaw=yaw, pitch=lean, roll=lean
-        )
+        yaw, lean = (headings.min() - LEAN, headings.max() + LEAN), (-LEAN, LEAN)
+        low, high = ends[:, :3].min(axis=0) - room, ends[:, :3].max(axis=0) + room
+        return SamplingRegion(low, high, yaw=yaw, pitch=lean, roll=lean)
 
     def _condition(self) -> Condition:
         """Limbs that cannot hold on reach something to stand on: all but two of more than four of them."""
@@ -332,10 +334,6 @@ class _LimbSearch(_ContactSearch):
         return Condition((rule,), dict.fromkeys(bearing, UsableSurface((0.0, 0.0, 1.0), STEEPEST)))
 
 
-def _limbs(body: BodyModel, names: tuple[str, ...]) -> tuple[Limb, ...]:
-    return tuple(limb_named(body, name) for name in names) if names else body.limbs
-
-
 def _kind(body: BodyModel, limb: Limb) -> ContactKind:
     """A person's hands hold on; all other limbs touch in their own way."""
     return ContactKind.GRASP if body.stature is not None and "hand" in limb.effector else limb.kind
@@ -346,9 +344,6 @@ def find_supports(
 ) -> ContactSearch:
     """Plan the contacts of a scenario that gives start and goal alone.
 
-    Args:
-        scenario: Without supports.
-
     Raises:
         BodyError: If the scenario names a limb that the body has not.
     """
@@ -358,10 +353,6 @@ def find_supports(
 
 def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     """Plan the supports of a scenario that lists none; None where there are none.
-
-    Args:
-        context: Of a scenario without supports.
-        report: Takes the ``contacts`` block.
 
     Raises:
         ScenarioError: If contacts of any limbs are asked for without the refinement, which alone takes them.
@@ -377,13 +368,7 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
 def plan_contacts_again(context: RunContext, report: Report, phase: int) -> RunContext | None:
     """Plan the supports again without the step of a phase, for which a later stage failed.
 
-    Args:
-        context: With the supports that failed.
-        report: Takes the ``contacts`` block again, in which the refused step is told.
-        phase: Index of the phase.
-
-    Returns:
-        None where there is no other plan; the failure of the later stage stays then.
+    None where there is no other plan; the failure of the later stage stays then.
     """
     failure, again = report.failure, context.search_again
     if failure is None or again is None or context.plan is None:

@@ -17,9 +17,9 @@ from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
 from manikin.motion.passage import Passage, measure_passage
-from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
+from manikin.numerics.spatial import IDENTITY, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
-from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, RunDirectory
+from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, SCENARIO, STAGES, SUMMARY, RunDirectory
 from manikin.pipeline.stages.contact_guides import ContactSearch
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
@@ -55,12 +55,10 @@ def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: Planar
     if transform_task_to_world.is_identity:
         return schedule
     # A contact that several phases hold stays one.
-    moved: dict[int, Contact] = {}
+    contacts = {id(contact): contact for phase in schedule.sequence for contact in phase.stance}
+    moved = {key: contact_in_world(item, transform_task_to_world) for key, item in contacts.items()}
     phases = []
     for phase in schedule.sequence:
-        for contact in phase.stance:
-            if id(contact) not in moved:
-                moved[id(contact)] = contact_in_world(contact, transform_task_to_world)
         stance = Stance([moved[id(contact)] for contact in phase.stance], model=phase.stance.model)
         load = phase.load
         if load is not None:
@@ -98,9 +96,8 @@ def trajectory_in_world(
 def plan_in_world(plan: ContactPlan, transform_task_to_world: PlanarTransform) -> PlannedContacts:
     """A contact plan as other programs and the check read it, in the world."""
     transform = transform_task_to_world
-    moved: dict[int, Contact] = {}
-    for contact in (contact for stage in plan.stages for contact in stage.contacts.values()):
-        moved.setdefault(id(contact), contact_in_world(contact, transform))
+    contacts = {id(contact): contact for stage in plan.stages for contact in stage.contacts.values()}
+    moved = {key: contact_in_world(contact, transform) for key, contact in contacts.items()}
     stages = [
         PlannedStage(
             {name: moved[id(contact)] for name, contact in stage.contacts.items()},
@@ -168,7 +165,7 @@ class RunContext:
         Raises:
             ScenarioError: If the body, the scene or the supports cannot be built.
         """
-        settings = settings or WholeBodySettings(manner=posture_style_of(scenario.manner))
+        settings = settings or WholeBodySettings(manner=posture_style_of(scenario.file.manner))
         body, scene = scenario.build_body(), scenario.build_scene()
         if scenario.file.supports is not None:
             scenario.check_contacts(scene)
@@ -177,10 +174,7 @@ class RunContext:
         return bare if task.file.supports is None else bare._posed(task)
 
     def with_supports(self, scenario: Scenario) -> "RunContext":
-        """The same for a scenario with supports, whose problem is posed.
-
-        Args:
-            scenario: In the frame of the task.
+        """The same for a scenario of the task frame with supports, whose problem is posed.
 
         Raises:
             ScenarioError: If the supports do not fit the scene, or a value is out of range.
@@ -188,25 +182,10 @@ class RunContext:
         scenario.check_contacts(self.scene)
         return self._posed(scenario)
 
-    def posed_problem(self) -> CentroidalProblem | KeyframeProblem:
-        """Problem of the centre of mass.
-
-        Raises:
-            ScenarioError: If there are no supports yet.
-        """
-        if self.problem is None:
-            raise ScenarioError(f"scenario {self.scenario.name!r} has no supports; valid: with supports")
-        return self.problem
-
     @property
     def padded(self) -> tuple[str, ...]:
         """Names of the obstacles that any part of the body may lean on."""
         return self.scenario.padded
-
-    @property
-    def known_postures(self) -> FloatArray | None:
-        """(n + 1, nq) postures of the contact plan, or None."""
-        return None if self.plan is None else self.plan.postures
 
     def _posed(self, scenario: Scenario) -> "RunContext":
         try:
@@ -240,10 +219,6 @@ class StageFailure:
     time_s: float
     where: str
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the ``failure`` block of the summary."""
-        return asdict(self)
-
 
 class Report:
     """Summary and files of one run; each is written as soon as it is known.
@@ -260,18 +235,15 @@ class Report:
     def __init__(
         self, context: RunContext, out: str | Path | None, progress: Progress | None, began: float
     ) -> None:
-        """Open the run directory.
+        """Open the run directory ``out``; nothing is written when None.
 
-        Args:
-            context: What is run.
-            out: Run directory; nothing is written when None.
-            began: Reading of ``time.perf_counter`` when the run began [s].
+        ``began`` is the reading of ``time.perf_counter`` when the run began [s].
 
         Raises:
             MotionFileError: If the directory cannot be made, or holds something that is not a run.
         """
         self._context, self._began = context, began
-        self.progress = progress or _silent
+        self.progress: Progress = progress or (lambda _stage, _share: None)
         self.failure: StageFailure | None = None
         self.planned: bool | None = False
         self.proved = False
@@ -280,7 +252,7 @@ class Report:
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
         if self._directory is not None:
-            self._directory.write_scenario(scenario.to_yaml())
+            self._directory.write(SCENARIO, scenario.to_yaml())
         stature = None if scenario.is_point_mass else context.body.stature
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
@@ -312,24 +284,16 @@ class Report:
         self.failure = StageFailure(stage, reason_in_world(reason, self.transform), float(time), where)
 
     def try_again(self, phase: int) -> None:
-        """Begin again with other contacts after a failure, which is kept among the refused ones.
-
-        Args:
-            phase: Index of the phase of the contacts that failed.
-        """
+        """Begin again with other contacts after a failure in a phase, which is kept among the refused."""
         if self.failure is not None:
-            self.refused.append({"phase": phase, **self.failure.as_dict()})
+            self.refused.append({"phase": phase, **asdict(self.failure)})
         self.failure, self.planned, self.proved = None, False, False
         self._tables = {}
         for stage in ("centroidal", "wholebody", "act", "execution"):
             self.summary[stage] = None
 
     def require(self, stage: str, table: RequirementTable) -> None:
-        """Take the requirements of a stage's result into the summary, in place of earlier ones.
-
-        Args:
-            stage: Stage whose result was measured.
-        """
+        """Take the requirements of a stage's result into the summary, in place of earlier ones."""
         self._tables[stage] = table
 
     def finish(self, stage: str, block: Mapping[str, Any]) -> None:
@@ -340,12 +304,12 @@ class Report:
     def keep(self, name: str, result: Mapping[str, Any]) -> None:
         """Keep what a stage found among the files of the run."""
         if self._directory is not None:
-            self._directory.write_stage(name, result)
+            self._directory.write(f"{STAGES}/{name}.json", result)
 
     def keep_scenario(self, scenario: Scenario) -> None:
         """Keep a scenario of the task frame with the supports that were found, in the world."""
         if self._directory is not None:
-            self._directory.write_scenario(scenario.from_task_frame(self.transform).to_yaml())
+            self._directory.write(SCENARIO, scenario.from_task_frame(self.transform).to_yaml())
 
     def keep_contact_plan(self, plan: ContactPlan) -> None:
         """Keep a contact plan of the task frame as a contact-plan file, in the world."""
@@ -378,14 +342,14 @@ class Report:
         word = "failed" if failure is not None else "proved" if required else "planned"
         self.summary |= {
             "verdict": word, "planned": self.planned, "proved": self.proved, "succeeded": failure is None,
-            "failure": None if failure is None else failure.as_dict(),
+            "failure": None if failure is None else asdict(failure),
             "requirements": [
                 row.as_dict(stage) for stage, table in self._tables.items() for row in table
             ],
         }  # fmt: skip
         self.summary["wall_s"] = clock.perf_counter() - self._began
         if self._directory is not None:
-            self._directory.write_summary(self.summary)
+            self._directory.write(SUMMARY, self.summary)
         return self.summary
 
     def judge(self) -> None:
@@ -402,10 +366,6 @@ class Report:
 def place(phase: int | None, where: str) -> str:
     """Place of a failure in words: a phase with its contacts, or what is known of both."""
     return where if phase is None else f"phase {phase}" + (f" on {where}" if where else "")
-
-
-def _silent(stage: str, share: float) -> None:
-    """Take a progress report and do nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -450,18 +410,12 @@ class RunResult:
         if recovery is not None:
             executed = recovery.trace.motion
         planned = planned if wholebody is None else wholebody.motion
-        transform = report.transform
-        return cls(
-            report.close(),
-            None if planned is None else motion_in_world(planned, transform),
-            None if executed is None else motion_in_world(executed, transform),
-            centroidal,
-            wholebody,
-            execution,
-            report.path,
-            recovery,
-            transform,
+        planned, executed = (
+            None if motion is None else motion_in_world(motion, report.transform)
+            for motion in (planned, executed)
         )
+        stages = centroidal, wholebody, execution, report.path, recovery
+        return cls(report.close(), planned, executed, *stages, report.transform)
 
     @property
     def succeeded(self) -> bool:

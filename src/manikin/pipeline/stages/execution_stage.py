@@ -3,7 +3,7 @@
 The act at the end of a motion is certified and appended to it before, and measured afterwards.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -108,13 +108,7 @@ def _kept_standing(execution: Execution) -> list[Requirement]:
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """Motion that is to be executed.
-
-    Attributes:
-        schedule: Contacts in time.
-        motion: All joints.
-        act: The act at the end of both, or None.
-    """
+    """Motion that is to be executed: contacts in time, all joints, and the act at the end of both."""
 
     schedule: ContactSchedule
     motion: Motion
@@ -132,7 +126,7 @@ FORCE_ERROR = 0.05
 
 def act_of(scenario: Scenario) -> Act | None:
     """The act of a scenario, or None."""
-    act = scenario.act
+    act = scenario.file.task.act
     return None if act is None else Act(ActKind(act.kind), act.on, act.direction, act.force_N)
 
 
@@ -140,12 +134,8 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
     """A motion with the scenario's act at its end; as it is without one, or where it cannot be done.
 
     The last posture is certified for the act first.
-
-    Args:
-        report: Takes the ``act`` block.
-        planned: The motion to the place of the act.
     """
-    act, section = act_of(context.scenario), context.scenario.act
+    act, section = act_of(context.scenario), context.scenario.file.task.act
     if act is None or section is None:
         return planned
     q, contacts = planned.motion.q[-1], list(planned.schedule.sequence[-1].stance)
@@ -173,13 +163,7 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
 def measured_act_failure(
     context: RunContext, report: Report, planned: PlannedMotion, executed: Motion
 ) -> StageFailure | None:
-    """Add what was exerted to the report; a failure where it is too little or too much, or nothing.
-
-    Args:
-        report: Has the ``act`` block.
-        planned: The motion, with its act or without one.
-        executed: What the physics engine made of it.
-    """
+    """Add what was exerted to the report; a failure where it is too little or too much, or nothing."""
     act, acting = act_of(context.scenario), planned.act
     if act is None or acting is None:
         return None
@@ -193,10 +177,8 @@ def measured_act_failure(
     row = Requirement("mean_force_error_N", "error of the mean force", "N", error, "<=", largest,
                       acting.timing.end, act.obstacle)  # fmt: skip
     report.require("act execution", RequirementTable((row,)))
-    if not row.held:
-        reason = f"the mean force was {result.mean_force:.0f} N; wanted {act.force:g} N"
-        return StageFailure("execution", reason, acting.timing.end, act.obstacle)
-    return None
+    reason = f"the mean force was {result.mean_force:.0f} N; wanted {act.force:g} N"
+    return None if row.held else StageFailure("execution", reason, acting.timing.end, act.obstacle)
 
 
 def _used_friction(
@@ -231,17 +213,12 @@ def execute_motion(
 
     A body that may be pushed is ready for it, but not told when or whence; see
     :mod:`manikin.control.plan_return`.
-
-    Args:
-        report: Takes the ``execution`` block, and the failure of a motion that broke a requirement.
-        planned: What is executed.
-        requirements: What the execution must keep.
     """
     scenario, act = context.scenario, planned.act
     # The share of the friction that planning keeps to, where it has its own, holds in control too.
     settings = ControlSettings(
         supports=SupportSettings(friction_share=scenario.friction_share),
-        returning=None if scenario.push is None else ReturnSettings(),
+        returning=None if scenario.file.push is None else ReturnSettings(),
     )
     result = execute(
         context.body, context.scene, planned.motion, planned.schedule,
@@ -254,10 +231,13 @@ def execute_motion(
     fallen = _failure(planned.schedule, result, table)
     exerted = measured_act_failure(context, report, planned, result.motion)
     failure = exerted if fallen is None else fallen
+    summary = result.summary()
+    if (push := summary["push"]) is not None:
+        push["direction_deg"] = report.transform.turned(push["direction_deg"])
     block = {
         "required": True,
-        "failure": None if failure is None else failure.as_dict(),
-        **_summary_in_world(result, report),
+        "failure": None if failure is None else asdict(failure),
+        **summary,
         **context.passage(result.schedule or planned.schedule, result.motion).summary(),
     }
     report.finish("execution", block)
@@ -266,13 +246,6 @@ def execute_motion(
         report.fail(failure.stage, failure.reason, failure.time_s, failure.where)
     report.keep_motions(planned.schedule, planned.motion, result.motion)
     return result
-
-
-def _summary_in_world(result: Execution, report: Report) -> dict[str, Any]:
-    block = result.summary()
-    if block["push"] is not None:
-        block["push"] |= {"direction_deg": report.transform.turned(block["push"]["direction_deg"])}
-    return block
 
 
 def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTable) -> StageFailure | None:
@@ -291,7 +264,7 @@ def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTab
 
 def _pushes(scenario: Scenario, motion: Motion) -> tuple[Push, ...]:
     """The push that a scenario asks for, its direction seen from where the body faces then."""
-    push = scenario.push
+    push = scenario.file.push
     if push is None:
         return ()
     scenario.check_push(float(motion.time[-1]))

@@ -33,9 +33,6 @@ STAGE = "push"
 def recover_from_push(context: RunContext, report: Report) -> Recovery:
     """Push the body of a scenario with a ``recovery`` section and measure what becomes of it.
 
-    Args:
-        report: Takes the ``push`` block, and the failure where the body does not stand in the end.
-
     Raises:
         ScenarioError: If there is nothing to recover from, or the push is not usable.
     """
@@ -103,9 +100,9 @@ def push_map_searches(
 
 
 def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
-    if scenario.recovery is None or scenario.push is None:
+    if scenario.file.recovery is None or scenario.file.push is None:
         raise ScenarioError(f"scenario {scenario.name!r} has no recovery; valid: recovery and push")
-    return scenario.recovery, scenario.push
+    return scenario.file.recovery, scenario.file.push
 
 
 def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> RecoveryTask:

@@ -1,82 +1,39 @@
 """Refinement stage: a motion of all joints through postures at the changes of contact."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from manikin.body import BodyModel
-from manikin.contact import ContactModel, ContactSchedule
+from manikin.contact import ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.whole_body_stage import certificate_summary, report_whole_body
-from manikin.planning.contacts import ContactPlan
-from manikin.planning.whole_body import KeyPostures, RefineResult, RefineScales, RefineSettings, refine_motion
+from manikin.planning.whole_body import RefineResult, RefineScales, RefineSettings, refine_motion
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.swing_planner import with_mid_flights
-from manikin.scene import Scene
 
 
-@dataclass(frozen=True, eq=False)
-class KeyedContacts:
-    """Initial guess of the refinement.
+def refine_contacts(
+    context: RunContext, report: Report, schedule: ContactSchedule, time: FloatArray, q: FloatArray
+) -> RefineResult:
+    """Refine the motion through key postures, and others between with lifted feet, at the scenario's pace.
 
-    Attributes:
+    Args:
+        report: Takes the ``wholebody`` block.
         schedule: Contacts in time.
         time: (n,) key times [s].
         q: (n, nq) postures at them.
     """
-
-    schedule: ContactSchedule
-    time: FloatArray
-    q: FloatArray
-
-    @classmethod
-    def of_plan(cls, plan: ContactPlan, model: ContactModel) -> "KeyedContacts":
-        """A contact plan, every phase as long as it has to be at least.
-
-        Args:
-            plan: Found from start and goal.
-            model: Contact model of every stance.
-        """
-        schedule = plan.schedule(model)
-        return cls(schedule, *plan.keys(schedule.instants))
-
-    @classmethod
-    def of_postures(cls, schedule: ContactSchedule, postures: KeyPostures) -> "KeyedContacts":
-        """Postures found at the key instants of a planned centre of mass, with its timing."""
-        return cls(schedule, schedule.instants, np.array([item.q for item in postures.postures]))
-
-    def at_pace(self, pace: float) -> "KeyedContacts":
-        """The same with everything ``pace`` times as fast."""
-        schedule = ContactSchedule(self.schedule.sequence, self.schedule.instants / pace)
-        return KeyedContacts(schedule, self.time / pace, self.q)
-
-    def with_lifted_feet(self, body: BodyModel, scene: Scene, padded: Sequence[str]) -> "KeyedContacts":
-        """The same with postures between, see ``with_mid_flights``."""
-        path = with_mid_flights(body, scene, self.schedule, KeyPath(self.time, self.q), padded)
-        return KeyedContacts(self.schedule, path.time, path.q)
-
-
-def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -> RefineResult:
-    """Refine the motion through key postures, at the scenario's pace.
-
-    Args:
-        report: Takes the ``wholebody`` block.
-        keyed: Contacts with a posture at each change.
-    """
     report.progress("wholebody", 0.0)
     body, scene, padded = context.body, context.scene, context.padded
-    keyed = keyed.at_pace(context.scenario.file.wholebody.pace).with_lifted_feet(body, scene, padded)
     options = context.scenario.file.wholebody
+    schedule = ContactSchedule(schedule.sequence, schedule.instants / options.pace)
+    path = with_mid_flights(body, scene, schedule, KeyPath(time / options.pace, q), padded)
     settings = RefineSettings(
         scales=RefineScales.of(body),
         contact_variables=options.contact_variables,
         speed_share=options.speed_share,
     )
     result = refine_motion(
-        body, scene, keyed.time, keyed.q, keyed.schedule, settings=settings,
+        body, scene, path.time, path.q, schedule, settings=settings,
         padded=padded, progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     block = refined_summary(result) | {"seed_matters": context.plan is not None}

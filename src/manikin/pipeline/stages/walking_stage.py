@@ -18,7 +18,7 @@ from manikin.contact.from_motion import schedule_of_support
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
 from manikin.numerics.signals import low_passed
-from manikin.numerics.spatial import FloatArray, PlanarTransform
+from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import BODY, WALK_PATHS, other_motion
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
@@ -42,7 +42,6 @@ from manikin.walking import (
     StepRule,
     Walk,
     Walker,
-    WalkingPath,
     WalkObstacle,
     WalkRoute,
     Waypoint,
@@ -104,11 +103,6 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
     With supports the walk leads from ``walking.start`` to the feet of their first phase, without them from
     start to goal.
 
-    Args:
-        context: Of a scenario with a planned walk.
-        report: Takes the ``walk`` block and the scenario with the supports, and the failure where there is
-            no way.
-
     Raises:
         ScenarioError: If the way cannot be asked for, or its end does not fit the first phase.
     """
@@ -125,31 +119,26 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
     rule = StepRule().scaled(context.body.stature or 1.75)
     height = context.scene.floor_height or 0.0
     with scenario.refusing(("walking",)):
-        if stance is None:
-            footprints = _along(path, rule, height, context)
-            walked = walking_supports(footprints, bare)
-        else:
-            rule = replace(rule, standing_width=_apart(stance))
-            footprints = _ending_for(scenario, [
-                place_footprints(path, rule, first=first, height=height) for first in FEET
-            ])  # fmt: skip
+        if stance is not None:
+            (left, _), (right, _) = (stance[foot] for foot in FEET)
+            rule = replace(rule, standing_width=float(np.hypot(*(left - right)[:2])))
+            choices = [place_footprints(path, rule, first=first, height=height) for first in FEET]
+            footprints = _ending_for(scenario, choices)
             walked = walk_before(footprints, bare)
+        else:
+            footprints = place_footprints(path, rule, height=height)
+            if _section(scenario).footprints == "library":  # where the feet of the library's walk stand
+                walk = walk_along(path, context.body, height=height)
+                footprints = walked_footprints(walk, rule, height=height)
+            walked = walking_supports(footprints, bare)
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
     report.keep_scenario(walked)
     return replace(context, body=walked.build_body()).with_supports(walked)
 
 
-def _along(path: WalkingPath, rule: StepRule, height: float, context: RunContext) -> Footprints:
-    """Footprints along a path by the rule, or where the feet of the library's walk stand."""
-    section = context.scenario.walking
-    if section is None or section.footprints == "stepper":
-        return place_footprints(path, rule, height=height)
-    return walked_footprints(walk_along(path, context.body, height=height), rule, height=height)
-
-
 def _ends(scenario: Scenario, stance: dict[str, tuple[FloatArray, float]] | None) -> tuple[FloatArray, ...]:
     """(3,) places from where to where the body walks."""
-    section = scenario.walking
+    section = scenario.file.walking
     if stance is None or section is None or section.start is None:
         return end_of(scenario, "start"), end_of(scenario, "goal")
     middle = np.mean([position[:2] for position, _ in stance.values()], axis=0)
@@ -168,17 +157,12 @@ def _first_stance(scenario: Scenario) -> dict[str, tuple[FloatArray, float]]:
     return {foot: (held[foot].position, held[foot].yaw) for foot in FEET}
 
 
-def _apart(stance: dict[str, tuple[FloatArray, float]]) -> float:
-    (left, _), (right, _) = (stance[foot] for foot in FEET)
-    return float(np.hypot(*(left - right)[:2]))
-
-
 def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
     """Walk whose last step is that of the foot that stays in the next phase; the shorter of two."""
     phases = scenario.explicit_supports().resolved_phases()
     stays = [foot for foot in FEET if len(phases) > 1 and phases[1].get(foot) == phases[0][foot]]
     fitting = [one for one in choices if one.steps[-1].effector in stays] or choices
-    return min(fitting, key=lambda one: one.duration)
+    return min(fitting, key=lambda one: one.end - one.start)
 
 
 STAGE = "walk"
@@ -219,12 +203,7 @@ class PlannedWalks:
 
 
 def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
-    """Find the routes of all walkers of a scenario, and walk them; None where there is none.
-
-    Args:
-        context: Of a scenario with a ``walking`` section.
-        report: Takes the ``walk`` block, and the failure where there is no way.
-    """
+    """Find the routes of all walkers of a scenario, and walk them; None where there is none."""
     plan = plan_walks(context)
     keep_paths(report, plan)
     report.progress(STAGE, 0.5)
@@ -239,9 +218,20 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         return None
     began = clock.perf_counter()
     walk = walk_along(plan.route, context.body, height=height)
-    block |= _walk_block(walk, clock.perf_counter() - began)
+    block |= {
+        "steps": int(np.sum(np.diff(walk.support.astype(np.int64), axis=0) == 1)),
+        "max_stance_slide_m": float(walk.slides.max(initial=0.0)),
+        "max_stance_slide_before_m": float(walk.slides_before.max(initial=0.0)),
+        "outside_library_share": float(np.mean(walk.outside)),
+        "motion_wall_ms": 1e3 * (clock.perf_counter() - began),
+    }
     schedule, motion = walked_motion(walk, height)
-    report.finish(STAGE, block | _balance_block(motion))
+    block |= {
+        "min_margin": float(motion.margin.min()),
+        "margin_unit": motion.margin_unit,
+        "balanced_share": float(np.mean(motion.margin >= 0.0)),
+    }
+    report.finish(STAGE, block)
     report.require(STAGE, _requirements(context, plan, walk))
     report.planned = True
     report.keep_motions(schedule, motion)
@@ -259,7 +249,6 @@ def plan_walks(
     """Find a route for every walker, each around those before.
 
     Args:
-        context: Of a scenario with a ``walking`` section.
         start: (3,) x, y [m], heading [rad] of the body at the beginning; that of the task if omitted.
         goal: (3,) The same at the end.
 
@@ -295,26 +284,19 @@ def plan_walks(
 
 
 def _section(scenario: Scenario) -> WalkingSection:
-    if scenario.walking is None:
+    if scenario.file.walking is None:
         raise InputError(f"scenario {scenario.name!r} has no walk; valid: one with walking")
-    return scenario.walking
+    return scenario.file.walking
 
 
 def keep_paths(report: Report, plan: PlannedWalks) -> None:
     """Keep the routes of all walkers among the files of the run: instants [s], x, y [m], headings [rad]."""
-    routes = {BODY: plan.route, **plan.others}
-    report.keep(WALK_PATHS, {
-        name: {
-            "time_s": route.time[::PATH_EVERY],
-            "place": _in_world(route.place[::PATH_EVERY], report.transform),
-        }
-        for name, route in routes.items()
-    })  # fmt: skip
-
-
-def _in_world(places: FloatArray, transform: PlanarTransform) -> FloatArray:
-    """(n, 3) x, y [m] and headings [rad] in the world."""
-    return np.column_stack([transform.points(places[:, :2]), places[:, 2] + transform.yaw])
+    kept, transform = {}, report.transform
+    for name, route in {BODY: plan.route, **plan.others}.items():
+        place = route.place[::PATH_EVERY]
+        place = np.column_stack([transform.points(place[:, :2]), place[:, 2] + transform.yaw])
+        kept[name] = {"time_s": route.time[::PATH_EVERY], "place": place}
+    report.keep(WALK_PATHS, kept)
 
 
 def end_of(scenario: Scenario, end: str) -> FloatArray:
@@ -386,21 +368,3 @@ def _requirements(context: RunContext, plan: PlannedWalks, walk: Walk) -> Requir
         Requirement("max_stance_slide_m", "slide of a foot on the ground", "m",
                     float(walk.slides.max(initial=0.0)), "<=", STANCE_SLIDE),
     ])  # fmt: skip
-
-
-def _walk_block(walk: Walk, wall: float) -> dict[str, Any]:
-    return {
-        "steps": int(np.sum(np.diff(walk.support.astype(np.int64), axis=0) == 1)),
-        "max_stance_slide_m": float(walk.slides.max(initial=0.0)),
-        "max_stance_slide_before_m": float(walk.slides_before.max(initial=0.0)),
-        "outside_library_share": float(np.mean(walk.outside)),
-        "motion_wall_ms": 1e3 * wall,
-    }
-
-
-def _balance_block(motion: Motion) -> dict[str, Any]:
-    return {
-        "min_margin": float(motion.margin.min()),
-        "margin_unit": motion.margin_unit,
-        "balanced_share": float(np.mean(motion.margin >= 0.0)),
-    }

@@ -61,13 +61,7 @@ class KeyedPlan:
 
 
 def with_key_postures(context: RunContext, report: Report, planned: CentroidalResult) -> KeyedPlan:
-    """Find the key postures of a plan, or of another one where a posture fails.
-
-    Args:
-        context: With supports.
-        report: Takes the ``centroidal`` block again.
-        planned: The plan; it is returned as it is where it failed.
-    """
+    """Find the key postures of a plan, or of another one where a posture fails; of a failed plan none."""
     if planned.trajectory is None:
         return KeyedPlan(planned)
     return _reported(report, _tested(context, report, planned, KEY_TOLERANCES[0]))
@@ -79,7 +73,6 @@ def with_stricter_key_postures(
     """Another plan where no motion was found and a key posture is only just within reach, or None.
 
     Args:
-        context: With supports.
         report: Has the failure of the whole body, which is forgotten where there is another plan.
         planned: The first plan.
         before: What was found for it.
@@ -118,7 +111,7 @@ def _eligible(
         return find_key_postures(
             context.body, context.scene, trajectory, manner=context.settings.manner,
             requirements=context.settings.requirements, range_margin=range_margin,
-            tolerance=tolerance, known=context.known_postures,
+            tolerance=tolerance, known=None if context.plan is None else context.plan.postures,
             padded=() if context.plan is None else context.padded,
         )  # fmt: skip
 
@@ -172,14 +165,11 @@ def _reported(report: Report, found: Eligibility) -> KeyedPlan:
 
 
 def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
-    """Plan the centre of mass on the supports, freely timed or through the key frames of a recording.
-
-    Args:
-        context: With supports.
-        report: Takes the ``centroidal`` block.
-    """
+    """Plan the centre of mass on the supports, freely timed or through the key frames of a recording."""
     report.progress("centroidal", 0.0)
-    problem = context.posed_problem()
+    problem = context.problem
+    if problem is None:
+        raise context.scenario.error(("supports",), "are missing; valid: with supports")
     if isinstance(problem, KeyframeProblem):
         result = plan_com_through_key_frames(problem)
     else:
@@ -196,11 +186,7 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
 
 
 def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[str, Any]) -> None:
-    """Take a plan into the report, with its trajectory.
-
-    Args:
-        block: Its ``centroidal`` block.
-    """
+    """Take a plan into the report, with its trajectory and its ``centroidal`` block."""
     report.finish("centroidal", block)
     if result.certificate is not None:
         report.require("centroidal", result.certificate.table(result.problem))
@@ -258,12 +244,7 @@ def _friction(trajectory: CentroidalTrajectory) -> dict[str, float | str]:
 
 
 def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) -> WholeBodyResult | None:
-    """Plan all joints along a trajectory of the centre of mass; None where there is none.
-
-    Args:
-        report: Takes the ``wholebody`` block.
-        plan: The trajectory with its key postures.
-    """
+    """Plan all joints along a trajectory of the centre of mass; None where there is none."""
     trajectory = plan.trajectory
     if trajectory is None:
         return None
@@ -271,7 +252,8 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     unused = rng.bit_generator.state
     result = plan_whole_body(
         context.body, context.scene, trajectory, rng=rng, settings=context.settings,
-        padded=context.padded, key_postures=context.known_postures, waypoints=plan.postures,
+        padded=context.padded, waypoints=plan.postures,
+        key_postures=None if context.plan is None else context.plan.postures,
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     block = wholebody_summary(result) | {"seed_matters": rng.bit_generator.state != unused}
@@ -283,13 +265,7 @@ def report_whole_body(
     context: RunContext, report: Report, schedule: ContactSchedule, result: WholeBodyResult | RefineResult,
     block: dict[str, Any],
 ) -> None:  # fmt: skip
-    """Take a motion of all joints into the report.
-
-    Args:
-        report: Takes the ``wholebody`` block.
-        schedule: Contacts of the motion in time.
-        block: What its method says of it.
-    """
+    """Take a motion of all joints into the report; ``block`` is what its method says of it."""
     passage = context.passage(schedule, result.motion).summary()
     friction = friction_use(
         schedule, result.motion.time, result.motion.contact_names, result.motion.contact_force
@@ -303,12 +279,7 @@ def report_whole_body(
 
 
 def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | None:
-    """Motion of a body that has no joints to plan for and nothing to execute; None without a plan.
-
-    Args:
-        report: Keeps the motion.
-        centroidal: The plan of its centre of mass.
-    """
+    """Motion of a body that has no joints to plan for and nothing to execute; None without a plan."""
     if centroidal.trajectory is None:
         return None
     motion = point_mass_motion(centroidal.problem, centroidal.trajectory, centroidal.polytopes)

@@ -9,6 +9,7 @@ from manikin.planning.contacts.contact_plan import (
     Stage,
     certify_plan,
 )
+from manikin.planning.contacts.crawl_search import CrawlSearch
 from manikin.planning.contacts.efort import (
     Task,
     efort,
@@ -50,12 +51,13 @@ from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
 __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
-    "ContactPlan", "ContactRules", "Duration", "Efort", "Endpoint", "Endpoints", "Extension", "Footholds",
-    "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance", "LimbCollisions",
-    "LimbHolds", "LimbSamples", "LimbSearch", "LimbSettings", "Manipulability", "PlanCertificate",
-    "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage", "StrongEfort", "SurfaceTable",
-    "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures", "WalkSearch", "WalkSettings", "WeightedSum",
-    "certify_plan", "duration", "efort", "find_candidates", "force_ellipsoid", "force_transmission_ratio",
-    "heading_of", "leave_seat", "limb_holds", "manipulability", "mirrored", "pulling_efort", "sample_limb",
-    "sample_limbs", "starts_on_limbs", "take_seat", "velocity_ellipsoid",
+    "ContactPlan", "ContactRules", "CrawlSearch", "Duration", "Efort", "Endpoint", "Endpoints",
+    "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance",
+    "LimbCollisions", "LimbHolds", "LimbSamples", "LimbSearch", "LimbSettings", "Manipulability",
+    "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage",
+    "StrongEfort", "SurfaceTable", "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures",
+    "WalkSearch", "WalkSettings", "WeightedSum", "certify_plan", "duration", "efort", "find_candidates",
+    "force_ellipsoid", "force_transmission_ratio", "heading_of", "leave_seat", "limb_holds",
+    "manipulability", "mirrored", "pulling_efort", "sample_limb", "sample_limbs", "starts_on_limbs",
+    "take_seat", "velocity_ellipsoid",
 ]  # fmt: skip

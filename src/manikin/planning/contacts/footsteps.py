@@ -13,6 +13,7 @@ best way is found.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import coal
 import numpy as np
@@ -62,6 +63,15 @@ GAP = 0.7
 MERGED = 0.06
 MERGED_TURN = math.radians(15.0)
 """Places [m] and headings [rad] this close together count as one foothold."""
+
+LOW_STEP = 0.05
+"""Distance of places on a way for one who crawls [m]."""
+
+LOW_RISE = 0.2
+"""Largest difference in height of its cells [m]."""
+
+BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])
+"""Shares of such a way at which nothing may stand in it."""
 
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.
@@ -317,6 +327,7 @@ class _Field:
         column: tuple[float, float, float],
         stride: float,
         highest: tuple[float, float],
+        gap: float = GAP,
     ) -> None:
         easy, self._highest = highest
         ends = np.array([hold.position for hold in (*start, *goal)])
@@ -347,9 +358,9 @@ class _Field:
         # Over gaps: cells at the edge of the ground reach farther.
         degree = np.bincount(near.ravel(), minlength=len(self._points))
         edge = np.flatnonzero(degree < 8)
-        if len(edge):
-            far = cKDTree(self._points[edge, :2]).query_pairs(GAP, output_type="ndarray")
-            near = np.vstack([near, edge[far]])
+        if len(edge) and gap:
+            far = edge[cKDTree(self._points[edge, :2]).query_pairs(gap, output_type="ndarray")]
+            near = np.vstack([near, far[self._is_open(scene, far, column)]])
         away = self._points[near[:, 0]] - self._points[near[:, 1]]
         rise = np.abs(away[:, 2])
         pace = STEP * (1.0 + 1.0 / 3.0) / stride
@@ -364,6 +375,7 @@ class _Field:
         middle = 0.5 * (goal[0].position + goal[1].position)
         self._root = int(self._tree.query(middle)[1])
         self._cost, before = dijkstra(graph, directed=False, indices=self._root, return_predecessors=True)
+        self._before = before
         self._pace = pace
         self._yaw = _middle_yaw(goal[0].yaw, goal[1].yaw)
         # Where the way leads from each cell, and how far it is.
@@ -373,6 +385,24 @@ class _Field:
         way = self._points[ahead, :2] - self._points[:, :2]
         self._heading = np.arctan2(way[:, 1], way[:, 0])
         self._way = np.linalg.norm(self._points[:, :2] - middle[:2], axis=1)
+
+    def _is_open(self, scene: Scene, pairs: np.ndarray, column: tuple[float, float, float]) -> np.ndarray:
+        """(k,) whether the column passes between pairs (k, 2) of cells over what has no ground."""
+        ends = self._points[pairs]
+        ends[..., 2] = ends[..., 2].max(axis=1, keepdims=True)
+        between = ends[:, :1] + BETWEEN[:, None] * (ends[:, 1:] - ends[:, :1])
+        free = _column_is_free(scene, between.reshape(-1, 3), column).reshape(len(pairs), -1)
+        return np.asarray(free.all(axis=1))
+
+    def way(self, place: FloatArray) -> FloatArray | None:
+        """(n, 3) cells from a place (3,) to the goal [m]; None where none lead there."""
+        row = int(self._tree.query(place)[1])
+        if not math.isfinite(self._cost[row]):
+            return None
+        rows = [row]
+        while self._before[rows[-1]] >= 0:
+            rows.append(int(self._before[rows[-1]]))
+        return self._points[rows]
 
     def walled_off(self, place: FloatArray) -> str:
         """Why no way leads from a place (3,) to the goal: a step that is too high, or no room."""
@@ -404,6 +434,42 @@ class _Field:
         straight = _angle(here - there) + _angle(there - self._yaw)
         across = _angle(here - self._yaw) + self._way[row] / TURN_WAY * (1.0 - np.cos(here - there))
         return costs[np.arange(len(places)), pick] + TURN_COST * np.minimum(straight, across)
+
+
+def low_way(
+    scene: Scene, footholds: Footholds, ends: tuple[tuple[Foothold, Foothold], tuple[Foothold, Foothold]],
+    low: tuple[float, float, float], high: tuple[float, float, float],
+) -> tuple[FloatArray, np.ndarray] | None:  # fmt: skip
+    """Way over the ground for a body that crawls, straight where it can be.
+
+    Args:
+        ends: Left and right foothold at start and goal.
+        low: Radius, lowest and highest end of what has to be free to crawl [m].
+        high: The same to walk.
+
+    Returns:
+        (n, 3) places on the ground, :data:`LOW_STEP` apart [m], and whether (n,) the body can walk there;
+        None where no way leads to the goal.
+    """
+    field_ = _Field(scene, footholds, *ends, low, 1.0, (LOW_RISE, LOW_RISE), gap=0.0)
+    start, goal = (0.5 * (left.position + right.position) for left, right in ends)
+    cells = field_.way(start)
+    if cells is None:
+        return None
+    corners, rest = [start], [*cells, goal]
+    while rest:
+        ways = [_between(corners[-1], end) for end in rest]
+        far = next((k for k in range(len(rest) - 1, 0, -1) if _column_is_free(scene, ways[k], low).all()), 0)
+        corners.append(rest[far])
+        rest = rest[far + 1 :]
+    places = np.vstack([start[None], *(_between(*pair)[1:] for pair in pairwise(corners))])
+    return places, _column_is_free(scene, places, high)
+
+
+def _between(first: FloatArray, last: FloatArray) -> FloatArray:
+    """(n, 3) places on a straight way, :data:`LOW_STEP` apart at most."""
+    count = 1 + math.ceil(float(np.linalg.norm(last - first)) / LOW_STEP)
+    return first + np.linspace(0.0, 1.0, max(count, 2))[:, None] * (last - first)
 
 
 def _angle(difference: FloatArray) -> FloatArray:

@@ -5,22 +5,20 @@ from manikin.planning.guide.checker import NO_MARGINS, Margins, ReachabilityChec
 from manikin.planning.guide.condition import Condition, LimbRule, UsableSurface
 from manikin.planning.guide.guide import (
     GuideResult,
-    GuideSettings,
     GuideTask,
     GuideWorld,
     offline_roadmap,
     plan_guide,
 )
 from manikin.planning.guide.roadmap import Roadmap, RoadmapSettings, Route, request
-from manikin.planning.guide.root_path import RootLimits, RootPath, ShortcutSettings
+from manikin.planning.guide.root_path import RootLimits, RootPath
 from manikin.planning.guide.root_pose import root_pose
-from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, SamplingRegion
+from manikin.planning.guide.sampler import PoseSampler, SamplingRegion
 from manikin.planning.guide.steering import LocalPlanner
 
 __all__ = [
-    "NO_MARGINS", "Abstraction", "Condition", "GuideResult", "GuideSettings", "GuideTask", "GuideWorld",
-    "LimbReach", "LimbRule", "LocalPlanner", "Margins", "PoseSampler", "ReachabilityChecker", "Roadmap",
-    "RoadmapSettings", "RootLimits", "RootPath", "Route", "SamplerSettings", "SamplingRegion",
-    "ShortcutSettings", "TrunkShape", "UsableSurface", "abstraction_of", "offline_roadmap", "plan_guide",
-    "request", "root_pose",
+    "NO_MARGINS", "Abstraction", "Condition", "GuideResult", "GuideTask", "GuideWorld", "LimbReach",
+    "LimbRule", "LocalPlanner", "Margins", "PoseSampler", "ReachabilityChecker", "Roadmap",
+    "RoadmapSettings", "RootLimits", "RootPath", "Route", "SamplingRegion", "TrunkShape", "UsableSurface",
+    "abstraction_of", "offline_roadmap", "plan_guide", "request", "root_pose",
 ]  # fmt: skip

@@ -5,19 +5,19 @@ in one posture, slightly enlarged so that the limbs' own roots have room, and fo
 convex hull of the places its effector can take.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from manikin.body.model import BodyModel
 from manikin.body.segments import Shape, ShapeKind
 from manikin.errors import BodyError
 from manikin.kinematics import ReachVolume
+from manikin.kinematics.limb_kinematics import inscribed_ball
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 
 TRUNK_SCALE = 1.1
@@ -83,7 +83,7 @@ class LimbReach:
                 "valid: at least four that do not lie in one plane"
             ) from None
         rows = hull.equations
-        centre, radius = _inscribed_ball(rows[:, :3], -rows[:, 3])
+        centre, radius = inscribed_ball(rows[:, :3], -rows[:, 3])
         values = {
             "vertices": points[hull.vertices], "normals": rows[:, :3], "offsets": -rows[:, 3],
             "centre": centre,
@@ -92,10 +92,6 @@ class LimbReach:
             object.__setattr__(self, key, frozen_array(value, key))
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "radius", radius)
-
-    def contains(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Whether each of (k, 3) points of the root's frame lies inside."""
-        return np.all(points @ self.normals.T <= self.offsets, axis=1)
 
     def coarse(self, directions: int) -> FloatArray:
         """(k, 3) vertices that are outermost in evenly spread directions, k <= ``directions``.
@@ -117,10 +113,6 @@ class LimbReach:
         factor = max(0.5, 1.0 - margin / self.radius)
         drawn = self.vertices if vertices is None else vertices
         return self.centre + factor * (drawn - self.centre)
-
-    def kept_margin(self, margin: float) -> float:
-        """Margin [m] that :meth:`shrunk` really keeps."""
-        return min(margin, 0.5 * self.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,65 +143,52 @@ class Abstraction:
 
 
 def abstraction_of(
-    body: BodyModel,
-    volumes: Sequence[ReachVolume],
-    *,
-    angles: Mapping[str, float] | None = None,
+    body: BodyModel, volumes: Sequence[ReachVolume], *, angles: Mapping[str, float] | None = None,
     trunk_scale: float = TRUNK_SCALE,
-    trunk_segments: Iterable[str] | None = None,
-) -> Abstraction:
+) -> Abstraction:  # fmt: skip
     """Abstraction of a body whose trunk is held in one posture.
 
     Args:
         volumes: Reach of each limb to be used.
         angles: Hinge angles of the trunk by name [rad]; the standing posture's where left out.
         trunk_scale: Factor on the radii and sides of the trunk's shapes, > 0.
-        trunk_segments: Segments that make up the trunk; those of no limb, and hanging on none, when omitted.
 
     Raises:
         BodyError: If a name is unknown, or there is no volume or no shape.
     """
     factor = finite_number(trunk_scale, "trunk_scale", above=0.0, error=BodyError)
-    wanted = _outside_limbs(body, volumes) if trunk_segments is None else list(trunk_segments)
     frames = _segment_frames(body, angles)
     shapes = [
         TrunkShape(
-            f"{name}/{shape.name}", shape.kind, shape.size, frames[name].act_points(shape.translation),
+            f"{name}/{shape.name}", shape.kind, shape.size, _moved(frames[name], shape.translation),
             frames[name].rotation @ shape.rotation,
         ).enlarged(factor)
-        for name in wanted
+        for name in _outside_limbs(body, volumes)
         for shape in body.segment(name).shapes
     ]  # fmt: skip
     limbs = [
-        LimbReach(volume.limb.name, frames[body.segment(volume.segment).name].act_points(volume.vertices))
-        for volume in volumes
+        LimbReach(volume.limb.name, _moved(frames[volume.segment], volume.vertices)) for volume in volumes
     ]
     return Abstraction(tuple(shapes), tuple(limbs))
 
 
-@dataclass(frozen=True, eq=False)
-class _Frame:
-    """Placement of a segment in the root's frame."""
-
-    rotation: FloatArray
-    translation: FloatArray
-
-    def act_points(self, points: FloatArray) -> FloatArray:
-        return np.asarray(points, dtype=np.float64) @ self.rotation.T + self.translation
+def _moved(frame: pin.SE3, points: FloatArray) -> FloatArray:
+    """Points (..., 3) of a segment's frame in the root's."""
+    return points @ frame.rotation.T + frame.translation
 
 
-def _segment_frames(body: BodyModel, angles: Mapping[str, float] | None) -> dict[str, _Frame]:
+def _segment_frames(body: BodyModel, angles: Mapping[str, float] | None) -> dict[str, pin.SE3]:
     """Frame of every segment in the root's frame in a posture."""
-    q = np.zeros(body.nq)
-    q[6] = 1.0
-    for name, angle in {**body.standing_angles, **(angles or {})}.items():
-        q[7 + body.joint_index(name)] = finite_number(angle, f"angle of {name!r} [rad]", error=BodyError)
+    wanted = {**body.standing_angles, **(angles or {})}
+    q = body.posture({
+        name: finite_number(angle, f"angle of {name!r} [rad]", error=BodyError)
+        for name, angle in wanted.items()
+    })  # fmt: skip
     model = body.pinocchio
     data = model.createData()
     pin.framesForwardKinematics(model, data, q)
     root = data.oMf[body.segment_frame(body.segments[0].name)].inverse()
-    placed = {s.name: root * data.oMf[body.segment_frame(s.name)] for s in body.segments}
-    return {name: _Frame(frame.rotation.copy(), frame.translation.copy()) for name, frame in placed.items()}
+    return {s.name: root * data.oMf[body.segment_frame(s.name)] for s in body.segments}
 
 
 def _outside_limbs(body: BodyModel, volumes: Sequence[ReachVolume]) -> list[str]:
@@ -219,11 +198,3 @@ def _outside_limbs(body: BodyModel, volumes: Sequence[ReachVolume]) -> list[str]
         if segment.parent in in_limbs:
             in_limbs.add(segment.name)
     return [segment.name for segment in body.segments if segment.name not in in_limbs]
-
-
-def _inscribed_ball(normals: FloatArray, offsets: FloatArray) -> tuple[FloatArray, float]:
-    """Centre and radius of the largest ball inside ``normals x <= offsets``."""
-    rows = np.hstack([normals, np.ones((len(normals), 1))])
-    bounds = [(None, None)] * 3 + [(0.0, None)]
-    result = linprog([0.0, 0.0, 0.0, -1.0], rows, offsets, bounds=bounds)
-    return result.x[:3], float(result.x[3])

@@ -6,20 +6,21 @@ farther than that between them then satisfies the plain condition everywhere, no
 was checked.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 
 import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from manikin.body.segments import ShapeKind
+from manikin.body.model import coal_shape
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.guide.abstraction import Abstraction, LimbReach, TrunkShape
 from manikin.planning.guide.condition import Condition, SceneTriangles, UsableSurface, endless
-from manikin.planning.guide.root_pose import angles_between, tilt
+from manikin.planning.guide.root_pose import tilt
 from manikin.scene.collision import CollisionPart, collision_parts, convex_geometry, triangle_geometry
 from manikin.scene.scene import Scene
 
@@ -59,6 +60,7 @@ class ReachabilityChecker:
 
     Attributes:
         margins: What is kept in hand.
+        reach_radius: Distance from the root's origin beyond which no limb reaches [m].
     """
 
     def __init__(
@@ -78,8 +80,9 @@ class ReachabilityChecker:
         self.condition.check_names(abstraction.limb_names)
         self.margins = margins or Margins()
         self._parts = tuple(part for item in scene for part in collision_parts(item))
+        trunk = [shape.enlarged(1.0, self.margins.trunk) for shape in abstraction.trunk]
         self._trunk = _Queries(
-            [_trunk_object(shape.enlarged(1.0, self.margins.trunk)) for shape in abstraction.trunk],
+            [(coal_shape(item), _place(item)) for item in trunk],
             [[(part.geometry, _place(part)) for part in self._parts]] * len(abstraction.trunk),
         )
         triangles = SceneTriangles.of(scene)
@@ -93,17 +96,8 @@ class ReachabilityChecker:
             [targets[self.condition.surface(limb.name).key] for limb in abstraction.limbs],
         )
         self._trunk_radius = max(shape.radius_about_root for shape in abstraction.trunk)
-        self._reach_radius = max(np.linalg.norm(limb.vertices, axis=1).max() for limb in abstraction.limbs)
-        self._reach_margin = min(limb.kept_margin(self.margins.reach) for limb in abstraction.limbs)
-        index = {name: number for number, name in enumerate(abstraction.limb_names)}
-        self._rules = [
-            (
-                rule,
-                [index[name] for name in rule.required],
-                [number for name, number in index.items() if name not in rule.required],
-            )
-            for rule in self.condition.rules
-        ]
+        self.reach_radius = float(max(np.linalg.norm(x.vertices, axis=1).max() for x in abstraction.limbs))
+        self._reach_margin = min(min(self.margins.reach, 0.5 * limb.radius) for limb in abstraction.limbs)
 
     def holds(self, pose: FloatArray) -> bool:
         """Whether a pose (7,) keeps the trunk free and the limbs within reach of the scene.
@@ -126,11 +120,16 @@ class ReachabilityChecker:
         lean = tilt(pose)
         self._limbs.place(pose)
         reaches = cache(self._limbs.meets)
-        return all(
-            self._rule_holds(rule.at_least, required, optional, reaches)
-            for rule, required, optional in self._rules
-            if rule.holds_at(lean, self._tilt_slack)
-        )
+        limbs = self.abstraction.limb_names
+        for rule in self.condition.rules:
+            if rule.holds_at(lean, self._tilt_slack):
+                optional = (row for row, name in enumerate(limbs) if name not in rule.required)
+                wanted = max(rule.at_least - len(rule.required), 0)
+                if not all(reaches(limbs.index(name)) for name in rule.required):
+                    return False
+                if len(list(islice(filter(reaches, optional), wanted))) < wanted:
+                    return False
+        return True
 
     def reaching(self, pose: FloatArray) -> tuple[str, ...]:
         """Names of the limbs whose volume meets a surface that counts for them."""
@@ -189,13 +188,8 @@ class ReachabilityChecker:
             angle: Angle turned [rad].
         """
         trunk = (way + self._trunk_radius * angle) / (2.0 * self.margins.trunk)
-        reach = (way + self._reach_radius * angle) / (2.0 * self._reach_margin)
+        reach = (way + self.reach_radius * angle) / (2.0 * self._reach_margin)
         return max(1, int(np.ceil(max(trunk, reach))))
-
-    def steps_between(self, first: FloatArray, second: FloatArray) -> int:
-        """:meth:`steps` of the straight way between two poses (7,)."""
-        way = float(np.linalg.norm(second[:3] - first[:3]))
-        return self.steps(way, float(angles_between(first, second)))
 
     def triangle_in_reach(self, pose: FloatArray, corners: FloatArray) -> bool:
         """Whether some limb's volume meets one triangle (3, 3) [m]."""
@@ -209,26 +203,9 @@ class ReachabilityChecker:
         return False
 
     @property
-    def reach_radius(self) -> float:
-        """Distance from the root's origin beyond which no limb reaches [m]."""
-        return float(self._reach_radius)
-
-    @property
     def _tilt_slack(self) -> float:
         """By how much the tilt may differ between a checked pose and its neighbours [rad]."""
         return 2.0 * self.margins.trunk / self._trunk_radius if self.margins.trunk > 0.0 else 0.0
-
-    def _rule_holds(
-        self, at_least: int, required: Sequence[int], optional: Sequence[int], reaches: Callable[[int], bool]
-    ) -> bool:
-        if not all(reaches(row) for row in required):
-            return False
-        wanted = at_least - len(required)
-        for left, row in zip(range(len(optional), 0, -1), optional, strict=True):
-            if wanted <= 0 or wanted > left:
-                break
-            wanted -= reaches(row)
-        return wanted <= 0
 
 
 _Target = tuple[coal.CollisionGeometry, pin.SE3]
@@ -290,16 +267,6 @@ class _Queries:
     def meets(self, row: int) -> bool:
         """Whether one of the group meets one of its targets where it was placed."""
         return any(pin.computeCollision(self._shapes, self._found, index) for index in self.rows[row])
-
-
-def _trunk_object(shape: TrunkShape) -> _Target:
-    if shape.kind is ShapeKind.SPHERE:
-        geometry = coal.Sphere(shape.size[0])
-    elif shape.kind is ShapeKind.CAPSULE:
-        geometry = coal.Capsule(shape.size[0], shape.size[1])
-    else:
-        geometry = coal.Box(*shape.size)
-    return geometry, _place(shape)
 
 
 def _volume_object(limb: LimbReach, margin: float) -> _Target:

@@ -173,7 +173,6 @@ class Condition:
     The default is the condition of the thesis: at least one limb reaches some surface.
 
     Attributes:
-        rules: Rules that must all hold.
         surfaces: Which surfaces count for a limb, by its name; any where left out.
     """
 

@@ -1,13 +1,13 @@
 """A guide for the root from start to goal: roadmap, request, spline ([Tonneau2015]_ chapter 6)."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.guide.abstraction import Abstraction
-from manikin.planning.guide.checker import Margins, ReachabilityChecker
+from manikin.planning.guide.checker import ReachabilityChecker
 from manikin.planning.guide.condition import Condition
 from manikin.planning.guide.roadmap import (
     Roadmap,
@@ -21,13 +21,12 @@ from manikin.planning.guide.roadmap import (
 from manikin.planning.guide.root_path import (
     RootLimits,
     RootPath,
-    ShortcutSettings,
     approximate,
     prune,
     shorten,
 )
 from manikin.planning.guide.root_pose import checked_pose
-from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, SamplingRegion
+from manikin.planning.guide.sampler import PoseSampler, SamplingRegion
 from manikin.planning.guide.steering import LocalPlanner
 from manikin.scene.scene import Scene
 
@@ -38,22 +37,6 @@ PATIENCE = 5
 """Times as many rejections in a row end a search for one task as end an offline roadmap."""
 
 
-@dataclass(frozen=True)
-class GuideSettings:
-    """Numbers that [Tonneau2015]_ chapter 6 leaves to its user.
-
-    Attributes:
-        sampler: Numbers of Algorithm 3.
-        roadmap: Numbers of Algorithm 4; its ``samples`` is the budget of one search.
-        shortcut: Numbers of 6.3.2.
-    """
-
-    margins: Margins = field(default_factory=Margins)
-    sampler: SamplerSettings = field(default_factory=SamplerSettings)
-    roadmap: RoadmapSettings = field(default_factory=RoadmapSettings)
-    shortcut: ShortcutSettings = field(default_factory=ShortcutSettings)
-
-
 @dataclass(frozen=True, eq=False)
 class GuideWorld:
     """Scene, creature and condition: what a roadmap is about.
@@ -61,17 +44,18 @@ class GuideWorld:
     Attributes:
         region: Where roots are drawn.
         condition: What every pose must satisfy.
+        roadmap: Numbers of Algorithm 4; its ``samples`` is the budget of one search.
     """
 
     scene: Scene
     abstraction: Abstraction
     region: SamplingRegion
     condition: Condition = field(default_factory=Condition)
-    settings: GuideSettings = field(default_factory=GuideSettings)
+    roadmap: RoadmapSettings = field(default_factory=RoadmapSettings)
 
     def checker(self) -> ReachabilityChecker:
         """Checker with the margins of planning."""
-        return ReachabilityChecker(self.abstraction, self.scene, self.condition, self.settings.margins)
+        return ReachabilityChecker(self.abstraction, self.scene, self.condition)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,41 +77,19 @@ class GuideTask:
         object.__setattr__(self, "limits", limits or RootLimits())
 
 
-@dataclass(frozen=True)
-class GuideStatistics:
-    """Effort of a search for a guide.
-
-    Attributes:
-        samples: Poses drawn in this search.
-        nodes: Nodes of the roadmap at the end.
-        parts: Parts of it that no way joins.
-        asked: Poses decided about.
-        route_poses: Poses of the way through the roadmap.
-        pruned_poses: Poses of it that pruning left.
-        control_poses: Control poses of the path.
-    """
-
-    samples: int = 0
-    nodes: int = 0
-    parts: int = 0
-    asked: int = 0
-    route_poses: int = 0
-    pruned_poses: int = 0
-    control_poses: int = 0
-
-
 @dataclass(frozen=True, eq=False)
 class GuideResult:
     """A path of the root, or why there is none.
 
     Attributes:
         milestones: (n, 7) poses that straight ways join, before the spline; None without a way.
+        samples: Poses drawn in this search.
         where: ``"start"``, ``"goal"`` or ``"roadmap"``: what the failure is about.
     """
 
     path: RootPath | None
     milestones: FloatArray | None
-    statistics: GuideStatistics
+    samples: int
     failure: str | None = None
     where: str | None = None
 
@@ -139,8 +101,8 @@ class GuideResult:
 
 def offline_roadmap(world: GuideWorld, rng: np.random.Generator) -> Roadmap:
     """Roadmap of a world without a task in mind, to be asked many times ([Tonneau2015]_ Algorithm 4)."""
-    checker, roadmap = world.checker(), Roadmap(world.settings.roadmap)
-    sampler = PoseSampler(checker, world.region, world.settings.sampler)
+    checker, roadmap = world.checker(), Roadmap(world.roadmap)
+    sampler = PoseSampler(checker, world.region)
     grow(roadmap, sampler, LocalPlanner(checker), rng, roadmap.settings.samples)
     return roadmap
 
@@ -156,44 +118,32 @@ def plan_guide(
     Args:
         roadmap: A roadmap of this world to begin with; it is left as it is. Empty when omitted.
     """
-    checker = world.checker()
-    planner = LocalPlanner(checker, (task.start, task.goal))
+    planner = LocalPlanner(world.checker(), (task.start, task.goal))
     unfit = unfit_end(planner, task.start, task.goal)
     if unfit is not None:
-        return _failed(unfit, GuideStatistics(asked=planner.asked))
-    growing = Roadmap(world.settings.roadmap) if roadmap is None else roadmap.copy()
+        return GuideResult(None, None, 0, unfit.failure, unfit.where)
+    growing = Roadmap(world.roadmap) if roadmap is None else roadmap.copy()
     growing.samples = growing.rejected = 0
     route = _search(world, task, growing, planner, rng)
-    statistics = GuideStatistics(growing.samples, len(growing.poses), len(growing.components), planner.asked)
     if route.poses is None:
-        return _failed(route, statistics)
+        return GuideResult(None, None, growing.samples, route.failure, route.where)
     pruned = prune(route.poses, planner)
-    shortcuts = world.settings.shortcut
-    path = shorten(approximate(pruned, planner, task.limits, rng, shortcuts), planner, rng, shortcuts)
-    counted = replace(
-        statistics, asked=planner.asked, route_poses=len(route.poses), pruned_poses=len(pruned),
-        control_poses=len(path.control_points),
-    )  # fmt: skip
-    return GuideResult(path, pruned, counted)
+    path = shorten(approximate(pruned, planner, task.limits, rng), planner, rng)
+    return GuideResult(path, pruned, growing.samples)
 
 
 def _search(
     world: GuideWorld, task: GuideTask, roadmap: Roadmap, planner: LocalPlanner, rng: np.random.Generator
 ) -> Route:
     """Grow the roadmap until start and goal are joined, and ask it for the way."""
-    sampler = PoseSampler(planner.checker, world.region, world.settings.sampler)
+    sampler = PoseSampler(planner.checker, world.region)
     start = attach(roadmap, task.start, planner, rng)
     goal = attach(roadmap, task.goal, planner, rng)
-    budget = world.settings.roadmap.samples
-    for _ in range(0, budget, CHUNK):
+    for _ in range(0, world.roadmap.samples, CHUNK):
         if roadmap.joined(start, goal):
             break
         before = roadmap.samples
-        grow(roadmap, sampler, planner, rng, CHUNK, PATIENCE * world.settings.roadmap.failures)
+        grow(roadmap, sampler, planner, rng, CHUNK, PATIENCE * world.roadmap.failures)
         if roadmap.samples == before:
             break
     return find_route(roadmap, planner, start, goal)
-
-
-def _failed(route: Route, statistics: GuideStatistics) -> GuideResult:
-    return GuideResult(None, None, statistics, route.failure, route.where)

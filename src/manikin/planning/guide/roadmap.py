@@ -7,10 +7,12 @@ shortest way by A*, or says why there is none ([Tonneau2015]_ 6.3.1).
 """
 
 import itertools
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 
 import networkx as nx
 import numpy as np
+from networkx.utils import UnionFind
 
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.guide.root_pose import distance
@@ -25,21 +27,18 @@ class RoadmapSettings:
     Attributes:
         failures: m, poses rejected in a row that end the construction.
         samples: Largest number of poses drawn.
-        position_share: s of the distance 6.3.
         nearest: Guards asked for each pose, the nearest ones; the thesis asks all.
         farthest: Guards farther than this are not asked.
     """
 
     failures: int = 50
     samples: int = 1500
-    position_share: float = 0.5
     nearest: int = 15
     farthest: float = 2.5
 
     def __post_init__(self) -> None:
         finite_number(self.failures, "roadmap failures", at_least=1)
         finite_number(self.samples, "roadmap samples", at_least=1)
-        finite_number(self.position_share, "roadmap position_share", at_least=0.0, at_most=1.0)
         finite_number(self.nearest, "roadmap nearest", at_least=1)
         finite_number(self.farthest, "roadmap farthest", above=0.0)
 
@@ -61,29 +60,24 @@ class Roadmap:
     samples: int = 0
     rejected: int = 0
     _poses: FloatArray = field(default_factory=lambda: np.empty((64, 7)))
-    _part: list[int] = field(default_factory=list)
+    _parts: UnionFind = field(default_factory=UnionFind)
 
     @property
     def poses(self) -> FloatArray:
         """(n, 7) the nodes' poses."""
-        return self._poses[: len(self._part)]
-
-    @property
-    def components(self) -> list[set[int]]:
-        """Parts of the roadmap that no way joins, the largest first."""
-        return sorted(nx.connected_components(self.graph), key=lambda part: (-len(part), min(part)))
+        return self._poses[: len(self.graph)]
 
     def copy(self) -> "Roadmap":
         """A copy that can grow without changing this one."""
-        return replace(self, graph=self.graph.copy(), _poses=self._poses.copy(), _part=list(self._part))
+        return replace(self, graph=self.graph.copy(), _poses=self._poses.copy(), _parts=deepcopy(self._parts))
 
     def joined(self, first: int, second: int) -> bool:
         """Whether two nodes lie in one part."""
-        return self._root(first) == self._root(second)
+        return self._parts[first] == self._parts[second]
 
     def nearest_nodes(self, pose: FloatArray, *, guards_only: bool) -> list[int]:
         """Nodes near a pose (7,), the nearest first, as many as the settings allow."""
-        away = distance(self.poses, pose, self.settings.position_share)
+        away = distance(self.poses, pose)
         order = np.argsort(away, kind="stable")
         order = order[away[order] <= self.settings.farthest]
         kept = [int(node) for node in order if not guards_only or self.graph.nodes[int(node)]["guard"]]
@@ -91,20 +85,19 @@ class Roadmap:
 
     def add(self, pose: FloatArray, *, guard: bool) -> int:
         """Add a node and return its number."""
-        node = len(self._part)
+        node = len(self.graph)
         if node == len(self._poses):
             self._poses = np.concatenate([self._poses, np.empty_like(self._poses)])
         self._poses[node] = pose
-        self._part.append(node)
         self.graph.add_node(node, guard=guard)
         return node
 
     def join(self, first: int, second: int, way: Way) -> None:
         """Add a way between two nodes, seen from the first."""
-        weight = float(distance(self.poses[first], self.poses[second], self.settings.position_share))
+        weight = float(distance(self.poses[first], self.poses[second]))
         seen = way if first < second else way.reversed()
         self.graph.add_edge(first, second, weight=weight, turn_at=seen.turn_at)
-        self._part[self._root(second)] = self._root(first)
+        self._parts.union(first, second)
 
     def way(self, first: int, second: int) -> Way:
         """The way of an edge, seen from the first node."""
@@ -115,12 +108,11 @@ class Roadmap:
         """One pass of Algorithm 4: whether a pose (7,) is kept, as a guard or as a connection."""
         seen: dict[int, tuple[int, Way]] = {}
         for node in self.nearest_nodes(pose, guards_only=True):
-            part = self._root(node)
-            if part in seen:
-                continue
-            way = planner.connect(pose, self.poses[node], float(rng.uniform()))
-            if way is not None:
-                seen[part] = (node, way)
+            part = self._parts[node]
+            if part not in seen:
+                way = planner.connect(pose, self.poses[node], float(rng.uniform()))
+                if way is not None:
+                    seen[part] = (node, way)
         if len(seen) == 1:
             self.rejected += 1
             return False
@@ -129,13 +121,6 @@ class Roadmap:
         for node, way in seen.values():
             self.join(new, node, way)
         return True
-
-    def _root(self, node: int) -> int:
-        """Representative of a node's part."""
-        while self._part[node] != node:
-            self._part[node] = self._part[self._part[node]]
-            node = self._part[node]
-        return node
 
 
 def grow(
@@ -214,10 +199,9 @@ def find_route(roadmap: Roadmap, planner: LocalPlanner, start: int, goal: int) -
     """
     if not roadmap.joined(start, goal):
         return Route(None, failure=_walled_off(roadmap, start, goal), where="roadmap")
-    share = roadmap.settings.position_share
 
     def estimate(first: int, second: int) -> float:
-        return float(distance(roadmap.poses[first], roadmap.poses[second], share))
+        return float(distance(roadmap.poses[first], roadmap.poses[second]))
 
     nodes = nx.astar_path(roadmap.graph, start, goal, heuristic=estimate, weight="weight")
     pieces = [roadmap.poses[start][None]]
@@ -246,7 +230,7 @@ def _walled_off(roadmap: Roadmap, start: int, goal: int) -> str:
     from_start = sorted(nx.node_connected_component(roadmap.graph, start))
     from_goal = sorted(nx.node_connected_component(roadmap.graph, goal))
     places, others = roadmap.poses[from_start], roadmap.poses[from_goal]
-    apart = np.array([distance(others, pose, roadmap.settings.position_share) for pose in places])
+    apart = np.array([distance(others, pose) for pose in places])
     row, column = np.unravel_index(int(np.argmin(apart)), apart.shape)
     closest = [np.round(pose[:3], 2).tolist() for pose in (places[row], others[column])]
     return (

@@ -49,10 +49,10 @@ class RootLimits:
     def __init__(self, linear: ArrayLike = 0.8, angular: ArrayLike = 1.0) -> None:
         """Take limits; one number stands for all three axes. The defaults are our choice."""
         for name, value, unit in (("linear", linear, "m/s"), ("angular", angular, "rad/s")):
-            numbers = np.broadcast_to(np.asarray(value, dtype=np.float64), (3,))
-            for number in numbers:
-                finite_number(float(number), f"root limits {name} [{unit}]", above=0.0)
-            object.__setattr__(self, name, frozen_array(numbers, f"root limits {name} [{unit}]", (3,)))
+            called = f"root limits {name} [{unit}]"
+            numbers = frozen_array(np.broadcast_to(np.asarray(value, dtype=np.float64), (3,)), called)
+            finite_number(numbers.min(), called, above=0.0)
+            object.__setattr__(self, name, numbers)
 
     @property
     def both(self) -> FloatArray:
@@ -215,23 +215,14 @@ _MOST_CONTROL_POSES = 300
 _SMALL_TURN = 0.2  # [rad]; the speed of a blended turn is then even within 0.4 %
 
 
-@dataclass(frozen=True)
-class ShortcutSettings:
-    """The numbers that 6.3.2 leaves to its user; all are our choice.
+SHORTCUTS = 150
+"""N, random shortcuts tried; our choice, as the other numbers that 6.3.2 leaves open."""
 
-    Attributes:
-        shortcuts: N, random shortcuts tried.
-        spacing: Time between control poses of the first approximation [s].
-    """
+SPACING = 0.25
+"""Time between control poses of the first approximation [s]."""
 
-    shortcuts: int = 150
-    spacing: float = 0.25
-    degree: int = 3
-
-    def __post_init__(self) -> None:
-        finite_number(self.shortcuts, "shortcut shortcuts", at_least=0)
-        finite_number(self.spacing, "shortcut spacing [s]", above=0.0)
-        finite_number(self.degree, "shortcut degree", at_least=1, at_most=5)
+DEGREE = 3
+"""Degree of the spline."""
 
 
 def prune(poses: FloatArray, planner: LocalPlanner) -> FloatArray:
@@ -256,22 +247,17 @@ def traverse_times(poses: FloatArray, limits: RootLimits) -> FloatArray:
 
 
 def approximate(
-    poses: FloatArray,
-    planner: LocalPlanner,
-    limits: RootLimits,
-    rng: np.random.Generator,
-    settings: ShortcutSettings | None = None,
+    poses: FloatArray, planner: LocalPlanner, limits: RootLimits, rng: np.random.Generator
 ) -> RootPath:
     """Spline close to a way of (n, 7) poses joined by straight ways, along all of which the condition holds.
 
     With many control poses it becomes the way itself; it is of degree 1 where no other was found.
     """
-    wanted = settings or ShortcutSettings()
     poses = _without_repeats(poses)
     times = traverse_times(poses, limits)
-    count = max(wanted.degree + 1, len(poses), int(np.ceil(times[-1] / wanted.spacing)) + 1)
+    count = max(DEGREE + 1, len(poses), int(np.ceil(times[-1] / SPACING)) + 1)
     while times[-1] > 0.0 and count <= _MOST_CONTROL_POSES:
-        path = RootPath.through(_spread(poses, times, count, rng), limits, wanted.degree)
+        path = RootPath.through(_spread(poses, times, count, rng), limits, DEGREE)
         if path_holds(path, planner):
             return path
         count = int(np.ceil(1.5 * count))
@@ -293,14 +279,11 @@ def path_holds(path: RootPath, planner: LocalPlanner, low: float = 0.0, high: fl
     return planner.poses_hold(path.poses(shares))
 
 
-def shorten(
-    path: RootPath, planner: LocalPlanner, rng: np.random.Generator, settings: ShortcutSettings | None = None
-) -> RootPath:
+def shorten(path: RootPath, planner: LocalPlanner, rng: np.random.Generator) -> RootPath:
     """Try random shortcuts; each one that is kept makes the way along the control poses quicker."""
-    wanted = settings or ShortcutSettings()
     if path.degree < 2 or len(path.control_points) < 4:
         return path
-    for _ in range(wanted.shortcuts):
+    for _ in range(SHORTCUTS):
         first, last = sorted(rng.choice(len(path.control_points), 2, replace=False).tolist())
         if last - first >= 2:
             path = _tried(path, first, last, planner)

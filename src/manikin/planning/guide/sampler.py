@@ -20,12 +20,19 @@ from manikin.numerics.spatial import FloatArray, axes_of_normal, finite_number, 
 from manikin.planning.guide.checker import ReachabilityChecker
 from manikin.planning.guide.condition import SceneTriangles, endless
 from manikin.scene.obstacle import HalfSpace, Obstacle
-from manikin.scene.scene import Scene
 
-AROUND = 1.0
-"""How much larger than the obstacles the default region is on every side [m]."""
+TRIANGLES = 20
+"""LIMIT1 of Algorithm 3, triangles tried for one pose; our choice, as the other numbers left open."""
 
-_BLOCK = 64  # candidates drawn at once
+TURNS = 8
+"""LIMIT2, tries per triangle."""
+
+UNIFORM_SHARE = 0.5
+"""Share s of triangles drawn uniformly; the others by their area."""
+
+STEP = 0.6
+"""Largest step away from the triangle [m]; the thesis has 1."""
+
 _FULL_TURN = (-float(np.pi), float(np.pi))
 
 
@@ -66,23 +73,6 @@ class SamplingRegion:
         for name, pair in (("yaw", yaw), ("pitch", pitch), ("roll", roll)):
             object.__setattr__(self, name, None if pair is None else _angle_range(pair, name))
 
-    @classmethod
-    def around(
-        cls, scene: Scene, poses: Sequence[FloatArray] = (), *, margin: float = AROUND,
-        yaw: Sequence[float] | None = None, pitch: Sequence[float] | None = None,
-        roll: Sequence[float] | None = None,
-    ) -> "SamplingRegion":  # fmt: skip
-        """Box around the finite obstacles and some poses (7,), ``margin`` [m] larger on every side.
-
-        Raises:
-            InputError: If there is neither a finite obstacle nor a pose.
-        """
-        boxes = [np.stack(item.bounds) for item in scene if not endless(item)]
-        corners = np.vstack([*boxes, *(pose[None, :3] for pose in poses)] or [np.empty((0, 3))])
-        if not len(corners):
-            raise InputError("sampling region has nothing to lie around; valid: a finite obstacle or a pose")
-        return cls(corners.min(axis=0) - margin, corners.max(axis=0) + margin, yaw, pitch, roll)
-
     def turns(self, count: int, rng: np.random.Generator) -> FloatArray:
         """(count, 4) random quaternions xyzw within the bounds."""
         if self.yaw is None and self.pitch is None and self.roll is None:
@@ -96,29 +86,6 @@ class SamplingRegion:
         return bool(np.all(position >= self.lower) and np.all(position <= self.upper))
 
 
-@dataclass(frozen=True)
-class SamplerSettings:
-    """The numbers that Algorithm 3 leaves to its user; all are our choice.
-
-    Attributes:
-        triangles: LIMIT1, triangles tried for one pose.
-        turns: LIMIT2, tries per triangle.
-        uniform_share: s, share of triangles drawn uniformly; the others by their area.
-        step: Largest step away from the triangle [m]; the thesis has 1.
-    """
-
-    triangles: int = 20
-    turns: int = 8
-    uniform_share: float = 0.5
-    step: float = 0.6
-
-    def __post_init__(self) -> None:
-        finite_number(self.triangles, "sampler triangles", at_least=1)
-        finite_number(self.turns, "sampler turns", at_least=1)
-        finite_number(self.uniform_share, "sampler uniform_share", at_least=0.0, at_most=1.0)
-        finite_number(self.step, "sampler step [m]", above=0.0)
-
-
 class PoseSampler:
     """Draws poses for one checker and region (GENERATECONFIGURATION).
 
@@ -127,15 +94,14 @@ class PoseSampler:
     """
 
     def __init__(
-        self, checker: ReachabilityChecker, region: SamplingRegion, settings: SamplerSettings | None = None
+        self, checker: ReachabilityChecker, region: SamplingRegion, uniform_share: float = UNIFORM_SHARE
     ) -> None:
         """Collect the triangles of the scene; planes are cut to the region.
 
         Raises:
             InputError: If no triangle lies in the region.
         """
-        self._checker, self._region = checker, region
-        self._settings = settings or SamplerSettings()
+        self._checker, self._region, self._uniform_share = checker, region, uniform_share
         finite = SceneTriangles.of(checker.scene)
         parts = [(finite.corners, finite.normals, finite.closed)]
         parts += [_cut_plane(item, region) for item in checker.scene if endless(item)]
@@ -154,18 +120,17 @@ class PoseSampler:
 
     def pick(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """(count,) indices of triangles, a share of them uniform and the others by area."""
-        uniform = rng.uniform(size=count) < self._settings.uniform_share
+        uniform = rng.uniform(size=count) < self._uniform_share
         by_area = np.searchsorted(self._cumulative, rng.uniform(size=count), side="right")
         anyone = rng.integers(0, len(self.corners), count)
         return np.where(uniform, anyone, np.minimum(by_area, len(self.corners) - 1))
 
     def draw(self, rng: np.random.Generator) -> FloatArray | None:
         """Draw one pose (7,) that satisfies the condition, or None after so many triangles."""
-        limits = self._settings
-        for triangle in self.pick(limits.triangles, rng):
-            points, directions = self._departures(int(triangle), limits.turns, rng)
-            turns = self._region.turns(limits.turns, rng)
-            steps = limits.step * (1.0 - rng.uniform(size=(limits.turns, limits.turns)))
+        for triangle in self.pick(TRIANGLES, rng):
+            points, directions = self._departures(int(triangle), TURNS, rng)
+            turns = self._region.turns(TURNS, rng)
+            steps = STEP * (1.0 - rng.uniform(size=(TURNS, TURNS)))
             pose = self._search(int(triangle), points, directions, turns, steps)
             if pose is not None:
                 return pose
@@ -177,11 +142,8 @@ class PoseSampler:
         """Inner loops of Algorithm 3 over one triangle, on numbers drawn before."""
         tries = 0
         while tries < len(points):
-            position = np.array(points[tries])
-            direction, steps_now = directions[tries], steps[tries]
-            for step in steps_now:
-                if tries == len(points):
-                    break
+            position, direction = points[tries], directions[tries]
+            for step in steps[tries, : len(points) - tries]:
                 position = position + step * direction
                 pose = np.concatenate([position, turns[tries]])
                 tries += 1

@@ -8,6 +8,7 @@ reach), so near them the plain condition counts, checked at closer poses.
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -47,7 +48,6 @@ class LocalPlanner:
     Attributes:
         checker: Decides about poses, with the margins of planning.
         ends: Poses near which the plain condition is enough.
-        asked: Number of poses decided about so far.
     """
 
     def __init__(self, checker: ReachabilityChecker, ends: Sequence[FloatArray] = ()) -> None:
@@ -60,20 +60,15 @@ class LocalPlanner:
             raise InputError(f"local planner has {checker.margins}; valid: margins > 0")
         self.checker = checker
         self.ends = tuple(ends)
-        self.asked = 0
-        self._plain: ReachabilityChecker | None = None
 
-    @property
+    @cached_property
     def plain(self) -> ReachabilityChecker:
         """Checker of the condition without margins."""
-        if self._plain is None:
-            kept = self.checker
-            self._plain = ReachabilityChecker(kept.abstraction, kept.scene, kept.condition, NO_MARGINS)
-        return self._plain
+        kept = self.checker
+        return ReachabilityChecker(kept.abstraction, kept.scene, kept.condition, NO_MARGINS)
 
     def holds(self, pose: FloatArray) -> bool:
         """Whether a pose (7,) satisfies the condition, near an end of the task the plain one."""
-        self.asked += 1
         return self.checker.holds(pose) or (self.near_end(pose) and self.plain.holds(pose))
 
     def near_end(self, pose: FloatArray) -> bool:
@@ -90,7 +85,8 @@ class LocalPlanner:
         """
         if tuple(first) > tuple(second):
             first, second = second, first
-        count = self.checker.steps_between(first, second)
+        way = float(np.linalg.norm(second[:3] - first[:3]))
+        count = self.checker.steps(way, float(angles_between(first, second)))
         poses = between(first, second, np.arange(count + 1) / count)
         return self.poses_hold(poses, ends_hold=True)
 
@@ -109,7 +105,6 @@ class LocalPlanner:
         for index in _middle_first(len(poses)):
             if ends_hold and not self.ends and index in (0, last):
                 continue
-            self.asked += 1
             if self.checker.holds(poses[index]):
                 continue
             if not (self.near_end(poses[index]) and self.plain.holds(poses[index])):
@@ -158,17 +153,13 @@ class LocalPlanner:
         return None
 
 
-_ORDERS: dict[int, list[int]] = {}
-
-
+@cache
 def _middle_first(count: int) -> list[int]:
     """0 ... count - 1 in an order that halves the gaps again and again."""
-    if count not in _ORDERS:
-        order, intervals = [0, count - 1] if count > 1 else [0], [(0, count - 1)]
-        for low, high in intervals:
-            if high - low > 1:
-                middle = (low + high) // 2
-                order.append(middle)
-                intervals += [(low, middle), (middle, high)]
-        _ORDERS[count] = order[:count]
-    return _ORDERS[count]
+    order, intervals = [0, count - 1] if count > 1 else [0], [(0, count - 1)]
+    for low, high in intervals:
+        if high - low > 1:
+            middle = (low + high) // 2
+            order.append(middle)
+            intervals += [(low, middle), (middle, high)]
+    return order

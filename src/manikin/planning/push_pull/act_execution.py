@@ -45,7 +45,6 @@ class PlannedAct:
     """A motion that ends with an act.
 
     Attributes:
-        motion: The whole of it.
         wishes: What each hand should feel.
     """
 

@@ -17,7 +17,6 @@ from manikin.planning.contacts import (
     ContactPlan,
     ContactRules,
     Efort,
-    GeneratedContact,
     Heuristic,
     LimbSamples,
     PostureFinder,
@@ -61,7 +60,6 @@ class BraceSettings:
         torque_share: Largest share of a joint's strength.
         enough: Postures that act after which the best one is taken.
         palm_room: Distance of the palms to the face [m]: the wrist of our shapes is thicker than the hand.
-        samples: Number of samples of each limb.
         friction_model: Friction model of feet and palms.
     """
 
@@ -72,7 +70,6 @@ class BraceSettings:
     torque_share: float = 0.9
     enough: int = 8
     palm_room: float = 0.02
-    samples: int = 10_000
     friction: float = 0.7
     friction_model: FrictionModel = "outer"
 
@@ -209,17 +206,19 @@ class _BraceSearch:
         near = Configuration(self._body, posture).com
         place, margin = loads.best_place(list(feet.values()), near, np.array([0.14, 0.1]))
         if margin < self._settings.margin:
-            self._reasons[_FEET][UNBALANCED] += 1
-            return None
+            return self._none(_FEET, UNBALANCED)
         contacts = {**feet, **hands}
         posed = self._poser.pose(
             contacts, contacts, posture, place=place, placements=self._poser.led(q[:7]),
             preferences=Preferences(grasp=FLAT_PALMS),
         )  # fmt: skip
         if posed.q is None:
-            self._reasons[_POSTURE][posed.reason] += 1
-            return None
+            return self._none(_POSTURE, posed.reason)
         return self._strong(posed.q, feet, hands, margin)
+
+    def _none(self, step: int, reason: str) -> None:
+        """Keep a reason for which a step found nothing."""
+        self._reasons[step][reason] += 1
 
     def _strong(
         self, q: FloatArray, feet: dict[str, Contact], hands: dict[str, Contact], margin: float
@@ -232,8 +231,7 @@ class _BraceSearch:
         forces = share_force(self._body, q, contacts, self._act, *rub)
         if largest is None or forces is None or forces.torque_share > self._settings.torque_share:
             joint = "friction" if forces is None else forces.tightest
-            self._reasons[_STRENGTH][f"{joint} is too weak"] += 1
-            return None
+            return self._none(_STRENGTH, f"{joint} is too weak")
         return Brace(q, feet, hands, forces, largest, margin)
 
     def _hands(self, q: FloatArray, heuristic: Heuristic) -> tuple[FloatArray, dict[str, Contact] | None]:
@@ -243,11 +241,9 @@ class _BraceSearch:
         for arm in ARMS:
             answer = self._generator.request(q, arm, task, order, kind=self._act.touch)
             if answer.contact is None or answer.q is None:
-                self._reasons[_HANDS][answer.message] += 1
-                return q, None
+                return q, self._none(_HANDS, answer.message)
             if self._act.obstacle not in answer.obstacles:
-                self._reasons[_HANDS][f"{arm} prefers {answer.obstacle}"] += 1
-                return q, None
+                return q, self._none(_HANDS, f"{arm} prefers {answer.obstacle}")
             q = answer.q
             # Held so that any force up to a hand's strength is felt.
             contact, away = answer.contact, self._settings.palm_room * answer.contact.normal
@@ -256,8 +252,7 @@ class _BraceSearch:
                 rotation=contact.rotation_contact_to_world,
             )  # fmt: skip
             if len(hands) == 2 and answer.score < 0.5 * BALANCED:
-                self._reasons[_HANDS]["the hands cannot act side by side"] += 1
-                return q, None
+                return q, self._none(_HANDS, "the hands cannot act side by side")
             alike = Mirrored(answer.contact.position, middle, across)
             order = WeightedSum([(1.0, heuristic), (BALANCED, alike)])
         return q, hands
@@ -270,19 +265,15 @@ class _BraceSearch:
         order = WeightedSum([(1.0, heuristic), (BALANCED, natural)])
         first = self._generator.request(q, LEGS[0], task, order)
         if first.contact is None or first.q is None:
-            return q, self._no_foot(first)
+            return q, self._none(_FEET, first.message)
         balance = Footing(loads, first.contact, natural, self._settings.margin, rules=self._rules)
         order = WeightedSum([(1.0, heuristic), (BALANCED, natural), (BALANCED, balance)])
         second = self._generator.request(first.q, LEGS[1], task, order)
         if second.contact is None or second.q is None:
-            return q, self._no_foot(second)
+            return q, self._none(_FEET, second.message)
         if min(first.score, second.score - BALANCED) < 0.5 * BALANCED:
-            self._reasons[_FEET][UNBALANCED] += 1
-            return q, None
+            return q, self._none(_FEET, UNBALANCED)
         return second.q, {item.effector: item for item in (first.contact, second.contact)}
-
-    def _no_foot(self, answer: GeneratedContact) -> None:
-        self._reasons[_FEET][answer.message] += 1
 
     def _why(self) -> str:
         act = self._act

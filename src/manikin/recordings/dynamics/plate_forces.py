@@ -7,7 +7,8 @@ assumed (:mod:`manikin.recordings.dynamics.recorded_forces`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from manikin.recordings.dynamics.recorded_dynamics import (
     margins_of_wrenches,
 )
 from manikin.recordings.dynamics.recorded_forces import torques_of
+from manikin.recordings.readers.marker_sets import SIDES
 from manikin.recordings.readers.markers import ForcePlate
 
 CUTOFF = 20.0
@@ -52,8 +54,7 @@ class PlateForces:
         wrench: (n, 6) of all plates about the world's origin, without their offsets [N, N.m].
         covered: (n,) whether every support is on a plate, so that the wrench is all there is.
         single: (n,) whether one foot alone supports.
-        effectors: The c effectors of the schedule.
-        of_effector: (n, c, 6) the part of the wrench on each of them; 0 where no plate carries it.
+        of_effector: (n, c, 6) the part of it on each effector of the schedule; 0 where no plate has it.
         apart: (n,) whether the load of each is known: all is covered, and no plate carries two of them.
     """
 
@@ -71,8 +72,7 @@ class PlateComparison:
 
     Attributes:
         single_frames: Of them in single support.
-        vertical_rms: Of the vertical force, per body weight.
-        vertical_rms_single: The same in single support.
+        vertical_rms: Of the vertical force, per body weight; ``vertical_rms_single`` in single support.
         cop_rms: Distance of the centres of pressure in single support, root mean square [m].
         cop_mean: Mean offset of ours in world x and y [m].
         margin_share: Share of the frames in which the plates' wrench has a positive margin on our stances.
@@ -99,8 +99,7 @@ def plate_forces(
 
     Args:
         plates: Of the same recording, at least one.
-        times: (n,) instants on their clock [s].
-        schedule: Stances on the same clock.
+        times: (n,) instants on their clock [s], which is that of the schedule.
         cutoff: Of the low-pass [Hz].
     """
     wrenches = np.array([_sampled(plate, times, cutoff) for plate in plates])
@@ -169,7 +168,7 @@ def compare_with_plates(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _HeldPlate:
     """A contact and the time for which it is made [s]."""
 
@@ -181,21 +180,15 @@ class _HeldPlate:
 def _held(schedule: ContactSchedule) -> list[_HeldPlate]:
     """Contacts in the order of their beginnings; one that lasts for several phases is one."""
     found: list[_HeldPlate] = []
-    for phase, begin, end in zip(
-        schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
-    ):
+    for phase, (begin, end) in zip(schedule.sequence, pairwise(schedule.instants.tolist()), strict=True):
         for contact in phase.stance:
-            same = [
-                number
-                for number, one in enumerate(found)
-                if one.end == begin
-                and one.contact.effector == contact.effector
-                and one.contact.same_place(contact)
-            ]
-            if same:
-                found[same[0]] = replace(found[same[0]], end=float(end))
+            for one in found:
+                same = one.contact.effector == contact.effector and one.contact.same_place(contact)
+                if same and one.end == begin:
+                    one.end = end
+                    break
             else:
-                found.append(_HeldPlate(contact, float(begin), float(end)))
+                found.append(_HeldPlate(contact, begin, end))
     return found
 
 
@@ -235,8 +228,6 @@ def _rms(values: FloatArray) -> float:
 JOINTS = ("hip_flexion", "hip_abduction", "knee_flexion", "ankle_dorsiflexion")
 """Hinges of a leg that are compared."""
 
-SIDES = ("left", "right")
-
 
 @dataclass(frozen=True)
 class TorqueComparison:
@@ -245,10 +236,8 @@ class TorqueComparison:
     Attributes:
         joint: The hinge, without its side.
         frames: Compared, of both sides.
-        rms: Root mean square of the difference [N.m].
-        mean: Of the difference, ours minus the plates' [N.m].
-        peak: Largest magnitude of ours [N.m].
-        peak_by_plates: Of theirs [N.m].
+        rms: Root mean square of the difference, ours minus the plates' [N.m]; ``mean`` is its mean.
+        peak: Largest magnitude of ours [N.m]; ``peak_by_plates`` is that of theirs.
     """
 
     joint: str
@@ -270,28 +259,20 @@ def compare_torques(
         measured: The plates at its instants.
     """
     theirs = torques_of(dynamics, measured.effectors, measured.of_effector)
-    names = motion.joint_names
-    feet = [f"{side}_foot" for side in SIDES]
     held = {
-        foot: measured.apart & motion.support[:, motion.contact_names.index(foot)]
-        for foot in feet
-        if foot in motion.contact_names
+        name: measured.apart & support
+        for name, support in zip(motion.contact_names, motion.support.T, strict=True)
     }
     found = []
     for joint in JOINTS:
-        ours, others = [np.zeros(0)], [np.zeros(0)]
-        for side, foot in zip(SIDES, feet, strict=True):
-            if foot in held:
-                column = 6 + names.index(f"{side}_{joint}")
-                ours.append(motion.tau[held[foot], column])
-                others.append(theirs[held[foot], column])
-        mine, plates = np.concatenate(ours), np.concatenate(others)
+        parts = [np.zeros((2, 0))]
+        for side in SIDES:
+            rows = held.get(f"{side}_foot")
+            if rows is not None:
+                column = 6 + motion.joint_names.index(f"{side}_{joint}")
+                parts.append(np.stack([motion.tau[rows, column], theirs[rows, column]]))
+        mine, plates = np.hstack(parts)
         if len(mine):
-            apart = mine - plates
-            found.append(
-                TorqueComparison(
-                    joint, len(mine), _rms(apart), float(apart.mean()),
-                    float(np.abs(mine).max()), float(np.abs(plates).max()),
-                )
-            )  # fmt: skip
+            apart, peaks = mine - plates, (float(np.abs(each).max()) for each in (mine, plates))
+            found.append(TorqueComparison(joint, len(mine), _rms(apart), float(apart.mean()), *peaks))
     return tuple(found)

@@ -45,7 +45,8 @@ from manikin.body.limbs import with_knees_and_elbows
 from manikin.contact import ContactSchedule, Stance
 from manikin.errors import InputError
 from manikin.kinematics.point_targets import PostureCost
-from manikin.motion.dynamics import FreeDynamics
+from manikin.motion.configuration_spline import align_quaternions
+from manikin.motion.dynamics import FreeDynamics, centroidal_motion
 from manikin.motion.motion import Motion
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import (
@@ -73,14 +74,11 @@ def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruc
     """A reconstruction low-passed by a Butterworth filter of second order, forward and backward.
 
     Filtered are position, hinges, and the rotation of the pelvis as a quaternion of continuous sign, then
-    normalised; hinges are kept to their limits. Residuals are those of the filtered postures.
-
-    Args:
-        found: At least four instants at an even rate.
-        cutoff: Where each of the two passes halves the power [Hz].
+    normalised; hinges are kept to their limits. Residuals are those of the filtered postures. Each of the two
+    passes halves the power at the cutoff [Hz].
 
     Raises:
-        InputError: If there are too few instants, or the cutoff is not below half their rate.
+        InputError: If there are less than four instants, or the cutoff is not below half their rate.
     """
     q = smoothed_postures(found, cutoff)
     residual = PostureCost(found.body, found.targets).distances(q, found.targets.positions)
@@ -94,8 +92,6 @@ def smoothed_postures(
     """(n, nq) postures of :func:`smoothed`, without their residuals.
 
     Args:
-        found: As of :func:`smoothed`, and so is ``cutoff``.
-        cutoff: Low-pass [Hz].
         limits: Whether hinges are kept to their limits; the kink where an angle meets its limit spoils second
             derivatives.
         touch_downs: Instants at which the cutoff rises for a moment, on the clock of ``found`` [s]; none for
@@ -105,14 +101,9 @@ def smoothed_postures(
     finite_number(cutoff, "cutoff [Hz]", above=0.0)
     if cutoff >= 0.5 * rate:
         raise InputError(f"cutoff is {cutoff:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
-    q = np.array(found.q)
-    flips = np.cumprod(np.where(np.sum(q[1:, 3:7] * q[:-1, 3:7], axis=1) < 0.0, -1.0, 1.0))
-    q[1:, 3:7] *= flips[:, None]
-    if len(touch_downs):
-        ceiling = np.minimum(local_cutoff(found.time, touch_downs, cutoff), HIGHEST_SHARE * rate)
-        q = smooth(q, rate, ceiling)
-    else:
-        q = low_passed(q, cutoff, rate)
+    q = align_quaternions(found.q)
+    ceiling = np.minimum(local_cutoff(found.time, touch_downs, cutoff), HIGHEST_SHARE * rate)
+    q = smooth(q, rate, ceiling) if len(touch_downs) else low_passed(q, cutoff, rate)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     if limits:
         q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
@@ -120,45 +111,27 @@ def smoothed_postures(
 
 
 def motion_of(found: Reconstruction, cutoff: float | None = MOTION_CUTOFF) -> Motion:
-    """A motion of the recorded postures, smoothed, with velocities and accelerations by central differences.
+    """A motion of the recorded postures, smoothed, with velocities and accelerations of :func:`rates_of`.
 
-    Differences are taken on the configuration space: the pelvis' parts are in its own frame. There are no
-    contacts and forces, and ``tau`` and ``margin`` are NaN.
-
-    Args:
-        found: At least four instants at an even rate.
-        cutoff: Of :func:`smoothed` [Hz]; None for the postures as they are.
-
-    Raises:
-        InputError: As :func:`smoothed`.
+    There are no contacts and forces, and ``tau`` and ``margin`` are NaN. With the cutoff None postures are as
+    they are; otherwise arguments and errors are those of :func:`smoothed`.
     """
-    _rate(found)
     q = found.q if cutoff is None else smoothed_postures(found, cutoff)
     v, a = rates_of(found, q)
-    com, spin = _com_and_spin(found.body, q, v)
-    n = len(q)
+    moved, n = centroidal_motion(found.body, q, v, a), len(q)
     return Motion(
-        time=found.time, q=q, v=v, a=a, tau=np.full_like(v, np.nan), com=com, angular_momentum=spin,
+        time=found.time, q=q, v=v, a=a, tau=np.full_like(v, np.nan), com=moved.com,
+        angular_momentum=moved.angular_momentum,
         margin=np.full(n, np.nan), support=np.zeros((n, 0), dtype=bool), contact_force=np.zeros((n, 0, 6)),
         contact_names=(), joint_names=tuple(found.body.joint_names),
     )  # fmt: skip
 
 
-def _com_and_spin(body: BodyModel, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) centre of mass [m] and (n, 3) angular momentum about it [kg.m^2/s]."""
-    data = body.pinocchio.createData()
-    com, spin = np.empty((len(q), 3)), np.empty((len(q), 3))
-    for frame in range(len(q)):
-        spin[frame] = pin.computeCentroidalMomentum(body.pinocchio, data, q[frame], v[frame]).angular
-        com[frame] = data.com[0]
-    return com, spin
-
-
 def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n, nv) velocities and accelerations of postures at the instants of a reconstruction.
 
-    By central differences on the configuration space; at both ends velocities continue the line of the
-    next two.
+    By central differences on the configuration space, the pelvis' parts in its own frame; at both ends
+    velocities continue the line of the next two.
 
     Raises:
         InputError: If there are too few instants.
@@ -173,44 +146,29 @@ def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArr
 def _rate(found: Reconstruction) -> float:
     if len(found.time) < FEWEST_FRAMES:
         raise InputError(f"reconstruction has {len(found.time)} instants; valid: at least {FEWEST_FRAMES}")
-    return (len(found.time) - 1) / float(found.time[-1] - found.time[0])
+    return found.rate
 
 
-TOUCH_DOWN_CUTOFF = 8.0
-"""Cutoff at a touch-down [Hz]."""
-
-TOUCH_DOWN_WIDTH = 0.08
-"""Time from a touch-down in which the cutoff falls to 1/e of its rise [s]."""
+TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH = 8.0, 0.08
+"""Cutoff at a touch-down [Hz], and time from it in which the cutoff falls to 1/e of its rise [s]."""
 
 
-def local_cutoff(
-    time: FloatArray, touch_downs: Sequence[float], cutoff: float, peak: float = TOUCH_DOWN_CUTOFF,
-    width: float = TOUCH_DOWN_WIDTH,
-) -> FloatArray:  # fmt: skip
-    """(n,) cutoff at each instant [Hz]: a bell over each touch-down, the highest where they overlap.
+def local_cutoff(time: FloatArray, touch_downs: Sequence[float], cutoff: float) -> FloatArray:
+    """(n,) cutoff at instants (n,) [s]: a bell over each touch-down [s], the highest where they overlap [Hz].
 
-    Args:
-        time: (n,) instants [s].
-        touch_downs: Instants of the peaks [s].
-        cutoff: Away from them [Hz].
-        peak: At a touch-down [Hz]; without effect below ``cutoff``.
-        width: Of the bell [s].
+    ``cutoff`` is that away from them.
     """
-    found = np.full(len(time), cutoff)
+    found, rise = np.full(len(time), cutoff), TOUCH_DOWN_CUTOFF - cutoff
     for instant in touch_downs:
-        found = np.maximum(found, cutoff + (peak - cutoff) * np.exp(-(((time - instant) / width) ** 2)))
+        found = np.maximum(found, cutoff + rise * np.exp(-(((time - instant) / TOUCH_DOWN_WIDTH) ** 2)))
     return found
 
 
 def smooth(values: FloatArray, rate: float, cutoff: FloatArray) -> FloatArray:
-    """(n, k) columns low-passed with a cutoff for each instant.
+    """(n, k) columns low-passed with a cutoff (n,) below half the rate for each instant [Hz].
 
-    Both ends are continued as point reflections, so that a straight line stays as it is.
-
-    Args:
-        values: (n, k), at least two instants at an even rate.
-        rate: Of the instants [Hz].
-        cutoff: (n,) frequency at which the amplitude is halved, below half the rate [Hz].
+    The amplitude is halved at the cutoff. Both ends are continued as point reflections, so that a straight
+    line stays as it is. There are at least two instants at an even rate.
     """
     pad = min(len(values) - 1, int(np.ceil(2.0 * rate / float(cutoff.min()))))
     first, last = 2.0 * values[0] - values[pad:0:-1], 2.0 * values[-1] - values[-2 : -pad - 2 : -1]
@@ -297,8 +255,7 @@ def dynamics_of(
     Args:
         found: At least four instants at an even rate, not yet smoothed.
         cutoff: Of the low-pass of the postures [Hz].
-        touch_downs: Instants at which it rises for a moment, on the clock of ``found`` [s], see
-            :func:`touch_downs_of`.
+        touch_downs: Instants at which it rises for a moment, see :func:`touch_downs_of` [s].
 
     Raises:
         InputError: If there are too few instants, or the cutoff is not below half their rate.
@@ -320,11 +277,11 @@ def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynami
         InputError: If there are too few instants.
     """
     v, a = rates_of(found, q)
-    com, spin = _com_and_spin(found.body, q, v)
-    free = FreeDynamics.of(found.body, q, v, a)
+    moved, free = centroidal_motion(found.body, q, v, a), FreeDynamics.of(found.body, q, v, a)
     return RecordedDynamics(
-        found.body, found.time, q, v, a, com, spin, free.needed, free.wrench, free.jacobians
-    )
+        found.body, found.time, q, v, a, moved.com, moved.angular_momentum, free.needed, free.wrench,
+        free.jacobians,
+    )  # fmt: skip
 
 
 def with_mass(found: Reconstruction, mass: float) -> Reconstruction:
@@ -353,9 +310,7 @@ class RecordedMargins:
         body: (n,) of the whole body: margin [N.m], force at the centre of mass that would end balance [N],
             distance of the zero moment point from the edge [m].
         mass: (n,) the same without angular momentum.
-        phase: (n,) index of the phase.
-        polytopes: One for each phase that has frames, by its index, about the middle of its contacts; None in
-            flight.
+        phase: (n,) index of the phase in ``polytopes``, which are None in flight and without frames.
         wrench: (n, 6) of the whole body about the world's origin [N, N.m].
         com: (n, 3) centre of mass [m].
     """
@@ -421,29 +376,15 @@ def recorded_margins(
 def margins_within(
     polytopes: Sequence[WrenchPolytope | None], phases: NDArray[np.int64], dynamics: RecordedDynamics
 ) -> RecordedMargins:
-    """Margins of a recorded motion in known polytopes.
-
-    Args:
-        polytopes: One for each phase; None for flight.
-        phases: (n,) index of the phase in each frame.
-    """
-    body, mass = (
-        margins_of_wrenches(polytopes, phases, wrench, dynamics.com)
-        for wrench in (dynamics.wrench, dynamics.point_mass_wrench)
-    )
+    """Margins of a recorded motion in the polytopes of its phases, None in flight, and (n,) phases."""
+    wrenches = dynamics.wrench, dynamics.point_mass_wrench
+    body, mass = (margins_of_wrenches(polytopes, phases, wrench, dynamics.com) for wrench in wrenches)
     return RecordedMargins(body, mass, phases, tuple(polytopes), dynamics.wrench, dynamics.com)
 
 
 def margins_of_wrenches(
     polytopes: Sequence[WrenchPolytope | None], phases: NDArray[np.int64], wrench: FloatArray, com: FloatArray
 ) -> MotionMargin:
-    """Margins of wrenches about the centre of mass in known polytopes.
-
-    Args:
-        polytopes: One for each phase; None for flight.
-        phases: (n,) index of the phase.
-        wrench: (n, 6) about the world's origin [N, N.m].
-        com: (n, 3) [m].
-    """
+    """Margins of wrenches (n, 6) about the world's origin, CoM (n, 3) [m]; see :func:`margins_within`."""
     stances = [FLIGHT if one is None else one.stance for one in polytopes]
     return motion_margin(stances, phases, wrench, com, polytopes=polytopes)

@@ -54,17 +54,15 @@ instants of supports are known to some hundredths of a second."""
 
 
 def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float) -> FloatArray:
-    """Share wrenches among contacts so that each is loaded smoothly, without regard to friction.
+    """(n, c, 6) shares of smoothly loaded contacts, about the world's origin; friction is not regarded.
+
+    Their sum over the contacts is the wrench where any is made; they are 0 elsewhere.
 
     Args:
         wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
         held: (n, c) which contacts are made.
         points: (n, c, 3) where they are [m]; any value where they are not made.
         step: Time between frames [s].
-
-    Returns:
-        (n, c, 6) of each contact, about the world's origin; their sum over the contacts is ``wrench`` where
-        any is made, and 0 elsewhere.
     """
     found = np.where(held[..., None], wrench[:, None], 0.0)
     for first, end in mask_runs(held.sum(axis=1) > 1):
@@ -75,17 +73,14 @@ def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArra
 def shared_wrenches(
     stance: Stance, wrench: FloatArray, weight: float, near: FloatArray | None = None
 ) -> FloatArray:
-    """Share wrenches among the contacts of a stance within their friction pyramids.
+    """(n, c, 6) shares of the contacts of a stance within their friction pyramids, about the world's origin.
+
+    Their sum over the contacts is the wrench.
 
     Args:
-        stance: At least one contact.
         wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
         weight: Of the body [N], the scale of forces.
-        near: (n, c, 6) shares about the world's origin to stay near to, as of :func:`smooth_shares`; None
-            for the least forces.
-
-    Returns:
-        (n, c, 6) of each contact, about the world's origin; their sum over the contacts is ``wrench``.
+        near: (n, c, 6) shares to stay near to, as of :func:`smooth_shares`; None for the least forces.
     """
     if len(stance) == 1:
         return np.array(wrench[:, None])
@@ -112,12 +107,12 @@ def _admissible(stance: Stance, shares: FloatArray, weight: float) -> NDArray[np
 def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray | None) -> FloatArray:
     """(n, c, 6) admissible shares of several contacts, nearest to given ones, or the least."""
     middle = np.mean([contact.position for contact in stance], axis=0)
-    wanted = _scaled(wrench, middle, weight)
+    wanted = _about(wrench, middle, weight)
     generators = _generators(stance, middle, weight)
     columns = np.vstack(generators).T
     known = np.zeros((len(wanted), columns.shape[1]))
     if near is not None:
-        given = _scaled(near, middle, weight).swapaxes(0, 1)
+        given = _about(near, middle, weight).swapaxes(0, 1)
         known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, given, strict=True)])
     pushes = _pushes(columns, wanted, known)
     ends = np.cumsum([0, *map(len, generators)])
@@ -149,14 +144,10 @@ def _smooth_run(
     inside[0], inside[-1] = _telling(held[:first][::-1], step), _telling(held[end:], step)
     changing = inside & ((before >= 0) | (after >= 0))
     frames, column = np.nonzero(changing)
-    rows = np.arange(len(frames))
-    ours, theirs = after[frames, column], before[frames, column]
-    change = sparse.csr_array(
-        (np.r_[np.ones((ours >= 0).sum()), -np.ones((theirs >= 0).sum())],
-         (np.r_[rows[ours >= 0], rows[theirs >= 0]], np.r_[ours[ours >= 0], theirs[theirs >= 0]])),
-        shape=(len(rows), count),
-    )  # fmt: skip
-    known = np.zeros((len(rows), 6))
+    # Rows of the identity, and a last one of zeros for the index -1 of a contact that is not made.
+    one = sparse.csr_array(sparse.vstack([sparse.eye_array(count), sparse.csr_array((1, count))]))
+    change = one[after[frames, column]] - one[before[frames, column]]
+    known = np.zeros((len(frames), 6))
     if first > 0:
         start = frames == 0
         known[start] = _about(found[first - 1, column[start]], places[0, column[start]])
@@ -167,10 +158,10 @@ def _smooth_run(
     frame, contact = np.nonzero(made)
     middle = places.sum(axis=1) / made.sum(axis=1)[:, None]
     total = _about(found[first:end][frame, contact], middle[frame])  # the whole wrench, once per contact
-    one = np.searchsorted(frame, np.arange(end - first))
+    begins = np.searchsorted(frame, np.arange(end - first))
     sums = _sums(frame, places[frame, contact] - middle[frame], end - first)
     system = sparse.block_array([[sparse.kron(cost, np.eye(6)), sums.T], [sums, None]])
-    right = np.concatenate([(change.T @ known).ravel(), total[one].ravel()])
+    right = np.concatenate([(change.T @ known).ravel(), total[begins].ravel()])
     solved = splu(sparse.csc_matrix(system)).solve(right)[: 6 * count].reshape(count, 6)
     solved[:, 3:] *= LEVER
     shares = np.zeros((end - first, made.shape[1], 6))
@@ -202,18 +193,11 @@ def _carried(arm: FloatArray) -> FloatArray:
     return wrench_map(-arm / LEVER)
 
 
-def _about(wrench: FloatArray, point: FloatArray) -> FloatArray:
-    """(k, 6) about points (k, 3), moments per lever."""
-    moved = wrench_about(wrench, point)
-    moved[:, 3:] /= LEVER
+def _about(wrench: FloatArray, point: FloatArray, weight: float = 1.0) -> FloatArray:
+    """(..., 6) about points, per weight and moments per lever."""
+    moved = wrench_about(wrench, point) / weight
+    moved[..., 3:] /= LEVER
     return moved
-
-
-def _scaled(wrench: FloatArray, middle: FloatArray, weight: float) -> FloatArray:
-    """(..., 6) about a point, per body weight and lever."""
-    wanted = wrench_about(wrench, middle) / weight
-    wanted[..., 3:] /= LEVER
-    return wanted
 
 
 def _generators(stance: Stance, middle: FloatArray, weight: float) -> list[FloatArray]:
@@ -256,6 +240,16 @@ def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches:
     return torques
 
 
+def _points(schedule: ContactSchedule, phases: NDArray[np.int64]) -> FloatArray:
+    """(n, c, 3) where each effector of a schedule is in contact in the phases (n,), else 0 [m]."""
+    names = schedule.sequence.effectors
+    points = np.zeros((len(phases), len(names), 3))
+    for number, phase in enumerate(schedule.sequence):
+        for contact in phase.stance:
+            points[phases == number, names.index(contact.effector)] = contact.position
+    return points
+
+
 def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0) -> FloatArray:
     """(n, c, 6) wrench on each effector of a schedule, about the world's origin [N, N.m]; 0 off its contacts.
 
@@ -263,11 +257,8 @@ def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, star
         start: The schedule's clock at the motion's first instant [s].
     """
     names, times = schedule.sequence.effectors, dynamics.time + start
-    phases = schedule.phase_at(times)
-    held, points = schedule.support(times, names), np.zeros((len(times), len(names), 3))
-    for number, phase in enumerate(schedule.sequence):
-        for contact in phase.stance:
-            points[phases == number, names.index(contact.effector)] = contact.position
+    phases, held = schedule.phase_at(times), schedule.support(times, names)
+    points = _points(schedule, phases)
     step = float(dynamics.time[1] - dynamics.time[0])
     wrenches, weight = smooth_shares(dynamics.wrench, held, points, step), GRAVITY * dynamics.body.mass
     for number, phase in enumerate(schedule.sequence):
@@ -292,20 +283,12 @@ def motion_on_contacts(
     are zero but for rounding.
 
     Args:
-        schedule: Its stances, of :func:`manikin.recordings.supports.body_supports.recorded_schedule`.
         start: The schedule's clock at the motion's first instant [s].
         margins: Of the same motion on the same stances, where they are known already.
     """
-    names = schedule.sequence.effectors
-    times = dynamics.time + start
-    phases = schedule.phase_at(times)
+    names, times = schedule.sequence.effectors, dynamics.time + start
     wrenches = contact_wrenches(dynamics, schedule, start)
-    forces = np.zeros_like(wrenches)
-    for number, phase in enumerate(schedule.sequence):
-        frames = phases == number
-        for contact in phase.stance:
-            column = names.index(contact.effector)
-            forces[frames, column] = wrench_about(wrenches[frames, column], contact.position)
+    forces = wrench_about(wrenches, _points(schedule, schedule.phase_at(times)))
     torques = torques_of(dynamics, names, wrenches)
     torques[:, :6] = 0.0
     return Motion(
@@ -320,10 +303,5 @@ def motion_on_contacts(
 def _moved_by(body: BodyModel, effector: str) -> list[int]:
     """Indices of the velocities that move an effector."""
     model = body.pinocchio
-    joint = model.frames[body.effector_frame(effector)].parentJoint
-    return [
-        place
-        for one in model.supports[joint]
-        for place in range(model.idx_vs[one], model.idx_vs[one] + model.nvs[one])
-        if one
-    ]
+    joints = model.supports[model.frames[body.effector_frame(effector)].parentJoint]
+    return [model.idx_vs[one] + k for one in joints if one for k in range(model.nvs[one])]

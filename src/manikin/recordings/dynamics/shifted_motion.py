@@ -27,7 +27,7 @@ on the world's heading. Only facets that a solution violates enter the program. 
 bounds repairs remains: the largest violation of each frame has a price.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,11 +56,8 @@ from manikin.recordings.dynamics.recorded_dynamics import (
 )
 from manikin.recordings.reconstruction.proportions import Reconstruction, level_heading
 
-PLACE_ERROR = 0.005
-"""``e``: of the centre of mass by markers [m]."""
-
-ACCELERATION_ERROR = 0.3
-"""``f``: of its acceleration [m/s^2]."""
+PLACE_ERROR, ACCELERATION_ERROR = 0.005, 0.3
+"""``e`` and ``f``: of the centre of mass by markers [m], and of its acceleration [m/s^2]."""
 
 ASIDE = 0.02
 """``a``: force plates under 11 straight walks of seven people say 6 to 25 mm, root mean square [m]."""
@@ -77,17 +74,11 @@ AT_FLOOR = 2e-4
 KNOTS = 0.04
 """Time between the knots of the spline [s]: a shift up to some 10 Hz."""
 
-LARGEST_RMS = 0.01
-"""Longest shift that is believed, root mean square [m]."""
+LARGEST_RMS, LEAST_BALANCED = 0.01, 0.9
+"""Of shifts that are believed: longest root mean square [m], least share of balanced frames with contacts."""
 
-LEAST_BALANCED = 0.9
-"""Share of the frames with contacts that have to be in balance once shifted."""
-
-PRICE = 1e4
-"""Price of a violation, per metre."""
-
-TOLERANCE = 1e-4
-"""Violations that are let pass, per body weight [m]."""
+PRICE, TOLERANCE = 1e4, 1e-4
+"""Price of a violation, per metre, and violations that are let pass, per body weight [m]."""
 
 ROUNDS = 12
 """Most times that violated facets are added."""
@@ -163,13 +154,13 @@ def least_shift(
         finite_number(aside, "aside [m]", above=0.0)
     weight = GRAVITY * dynamics.body.mass
     kept, spline = inside * weight, _Spline.over(dynamics.time)
-    axes = _sole_axes(dynamics, margins) if aside is not None else _Rows.none()
+    axes = _Rows.joined([] if aside is None else list(_sole_axes(dynamics, margins)))
     turn = rotation_from_yaw(level_heading(dynamics.q[:1]))
     shift, bend = np.zeros((len(dynamics), 3)), np.zeros((len(dynamics), 3))
     used, solved = np.zeros((0, 2), dtype=np.int64), True
     for number in range(ROUNDS):
         wrench = _shifted_wrench(dynamics, shift, bend)
-        known = np.unique(np.vstack([used, _violated(margins, wrench, kept, weight)]), axis=0)
+        known = np.unique(np.vstack([used, _violated(margins, wrench, kept - TOLERANCE * weight)]), axis=0)
         if len(known) == len(used) and (number or not len(axes.frame)):
             break
         used = known
@@ -207,28 +198,31 @@ def _lengths(polytope: WrenchPolytope) -> FloatArray:
     return np.sqrt(np.sum(force**2, axis=1) + np.sum(moment**2, axis=1))
 
 
-def _about_contacts(margins: RecordedMargins, wrench: FloatArray) -> FloatArray:
-    """(n,) margins of (n, 6) wrenches with moments about the middle of the contacts [N.m]; NaN in flight."""
-    found = np.full(len(wrench), np.nan)
+def _distances(
+    margins: RecordedMargins, wrench: FloatArray
+) -> Iterator[tuple[NDArray[np.int64], FloatArray, FloatArray]]:
+    """Of each phase with contacts the frames, their distances (k, m) to the facets, and :func:`_lengths`."""
     for number in np.unique(margins.phase):
         polytope = margins.polytopes[number]
         if polytope is not None:
-            frames = margins.phase == number
+            frames = np.flatnonzero(margins.phase == number)
             distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
-            found[frames] = (distance / _lengths(polytope)).min(axis=1)
+            yield frames, distance, _lengths(polytope)
+
+
+def _about_contacts(margins: RecordedMargins, wrench: FloatArray) -> FloatArray:
+    """(n,) margins of (n, 6) wrenches with moments about the middle of the contacts [N.m]; NaN in flight."""
+    found = np.full(len(wrench), np.nan)
+    for frames, distance, lengths in _distances(margins, wrench):
+        found[frames] = (distance / lengths).min(axis=1)
     return found
 
 
-def _violated(margins: RecordedMargins, wrench: FloatArray, kept: float, weight: float) -> NDArray[np.int64]:
-    """(v, 2) frame and facet of its polytope, of all that are nearer than ``kept`` or beyond."""
+def _violated(margins: RecordedMargins, wrench: FloatArray, least: float) -> NDArray[np.int64]:
+    """(v, 2) frame and facet of its polytope, of all that are nearer than the least distance, or beyond."""
     found = [np.zeros((0, 2), dtype=np.int64)]
-    for number in np.unique(margins.phase):
-        polytope = margins.polytopes[number]
-        if polytope is None:
-            continue
-        frames = np.flatnonzero(margins.phase == number)
-        distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
-        where, row = np.nonzero(distance < (kept - TOLERANCE * weight) * _lengths(polytope))
+    for frames, distance, lengths in _distances(margins, wrench):
+        where, row = np.nonzero(distance < least * lengths)
         found.append(np.column_stack([frames[where], row]))
     return np.vstack(found)
 
@@ -263,14 +257,10 @@ class _Rows:
         return cls(frame, base, on_shift, on_bend)
 
     @classmethod
-    def none(cls) -> "_Rows":
-        """No rows."""
-        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
-
-    @classmethod
     def joined(cls, parts: Sequence["_Rows"]) -> "_Rows":
-        """The rows of several."""
-        each = [(one.frame, one.base, one.on_shift, one.on_bend) for one in (cls.none(), *parts)]
+        """The rows of several, or of none."""
+        none = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
+        each = [none, *((one.frame, one.base, one.on_shift, one.on_bend) for one in parts)]
         return cls(*(np.concatenate(column) for column in zip(*each, strict=True)))
 
     def scaled(self, unit: float) -> "_Rows":
@@ -284,12 +274,8 @@ class _Rows:
     def taken(self, spline: "_Spline") -> list[sparse.csr_array]:
         """What the coefficients of each axis take, (v, k) each."""
         values, second = spline.values[self.frame], spline.second[self.frame]
-        return [
-            sparse.csr_array(
-                values.multiply(self.on_shift[:, [axis]]) + second.multiply(self.on_bend[:, [axis]])
-            )
-            for axis in range(3)
-        ]
+        parts = zip(self.on_shift.T[..., None], self.on_bend.T[..., None], strict=True)
+        return [sparse.csr_array(values.multiply(a) + second.multiply(b)) for a, b in parts]
 
 
 def _facets(
@@ -306,21 +292,18 @@ def _facets(
     return _Rows.joined(parts)
 
 
-def _sole_axes(dynamics: RecordedDynamics, margins: RecordedMargins) -> _Rows:
+def _sole_axes(dynamics: RecordedDynamics, margins: RecordedMargins) -> Iterator[_Rows]:
     """Moments about the long axis of each foot that carries alone."""
-    parts = []
     for number in np.unique(margins.phase):
         polytope = margins.polytopes[number]
         if polytope is None or len(polytope.stance) != 1:
             continue
         contact = polytope.stance.contacts[0]
-        if contact.kind is not ContactKind.SOLE or not contact.effector.endswith("foot"):
-            continue
-        frame = np.flatnonzero(margins.phase == number)
-        row = np.append(np.zeros(3), contact.rotation_contact_to_world[:, 0])
-        rows = np.tile(row, (len(frame), 1))
-        parts.append(_Rows.of(dynamics, frame, rows, np.zeros(len(frame)), contact.position))
-    return _Rows.joined(parts)
+        if contact.kind is ContactKind.SOLE and contact.effector.endswith("foot"):
+            frame = np.flatnonzero(margins.phase == number)
+            rows = np.zeros((len(frame), 6))
+            rows[:, 3:] = contact.rotation_contact_to_world[:, 0]
+            yield _Rows.of(dynamics, frame, rows, np.zeros(len(frame)), contact.position)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,6 @@ turns ``R = Rz Ry Rx`` of its degrees of freedom its rotation to its parent is `
 the rest pose. Our joint of a bone's name is where the bone begins.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -68,17 +67,10 @@ def read_asf(path: str | Path) -> Skeleton:
     order, parents = _tree(sections["hierarchy"], bones, file)
     unit = INCH / float(scale)
     factor = 1.0 if radians else np.pi / 180.0
-    return Skeleton(
-        Path(path).name,
-        order,
-        parents,
-        unit * np.array([bones[name]["vector"] for name in order]),
-        np.array([fixed_turns(factor * bones[n]["axis"][None], bones[n]["order"])[0] for n in order]),
-        tuple(bones[name]["dof"] for name in order),
-        root["order"],
-        radians,
-        unit,
-    )
+    vectors = unit * np.array([bones[name]["vector"] for name in order])
+    axes = np.array([fixed_turns(factor * bones[n]["axis"][None], bones[n]["order"])[0] for n in order])
+    turns = tuple(bones[name]["dof"] for name in order)
+    return Skeleton(Path(path).name, order, parents, vectors, axes, turns, root["order"], radians, unit)
 
 
 def _sections(text: str, file: str) -> dict[str, list[list[str]]]:
@@ -228,12 +220,16 @@ def _frames(text: str, skeleton: Skeleton, file: str) -> tuple[FloatArray, bool]
     width = sum(len(turns) for turns in skeleton.turns)
     words: list[list[str]] = []
     radians, number, seen = skeleton.radians, None, width
-    for line, entry in _lines(text):
-        where = f"{file}: line {line}"
+    for line, content in enumerate(text.splitlines(), start=1):
+        entry, where, last = content.split("#")[0].split(), f"{file}: line {line}", number
+        if not entry:
+            continue
         if len(entry) == 1 and entry[0].startswith(":"):
             radians = {":DEGREES": False, ":RADIANS": True}.get(entry[0].upper(), radians)
         elif len(entry) == 1:
-            number = _frame_number(entry[0], number, where)
+            number = whole_number(entry[0], where)
+            if last is not None and number != last + 1:
+                raise InputError(f"{where}: frame {number} after {last}; valid: {last + 1}")
             _complete(seen, width, where)
             words.append([""] * width)
             seen = 0
@@ -248,26 +244,12 @@ def _frames(text: str, skeleton: Skeleton, file: str) -> tuple[FloatArray, bool]
     return numbers(flat, f"{file}: a frame").reshape(len(words), width), radians
 
 
-def _lines(text: str) -> Iterator[tuple[int, list[str]]]:
-    for number, line in enumerate(text.splitlines(), start=1):
-        entry = line.split("#")[0].split()
-        if entry:
-            yield number, entry
-
-
 def _slots(skeleton: Skeleton) -> dict[str, slice]:
     found, start = {}, 0
     for bone, turns in zip(skeleton.bones, skeleton.turns, strict=True):
         found[bone] = slice(start, start + len(turns))
         start += len(turns)
     return found
-
-
-def _frame_number(word: str, last: int | None, where: str) -> int:
-    number = whole_number(word, where)
-    if last is not None and number != last + 1:
-        raise InputError(f"{where}: frame {number} after {last}; valid: {last + 1}")
-    return number
 
 
 def _complete(seen: int, width: int, where: str) -> None:
@@ -283,8 +265,8 @@ def _take(entry: list[str], slots: dict[str, slice], frame: list[str], where: st
     slot = slots.get(name)
     if slot is None:
         raise InputError(f"{where}: {name[:40]!r} is no bone; valid: {', '.join(slots)}")
-    if not values or slot.stop - slot.start != len(values):
-        wanted = slot.stop - slot.start
+    wanted = slot.stop - slot.start
+    if not values or wanted != len(values):
         raise InputError(f"{where}: {name!r} has {len(values)} values; valid: {wanted} (is it cut short?)")
     if frame[slot.start]:
         raise InputError(f"{where}: {name!r} twice in one frame; valid: once")
@@ -296,8 +278,12 @@ def _recording(name: str, skeleton: Skeleton, frames: FloatArray, radians: bool,
     slots = _slots(skeleton)
     rotations = np.empty((len(frames), len(skeleton.bones), 3, 3))
     for number, bone in enumerate(skeleton.bones):
-        values = _by_turn(frames[:, slots[bone]], skeleton.turns[number])
-        angles = values if radians else np.deg2rad(values)
+        angles = np.zeros((len(frames), 3))
+        for column, turn in enumerate(skeleton.turns[number]):
+            if turn in TURNS:
+                angles[:, TURNS.index(turn)] = frames[:, slots[bone].start + column]
+        if not radians:
+            angles = np.deg2rad(angles)
         axes, order = skeleton.axes[number], skeleton.root_order if number == 0 else "XYZ"
         rotations[:, number] = axes @ fixed_turns(angles, order) @ axes.T
     # A bone begins where its parent ends.
@@ -305,22 +291,5 @@ def _recording(name: str, skeleton: Skeleton, frames: FloatArray, radians: bool,
     offsets = np.array([np.zeros(3) if parent < 0 else vectors[parent] for parent in parents])
     ends = {bone: vectors[k] for k, bone in enumerate(skeleton.bones) if k not in parents}
     root = frames[:, slots[ROOT]][:, [skeleton.turns[0].index(axis) for axis in ("tx", "ty", "tz")]]
-    return z_up(
-        name,
-        skeleton.bones,
-        np.array(parents),
-        offsets,
-        ends,
-        rotations,
-        skeleton.metres_per_unit * root,
-        rate,
-    )
-
-
-def _by_turn(values: FloatArray, turns: tuple[str, ...]) -> FloatArray:
-    """(n, 3) angles about x, y and z, zero where the bone does not turn."""
-    angles = np.zeros((len(values), 3))
-    for column, turn in enumerate(turns):
-        if turn in TURNS:
-            angles[:, TURNS.index(turn)] = values[:, column]
-    return angles
+    root = skeleton.metres_per_unit * root
+    return z_up(name, skeleton.bones, np.array(parents), offsets, ends, rotations, root, rate)

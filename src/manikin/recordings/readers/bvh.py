@@ -44,16 +44,11 @@ def read_bvh(path: str | Path, metres_per_unit: float | None = None) -> Recordin
     joints = _Hierarchy(hierarchy, file).joints
     rate, values = _motion(motion, sum(len(joint.channels) for joint in joints), file)
     unit = metres_per_unit or _unit(joints, file)
-    return z_up(
-        Path(path).name,
-        tuple(joint.name for joint in joints),
-        np.array([joint.parent for joint in joints]),
-        unit * np.array([joint.offset if joint.parent >= 0 else np.zeros(3) for joint in joints]),
-        {joint.name: unit * joint.end for joint in joints if joint.end is not None},
-        _rotations(joints, values),
-        unit * values[:, [joints[0].channels.index(name) for name in _POSITIONS]],
-        rate,
-    )
+    offsets = unit * np.array([joint.offset if joint.parent >= 0 else np.zeros(3) for joint in joints])
+    ends = {joint.name: unit * joint.end for joint in joints if joint.end is not None}
+    root = unit * values[:, [joints[0].channels.index(name) for name in _POSITIONS]]
+    names, parents = tuple(joint.name for joint in joints), np.array([joint.parent for joint in joints])
+    return z_up(Path(path).name, names, parents, offsets, ends, _rotations(joints, values), root, rate)
 
 
 @dataclass
@@ -73,7 +68,6 @@ class _Hierarchy:
     def __init__(self, words: list[str], file: str) -> None:
         self.file = file
         self.joints: list[_Joint] = []
-        self._names: set[str] = set()
         self._words = words
         self._next = 0
         self._expect("ROOT")
@@ -103,9 +97,8 @@ class _Hierarchy:
 
     def _begin(self, parent: int) -> int:
         name = self._word()
-        if name in self._names:
+        if any(name == joint.name for joint in self.joints):
             raise self._error(f"joint {name[:40]!r} occurs twice", "unique names")
-        self._names.add(name)
         self._expect("{")
         self.joints.append(_Joint(name, parent))
         return len(self.joints) - 1
@@ -126,7 +119,7 @@ class _Hierarchy:
             wrong = repr(unknown[0][:40]) if unknown else str(count)
             raise InputError(f"{where}: {wrong}; valid: 1 to 6 of {', '.join(_POSITIONS + _ROTATIONS)}")
         placed = [name for name in channels if name in _POSITIONS]
-        if len(set(placed)) != (3 if joint == 0 else 0) or len(placed) != len(set(placed)):
+        if sorted(placed) != ([] if joint else list(_POSITIONS)):
             raise InputError(f"{where}: {placed}; valid: three positions of the root, none of other joints")
         return channels
 
@@ -193,10 +186,10 @@ def _span(joints: list[_Joint]) -> float:
     branches: dict[int, float] = {}
     owner: list[int] = []
     for number, joint in enumerate(joints):
-        own = 0.0 if joint.parent < 0 else float(np.linalg.norm(joint.offset))
-        lengths.append(own + (lengths[joint.parent] if joint.parent >= 0 else 0.0))
+        before = lengths[joint.parent] + float(np.linalg.norm(joint.offset)) if joint.parent >= 0 else 0.0
+        lengths.append(before)
         owner.append(number if joint.parent <= 0 else owner[joint.parent])
-        tip = lengths[-1] + (0.0 if joint.end is None else float(np.linalg.norm(joint.end)))
+        tip = before + (0.0 if joint.end is None else float(np.linalg.norm(joint.end)))
         branches[owner[-1]] = max(branches.get(owner[-1], 0.0), tip)
     return sum(sorted(branches.values())[-2:])
 

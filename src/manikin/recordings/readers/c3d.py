@@ -44,8 +44,17 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
             known or wrongly described, or ezc3d is not installed.
     """
     file = str(path)
-    ezc3d = _library(file)
-    layout = c3d_layout(_content(path), file)
+    try:
+        import ezc3d
+    except ModuleNotFoundError as error:
+        if error.name != "ezc3d":
+            raise
+        raise InputError(f"{file}: C3D files need ezc3d; install it with: pip install ezc3d") from None
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}; valid: a C3D file") from None
+    layout = c3d_layout(content, file)
     with_plates = plates and _has_plates(layout)
     try:
         found = ezc3d.c3d(file)
@@ -61,31 +70,13 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     declared_up = next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "")
     turn = rotation_to_z_up(up or declared_up or "+z", f"{file}: POINT:Y_SCREEN")
     rate = layout.real("POINT", "RATE")
-    start = (layout.first_frame - 1) / rate
     names, kept = _markers(parameters, layout)
     positions = unit * _finite(points[:3, kept], file, "a point").transpose(2, 1, 0) @ turn.T
     return MarkerRecording(
-        Path(path).name, names, without_unseen(positions), rate, start,
+        Path(path).name, names, without_unseen(positions), rate, (layout.first_frame - 1) / rate,
         _plates(parameters, found["data"]["analogs"][0], layout, unit, turn) if with_plates else (),
         _events(parameters, layout), _subject(parameters, unit),
     )  # fmt: skip
-
-
-def _library(file: str) -> Any:
-    try:
-        import ezc3d
-    except ModuleNotFoundError as error:
-        if error.name != "ezc3d":
-            raise
-        raise InputError(f"{file}: C3D files need ezc3d; install it with: pip install ezc3d") from None
-    return ezc3d
-
-
-def _content(path: str | Path) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; valid: a C3D file") from None
 
 
 def _finite(values: FloatArray, file: str, what: str) -> FloatArray:
@@ -132,12 +123,10 @@ def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
         return None if found is None else unit * found
 
     diameter = length("markerdiameter")
-    offset = length("lshoulderoffset", "rshoulderoffset")
-    return Subject(
-        measure("bodymass"), length("height"), length("lkneewidth", "rkneewidth"),
-        length("lanklewidth", "ranklewidth"), length("lelbowwidth", "relbowwidth"), offset,
-        None if diameter is None else 0.5 * diameter,
-    )  # fmt: skip
+    both = ("kneewidth", "anklewidth", "elbowwidth", "shoulderoffset")
+    knee, ankle, elbow, offset = (length(f"l{name}", f"r{name}") for name in both)
+    radius = None if diameter is None else 0.5 * diameter
+    return Subject(measure("bodymass"), length("height"), knee, ankle, elbow, offset, radius)
 
 
 def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:
@@ -172,30 +161,27 @@ def _has_plates(layout: C3dLayout) -> bool:
     types = layout.integers("FORCE_PLATFORM", "TYPE")[:count]
     wrong = sorted(set(types.tolist()) - set(CHANNELS))
     if wrong or len(types) < count:
-        raise layout.error(
-            f"force plates of type {wrong}, {len(types)} of {count}", "1 to 4, or plates=False"
-        )
+        told = f"force plates of type {wrong}, {len(types)} of {count}"
+        raise layout.error(told, "1 to 4, or plates=False")
     for name, each in (("CORNERS", 12), ("ORIGIN", 3)):
         if layout.count("FORCE_PLATFORM", name) < each * count:
             raise layout.error(f"FORCE_PLATFORM:{name} has too few values", f"{each} for each of {count}")
-    _check_channels(layout, count, max(CHANNELS[kind] for kind in types.tolist()))
-    _check_matrices(layout, count, 4 in types)
-    if 3 in types and 0 < layout.count("FORCE_PLATFORM", "FPCOPPOLY") < 12 * count:
-        raise layout.error("FORCE_PLATFORM:FPCOPPOLY has too few values", f"12 for each of {count}")
-    if layout.count("FORCE_PLATFORM", "UNITS") == 0 and ("FORCE_PLATFORM", "UNITS") in layout.parameters:
-        raise layout.error("FORCE_PLATFORM:UNITS is empty", "a unit")
-    return True
-
-
-def _check_channels(layout: C3dLayout, count: int, each: int) -> None:
-    parameter = layout.parameters.get(("FORCE_PLATFORM", "CHANNEL"))
-    size = parameter.dimensions if parameter else ()
+    each, size = max(CHANNELS[kind] for kind in types.tolist()), layout.size("CHANNEL")
     used = layout.integers("FORCE_PLATFORM", "CHANNEL")
     if len(size) != 2 or size[0] < each or size[1] < count:
         raise layout.error(f"FORCE_PLATFORM:CHANNEL is of size {size}", f"({each}, {count})")
     used = used.reshape(size[1], size[0])[:count, :each]
     if used.min() < 1 or used.max() > layout.channels:
         raise layout.error("FORCE_PLATFORM:CHANNEL names no channel", f"1 to {layout.channels}")
+    size = layout.size("CAL_MATRIX")
+    complete = len(size) == 3 and min(size[:2]) >= 6 and size[2] >= count
+    if not complete and (4 in types or (len(size) > 2 and layout.count("FORCE_PLATFORM", "CAL_MATRIX"))):
+        raise layout.error(f"FORCE_PLATFORM:CAL_MATRIX is of size {size}", f"(6, 6, {count})")
+    if 3 in types and 0 < layout.count("FORCE_PLATFORM", "FPCOPPOLY") < 12 * count:
+        raise layout.error("FORCE_PLATFORM:FPCOPPOLY has too few values", f"12 for each of {count}")
+    if layout.count("FORCE_PLATFORM", "UNITS") == 0 and ("FORCE_PLATFORM", "UNITS") in layout.parameters:
+        raise layout.error("FORCE_PLATFORM:UNITS is empty", "a unit")
+    return True
 
 
 def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
@@ -206,17 +192,8 @@ def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
         declared = units[channel - 1] if 0 < channel <= len(units) else ""
         plain = "".join(letter for letter in declared.lower() if letter.isalpha())
         if plain in ("nm", "nmm") and plain != f"n{lengths}":
-            raise layout.error(
-                f"moments in {declared} of lengths in {lengths}", f"N{lengths}, or plates=False"
-            )
-
-
-def _check_matrices(layout: C3dLayout, count: int, needed: bool) -> None:
-    parameter = layout.parameters.get(("FORCE_PLATFORM", "CAL_MATRIX"))
-    size = parameter.dimensions if parameter else ()
-    complete = len(size) == 3 and min(size[:2]) >= 6 and size[2] >= count
-    if not complete and (needed or (len(size) > 2 and parameter is not None and parameter.count)):
-        raise layout.error(f"FORCE_PLATFORM:CAL_MATRIX is of size {size}", f"(6, 6, {count})")
+            wrong = f"moments in {declared} of lengths in {lengths}"
+            raise layout.error(wrong, f"N{lengths}, or plates=False")
 
 
 def _plates(
@@ -225,8 +202,7 @@ def _plates(
     """Plates by their channels (c, n), their moments in the file's unit of length."""
     types = layout.integers("FORCE_PLATFORM", "TYPE")
     count = int(layout.integers("FORCE_PLATFORM", "USED")[0])
-    each = layout.parameters["FORCE_PLATFORM", "CHANNEL"].dimensions[0]
-    used = layout.integers("FORCE_PLATFORM", "CHANNEL").reshape(-1, each) - 1
+    used = layout.integers("FORCE_PLATFORM", "CHANNEL").reshape(-1, layout.size("CHANNEL")[0]) - 1
     corners, origins = (_reals(parameters, layout, name) for name in ("CORNERS", "ORIGIN"))
     force_unit = next(iter(_texts(parameters, "FORCE_PLATFORM", "UNITS")), "N")
     rate = layout.real("POINT", "RATE")
@@ -235,10 +211,10 @@ def _plates(
     found = []
     for plate, kind in enumerate(types[:count].tolist()):
         name = f"force plate {plate + 1}"
-        calibration = _reals(parameters, layout, "CAL_MATRIX") if kind == 4 else None
-        if calibration is not None:
-            size = layout.parameters["FORCE_PLATFORM", "CAL_MATRIX"].dimensions
-            calibration = calibration.reshape(size, order="F")[:6, :6, plate]
+        calibration = None
+        if kind == 4:
+            table = _reals(parameters, layout, "CAL_MATRIX")
+            calibration = table.reshape(layout.size("CAL_MATRIX"), order="F")[:6, :6, plate]
         surface = corners[12 * plate : 12 * plate + 12].reshape(4, 3)
         own = _finite(channels[used[plate, : CHANNELS[kind]]], layout.file, name)
         force, moment = plate_load(kind, own, surface, origins[3 * plate : 3 * plate + 3], calibration)

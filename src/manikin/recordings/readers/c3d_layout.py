@@ -24,18 +24,14 @@ from manikin.numerics.spatial import FloatArray
 def plate_load(
     kind: int, channels: FloatArray, corners: FloatArray, origin: FloatArray, calibration: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Force and moment about the middle of the corners, in the axes of the corners.
+    """(n, 3) force and (n, 3) moment about the middle of the corners, in their axes and the channels' units.
 
     Args:
         kind: Type of the plate: 1 force, centre of pressure and free moment; 2 force and moment; 3 eight
             forces of four sensors; 4 as 2 with a calibration matrix.
         channels: (c, n) its channels.
-        corners: (4, 3).
-        origin: (3,).
+        corners: (4, 3), and ``origin`` (3,).
         calibration: (6, 6), used by type 4 only.
-
-    Returns:
-        (n, 3) and (n, 3), in the units of the channels.
     """
     axes, origin = _axes(corners), -origin if origin[2] > 0.0 else origin
     if kind == 1:
@@ -146,6 +142,11 @@ class C3dLayout:
         parameter = self.parameters.get((group, name))
         return parameter.count if parameter else 0
 
+    def size(self, name: str) -> tuple[int, ...]:
+        """Dimensions of a parameter of the force plates; none where it is missing."""
+        parameter = self.parameters.get(("FORCE_PLATFORM", name))
+        return parameter.dimensions if parameter else ()
+
     def error(self, wrong: str, valid: str) -> InputError:
         """What is wrong with the file, as one line."""
         return InputError(f"{self.file}: {wrong}; valid: {valid}")
@@ -195,8 +196,7 @@ def _check_counts(layout: C3dLayout, measured: int) -> None:
         raise layout.error(f"{layout.points} points in {layout.frames} frames", "at least one of each")
     if layout.channels * layout.samples != measured:
         raise layout.error(f"{measured} samples for {layout.samples} instants", "a multiple of the instants")
-    pairs = (("POINT", layout.points), ("ANALOG", layout.channels))
-    for group, count in pairs:
+    for group, count in (("POINT", layout.points), ("ANALOG", layout.channels)):
         used = layout.integers(group, "USED")
         if (used[0] if len(used) else 0) != count:
             raise layout.error(f"{group}:USED is {used[:1].tolist()} where the header has {count}", "equal")

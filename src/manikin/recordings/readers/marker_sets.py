@@ -123,9 +123,7 @@ def _computed(names: set[str]) -> set[str]:
     return {
         name
         for name in names
-        if len(name) > 2
-        and name[-1] in _COMPUTED
-        and all(name[:-1] + letter in names for letter in _COMPUTED)
+        if len(name) > 2 and name[-1] in _COMPUTED and names.issuperset(name[:-1] + end for end in _COMPUTED)
     }
 
 
@@ -154,31 +152,21 @@ WRISTS = {"left_hand": ("lhand",), "right_hand": ("rhand",)}
 """Joints that are the wrist before those of JOINTS: CMU's ASF ends the forearm twice, second at the wrist."""
 
 
-def joint_of(recording: Recording, segment: str) -> str:
-    """Name of the recorded joint at which one of our segments begins.
+def joint_of(recording: Recording, segment: str, before: Mapping[str, tuple[str, ...]] = WRISTS) -> int:
+    """Index of the recorded joint at which one of our segments begins.
+
+    Args:
+        before: Names that are looked for before those of :data:`JOINTS`.
 
     Raises:
-        InputError: If the skeleton has none.
-    """
-    names = (*WRISTS.get(segment, ()), *JOINTS[segment])
-    for name in names:
-        if name in recording.joint_names:
-            return name
-    raise InputError(
-        f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {', '.join(names)}"
-    )
-
-
-def segment_joint(recording: Recording, segment: str) -> int:
-    """Index of the joint at which a segment of :data:`JOINTS` begins.
-
-    Raises:
-        InputError: If the segment is not known, or the recording has none of its names.
+        InputError: If the segment is not among :data:`JOINTS`, or the skeleton has none of its names.
     """
     if segment not in JOINTS:
         raise InputError(f"no segment {segment!r}; valid: {', '.join(JOINTS)}")
-    for name in JOINTS[segment]:
+    names = (*before.get(segment, ()), *JOINTS[segment])
+    for name in names:
         if name in recording.joint_names:
             return recording.joint_names.index(name)
-    names = ", ".join(JOINTS[segment])
-    raise InputError(f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {names}")
+    raise InputError(
+        f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {', '.join(names)}"
+    )

@@ -23,12 +23,7 @@ NEIGHBOURS = 6
 
 @dataclass(frozen=True)
 class Gap:
-    """One run of frames without a marker.
-
-    Attributes:
-        first: First frame without it.
-        stop: First frame with it again, or the number of frames.
-    """
+    """One run of frames without a marker, from ``first`` up to, not with, ``stop``."""
 
     marker: str
     first: int
@@ -37,46 +32,6 @@ class Gap:
     def __len__(self) -> int:
         """Number of frames without the marker."""
         return self.stop - self.first
-
-
-def gaps_of(seen: NDArray[np.bool_], names: Sequence[str]) -> tuple[Gap, ...]:
-    """Gaps, marker by marker.
-
-    Args:
-        seen: (n, m) whether each marker was seen.
-        names: (m,) of the markers.
-    """
-    return tuple(
-        Gap(names[marker], first, stop)
-        for marker in np.flatnonzero(~seen.all(axis=0)).tolist()
-        for first, stop in mask_runs(~seen[:, marker])
-    )
-
-
-def filled(positions: FloatArray, longest: int) -> FloatArray:
-    """Positions with the gaps of up to ``longest`` frames filled.
-
-    A gap is filled by the cubic spline through the :data:`NEIGHBOURS` frames nearest to it on either side
-    in which the marker was seen. One with fewer than two such frames on a side, as at the ends of the
-    recording, stays.
-
-    Args:
-        positions: (n, m, 3) [m], NaN in gaps.
-        longest: Frames of the longest gap to be filled.
-
-    Returns:
-        (n, m, 3) [m].
-    """
-    found = np.array(positions)
-    for marker in range(positions.shape[1]):
-        seen = ~np.isnan(positions[:, marker, 0])
-        frames = np.flatnonzero(seen)
-        for first, stop in mask_runs(~seen):
-            after = int(np.searchsorted(frames, first))
-            used = frames[max(after - NEIGHBOURS, 0) : after + NEIGHBOURS]
-            if stop - first <= longest and 2 <= after <= len(frames) - 2:
-                found[first:stop, marker] = CubicSpline(used, positions[used, marker])(np.arange(first, stop))
-    return found
 
 
 LEAST_FORCE = 20.0
@@ -109,11 +64,10 @@ class ForcePlate:
         where = f"force plate {self.name!r}"
         finite_number(self.rate, f"{where} rate [Hz]", above=0.0)
         finite_number(self.start, f"{where} start [s]")
-        shapes = {"wrenches": (None, 6), "origin": (3,), "normal": (3,)}
-        if self.corners is not None:
-            shapes["corners"] = (4, 3)
+        shapes = {"wrenches": (None, 6), "origin": (3,), "normal": (3,), "corners": (4, 3)}
         for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen_array(getattr(self, name), f"{where} {name}", shape))
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, frozen_array(value, f"{where} {name}", shape))
         if not len(self.wrenches):
             raise InputError(f"{where} has no sample; valid: at least one")
         if abs(np.linalg.norm(self.normal) - 1.0) > 1e-6:
@@ -259,7 +213,11 @@ class MarkerRecording(Displayed):
     @cached_property
     def gaps(self) -> tuple[Gap, ...]:
         """Runs of frames in which a marker was not seen, marker by marker."""
-        return gaps_of(self.seen, self.marker_names)
+        return tuple(
+            Gap(self.marker_names[marker], first, stop)
+            for marker in np.flatnonzero(~self.seen.all(axis=0)).tolist()
+            for first, stop in mask_runs(~self.seen[:, marker])
+        )
 
     def marker(self, name: str) -> FloatArray:
         """(n, 3) places of one marker [m].
@@ -308,15 +266,22 @@ class MarkerRecording(Displayed):
         )
 
     def with_gaps_filled(self, longest: float = LONGEST_GAP) -> "MarkerRecording":
-        """Recording with short gaps filled by interpolation, see :func:`filled`.
+        """Recording with gaps of up to ``longest`` [s] filled; its :attr:`gaps` are those that are left.
 
-        :attr:`gaps` of the result are those that are left: longer ones, and those at the ends.
-
-        Args:
-            longest: Longest gap that is filled [s].
+        A gap is filled by the cubic spline through the :data:`NEIGHBOURS` frames nearest to it on either side
+        in which the marker was seen. One with fewer than two such frames on a side, as at the ends of the
+        recording, stays.
         """
         finite_number(longest, "longest gap [s]", at_least=0.0)
-        return replace(self, positions=filled(self.positions, int(longest * self.rate + 1e-6)))
+        positions = np.array(self.positions)
+        for gap in self.gaps:
+            marker, inside = self.marker_index(gap.marker), np.arange(gap.first, gap.stop)
+            frames = np.flatnonzero(self.seen[:, marker])
+            after = int(np.searchsorted(frames, gap.first))
+            used = frames[max(after - NEIGHBOURS, 0) : after + NEIGHBOURS]
+            if len(gap) <= int(longest * self.rate + 1e-6) and 2 <= after <= len(frames) - 2:
+                positions[inside, marker] = CubicSpline(used, self.positions[used, marker])(inside)
+        return replace(self, positions=positions)
 
 
 def unique_names(names: Sequence[str]) -> tuple[str, ...]:

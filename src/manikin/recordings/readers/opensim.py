@@ -61,21 +61,20 @@ def read_mot(
         raise InputError(f"{file}: no column of time with two instants; valid: time first, a row per instant")
     time = table[:, 0]
     step = (time[-1] - time[0]) / (len(time) - 1)
-    if not (np.isfinite(step) and step > 0.0):
+    if not 0.0 < step < np.inf:
         raise InputError(f"{file}: time does not rise; valid: evenly rising instants")
     check_even(time, 1.0 / step, file)
-    plates = []
-    for plate, columns in _mot_plates(names, file).items():
-        force, point, moment = (table[:, columns[k : k + 3]] @ turn.T for k in (0, 3, 6))
-        plates.append(_plate(f"{file}: {plate}", force, point, moment, 1.0 / step, time[0], fixed))
-    return tuple(plates)
+    return tuple(
+        _plate(f"{file}: {plate}", [table[:, part] @ turn.T for part in parts], 1.0 / step, time[0], fixed)
+        for plate, parts in _mot_plates(names, file).items()
+    )
 
 
 def _plate(
-    name: str, force: FloatArray, point: FloatArray, moment: FloatArray, rate: float, start: float,
-    fixed: FloatArray | None,
-) -> ForcePlate:  # fmt: skip
-    """A plate of what the file holds, turned to z up."""
+    name: str, parts: Sequence[FloatArray], rate: float, start: float, fixed: FloatArray | None
+) -> ForcePlate:
+    """A plate of its force, point and moment, turned to z up."""
+    force, point, moment = parts
     pressed = force[:, 2] >= LEAST_FORCE
     # Without a force there is no point where it acts; some files say so.
     free = np.isnan(point).any(axis=1) | np.isnan(moment).any(axis=1)
@@ -112,34 +111,27 @@ def _mot_table(text: str, file: str) -> tuple[list[str], FloatArray]:
         raise InputError(f"{file}: no endheader with columns after it; valid: a MOT or STO file")
     names = lines[0].split()
     rows = [line.split() for line in lines[1:]]
-    wrong = next((number for number, row in enumerate(rows, start=1) if len(row) != len(names)), None)
-    if wrong is not None:
-        raise InputError(
-            f"{file}: row {wrong}: {len(rows[wrong - 1])} numbers for {len(names)} columns; "
-            f"valid: {len(names)} (is the file cut short?)"
-        )
-    declared = _declared(head, file)
-    for key, count in (("rows", len(rows)), ("columns", len(names))):
-        if declared.get(key, count) != count:
-            raise InputError(f"{file}: {count} {key} where {declared[key]} are declared; valid: all of them")
+    for number, row in enumerate(rows, start=1):
+        if len(row) != len(names):
+            raise InputError(
+                f"{file}: row {number}: {len(row)} numbers for {len(names)} columns; "
+                f"valid: {len(names)} (is the file cut short?)"
+            )
+    counts = {"rows": len(rows), "columns": len(names)}
+    for line in head.splitlines():  # such as nRows=12 or datarows 12
+        key, *number = line.replace("=", " ").split() or [""]
+        for name in counts:
+            if key.lower() in (f"n{name}", f"data{name}"):
+                declared = whole_number(" ".join(number), f"{file}: {key}")
+                if declared != counts[name]:
+                    wrong = f"{counts[name]} {name} where {declared} are declared"
+                    raise InputError(f"{file}: {wrong}; valid: all of them")
     flat = numbers([word for row in rows for word in row], f"{file}: a row", gaps=True)
     return names, flat.reshape(len(rows), len(names))
 
 
-def _declared(head: str, file: str) -> dict[str, int]:
-    """Rows and columns of the header, ``nRows=12`` or ``datarows 12``."""
-    found = {}
-    for line in head.splitlines():
-        words = line.replace("=", " ").split()
-        key = words[0].lower() if words else ""
-        for name in ("rows", "columns"):
-            if key in (f"n{name}", f"data{name}"):
-                found[name] = whole_number(" ".join(words[1:]), f"{file}: {words[0]}")
-    return found
-
-
-def _mot_plates(names: list[str], file: str) -> dict[str, list[int]]:
-    """Nine columns of each plate, force, point and moment, by the beginning of their names."""
+def _mot_plates(names: list[str], file: str) -> dict[str, list[list[int]]]:
+    """Three columns each of force, point and moment of each plate, by the beginning of their names."""
     places = {name: place for place, name in enumerate(names)}
     if len(places) != len(names):
         raise InputError(f"{file}: a column occurs twice; valid: unique names")
@@ -150,11 +142,11 @@ def _mot_plates(names: list[str], file: str) -> dict[str, list[int]]:
         stem = name[:-2]
         moments = [f"{stem}m", stem.replace("force", "torque"), stem.replace("force", "moment")]
         moment = next((m for m in moments if f"{m}x" in places), f"{stem}m")
-        wanted = [f"{part}{axis}" for part in (f"{stem}v", f"{stem}p", moment) for axis in "xyz"]
-        missing = [column for column in wanted if column not in places]
+        wanted = [[f"{part}{axis}" for axis in "xyz"] for part in (f"{stem}v", f"{stem}p", moment)]
+        missing = [column for part in wanted for column in part if column not in places]
         if missing:
             raise InputError(f"{file}: no column {missing[0][:60]!r}; valid: force, point and moment of each")
-        found[stem.strip("_") or "plate"] = [places[column] for column in wanted]
+        found[stem.strip("_") or "plate"] = [[places[column] for column in part] for part in wanted]
     if not found:
         raise InputError(f"{file}: no columns of a force plate; valid: ground_force_1_vx and so on")
     return found
@@ -189,16 +181,11 @@ def read_trc(
         raise InputError(f"{file}: frame numbers do not rise by one; valid: no row missing")
     check_even(table[:, 1], rate, file)
     positions = unit * without_unseen(table[:, 2:].reshape(frames, markers, 3)) @ turn.T
-    return MarkerRecording(
-        Path(path).name, names, positions, rate, float(table[0, 1]), _plates(Path(path), forces, up)
-    )
-
-
-def _plates(path: Path, forces: str | Path | Sequence[ForcePlate] | None, up: str) -> tuple[ForcePlate, ...]:
     if forces is None:
-        beside = path.with_name(f"{path.stem}_grf.mot")
-        return read_mot(beside, up) if beside.is_file() else ()
-    return read_mot(forces, up) if isinstance(forces, str | Path) else tuple(forces)
+        beside = Path(path).with_name(f"{Path(path).stem}_grf.mot")
+        forces = beside if beside.is_file() else ()
+    plates = read_mot(forces, up) if isinstance(forces, str | Path) else tuple(forces)
+    return MarkerRecording(Path(path).name, names, positions, rate, float(table[0, 1]), plates)
 
 
 def _header(lines: list[str], file: str) -> tuple[float, int, int, float]:
@@ -238,10 +225,7 @@ def _table(lines: list[str], width: int, file: str) -> FloatArray:
             raise InputError(
                 f"{file}: line {number}: {len(cells)} cells; valid: {width} (is the file cut short?)"
             )
-        row = cells[:width]
-        if " " in line or not all(row):
-            row = [cell if cell.strip() else "nan" for cell in row]
-        words += row
+        words += [cell if cell.strip() else "nan" for cell in cells[:width]]
     table = numbers(words, f"{file}: a frame", gaps=True).reshape(-1, width)
     if np.any(np.isnan(table[:, :2])):
         raise InputError(f"{file}: a frame without number or time; valid: both in every row")

@@ -1,7 +1,7 @@
 """Recorded skeletons: names, lengths and rotations of joints at an even rate, and measures of the person."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from types import MappingProxyType
 
@@ -46,9 +46,8 @@ UNKNOWN = Subject()
 """Nothing is said."""
 
 
-Y_UP_TO_Z_UP: FloatArray = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+Y_UP_TO_Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rotation of the files' axes (X left, Y up, Z forward) to ours (x forward, y left, z up)."""
-Y_UP_TO_Z_UP.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,11 +81,9 @@ class Recording(Displayed):
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
         return {
-            "name": self.name,
-            "frames": str(len(self)),
-            "rate": f"{self.rate:g} Hz",
+            "name": self.name, "frames": str(len(self)), "rate": f"{self.rate:g} Hz",
             "joints": str(len(self.joint_names)),
-        }
+        }  # fmt: skip
 
     def __post_init__(self) -> None:
         where, joints = f"recording {self.name!r}", len(self.joint_names)
@@ -145,29 +142,15 @@ class Recording(Displayed):
         places.setflags(write=False)
         return places
 
-    def joint_index(self, name: str) -> int:
-        """Place of a joint among the joints.
-
-        Raises:
-            InputError: If there is none of that name.
-        """
-        try:
-            return self.joint_names.index(name)
-        except ValueError:
-            raise InputError(
-                f"recording {self.name!r} has no joint {name!r}; valid: {', '.join(self.joint_names)}"
-            ) from None
-
     def cut(self, start: int, stop: int) -> "Recording":
         """Recording of the frames from ``start`` up to, not with, ``stop``.
 
         Raises:
             InputError: If no frame is left.
         """
-        return Recording(
-            self.name, self.joint_names, self.parents, self.offsets, self.ends,
-            self.rotations[start:stop], self.root_positions[start:stop], self.rate,
-        )  # fmt: skip
+        return replace(
+            self, rotations=self.rotations[start:stop], root_positions=self.root_positions[start:stop]
+        )
 
 
 def z_up(

@@ -24,10 +24,10 @@ The file's x axis stays x where it is not the one that points up: OpenSim's forw
 
 
 def metres_per(unit: str, where: str) -> float:
-    """A declared unit of length [m].
+    """A declared unit of length, one of :data:`LENGTHS` [m].
 
     Raises:
-        InputError: If it is not among :data:`LENGTHS`.
+        InputError: If it is none of them; the message begins with ``where``.
     """
     metres = LENGTHS.get(unit.strip().lower())
     if metres is None:
@@ -36,14 +36,10 @@ def metres_per(unit: str, where: str) -> float:
 
 
 def rotation_to_z_up(up: str, where: str) -> FloatArray:
-    """(3, 3) rotation from the file's axes to the world's.
-
-    Args:
-        up: The file's axis that points up, ``"y"``, ``"+Z"``, ``"-x"``...
-        where: File or key, for the message.
+    """(3, 3) rotation to the world's axes of a file whose axis ``up`` (``"y"``, ``"-X"``) points up.
 
     Raises:
-        InputError: If it is no axis.
+        InputError: If that is no axis; the message begins with ``where``.
     """
     axis = up.strip().lower()
     rotation = UP_TO_Z.get(axis if axis[:1] in ("+", "-") else f"+{axis}")
@@ -57,10 +53,7 @@ LARGEST = 1e12
 
 
 def read_text(path: str | Path, kind: str) -> str:
-    """Text of a file.
-
-    Args:
-        kind: What it should be, for the message (``"BVH"``).
+    """Text of a file that should be of a ``kind`` such as ``"BVH"``.
 
     Raises:
         InputError: If it is missing, unreadable, empty or no text.
@@ -72,31 +65,23 @@ def read_text(path: str | Path, kind: str) -> str:
         raise InputError(f"{file}: {error.strerror or error}; valid: a {kind} file") from None
     except UnicodeDecodeError:
         raise InputError(f"{file}: is no text; valid: a {kind} file") from None
-    if not text.strip():
-        raise InputError(f"{file}: is empty; valid: a {kind} file")
-    if "\0" in text:
-        raise InputError(f"{file}: is no text; valid: a {kind} file")
+    if not text.strip() or "\0" in text:
+        raise InputError(f"{file}: is {'no text' if text.strip() else 'empty'}; valid: a {kind} file")
     return text
 
 
 def numbers(words: list[str], where: str, gaps: bool = False) -> FloatArray:
-    """(n,) finite numbers, none beyond :data:`LARGEST`.
-
-    Args:
-        where: File and line or key, for the message.
-        gaps: Whether ``nan`` may stand where there is no number.
+    """(n,) finite numbers, none beyond :data:`LARGEST`; with ``gaps``, ``nan`` may stand where there is none.
 
     Raises:
-        InputError: If a word is no such number.
+        InputError: If a word is no such number; the message begins with ``where``.
     """
     try:
         values = np.array(list(map(float, words)), dtype=np.float64)
     except ValueError:
         wrong = next(word for word in words if not _is_number(word))
         raise InputError(f"{where}: {wrong[:40]!r} is no number; valid: finite numbers") from None
-    good = np.abs(values) <= LARGEST
-    if gaps:
-        good |= np.isnan(values)
+    good = (np.abs(values) <= LARGEST) | (np.isnan(values) & gaps)
     if not np.all(good):
         wrong = words[int(np.argmin(good))]
         raise InputError(f"{where}: is {wrong[:40]!r}; valid: finite numbers up to {LARGEST:g}")
@@ -115,32 +100,19 @@ def whole_number(word: str, where: str) -> int:
 
 
 def check_even(time: FloatArray, rate: float, where: str) -> None:
-    """Refuse instants that are not at an even rate, to half a frame.
-
-    Args:
-        time: (n,) [s].
-        rate: Per second [Hz].
-        where: File, for the message.
+    """Refuse instants (n,) [s] that are not at an even rate [Hz], to half a frame.
 
     Raises:
-        InputError: If an instant is elsewhere.
+        InputError: If an instant is elsewhere; the message begins with ``where``.
     """
-    off = np.abs((time - time[0]) * rate - np.arange(len(time)))
-    if not np.all(off < 0.5):
-        row = int(np.argmin(off < 0.5)) + 1
+    even = np.abs((time - time[0]) * rate - np.arange(len(time))) < 0.5
+    if not np.all(even):
+        row = int(np.argmin(even)) + 1
         raise InputError(f"{where}: row {row} is not at an even {rate:g} Hz; valid: no row missing")
 
 
 def rotations_of(angles: FloatArray, axes: str) -> FloatArray:
-    """Product of turns about coordinate axes, the first leftmost.
-
-    Args:
-        angles: (n, k) [rad], one column per turn.
-        axes: k letters of ``XYZ``.
-
-    Returns:
-        (n, 3, 3).
-    """
+    """(n, 3, 3) product of turns by angles (n, k) [rad] about k of the axes ``XYZ``, the first leftmost."""
     total = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
     for column, axis in enumerate(axes):
         total = total @ _turns(angles[:, column], "XYZ".index(axis))

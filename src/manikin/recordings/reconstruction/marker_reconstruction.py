@@ -18,6 +18,7 @@ Markers that are not seen give NaN.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,9 +62,7 @@ def landmarks(recording: MarkerRecording, found: MarkerSet) -> dict[str, FloatAr
 def pelvis_axes(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
     """(n, 3, 3) axes of the pelvis by its markers, to the world: y to the left ASIS, x forward in the plane.
 
-    Args:
-        marks: Of them both ASIS, and both PSIS or the sacrum.
-        where: What messages begin with.
+    Of them both ASIS are needed, and both PSIS or the sacrum. Messages begin with ``where``.
 
     Raises:
         InputError: If a marker is missing or never seen with the others, or the ASIS are too far apart or too
@@ -75,26 +74,22 @@ def pelvis_axes(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
                 f"{where} has no marker that is known as the {side} ASIS; valid: both, and PSIS or sacrum"
             )
     y = marks["left_asis"] - marks["right_asis"]
-    x = 0.5 * (marks["left_asis"] + marks["right_asis"]) - _back(marks, where)
+    x = middle(marks, "asis") - _back(marks, where)
     axes = frames(np.cross(x, y), y, keep_y=True)
     width = np.linalg.norm(y, axis=1)
     seen = ~np.isnan(axes[:, 0, 0])
     if not seen.any():
-        raise InputError(
-            f"{where} never sees the markers of the pelvis at once; valid: in one frame at least"
-        )
+        raise InputError(f"{where} never sees the markers of the pelvis at once; valid: in one frame or more")
     low, high = PELVIS_WIDTHS
     if not low <= (usual := float(np.median(width[seen]))) <= high:
-        raise InputError(
-            f"{where} has the ASIS {usual:.3g} m apart; "
-            f"valid: {low} to {high} m (is the unit of length right?)"
-        )
+        right = f"valid: {low} to {high} m (is the unit of length right?)"
+        raise InputError(f"{where} has the ASIS {usual:.3g} m apart; {right}")
     return axes
 
 
 def _back(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
     if "left_psis" in marks and "right_psis" in marks:
-        return 0.5 * (marks["left_psis"] + marks["right_psis"])
+        return middle(marks, "psis")
     if "sacrum" not in marks:
         raise InputError(f"{where} has no marker on the back of the pelvis; valid: both PSIS, or the sacrum")
     return marks["sacrum"]
@@ -102,13 +97,11 @@ def _back(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
 
 def hip_centres(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -> dict[str, FloatArray]:
     """(n, 3) hips by segment, fixed to the pelvis: the file's, or by Harrington et al. (2007)."""
-    front = 0.5 * (marks["left_asis"] + marks["right_asis"])
+    front = middle(marks, "asis")
     width = float(np.nanmedian(np.linalg.norm(marks["left_asis"] - marks["right_asis"], axis=1)))
     depth = float(np.nanmedian(np.linalg.norm(front - _back(marks, where), axis=1)))
     back, down, aside = -0.24 * depth - 0.0099, -0.30 * width - 0.0109, 0.33 * width + 0.0073
-    local = {
-        side: np.array([back, sign * aside, down]) for side, sign in zip(SIDES, (1.0, -1.0), strict=True)
-    }
+    local = {"left": np.array([back, aside, down]), "right": np.array([back, -aside, down])}
     if all(f"{side}_hip" in marks for side in SIDES):
         for side in SIDES:
             given = np.einsum("nji,nj->ni", axes, marks[f"{side}_hip"] - front)
@@ -122,11 +115,7 @@ def marker_centres(
 ) -> dict[str, FloatArray]:
     """Joint centres in the world, (n, 3) [m], by the segment that begins there, of those that are known.
 
-    Args:
-        marks: (n, 3) markers by role.
-        axes: (n, 3, 3) of the pelvis, by :func:`pelvis_axes`.
-        subject: Measures of the joints.
-        where: What messages begin with.
+    ``axes`` (n, 3, 3) are those of :func:`pelvis_axes`; messages begin with ``where``.
     """
     radius = MARKER_RADIUS if subject.marker_radius is None else subject.marker_radius
     found = hip_centres(marks, axes, where) | _shoulders(marks, subject, radius)
@@ -201,12 +190,9 @@ def _shoulders(marks: Mapping[str, FloatArray], subject: Subject, radius: float)
     depth = SHOULDER_SHARE * float(np.nanmedian(np.linalg.norm(left - right, axis=1)))
     if subject.shoulder_offset is not None:
         depth = subject.shoulder_offset + radius
-    up = 0.5 * (left + right) - 0.5 * (marks["left_asis"] + marks["right_asis"])
-    thorax = frames(up, left - right, keep_y=True)
-    return {
-        "left_upper_arm": left - depth * thorax[:, :, 2],
-        "right_upper_arm": right - depth * thorax[:, :, 2],
-    }
+    up = middle(marks, "shoulder") - middle(marks, "asis")
+    down = depth * frames(up, left - right, keep_y=True)[:, :, 2]
+    return {"left_upper_arm": left - down, "right_upper_arm": right - down}
 
 
 def check_sides(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -> None:
@@ -233,13 +219,14 @@ def check_sides(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -
 
 
 def _upward(marks: Mapping[str, FloatArray]) -> FloatArray | None:
-    pelvis = 0.5 * (marks["left_asis"] + marks["right_asis"])
-    for names in (("left_shoulder", "right_shoulder"), ("c7",)):
-        if all(name in marks for name in names):
-            return sum((marks[name] for name in names[1:]), marks[names[0]]) / len(names) - pelvis
+    pelvis = middle(marks, "asis")
+    if "left_shoulder" in marks and "right_shoulder" in marks:
+        return middle(marks, "shoulder") - pelvis
+    if "c7" in marks:
+        return marks["c7"] - pelvis
     for name in ("knee_lateral", "ankle_lateral"):
         if f"left_{name}" in marks and f"right_{name}" in marks:
-            return pelvis - 0.5 * (marks[f"left_{name}"] + marks[f"right_{name}"])
+            return pelvis - middle(marks, name)
     return None
 
 
@@ -291,15 +278,13 @@ def reconstruct_markers(
             f"recording {recording.name!r} sees half of its markers in one frame only; valid: in two at least"
         )
     starts = _starts(body, marked)[first:stop]
-    wanted = PointTargets(placed.names, placed.segments, placed.points, filled[first:stop], placed.weights)
+    wanted = replace(placed, positions=filled[first:stop])
     q, residual = follow(body, wanted, starts, recording.rate)
     recorded = recording.chosen(placed.names).positions[first:stop]
-    time = np.arange(stop - first) / recording.rate
-    followed = {*placed.names}
     return Reconstruction(
-        body, time, q, PointTargets(placed.names, placed.segments, placed.points, recorded, placed.weights),
+        body, np.arange(stop - first) / recording.rate, q, replace(placed, positions=recorded),
         np.where(np.isnan(recorded[..., 0]), np.nan, residual), first,
-        tuple(name for name in recording.marker_names if name not in followed),
+        tuple(name for name in recording.marker_names if name not in placed.names),
         tuple(s.name for s in body.segments if s.hinges and not _is_marked(body, s.name, {*placed.segments})),
     )  # fmt: skip
 
@@ -335,8 +320,7 @@ def _placed(marked: _Marked, body: BodyModel) -> PointTargets:
         points = _local(body, q, segments, positions[frames])
         placed = PointTargets(names, segments, points, positions, np.ones(len(names)))
         if number < ROUNDS:
-            here = PointTargets(names, segments, points, positions[frames], placed.weights)
-            q = improved(body, here, q)
+            q = improved(body, replace(placed, positions=positions[frames]), q)
     return placed
 
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from manikin.body import BodyModel
 from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.readers.marker_sets import SIDES, MarkerSet
+from manikin.recordings.readers.marker_sets import SIDES, MarkerSet, joint_of
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import (
@@ -22,7 +22,6 @@ from manikin.recordings.reconstruction.proportions import (
     far_point,
     frames,
     hanging_arms,
-    joint_of,
     middle,
     trunk_axes,
 )
@@ -48,14 +47,12 @@ def placing_targets(
     Returns:
         Targets, NaN where one is not seen, and (n, 3, 3) from the axes of our pelvis to the world's.
     """
-    names = [name for name in CENTRES if name in centres and _seen(centres[name])]
-    guides: list[_Guide] = [(name, np.zeros(3), centres[name]) for name in names]
-    weights = [1.0] * len(guides)
+    joints = [name for name in CENTRES if name in centres and _seen(centres[name])]
     up = _trunk_up(marks, centres)
     if up is not None and not _seen(up + pelvis[:, :, 0]):
         up = None
     pelvis = _aligned_pelvis(pelvis, up, centres)
-    guides.append(("pelvis", np.array([0.0, 0.0, ARM]), middle(centres, "thigh") + ARM * pelvis[:, :, 2]))
+    guides = [("pelvis", ARM * _Z, middle(centres, "thigh") + ARM * pelvis[:, :, 2])]
     thorax = _thorax(recording, found, centres, pelvis, up)
     if thorax is not None:
         guides += _thorax_guides(body, marks, centres, thorax)
@@ -63,14 +60,15 @@ def placing_targets(
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         guides += _foot(side, marks, centres)
         guides += _turns_of_limbs(body, side, sign, marks, centres)
-    guides = [guide for guide in guides if _seen(guide[2])]
-    weights += [WEIGHT] * (len(guides) - len(weights))
-    segments = tuple(segment for segment, _, _ in guides)
-    targets = PointTargets(
-        segments, segments, np.array([point for _, point, _ in guides]),
-        np.stack([places for _, _, places in guides], axis=1), np.array(weights),
-    )  # fmt: skip
-    return targets, pelvis
+    guides = [(name, np.zeros(3), centres[name]) for name in joints] + [g for g in guides if _seen(g[2])]
+    return _targets(guides, len(joints)), pelvis
+
+
+def _targets(guides: Sequence[_Guide], joints: int = 0) -> PointTargets:
+    """Targets of guides, after joint centres, whose weight is 1."""
+    segments, points, places = zip(*guides, strict=True)
+    weights = np.append(np.ones(joints), np.full(len(guides) - joints, WEIGHT))
+    return PointTargets(segments, segments, np.array(points), np.stack(places, axis=1), weights)
 
 
 def cluster_turns(places: FloatArray) -> FloatArray | None:
@@ -122,8 +120,7 @@ def _aligned_pelvis(
 ) -> FloatArray:
     """Turned about the left-right axis, by the same angle always, to the trunk or the vertical."""
     if up is None:
-        local = np.einsum("nji,j->ni", turns, np.array([0.0, 0.0, 1.0]))
-        local = np.nanmedian(local, axis=0)
+        local = np.nanmedian(turns[:, 2], axis=0)
     else:
         straight = _straightest(up, centres, turns)
         local = turns[straight].T @ up[straight]
@@ -139,8 +136,8 @@ def _straightest(up: FloatArray, centres: Mapping[str, FloatArray], turns: Float
         hanging = np.zeros(len(up), dtype=bool)
         hanging[hanging_arms(centres)] = True
         allowed = allowed & hanging if np.any(allowed & hanging) else allowed
-    frames_allowed = np.flatnonzero(allowed)
-    return int(frames_allowed[np.argsort(length[frames_allowed])[int(0.9 * (len(frames_allowed) - 1))]])
+    known = np.flatnonzero(allowed)
+    return int(known[np.argsort(length[known])[int(0.9 * (len(known) - 1))]])
 
 
 def _thorax(
@@ -171,19 +168,24 @@ def _thorax_guides(
 ) -> list[_Guide]:
     """Where the chest points, seen from the shoulders, or from the neck's base."""
     if "left_upper_arm" in centres:
-        base = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
         place = middle(centres, "upper_arm")
-        return [("thorax", base + ARM * np.eye(3)[0], place + ARM * thorax[:, :, 0])]
+        return [("thorax", _girdle(body) + ARM * _X, place + ARM * thorax[:, :, 0])]
     # As far from the hips as in our straight trunk: markers are not where our neck begins, and a trunk that
     # is pressed together or pulled apart would bend to its limits.
-    base, hips = np.array(body.segment("neck").origin), middle(centres, "thigh")
+    base, hips = body.segment("neck").origin, middle(centres, "thigh")
     up = 0.5 * (marks["c7"] + marks["notch"]) - hips
-    rise = float(np.linalg.norm(base + body.segment("thorax").origin + body.segment("lumbar").origin))
-    place = hips + rise * up / np.linalg.norm(up, axis=1, keepdims=True)
-    return [
-        ("thorax", base + ARM * axis, place + ARM * np.einsum("nij,j->ni", thorax, axis))
-        for axis in np.eye(3)
-    ]
+    place = hips + _trunk_length(body) * up / np.linalg.norm(up, axis=1, keepdims=True)
+    return [("thorax", base + ARM * axis, place + ARM * thorax[:, :, k]) for k, axis in enumerate(np.eye(3))]
+
+
+def _girdle(body: BodyModel) -> FloatArray:
+    """(3,) between the shoulders, in the thorax [m]."""
+    return body.segment("left_upper_arm").origin * [1.0, 0.0, 1.0]
+
+
+def _trunk_length(body: BodyModel) -> float:
+    """From the pelvis to the neck of a straight trunk [m]."""
+    return float(np.linalg.norm(sum(body.segment(name).origin for name in ("neck", "thorax", "lumbar"))))
 
 
 def _marker_guides_head(
@@ -198,14 +200,19 @@ def _marker_guides_head(
     if not known.any():
         return []
     axes = turns @ Rotation.from_matrix(local[known]).mean().as_matrix()
-    origin = np.array(body.segment("neck").origin)
     if "left_upper_arm" in centres:
-        girdle = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
-        place = middle(centres, "upper_arm") + np.einsum("nij,j->ni", thorax, origin - girdle)
-    else:
-        rise = float(np.linalg.norm(origin + body.segment("thorax").origin + body.segment("lumbar").origin))
-        place = middle(centres, "thigh") + rise * thorax[:, :, 2]
-    return [("neck", ARM * axis, place + ARM * np.einsum("nij,j->ni", axes, axis)) for axis in np.eye(3)[::2]]
+        return _head_guides(body, centres, thorax, axes)[::-1]
+    place = middle(centres, "thigh") + _trunk_length(body) * thorax[:, :, 2]
+    return [("neck", ARM * _X, place + ARM * axes[:, :, 0]), ("neck", ARM * _Z, place + ARM * axes[:, :, 2])]
+
+
+def _head_guides(
+    body: BodyModel, centres: Mapping[str, FloatArray], thorax: FloatArray, axes: FloatArray
+) -> list[_Guide]:
+    """Above and before the neck's base, by the axes of the head."""
+    rise = body.segment("neck").origin - _girdle(body)
+    base = middle(centres, "upper_arm") + np.einsum("nij,j->ni", thorax, rise)
+    return [("neck", ARM * _Z, base + ARM * axes[:, :, 2]), ("neck", ARM * _X, base + ARM * axes[:, :, 0])]
 
 
 def _foot(side: str, marks: Mapping[str, FloatArray], centres: Mapping[str, FloatArray]) -> list[_Guide]:
@@ -216,8 +223,7 @@ def _foot(side: str, marks: Mapping[str, FloatArray], centres: Mapping[str, Floa
     bone = toe - heel
     rise = rise_when_flat(ankle, bone, 0.0)
     point = ARM * np.array([np.cos(rise), 0.0, np.sin(rise)])
-    length = np.linalg.norm(bone, axis=1, keepdims=True)
-    return [(f"{side}_foot", point, ankle + ARM * bone / length)]
+    return [(f"{side}_foot", point, ankle + ARM * bone / np.linalg.norm(bone, axis=1, keepdims=True))]
 
 
 def _turns_of_limbs(
@@ -233,21 +239,19 @@ def _turns_of_limbs(
         if centre is not None and marker is not None and _seen(marker - centre):
             away = marker - centre
             place = centre + ARM * away / np.linalg.norm(away, axis=1, keepdims=True)
-            origin = np.array(body.segment(f"{side}_{following}").origin)
+            origin = body.segment(f"{side}_{following}").origin
             guides.append((f"{side}_{segment}", origin + sign * ARM * np.eye(3)[1], place))
     radius, ulna = marks.get(f"{side}_wrist_radius"), marks.get(f"{side}_wrist_ulna")
     if radius is not None and ulna is not None and _seen(radius - ulna):
         away = radius - ulna
         place = 0.5 * (radius + ulna) + ARM * away / np.linalg.norm(away, axis=1, keepdims=True)
-        origin = np.array(body.segment(f"{side}_hand").origin)
-        guides.append((f"{side}_forearm", origin + ARM * np.eye(3)[0], place))
+        guides.append((f"{side}_forearm", body.segment(f"{side}_hand").origin + ARM * _X, place))
     return guides
 
 
 def _of_segment(recording: MarkerRecording, found: MarkerSet, segment: str) -> FloatArray:
     """(n, k, 3) markers of a segment."""
-    names: Sequence[str] = [name for name, place in found.segments.items() if place == segment]
-    return recording.chosen(names).positions
+    return recording.chosen([name for name, place in found.segments.items() if place == segment]).positions
 
 
 WEIGHT = 0.05
@@ -264,6 +268,8 @@ OTHER_FOOT = np.deg2rad(25.0)
 
 _PARTS = {"pelvis": "thigh", "thorax": "upper_arm"}
 
+_X, _, _Z = np.eye(3)
+
 HEADS = ("head", "Head")
 NECKS = ("neck", "Neck", "lowerneck")
 
@@ -278,7 +284,7 @@ def trunk_turns(recording: Recording, centres: Mapping[str, FloatArray], segment
     length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
     hanging = hanging_arms(centres)
     straight = hanging[np.argmax(length[hanging])]
-    turns = recording.world_rotations[:, recording.joint_index(joint_of(recording, segment))]
+    turns = recording.world_rotations[:, joint_of(recording, segment)]
     turned = turns @ turns[straight].T @ geometric[straight]
     return frames(turned[:, :, 2], geometric[:, :, 1], keep_y=True)
 
@@ -289,46 +295,34 @@ def orientation_targets(
 ) -> PointTargets:  # fmt: skip
     """Targets of the turns of pelvis, thorax and head and of the directions of feet and hands.
 
-    Args:
-        centres: (n, 3) joint centres [m].
-        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
-        thorax: (n, 3, 3) from the thorax' axes to the world's.
+    Joint centres (n, 3) [m]; ``pelvis`` and ``thorax`` (n, 3, 3) are from their axes to the world's.
     """
-    girdle = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
-    found: list[tuple[str, FloatArray, FloatArray]] = [
-        ("pelvis", np.array([0.0, 0.0, ARM]), middle(centres, "thigh") + ARM * pelvis[:, :, 2]),
-        ("thorax", girdle + np.array([ARM, 0.0, 0.0]), middle(centres, "upper_arm") + ARM * thorax[:, :, 0]),
+    found: list[_Guide] = [
+        ("pelvis", ARM * _Z, middle(centres, "thigh") + ARM * pelvis[:, :, 2]),
+        ("thorax", _girdle(body) + ARM * _X, middle(centres, "upper_arm") + ARM * thorax[:, :, 0]),
     ]
-    found += _head(recording, body, centres, thorax, girdle)
-    for side in ("left", "right"):
+    found += _head(recording, body, centres, thorax)
+    for side in SIDES:
         for segment in (f"{side}_foot", f"{side}_hand"):
             far = far_point(recording, joint_of(recording, segment))
             if far is not None:
                 bone = far - centres[segment]
                 length = float(np.median(np.linalg.norm(bone, axis=1)))
-                direction = np.array([0.0, 0.0, -1.0])
+                direction = -_Z
                 if segment.endswith("foot"):
                     toes = body.segment(f"{side}_toes").origin
                     rise = rise_when_flat(centres[segment], bone, float(np.arctan2(toes[2], toes[0])))
                     direction = np.array([np.cos(rise), 0.0, np.sin(rise)])
                 found.append((segment, length * direction, far))
-    segments = tuple(segment for segment, _, _ in found)
-    return PointTargets(
-        tuple(f"{segment} guide" for segment in segments), segments, np.array([p for _, p, _ in found]),
-        np.stack([places for _, _, places in found], axis=1), np.full(len(found), WEIGHT),
-    )  # fmt: skip
+    return _targets(found)
 
 
 def rise_when_flat(ankle: FloatArray, bone: FloatArray, ours: float) -> float:
     """Angle above the horizontal of a recorded foot's bone when the sole is flat [rad].
 
-    The sole is taken to be flat where the ankle is lowest. An angle that is far from our foot's says
-    that it never is (crawling, lying), and ours is taken.
-
-    Args:
-        ankle: (n, 3) [m]; frames that are NaN are left out.
-        bone: (n, 3) from back to front [m].
-        ours: Our foot's angle [rad].
+    The sole is taken to be flat where the ankle (n, 3) [m] is lowest; ``bone`` (n, 3) [m] is from back to
+    front, both NaN where not known. An angle that is far from our foot's, ``ours`` [rad], says that it never
+    is (crawling, lying), and ours is taken.
     """
     known = ~np.isnan(ankle[:, 2] + bone[:, 2])
     if not known.any():
@@ -341,24 +335,16 @@ def rise_when_flat(ankle: FloatArray, bone: FloatArray, ours: float) -> float:
 
 
 def _head(
-    recording: Recording, body: BodyModel, centres: Mapping[str, FloatArray], thorax: FloatArray,
-    girdle: FloatArray,
-) -> list[tuple[str, FloatArray, FloatArray]]:  # fmt: skip
+    recording: Recording, body: BodyModel, centres: Mapping[str, FloatArray], thorax: FloatArray
+) -> list[_Guide]:
     """Above and before the neck's base, by the line from the neck to the vertex; none without a head."""
-    head = next((name for name in HEADS if name in recording.joint_names), None)
-    neck = next((name for name in NECKS if name in recording.joint_names), None)
+    known = recording.joint_names
+    head, neck = (next((known.index(n) for n in names if n in known), None) for names in (HEADS, NECKS))
     if head is None or neck is None:
         return []
     top = far_point(recording, head)
-    if top is None:
-        top = recording.positions[:, recording.joint_index(head)]
-    up = top - recording.positions[:, recording.joint_index(neck)]
-    turns = recording.world_rotations[:, recording.joint_index(head)]
+    up = (recording.positions[:, head] if top is None else top) - recording.positions[:, neck]
+    turns = recording.world_rotations[:, head]
     local = Rotation.from_matrix(turns.transpose(0, 2, 1) @ thorax).mean().as_matrix()
     axes = frames(up, (turns @ local)[:, :, 1], keep_y=False)
-    rise = np.array(body.segment("neck").origin) - girdle
-    base = middle(centres, "upper_arm") + np.einsum("nij,j->ni", thorax, rise)
-    return [
-        ("neck", np.array([0.0, 0.0, ARM]), base + ARM * axes[:, :, 2]),
-        ("neck", np.array([ARM, 0.0, 0.0]), base + ARM * axes[:, :, 0]),
-    ]
+    return _head_guides(body, centres, thorax, axes)

@@ -30,15 +30,13 @@ def joint_centres(recording: Recording) -> Mapping[str, FloatArray]:
     Raises:
         InputError: If the skeleton lacks one of the joints.
     """
-    joints = [recording.joint_index(joint_of(recording, segment)) for segment in CENTRES]
-    return {segment: recording.positions[:, joint] for segment, joint in zip(CENTRES, joints, strict=True)}
+    return {segment: recording.positions[:, joint_of(recording, segment)] for segment in CENTRES}
 
 
-def far_point(recording: Recording, joint: str) -> FloatArray | None:
+def far_point(recording: Recording, index: int) -> FloatArray | None:
     """(n, 3) end of the bone that begins at a joint: its first child, or its end [m]; None without one."""
-    index = recording.joint_index(joint)
-    children = np.flatnonzero(recording.parents == index)
-    offset = recording.offsets[children[0]] if children.size else recording.ends.get(joint)
+    children, name = np.flatnonzero(recording.parents == index), recording.joint_names[index]
+    offset = recording.offsets[children[0]] if children.size else recording.ends.get(name)
     if offset is None or np.linalg.norm(offset) < 1e-3:
         return None
     return recording.positions[:, index] + recording.world_rotations[:, index] @ offset
@@ -66,18 +64,11 @@ def trunk_axes(centres: Mapping[str, FloatArray], part: str) -> FloatArray:
 def analytic_ik(
     body: BodyModel, centres: Mapping[str, FloatArray], pelvis: FloatArray, thorax: FloatArray
 ) -> FloatArray:
-    """Postures within the joints' limits, close to the recorded ones.
+    """(n, nq) postures within the joints' limits, close to the recorded ones.
 
-    Lumbar and thorax share the rotation of the spine, limbs point as recorded, and the bend of knee and
-    elbow gives the rotation about the limb; neck, wrists and ankles are at 0.
-
-    Args:
-        centres: (n, 3) joint centres [m].
-        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
-        thorax: (n, 3, 3) from the thorax' axes to the world's.
-
-    Returns:
-        (n, nq).
+    Lumbar and thorax share the rotation of the spine, limbs point as recorded, and the bend of knee and elbow
+    gives the rotation about the limb; neck, wrists and ankles are at 0. Joint centres are (n, 3) [m]; pelvis
+    and thorax (n, 3, 3) are from their axes to the world's.
     """
     q = np.tile(body.zero_posture(), (len(pelvis), 1))
     q[:, :3] = middle(centres, "thigh")
@@ -89,9 +80,8 @@ def analytic_ik(
         carriers["thorax"] = carriers["thorax"] @ _set_ball(body, q, name, half)
     for part, (carrier, beyond, end, hinge, sign) in _LIMBS.items():
         for side in SIDES:
-            upper = centres[f"{side}_{beyond}"] - centres[f"{side}_{part}"]
-            lower = centres[f"{side}_{end}"] - centres[f"{side}_{beyond}"]
-            upper, lower = unit(upper), unit(lower)
+            upper = unit(centres[f"{side}_{beyond}"] - centres[f"{side}_{part}"])
+            lower = unit(centres[f"{side}_{end}"] - centres[f"{side}_{beyond}"])
             cross = np.cross(upper, lower)
             bent = np.linalg.norm(cross, axis=1)
             y = sign * cross + np.maximum(STRAIGHT - bent, 0.0)[:, None] * carriers[carrier][:, :, 1]
@@ -105,12 +95,9 @@ def analytic_ik(
 
 def frames(z: FloatArray, y: FloatArray, *, keep_y: bool) -> FloatArray:
     """(n, 3, 3) with columns x, y, z of (n, 3) directions; the one kept is exact."""
-    if keep_y:
-        y = unit(y)
-        z = unit(z - np.sum(z * y, axis=1, keepdims=True) * y)
-    else:
-        z = unit(z)
-        y = unit(y - np.sum(y * z, axis=1, keepdims=True) * z)
+    kept, other = (unit(y), z) if keep_y else (unit(z), y)
+    other = unit(other - np.sum(other * kept, axis=1, keepdims=True) * kept)
+    y, z = (kept, other) if keep_y else (other, kept)
     return np.stack([np.cross(y, z), y, z], axis=-1)
 
 
@@ -156,20 +143,21 @@ class Reconstruction(Displayed):
     neutral: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        n = len(self.time)
+        n, what = len(self.time), "reconstruction"
         for name, shape in (("time", (n,)), ("q", (n, self.body.nq))):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), f"reconstruction {name}", shape))
+            object.__setattr__(self, name, frozen_array(getattr(self, name), f"{what} {name}", shape))
         if len(self.targets) != n:
-            raise InputError(
-                f"reconstruction of {n} instants with {len(self.targets)} of targets; valid: as many"
-            )
-        residual = np.array(self.residual, dtype=np.float64)
-        if residual.shape != (n, len(self.joints)):
-            raise InputError(
-                f"reconstruction residual has shape {residual.shape}; valid: {(n, len(self.joints))}"
-            )
+            raise InputError(f"{what} of {n} instants with {len(self.targets)} of targets; valid: as many")
+        residual, shape = np.array(self.residual, dtype=np.float64), (n, len(self.joints))
+        if residual.shape != shape:
+            raise InputError(f"{what} residual has shape {residual.shape}; valid: {shape}")
         residual.setflags(write=False)
         object.__setattr__(self, "residual", residual)
+
+    @property
+    def rate(self) -> float:
+        """Instants per second [Hz]; 1 of a single instant."""
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0]) if len(self.time) > 1 else 1.0
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -204,25 +192,17 @@ def segment_lengths(centres: Mapping[str, FloatArray]) -> dict[str, float]:
     """Lengths of a person [m] by the names of :data:`manikin.body.anthropometry.MEASURED_LENGTHS`.
 
     Medians over the instants and the mean of both sides; the trunk's is taken where it is
-    extended and no arm is raised. Lengths of which a joint is missing are left out.
-
-    Args:
-        centres: (n, 3) joint centres [m], see
-            :func:`manikin.recordings.reconstruction.proportions.joint_centres`; NaN where one is not known.
+    extended and no arm is raised. Lengths of which a joint is missing are left out. Joint centres (n, 3) [m],
+    see :func:`joint_centres`, are NaN where one is not known.
     """
-
-    def apart(first: str, second: str) -> float:
-        if first not in centres or second not in centres:
-            return np.nan
-        distance = np.linalg.norm(centres[first] - centres[second], axis=1)
-        return float(np.median(distance[~np.isnan(distance)])) if not np.all(np.isnan(distance)) else np.nan
-
-    pairs = {
-        name: [(f"{side}_{near}", f"{side}_{far}") for side in SIDES] for name, (near, far) in _BONES.items()
-    }
+    pairs = {name: [(f"{side}_{a}", f"{side}_{b}") for side in SIDES] for name, (a, b) in _BONES.items()}
     pairs |= {"hips": [("left_thigh", "right_thigh")], "shoulders": [("left_upper_arm", "right_upper_arm")]}
-    lengths = {name: [apart(*pair) for pair in both] for name, both in pairs.items()}
-    found = {name: float(np.nanmean(both)) for name, both in lengths.items() if not np.all(np.isnan(both))}
+    found: dict[str, float] = {}
+    for name, both in pairs.items():
+        apart = [np.linalg.norm(centres[a] - centres[b], axis=1) for a, b in both if {a, b} <= set(centres)]
+        known = [np.median(each[~np.isnan(each)]) for each in apart if not np.all(np.isnan(each))]
+        if known:
+            found[name] = float(np.mean(known))
     if "hips" in found and "shoulders" in found:
         length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
         if not np.all(np.isnan(length)):
@@ -273,11 +253,7 @@ def human_of(
     lengths = segment_lengths(centres)
     if stature is None:
         usual = Anthropometry(REFERENCE_STATURE, REFERENCE_MASS, sex)
-        heights = {
-            "thigh": usual.length("thigh"),
-            "shank": usual.length("shank"),
-            "trunk": usual.shoulder_height,
-        }
+        heights = {name: usual.length(name) for name in ("thigh", "shank")} | {"trunk": usual.shoulder_height}
         known = [name for name in heights if name in lengths]
         share = sum(lengths[n] for n in known) / sum(heights[n] for n in known) if known else 1.0
         stature = REFERENCE_STATURE * share

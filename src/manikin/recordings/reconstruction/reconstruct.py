@@ -10,7 +10,7 @@ on the trunk its upper end has a third of the pelvis' acceleration along the wal
 unmeasured trunk therefore tilts forward and back such that a third remains.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,26 +34,6 @@ from manikin.recordings.reconstruction.proportions import (
     human_of,
     joint_centres,
 )
-
-
-def reconstruct_skeleton(
-    recording: Recording, body: BodyModel | None, sex: str, mass: float | None
-) -> Reconstruction:
-    """Motion of our human that follows a skeleton; see :func:`reconstruct`.
-
-    Hips, knees, ankles, shoulders, elbows and wrists are followed; the rotations of pelvis, thorax, head,
-    feet and hands count less. Our shoulders are fixed in the thorax: movements of a recorded shoulder girdle
-    remain as residuals.
-    """
-    centres = joint_centres(recording)
-    measured = human_of(centres, sex, mass)
-    person = measured if body is None else body
-    pelvis, thorax = (trunk_turns(recording, centres, name) for name in ("pelvis", "thorax"))
-    wanted = origin_targets(centres, CENTRES)
-    followed = wanted.and_these(orientation_targets(recording, person, centres, pelvis, thorax))
-    q, residual = follow(person, followed, analytic_ik(person, centres, pelvis, thorax), recording.rate)
-    return Reconstruction(person, recording.time, q, wanted, residual[:, : len(wanted.names)])
-
 
 UPRIGHT = ("lumbar", "thorax", "neck", "left_upper_arm", "right_upper_arm")
 """Segments on ball joints, from the pelvis outward, that are upright or hang unless they are recorded."""
@@ -89,9 +69,8 @@ def unmeasured_upright(found: Reconstruction) -> Reconstruction:
         places = [7 + body.joint_index(hinge.name) for hinge in segment.hinges]
         carrier = turns[segment.parent or ""]
         if name in found.neutral:
-            wanted = _heading(carrier) @ ball_rotation(axes, standing[places])
-            if name in _TILTED:
-                wanted = _heading(carrier) @ tilts @ ball_rotation(axes, standing[places])
+            upright = _heading(carrier) @ tilts if name in _TILTED else _heading(carrier)
+            wanted = upright @ ball_rotation(axes, standing[places])
             angles = ball_angles(axes, carrier.transpose(0, 2, 1) @ wanted, standing[places])
             limits = [(hinge.lower, hinge.upper) for hinge in segment.hinges]
             q[:, places] = np.clip(angles, *np.transpose(limits))
@@ -101,7 +80,7 @@ def unmeasured_upright(found: Reconstruction) -> Reconstruction:
 
 def _calming_tilts(found: Reconstruction, pelvis: FloatArray) -> FloatArray:
     """(n, 3, 3) tilts of the trunk about the left axis; none where it is measured or clips are short."""
-    n, rate = len(found.q), (len(found.q) - 1) / max(float(found.time[-1] - found.time[0]), 1e-9)
+    n, rate = len(found.q), found.rate
     if not set(_TILTED) <= set(found.neutral) or n * SLOW < rate or rate <= 2.0 * SLOW:
         return np.tile(np.eye(3), (n, 1, 1))
     place = found.q[:, :2]
@@ -118,16 +97,15 @@ def _heading(turns: FloatArray) -> FloatArray:
     return Rotation.from_rotvec(yaw[:, None] * [0.0, 0.0, 1.0]).as_matrix()
 
 
-FEWEST_FRAMES = 2
-
-
 def reconstruct(
     recording: Recording | MarkerRecording, body: BodyModel | None = None, *, sex: str = "male",
     mass: float | None = None,
 ) -> Reconstruction:  # fmt: skip
     """Motion of our human that follows a recording, by inverse kinematics within joint limits.
 
-    Of a skeleton the joint centres are followed, of markers the markers themselves
+    Of a skeleton hips, knees, ankles, shoulders, elbows and wrists are followed; the rotations of pelvis,
+    thorax, head, feet and hands count less. Our shoulders are fixed in the thorax: movements of a recorded
+    shoulder girdle remain as residuals. Of markers the markers themselves are followed
     (:mod:`manikin.recordings.reconstruction.marker_reconstruction`). Unmeasured segments are held as in
     standing, trunk and head upright and arms hanging.
 
@@ -146,7 +124,13 @@ def reconstruct(
     _check(recording)
     if isinstance(recording, MarkerRecording):
         return unmeasured_upright(reconstruct_markers(recording, body, sex, mass))
-    return reconstruct_skeleton(recording, body, sex, mass)
+    centres = joint_centres(recording)
+    person = human_of(centres, sex, mass) if body is None else body
+    pelvis, thorax = (trunk_turns(recording, centres, name) for name in ("pelvis", "thorax"))
+    wanted = origin_targets(centres, CENTRES)
+    followed = wanted.and_these(orientation_targets(recording, person, centres, pelvis, thorax))
+    q, residual = follow(person, followed, analytic_ik(person, centres, pelvis, thorax), recording.rate)
+    return Reconstruction(person, recording.time, q, wanted, residual[:, : len(wanted.names)])
 
 
 def person_of(
@@ -155,7 +139,6 @@ def person_of(
     """Our human with the lengths of a person of whom there are several recordings, from all their frames.
 
     Args:
-        recordings: Of the same person, at least one.
         sex: Table of segment masses.
         mass: Body mass [kg]; None for the one in the files, or else a usual one.
 
@@ -167,7 +150,10 @@ def person_of(
         raise InputError("no recording to take a person's lengths from; valid: at least one")
     for recording in recordings:
         _check(recording)
-    each = [_centres(recording) for recording in recordings]
+    each = [
+        centres_of_markers(one) if isinstance(one, MarkerRecording) else joint_centres(one)
+        for one in recordings
+    ]
     everywhere = {
         name: np.concatenate([
             found.get(name, np.full((len(recording), 3), np.nan))
@@ -184,18 +170,9 @@ def person_of(
     return human_of(everywhere, sex, mass, float(np.median(statures)) if statures else None)
 
 
-def _centres(recording: Recording | MarkerRecording) -> Mapping[str, FloatArray]:
-    if isinstance(recording, MarkerRecording):
-        return centres_of_markers(recording)
-    return joint_centres(recording)
-
-
 def _check(recording: Recording | MarkerRecording) -> None:
     if not isinstance(recording, Recording | MarkerRecording):
-        raise InputError(
-            f"reconstruction of a {type(recording).__name__}; valid: a Recording or a MarkerRecording"
-        )
-    if len(recording) < FEWEST_FRAMES:
-        raise InputError(
-            f"recording {recording.name!r} has {len(recording)} frame; valid: at least {FEWEST_FRAMES}"
-        )
+        given = type(recording).__name__
+        raise InputError(f"reconstruction of a {given}; valid: a Recording or a MarkerRecording")
+    if len(recording) < 2:
+        raise InputError(f"recording {recording.name!r} has {len(recording)} frame; valid: at least 2")

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, Literal
 
 from manikin.errors import InputError
@@ -25,7 +24,6 @@ from manikin.recordings.statistics.passages import (
 )
 from manikin.recordings.statistics.phases import (
     BYS,
-    SHORTEST,
     By,
     PhaseSequence,
     SequenceConsistency,
@@ -58,10 +56,8 @@ class StatisticsSettings:
         active: Effectors that define phases and sequences; None for all.
         phases: Number of phases that are compared in sequences; None for all.
         start: Kind of phase from which on they are compared, such as ``DS``; None for the first of all.
-        shortest: Phases shorter than this are passed over in sequences [s].
         origin: From where placements are seen: the first stance, or where the centre of mass was lowest or
-            highest.
-        mirror: Whether motions that begin there with the right foot are seen in a mirror.
+            highest. Motions that begin there with the right foot are seen in a mirror.
     """
 
     overhead: Overhead | None = None
@@ -69,9 +65,7 @@ class StatisticsSettings:
     active: Collection[str] | None = None
     phases: int | None = None
     start: str | None = None
-    shortest: float = SHORTEST
     origin: From = "stance"
-    mirror: bool = True
 
     def __post_init__(self) -> None:
         if self.origin not in FROMS:
@@ -112,15 +106,16 @@ class GroupStatistics:
     motions: tuple[str, ...]
     durations: Mapping[By, Mapping[str, Spread]]
     consistency: SequenceConsistency
-    distances: Mapping[str, Spread] = field(default_factory=lambda: MappingProxyType({}))
-    within: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    whole: Mapping[str, Passage] = field(default_factory=lambda: MappingProxyType({}))
+    distances: Mapping[str, Spread] = field(default_factory=dict)
+    within: Mapping[str, float] = field(default_factory=dict)
+    whole: Mapping[str, Passage] = field(default_factory=dict)
     under: tuple[tuple[str, Passage], ...] = ()
     placements: tuple[SupportPlacement, ...] = ()
-    unplaced: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    unplaced: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, with units in the keys."""
+        low = [passage.com_lowest for passage in self.whole.values()]
         return {
             "motions": list(self.motions),
             "durations": {
@@ -136,7 +131,7 @@ class GroupStatistics:
             "first_steps": dict(self.consistency.first_steps),
             "largest_com_distance": {name: one.as_dict("m") for name, one in self.distances.items()},
             "share_within_limit": dict(self.within),
-            "com_lowest": self._com_lowest(),
+            "com_lowest": Spread.of(low).as_dict("m") if low else None,
             "passages": [{"motion": name, **one.as_dict()} for name, one in self.under],
             "placements": [
                 {
@@ -147,11 +142,6 @@ class GroupStatistics:
             ],
             "unplaced": dict(self.unplaced),
         }  # fmt: skip
-
-    def _com_lowest(self) -> dict[str, Any] | None:
-        if not self.whole:
-            return None
-        return Spread.of(passage.com_lowest for passage in self.whole.values()).as_dict("m")
 
 
 def group_statistics(
@@ -175,14 +165,12 @@ def group_statistics(
         group,
         tuple(clip.name for clip in clips),
         _durations(sequences),
-        consistency=sequence_consistency(
-            sequences, phases=how.phases, shortest=how.shortest, start=how.start
-        ),
+        sequence_consistency(sequences, phases=how.phases, start=how.start),
         distances=largest_distances(clips),
         within=shares_within(clips, how.limit),
         whole={clip.name: whole_passage(clip) for clip in clips},
         under=tuple((c.name, p) for c in clips for p in passages(c, how.overhead)) if how.overhead else (),
-        placements=support_placements(placed, origins, mirror=how.mirror),
+        placements=support_placements(placed, origins, mirror=True),
         unplaced=unplaced,
     )
 
@@ -236,8 +224,9 @@ def clip_as_dict(clip: RecordedClip, settings: StatisticsSettings | None = None)
         "supports": [
             {
                 "effector": one.effector, "start_s": one.time[0], "end_s": one.time[-1],
-                "com_distance_min_m": one.spread.smallest, "com_distance_mean_m": one.spread.mean,
-                "com_distance_max_m": one.spread.largest, "share_within_limit": one.share_within(how.limit),
+                "com_distance_min_m": one.distance.min(), "com_distance_mean_m": one.distance.mean(),
+                "com_distance_max_m": one.distance.max(),
+                "share_within_limit": (one.distance <= how.limit).mean(),
             }
             for one in support_distances(clip)
         ],

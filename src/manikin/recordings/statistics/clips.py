@@ -73,33 +73,23 @@ class RecordedClip:
 
 
 def clip_of(found: Reconstruction, name: str, group: str, *, start: float = 0.0) -> RecordedClip:
-    """Supports, centre of mass and highest points of a reconstructed recording.
+    """Clip of a reconstructed recording, not yet smoothed, of at least four instants at an even rate.
 
-    Args:
-        found: At least four instants at an even rate, not yet smoothed.
-        group: What it is compared with.
-        start: What the first frame of the recording is on its clock [s].
+    ``start`` is what the first frame of the recording is on its clock [s].
     """
     known, still = supports_of(found, start=start), smoothed(found, MOTION_CUTOFF)
     com, tops = com_and_tops(still.body, still.q)
     standing, _ = com_and_tops(still.body, still.body.standing_posture()[None])
-    return RecordedClip(
-        name, group, known, known.start + still.time - still.time[0], com, tops, float(standing[0, 2])
-    )
+    time = known.start + still.time - still.time[0]
+    return RecordedClip(name, group, known, time, com, tops, float(standing[0, 2]))
 
 
 def com_and_tops(
     body: BodyModel, postures: FloatArray, parts: Mapping[str, Sequence[str]] = PARTS
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Centre of mass, and highest point of some parts of a body.
+    """(n, 3) centres of mass in postures (n, nq), and (n, 3) highest points by part [m].
 
-    Args:
-        body: The body; parts of which it has no segment are left out.
-        postures: (n, nq).
-        parts: Segments of each part.
-
-    Returns:
-        (n, 3) centres of mass and (n, 3) highest points by part [m].
+    Parts, of the segments given for each, are left out if the body has no segment of them.
     """
     model, data = body.pinocchio, body.pinocchio.createData()
     have = {segment.name: segment for segment in body.segments}
@@ -135,11 +125,7 @@ READ = 0.1
 
 @dataclass(frozen=True)
 class GroupedFile:
-    """A recording and what it is compared with.
-
-    Attributes:
-        group: Name of its group.
-    """
+    """A recording and the name of the group with which it is compared."""
 
     path: Path
     group: str
@@ -147,12 +133,7 @@ class GroupedFile:
 
 @dataclass(frozen=True, eq=False)
 class ClipFiles:
-    """Clips read from files.
-
-    Attributes:
-        clips: Those that could be used, in the order of the files.
-        refused: Why the others could not, in one line, by file.
-    """
+    """Clips in the order of their files, and why the others could not be used, in one line by file."""
 
     clips: tuple[RecordedClip, ...]
     refused: Mapping[Path, str]
@@ -192,7 +173,6 @@ def read_clips(
     Recordings of the same skeleton are taken as of one person, whose lengths come from all of them.
 
     Args:
-        files: Of any format that is known.
         sex: Table of segment masses.
         report: Told the share that is done and the file at work.
     """

@@ -6,7 +6,7 @@ bound. The position of a box is given, and the room is the least one while any p
 a collision. A person who crouches on the spot, or is low when the recording begins or ends, passes no bar.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,14 +85,11 @@ class SupportPlacement:
     def ellipse(self, share: float = 0.5) -> tuple[FloatArray, float]:
         """Ellipse about the mean in which a share of places lies, were they normal with this covariance.
 
-        Args:
-            share: Between 0 and 1.
-
         Returns:
             (2,) half axes, the longer one first [m], and the direction of the longer one [rad].
 
         Raises:
-            InputError: If the share is not in between, or there is one place only.
+            InputError: If the share is not between 0 and 1, or there is one place only.
         """
         if not 0.0 < share < 1.0 or len(self.places) < 2:
             raise InputError(
@@ -129,11 +126,9 @@ def com_extreme(clip: RecordedClip, *, highest: bool = False) -> Origin:
     """
     frame = int(np.argmax(clip.com[:, 2]) if highest else np.argmin(clip.com[:, 2]))
     instant = float(clip.time[frame])
-    before, after = (
-        [np.interp(instant + shift, clip.time, clip.com[:, axis]) for axis in range(2)]
-        for shift in (-AROUND, AROUND)
-    )
-    return Origin(clip.com[frame, :2], _heading(clip, np.subtract(after, before)), instant)
+    around = (instant - AROUND, instant + AROUND)
+    way = np.array([np.diff(np.interp(around, clip.time, clip.com[:, axis]))[0] for axis in range(2)])
+    return Origin(clip.com[frame, :2], _heading(clip, way), instant)
 
 
 def support_placements(
@@ -158,26 +153,17 @@ def support_placements(
         later = [one.effector for one in clip.supports.supports if one.start > origin.instant]
         first = next((name for name in later if name.endswith("foot")), None)
         turned = mirror and first == "right_foot"
-        for effector, places in _numbered(clip, origin).items():
-            name = mirrored(effector) if turned else effector
-            for number, place in places.items():
-                seen = origin.seen(place) * ([1.0, -1.0] if turned else [1.0, 1.0])
+        for effector in {one.effector for one in clip.supports.supports}:
+            supports = clip.supports.of(effector)
+            before = sum(one.start <= origin.instant for one in supports)
+            for number, one in enumerate(supports, start=1 - before):
+                seen = origin.seen(one.place) * ([1.0, -1.0] if turned else [1.0, 1.0])
+                name = mirrored(effector) if turned else effector
                 found.setdefault((name, number), []).append((clip.name, seen))
     return tuple(
-        SupportPlacement(
-            name, number, tuple(clip for clip, _ in each), np.array([place for _, place in each])
-        )
+        SupportPlacement(name, number, tuple(clip for clip, _ in each), np.array([seen for _, seen in each]))
         for (name, number), each in sorted(found.items())
     )
-
-
-def _numbered(clip: RecordedClip, origin: Origin) -> Mapping[str, Mapping[int, FloatArray]]:
-    numbered = {}
-    for name in {one.effector for one in clip.supports.supports}:
-        supports = clip.supports.of(name)
-        before = sum(one.start <= origin.instant for one in supports)
-        numbered[name] = {index + 1 - before: one.place for index, one in enumerate(supports)}
-    return numbered
 
 
 def _heading(clip: RecordedClip, way: FloatArray) -> float:
@@ -194,13 +180,7 @@ LIMIT = 1.08
 
 @dataclass(frozen=True, eq=False)
 class SupportDistance:
-    """Distance from the centre of mass to the place of one support while it supports.
-
-    Attributes:
-        clip: Name of the motion.
-        time: (k,) instants, at least one [s].
-        distance: (k,) [m].
-    """
+    """Distance (k,) from the CoM to the place of one support at instants (k,) while it supports [m, s]."""
 
     clip: str
     effector: str
@@ -211,15 +191,6 @@ class SupportDistance:
         for name in ("time", "distance"):
             value = frozen_array(getattr(self, name), f"support distance {name}", (len(self.time),))
             object.__setattr__(self, name, value)
-
-    @property
-    def spread(self) -> Spread:
-        """Over the instants [m]."""
-        return Spread.of(self.distance)
-
-    def share_within(self, limit: float = LIMIT) -> float:
-        """Share of the instants at which the distance is not above a limit [m]."""
-        return float(np.mean(self.distance <= limit))
 
 
 def support_distances(clip: RecordedClip) -> tuple[SupportDistance, ...]:
@@ -241,21 +212,22 @@ def largest_distances(clips: Sequence[RecordedClip]) -> dict[str, Spread]:
     """The largest distance of each motion, by effector, over all motions ([Qiu2012]_ Table 3.5) [m]."""
     largest: dict[str, list[float]] = {}
     for clip in clips:
-        own: dict[str, float] = {}
-        for one in support_distances(clip):
-            own[one.effector] = max(own.get(one.effector, 0.0), float(one.distance.max()))
-        for effector, value in own.items():
-            largest.setdefault(effector, []).append(value)
+        for effector, each in _distances([clip]).items():
+            largest.setdefault(effector, []).append(float(each.max()))
     return {effector: Spread.of(values) for effector, values in sorted(largest.items())}
 
 
 def shares_within(clips: Sequence[RecordedClip], limit: float = LIMIT) -> dict[str, float]:
     """Share of all instants of all motions at which the distance is not above a limit, by effector."""
+    return {name: float(np.mean(each <= limit)) for name, each in sorted(_distances(clips).items())}
+
+
+def _distances(clips: Sequence[RecordedClip]) -> dict[str, FloatArray]:
+    """All distances [m] by effector."""
     every: dict[str, list[FloatArray]] = {}
-    for clip in clips:
-        for one in support_distances(clip):
-            every.setdefault(one.effector, []).append(one.distance)
-    return {name: float(np.mean(np.concatenate(each) <= limit)) for name, each in sorted(every.items())}
+    for one in (one for clip in clips for one in support_distances(clip)):
+        every.setdefault(one.effector, []).append(one.distance)
+    return {effector: np.concatenate(each) for effector, each in every.items()}
 
 
 CROSSED = 0.1
@@ -279,9 +251,7 @@ class Overhead:
     def __post_init__(self) -> None:
         finite_number(self.height, "height to pass under [m]", above=0.0)
         if (self.x is None) != (self.y is None):
-            raise InputError(
-                "something overhead has one of x and y only; valid: both for a box, none for a bar"
-            )
+            raise InputError("overhead has one of x and y only; valid: both for a box, none for a bar")
         for axis, ends in (("x", self.x), ("y", self.y)):
             if ends is not None and not ends[0] < ends[1]:
                 raise InputError(f"something overhead has {axis} from {ends[0]} to {ends[1]}; valid: rising")
@@ -303,9 +273,7 @@ def whole_passage(clip: RecordedClip) -> Passage:
 def passages(clip: RecordedClip, overhead: Overhead) -> tuple[Passage, ...]:
     """Times in which a person is below something, in order.
 
-    Args:
-        clip: The motion, with tops.
-        overhead: What is passed. All tops have to be below a bar, any part or the centre of mass below a box.
+    All tops have to be below a bar, any part or the centre of mass below a box.
 
     Raises:
         InputError: If the motion has no tops.
@@ -318,10 +286,8 @@ def passages(clip: RecordedClip, overhead: Overhead) -> tuple[Passage, ...]:
     else:
         under = np.any([overhead.above(place) for place in (clip.com, *clip.tops.values())], axis=0)
     found = [(first, stop, _passage(clip, first, stop, overhead)) for first, stop in mask_runs(under)]
-    if overhead.x is not None:
-        return tuple(one for _, _, one in found)
-    last = len(clip.time)
-    return tuple(one for a, b, one in found if a > 0 and b < last and one.travelled >= CROSSED)
+    last, box = len(clip.time), overhead.x is not None
+    return tuple(one for a, b, one in found if box or (a > 0 and b < last and one.travelled >= CROSSED))
 
 
 def _passage(clip: RecordedClip, first: int, stop: int, overhead: Overhead | None) -> Passage:

@@ -33,14 +33,13 @@ class PhaseSequence:
 
     Attributes:
         group: What it is compared with: a person, a condition.
-        start_seen: Whether the first phase begins with a change of the supports, not with the recording.
-        end_seen: Whether the last phase ends with a change of the supports.
+        end_seen: Whether the last phase ends with a change of the supports, not with the recording. The first
+            one begins with it.
     """
 
     name: str
     group: str
     phases: tuple[SupportPhase, ...]
-    start_seen: bool = False
     end_seen: bool = False
 
     def of_effectors(self, active: Collection[str]) -> "PhaseSequence":
@@ -72,30 +71,21 @@ class PhaseSequence:
     @cached_property
     def labels(self) -> tuple[str, ...]:
         """Kind and number of each phase: DS-1, SS-1, DS-2 and so on ([Qiu2012]_ Fig. 3.8)."""
-        seen: Counter[str] = Counter()
-        labels = []
-        for kind in self.kinds:
-            seen[kind] += 1
-            labels.append(f"{kind}-{seen[kind]}")
-        return tuple(labels)
+        kinds = self.kinds
+        return tuple(f"{kind}-{kinds[: number + 1].count(kind)}" for number, kind in enumerate(kinds))
 
     @property
     def whole(self) -> tuple[bool, ...]:
         """Whether each phase is seen from its beginning to its end."""
         last = len(self.phases) - 1
-        return tuple(
-            (number > 0 or self.start_seen) and (number < last or self.end_seen)
-            for number in range(len(self.phases))
-        )
+        return tuple(number > 0 and (number < last or self.end_seen) for number in range(len(self.phases)))
 
     @property
     def first_step(self) -> str | None:
         """The effector that touches down first; None if none does."""
-        for before, after in pairwise(self.phases):
-            for name in after.effectors:
-                if name not in before.effectors:
-                    return name
-        return None
+        pairs = ((before.effectors, after.effectors) for before, after in pairwise(self.phases))
+        steps = (name for before, after in pairs for name in after if name not in before)
+        return next(steps, None)
 
 
 def kind_of(effectors: Iterable[str]) -> str:
@@ -130,18 +120,11 @@ By = Literal["number", "kind", "effectors"]
 BYS: tuple[By, ...] = ("number", "kind", "effectors")
 
 
-def phase_durations(
-    sequences: Sequence[PhaseSequence], by: By = "number", *, cut: bool = False
-) -> dict[str, Spread]:
+def phase_durations(sequences: Sequence[PhaseSequence], by: By = "number") -> dict[str, Spread]:
     """Durations of the phases of the same name over all motions ([Qiu2012]_ Table 3.4, Fig. 3.11) [s].
 
-    Args:
-        sequences: Of at least one motion; give those of one group, or of all.
-        by: What makes a name.
-        cut: Whether phases count that begin or end with the recording.
-
-    Returns:
-        Spread of each name, in the order in which they appear.
+    Names, by the rule ``by``, are in the order in which they appear. Phases that begin or
+    end with the recording do not count.
 
     Raises:
         InputError: If ``by`` is unknown.
@@ -151,7 +134,7 @@ def phase_durations(
     values: dict[str, list[float]] = {}
     for one in sequences:
         for name, phase, whole in zip(names_of(one, by), one.phases, one.whole, strict=True):
-            if whole or cut:
+            if whole:
                 values.setdefault(name, []).append(phase.duration)
     return {name: Spread.of(durations) for name, durations in values.items()}
 
@@ -208,18 +191,13 @@ class SequenceConsistency:
         return self.counts[self.modal] / self.motions if self.counts else 0.0
 
     @property
-    def mirrored_counts(self) -> Mapping[Supporting, int]:
-        """Motions of each sequence, with its mirror image counted as the more frequent of both."""
+    def mirrored_share(self) -> float:
+        """Share of the motions with the most frequent sequence or its mirror image."""
         merged: Counter[Supporting] = Counter()
         for sequence, count in self.counts.items():
             image = mirror_image(sequence)
             merged[image if image in merged else sequence] += count
-        return dict(merged.most_common())
-
-    @property
-    def mirrored_share(self) -> float:
-        """Share of the motions with the most frequent sequence or its mirror image."""
-        return max(self.mirrored_counts.values(), default=0) / max(self.motions, 1)
+        return max(merged.values(), default=0) / max(self.motions, 1)
 
 
 def sequence_consistency(
@@ -229,7 +207,6 @@ def sequence_consistency(
     """Count the sequences of supports and the first steps.
 
     Args:
-        motions: Those of one group, or all.
         phases: How many phases are compared; None for all.
         shortest: Phases shorter than this are passed over [s].
         start: Kind of the first compared phase, such as ``DS``, for recordings that begin anywhere: the first
@@ -259,8 +236,7 @@ def initials(sequence: Supporting) -> str:
 def _from(one: PhaseSequence, kind: str | None) -> tuple[SupportPhase, ...]:
     if kind is None:
         return one.phases
-    first = 0 if one.start_seen else 1
-    begins = (number for number in range(first, len(one.phases)) if one.kinds[number] == kind)
+    begins = (number for number in range(1, len(one.phases)) if one.kinds[number] == kind)
     return one.phases[next(begins, len(one.phases)) :]
 
 
@@ -326,12 +302,8 @@ def published_distances() -> dict[str, Spread]:
 
 def published_heights() -> PublishedHeights:
     """Heights of the centre of mass and of the beams."""
-    data = _published()
-    return PublishedHeights(
-        data["com_m"]["standing"],
-        MappingProxyType(data["com_m"]["lowest"]),
-        MappingProxyType(data["beam_heights_m"]),
-    )
+    com, beams = _published()["com_m"], _published()["beam_heights_m"]
+    return PublishedHeights(com["standing"], MappingProxyType(com["lowest"]), MappingProxyType(beams))
 
 
 @cache
@@ -346,12 +318,10 @@ def _sequence(name: str, frames: Sequence[int]) -> PhaseSequence:
     last = data["end_frames"].get(name)
     if last is not None:
         ends.append(last)
-    longer = max(data["table_3_2"], key=lambda row: len(row["phases"]))
-    shorter = min(data["table_3_2"], key=lambda row: len(row["phases"]))
-    feet = (shorter if len(frames) < len(shorter["phases"]) else longer)["phases"]
+    shorter, *_, longer = sorted((row["phases"] for row in data["table_3_2"]), key=len)
+    feet = shorter if len(frames) < len(shorter) else longer
     phases = tuple(
         SupportPhase(start * data["frame_s"], end * data["frame_s"], _FEET[one])
         for (start, end), one in zip(pairwise(ends), feet, strict=False)
     )
-    group = name.removeprefix("01_TR_")[:4]
-    return PhaseSequence(name, group, phases, end_seen=last is None)
+    return PhaseSequence(name, name.removeprefix("01_TR_")[:4], phases, end_seen=last is None)

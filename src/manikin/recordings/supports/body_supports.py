@@ -15,7 +15,7 @@ A hand that hangs at the side or lies on the person's own knee rests only while 
 the body; a hand that carries a load moves with the body. Neither supports.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -28,7 +28,6 @@ from manikin.numerics.signals import lasting, mask_runs, switch
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.supports.support_levels import (
-    CUTOFF,
     JOINTS,
     SHORTEST_REST,
     Track,
@@ -96,35 +95,34 @@ class Support:
         """[s]."""
         return self.end - self.start
 
+    def frames(self, start: float, rate: float, count: int) -> tuple[int, int]:
+        """First frame and the one after the last, of ``count`` at a rate [Hz] from an instant on [s]."""
+        first, stop = (round((instant - start) * rate) for instant in (self.start, self.end))
+        return first, stop if self.end_seen else count
 
-def support_between(
-    effector: str, positions: FloatArray, frames: tuple[int, int], rate: float, start: float
+
+Places = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def support_in(
+    effector: str, frames: tuple[int, int], count: int, rate: float, start: float, places: Places
 ) -> Support:
-    """Support of one point for a run of frames.
+    """Support for a run of ``count`` frames at a rate [Hz] from an instant on [s], with its three places."""
+    first, stop = frames
+    instants = start + first / rate, start + min(stop, count - 1) / rate
+    return Support(effector, *instants, *places, first > 0, stop < count)
 
-    Args:
-        positions: (n, 3) of the point in all frames [m].
-        frames: First frame of the run and the one after its last.
-        rate: Frames per second [Hz].
-        start: Instant of the first of all frames [s].
-    """
-    (first, stop), last = frames, len(positions) - 1
-    return Support(
-        effector, start + first / rate, start + min(stop, last) / rate,
-        median_place(positions[first:stop]), positions[first], positions[stop - 1],
-        first > 0, stop <= last,
-    )  # fmt: skip
+
+def support_between(effector: str, point: Track, frames: tuple[int, int], start: float) -> Support:
+    """Support of one point for a run of frames: first frame and the one after its last."""
+    during = point.positions[slice(*frames)]
+    places = median_place(during), during[0], during[-1]
+    return support_in(effector, frames, len(point.positions), point.rate, start, places)
 
 
 @dataclass(frozen=True)
 class SupportPhase:
-    """A time in which the supports do not change.
-
-    Attributes:
-        start: [s].
-        end: [s].
-        effectors: Those that support; none in flight.
-    """
+    """A time [s] in which the same effectors support, none in flight."""
 
     start: float
     end: float
@@ -142,8 +140,7 @@ class RecordedSupports(Displayed):
 
     Attributes:
         supports: In the order of their starts.
-        start: First instant looked at [s].
-        end: Last instant looked at [s].
+        start: First instant looked at [s]; ``end`` is the last one.
         surfaces: Heights of the surfaces found on which feet stand, lowest first [m].
     """
 
@@ -184,20 +181,16 @@ class RecordedSupports(Displayed):
 
 TRUNK = "pelvis"
 """Effector that stands for the whole trunk."""
-ROLLS = 0.20
-"""Speed up to which a knee, an elbow or a palm may stay: what the body turns about is not one point [m/s]."""
-
-LEAVES = 0.25
-"""Speed above which it may leave [m/s]."""
+ROLLS, LEAVES = 0.20, 0.25
+"""Speed up to which a knee, an elbow or a palm may stay, for what the body turns about is not one point, and
+from which it may leave [m/s]."""
 
 SLIDE_WAY = 0.15
 """Longest way along which they slide between two rests, in contrast to a swing [m]."""
 
-LOW_LYING = 0.13
-"""Height above the ground within which a knee or an elbow comes to rest on it [m]."""
-
-AWAY = 0.18
-"""Height from which it has left the ground: limbs of a model are not as thick as flesh and floor mats [m]."""
+LOW_LYING, AWAY = 0.13, 0.18
+"""Height above the ground within which a knee or an elbow comes to rest on it, and from which it has left it:
+limbs of a model are not as thick as flesh and floor mats [m]."""
 
 LYING = 0.12
 """Height of the middle of the hips above the ground, per stature, within which the trunk lies on it."""
@@ -206,9 +199,7 @@ SHORTEST = 0.12
 """Shorter supports, and shorter interruptions, are noise [s]."""
 
 
-def ground_supports(
-    found: Reconstruction, floor: FloatArray, rate: float, *, start: float = 0.0, cutoff: float = CUTOFF
-) -> tuple[Support, ...]:
+def ground_supports(found: Reconstruction, floor: FloatArray, start: float) -> Iterator[Support]:
     """Supports of knees, elbows and the pelvis on the ground; none for a body that is not a human.
 
     The pelvis stands for the trunk: it supports where it is low and nearer to lying than to upright.
@@ -217,11 +208,10 @@ def ground_supports(
     """
     stature = found.body.stature
     if stature is None:
-        return ()
+        return
     names = (*JOINTS, TRUNK)
-    supports: list[Support] = []
     for name, positions in zip(names, effector_places(found.body, found.q, names), strict=True):
-        one = track(positions, rate, cutoff)
+        one = track(positions, found.rate)
         height = one.positions[:, 2] - floor
         slow, fast = slow_and_leaving(one)
         if name == TRUNK:
@@ -229,11 +219,8 @@ def ground_supports(
             touching = switch(slow & low, fast | ~low)
         else:
             touching = switch(slow & (height < LOW_LYING), fast | (height > AWAY))
-        supports += [
-            support_between(name, one.positions, frames, rate, start)
-            for frames in lasting(touching, SHORTEST * rate)
-        ]
-    return tuple(supports)
+        for frames in lasting(touching, SHORTEST * one.rate):
+            yield support_between(name, one, frames, start)
 
 
 def stays(one: Track) -> list[tuple[int, int]]:
@@ -266,53 +253,37 @@ BESIDE_HAND = 0.30
 SHORTEST_HOLD = 0.25
 """A hand that swings back stays for less while the body runs past it [s]."""
 
-SEAT_NEAR = 0.08
-"""Difference between the heights of a palm and a seat up to which it rests on it [m]."""
-
-SEAT_SOON = 0.5
-"""Time before a seat is taken, and after it is left, for which hands may hold it [s]."""
-
-SEAT_REACH = 0.5
-"""Level distance of a hand from the middle of the buttocks up to which it may hold their seat [m]."""
+SEAT_NEAR, SEAT_REACH, SEAT_SOON = 0.08, 0.5, 0.5
+"""Difference between the heights of a palm and a seat, and level distance from the middle of the buttocks, up
+to which a hand may hold the seat [m]; time for which it may before it is taken and after it is left [s]."""
 
 
 def hand_supports(
-    found: Reconstruction, floor: FloatArray, seats: Sequence[Support], rate: float, *,
-    start: float = 0.0, cutoff: float = CUTOFF,
-) -> tuple[Support, ...]:  # fmt: skip
+    found: Reconstruction, floor: FloatArray, seats: Sequence[Support], start: float
+) -> Iterator[Support]:
     """Supports of the hands, by hand and in order; none for a body without hands.
 
     Args:
         found: At least four instants.
         floor: (n,) height of the surface under the feet [m].
         seats: Supports of the seat.
-        rate: Frames per second [Hz].
         start: Instant of the first frame [s].
-        cutoff: Of the low-pass filter [Hz].
-
-    Raises:
-        InputError: If the cutoff is too high.
     """
     if not set(HANDS) <= set(found.body.effectors):
-        return ()
-    supports: list[Support] = []
-    for name in HANDS:
-        if name in found.neutral:
-            continue
+        return
+    for name in sorted(set(HANDS) - set(found.neutral)):
         places = effector_places(found.body, found.q, (name, name.replace("hand", "upper_arm"), *OWN))
-        hand, shoulder = (track(one, rate, cutoff) for one in places[:2])
+        hand, shoulder = (track(one, found.rate) for one in places[:2])
         beside = np.linalg.norm(places[2:] - places[0], axis=2).min(axis=0)
         for frames in stays(hand):
-            one = support_between(name, hand.positions, frames, rate, start)
-            during = slice(*frames)
+            one, during = support_between(name, hand, frames, start), slice(*frames)
             own, way = (float(np.linalg.norm(np.ptp(p.positions[during], axis=0))) for p in (hand, shoulder))
             on_ground = float(np.median(hand.positions[during, 2] - floor[during])) < AWAY
             apart = float(np.median(beside[during])) > BESIDE_HAND or _on_seat(one, seats)
             slow = float(np.median(hand.speed[during])) < SLIDES
             held = one.duration > SHORTEST_HOLD and way > PASSED and own < STAYS * way and slow and apart
             if on_ground or held:
-                supports.append(one)
-    return tuple(supports)
+                yield one
 
 
 def _on_seat(hand: Support, seats: Sequence[Support]) -> bool:
@@ -345,36 +316,34 @@ SHORTEST_SEAT = 0.2
 
 
 def seat_supports(
-    found: Reconstruction, soles: Mapping[str, tuple[FloatArray, FloatArray]], rate: float, *,
-    start: float = 0.0, cutoff: float = CUTOFF,
-) -> tuple[Support, ...]:  # fmt: skip
+    found: Reconstruction, soles: Mapping[str, tuple[FloatArray, FloatArray]], start: float
+) -> tuple[Support, ...]:
     """Supports of the seat, in order; none for a body without buttocks, or while the person lies.
 
     Args:
         found: At least four instants.
         soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
-        rate: As of :func:`hand_supports`, and so are ``start`` and ``cutoff``.
+        start: Instant of the first frame [s].
     """
     body = found.body
     if SEAT not in body.effectors:
         return ()
     com, (buttocks,) = com_path(body, found.q), effector_places(body, found.q, (SEAT,))
     standing = float(effector_places(body, body.standing_posture()[None], (SEAT,))[0, 0, 2])
-    seat = track(buttocks, rate, cutoff)
+    seat = track(buttocks, found.rate)
     height = seat.positions[:, 2]
     floor = np.min([end[:, 2] for both in soles.values() for end in both], axis=0)
     beside = np.min([_beyond(com, heel, toes) for heel, toes in soles.values()], axis=0)
     rests = seat.resting & (height - floor < LOW * standing) & (beside > BESIDE) & ~lying(found)
     seated = np.zeros(len(height), dtype=bool)
     for first, stop in mask_runs(rests):
-        if stop - first >= SHORTEST_REST * rate:
+        if stop - first >= SHORTEST_REST * seat.rate:
             # From this rest as far as the buttocks are no higher, before and after.
             near = height < float(np.median(height[first:stop])) + RISEN
             for begin, end in mask_runs(near):
                 seated[begin:end] |= begin < stop and first < end
     return tuple(
-        support_between(SEAT, seat.positions, frames, rate, start)
-        for frames in lasting(seated, SHORTEST_SEAT * rate)
+        support_between(SEAT, seat, frames, start) for frames in lasting(seated, SHORTEST_SEAT * seat.rate)
     )
 
 

@@ -10,7 +10,6 @@ else is a grasp, as the recording does not show the surface.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,13 +55,7 @@ SHORTEST_PART = 0.04
 """Shorter changes between heel, full sole and toes are noise [s]."""
 
 
-class _Part(IntEnum):
-    """What of an effector touches in one frame."""
-
-    NONE = 0
-    FULL = 1
-    HEEL = 2
-    TOES = 3
+_FULL, _HEEL, _TOES = 1, 2, 3  # what of an effector touches in one frame; 0 for nothing
 
 
 def recorded_schedule(
@@ -80,13 +73,12 @@ def recorded_schedule(
     """
     if len(found.time) < 2:
         raise InputError("stances of a reconstruction of one instant; valid: at least two")
-    soles, rate = sole_points(found), (len(found.time) - 1) / float(found.time[-1] - found.time[0])
+    soles, rate = sole_points(found), found.rate
     contacts: list[Contact] = []
     table = np.zeros((len(found.time), len(supports.supports)), dtype=np.int8)
     for column, support in enumerate(supports.supports):
-        first, stop = (round((instant - supports.start) * rate) for instant in (support.start, support.end))
-        frames = slice(first, stop if support.end_seen else len(table))
-        table[frames, column] = _Part.FULL
+        frames = slice(*support.frames(supports.start, rate, len(table)))
+        table[frames, column] = _FULL
         if support.effector in soles and found.body.sole_length and found.body.sole_width:
             ends = _SoleEnds(*soles[support.effector], frames, rate)
             size = found.body.sole_length, found.body.sole_width
@@ -99,7 +91,7 @@ def recorded_schedule(
     return schedule_of_support(
         supports.start + found.time,
         table,
-        lambda column, row: _part(contacts[column], _Part(table[row, column]), hinge),
+        lambda column, row: _part(contacts[column], int(table[row, column]), hinge),
         STRONGEST * found.body.mass * GRAVITY,
     )
 
@@ -108,10 +100,8 @@ class _SoleEnds:
     """Heel and toes of a foot during one of its supports."""
 
     def __init__(self, heel: FloatArray, toes: FloatArray, frames: slice, rate: float) -> None:
-        speeds = [
-            np.linalg.norm(np.gradient(end, 1.0 / rate, axis=0), axis=1)[frames] for end in (heel, toes)
-        ]
-        speed = np.max(speeds, axis=0)
+        rates = (np.gradient(end, 1.0 / rate, axis=0)[frames] for end in (heel, toes))
+        speed = np.max([np.linalg.norm(each, axis=1) for each in rates], axis=0)
         self.heel, self.toes, self.rate = heel[frames], toes[frames], rate
         # Frames in which both rest (the slowest tenth where there is none) and their middle is lowest.
         slow = speed <= max(REST, float(np.quantile(speed, 0.1)))
@@ -128,10 +118,10 @@ class _SoleEnds:
     def parts(self) -> NDArray[np.int8]:
         """What touches in each frame."""
         heel, toes = (end[:, 2] - np.median(end[self.flat, 2]) for end in (self.heel, self.toes))
-        parts = np.full(len(heel), _Part.FULL, dtype=np.int8)
-        parts[(heel > LIFTED) & (heel > toes)] = _Part.TOES
-        parts[(toes > LIFTED) & (toes > heel)] = _Part.HEEL
-        for part in (_Part.HEEL, _Part.TOES, _Part.FULL):
+        parts = np.full(len(heel), _FULL, dtype=np.int8)
+        parts[(heel > LIFTED) & (heel > toes)] = _TOES
+        parts[(toes > LIFTED) & (toes > heel)] = _HEEL
+        for part in (_HEEL, _TOES, _FULL):
             for first, stop in mask_runs(parts == part):
                 if stop - first < SHORTEST_PART * self.rate:
                     parts[first:stop] = parts[first - 1] if first else parts[min(stop, len(parts) - 1)]
@@ -151,25 +141,20 @@ def _other_contact(
     if name not in (SEAT, TRUNK):
         rotation = rotation_from_yaw(level_heading(found.q[frames]))
         return point(name, place, rotation=rotation, friction=friction)
-    size = (SEAT_LENGTH, SEAT_WIDTH) if name == SEAT else (TRUNK_LENGTH, SEAT_WIDTH)
     # A seated person looks along x of the pelvis; a lying one has the shoulders along its z.
-    along = Rotation.from_quat(found.q[frames, 3:7]).apply(
-        [1.0, 0.0, 0.0] if name == SEAT else [0.0, 0.0, 1.0]
-    )
-    ahead = along.mean(axis=0)
+    length, axis = (SEAT_LENGTH, [1.0, 0.0, 0.0]) if name == SEAT else (TRUNK_LENGTH, [0.0, 0.0, 1.0])
+    ahead = Rotation.from_quat(found.q[frames, 3:7]).apply(axis).mean(axis=0)
     if name == TRUNK:
         level = ahead[:2] / max(float(np.linalg.norm(ahead[:2])), 1e-9)
         place = place + 0.5 * TRUNK_LENGTH * stature * np.append(level, 0.0)
-    return sole(
-        name, place, float(np.arctan2(ahead[1], ahead[0])), length=size[0] * stature, width=size[1] * stature,
-        friction=friction,
-    )  # fmt: skip
+    length, width, yaw = length * stature, SEAT_WIDTH * stature, float(np.arctan2(ahead[1], ahead[0]))
+    return sole(name, place, yaw, length=length, width=width, friction=friction)
 
 
-def _part(contact: Contact, part: _Part, hinge: float) -> Contact:
-    if part is _Part.TOES:
+def _part(contact: Contact, part: int, hinge: float) -> Contact:
+    if part == _TOES:
         return sole_part(contact, SolePart.TOES, hinge)
-    if part is _Part.HEEL:
+    if part == _HEEL:
         rear, half = -0.5 * contact.length, 0.5 * contact.width
         front = rear + HEEL_SHARE * contact.length
         points = [[front, half, 0.0], [front, -half, 0.0], [rear, -half, 0.0], [rear, half, 0.0]]

@@ -16,7 +16,7 @@ distance is taken.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,42 +24,31 @@ from numpy.typing import NDArray
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.body_supports import Support, median_place
+from manikin.recordings.supports.body_supports import Places, Support, median_place, support_in
 from manikin.recordings.supports.support_levels import CUTOFF as SUPPORT_LEVELS_CUTOFF
-from manikin.recordings.supports.support_levels import Track, com_path, slowest_speed, track
+from manikin.recordings.supports.support_levels import RecordedSole, com_path, track
 
 FREE = 0.8
 """Downward acceleration over gravity from which, as a median, nothing carries: a tenth of a second of free
 fall has about as much left after the low-pass."""
 
 
-def while_carried(
-    supports: Sequence[Support], found: Reconstruction, rate: float, *,
-    start: float = 0.0, cutoff: float = SUPPORT_LEVELS_CUTOFF,
-) -> tuple[Support, ...]:  # fmt: skip
+def while_carried(supports: Sequence[Support], found: Reconstruction, start: float) -> Iterator[Support]:
     """Those supports during which the centre of mass does not fall freely, in order.
 
-    Args:
-        found: At least four instants.
-        rate: Frames per second [Hz].
-        start: Instant of the first frame [s].
-        cutoff: Of the low-pass filter [Hz].
+    The first frame is at ``start`` [s].
     """
-    falls = -vertical_acceleration(found, rate, cutoff) / GRAVITY
-    kept = []
+    falls = -vertical_acceleration(found, SUPPORT_LEVELS_CUTOFF) / GRAVITY
     for one in supports:
-        first, last = (round((instant - start) * rate) for instant in (one.start, one.end))
+        first, last = (round((instant - start) * found.rate) for instant in (one.start, one.end))
         if float(np.median(falls[first : last + 1])) < FREE:
-            kept.append(one)
-    return tuple(kept)
+            yield one
 
 
-def vertical_acceleration(
-    found: Reconstruction, rate: float, cutoff: float = SUPPORT_LEVELS_CUTOFF
-) -> FloatArray:
-    """(n,) upward acceleration of the CoM [m/s^2], with the rate and the cutoff of the low-pass in Hz."""
-    height = track(com_path(found.body, found.q), rate, cutoff).positions[:, 2]
-    return np.gradient(np.gradient(height, 1.0 / rate), 1.0 / rate)
+def vertical_acceleration(found: Reconstruction, cutoff: float) -> FloatArray:
+    """(n,) upward acceleration of the centre of mass, low-passed with a cutoff in Hz [m/s^2]."""
+    height = track(com_path(found.body, found.q), found.rate, cutoff).positions[:, 2]
+    return np.gradient(np.gradient(height, 1.0 / found.rate), 1.0 / found.rate)
 
 
 CUTOFF = 10.0
@@ -79,91 +68,47 @@ AT_END = 0.05
 TOGETHER = 0.03
 """Time within which both feet leave or land together [s]."""
 
-AWAY = 0.10
-"""Height above where a foot stood, or above a surface, up to which it can be what carries [m]."""
+AWAY, NEAR = 0.10, 0.02
+"""Height above where a foot stood, or above a surface, up to which it can be what carries; the second beside
+an end of the recording, where the fall that would bound the support is not seen [m]."""
 
-NEAR = 0.02
-"""AWAY beside an end of the recording [m]: the fall that would bound the support is not seen."""
-
-SHORTEST = 0.08
-"""Shorter times between two falls are noise [s]."""
-
-SHORTEST_KEPT = 0.04
-"""Less of a support beside a fall is none [s]."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Foot:
-    """Ends of a sole."""
-
-    heel: Track
-    toes: Track
-
-    @property
-    def lowest(self) -> FloatArray:
-        """(n,) height of the lower end [m]."""
-        return np.minimum(self.heel.positions[:, 2], self.toes.positions[:, 2])
-
-    @property
-    def speed(self) -> FloatArray:
-        """(n,) of the slowest point of the sole [m/s]."""
-        return slowest_speed(self.heel, self.toes)
-
-    def middle(self, first: int, stop: int) -> FloatArray:
-        """(3,) of the sole, as a median."""
-        return median_place(0.5 * (self.heel.positions + self.toes.positions)[first:stop])
-
-    def contact(self, frame: int) -> FloatArray:
-        """(3,) its lower end."""
-        ends = self.heel.positions[frame], self.toes.positions[frame]
-        return ends[0] if ends[0][2] < ends[1][2] else ends[1]
+SHORTEST, SHORTEST_KEPT = 0.08, 0.04
+"""Shorter times between two falls are noise, and less of a support beside a fall is none [s]."""
 
 
 def by_the_force(
     supports: Sequence[Support], found: Reconstruction,
-    soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float], rate: float, *,
-    start: float = 0.0,
+    soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float], start: float = 0.0,
 ) -> tuple[Support, ...]:  # fmt: skip
     """Supports of feet cut at falls and extended to where the body is carried; missing ones are added.
 
     Args:
         supports: Of any effectors; those of feet change.
-        found: At least four instants.
         soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
         surfaces: Heights on which feet stand [m].
-        rate: Frames per second [Hz].
         start: Instant of the first frame [s].
     """
+    n, rate = len(found.time), found.rate
     if rate <= 2.0 * CUTOFF or not surfaces:
         return tuple(supports)
-    n = len(found.time)
-    force = 1.0 + vertical_acceleration(found, rate, CUTOFF) / GRAVITY
+    force = 1.0 + vertical_acceleration(found, CUTOFF) / GRAVITY
     edge = min(round(AT_END * rate), (n - 1) // 2)
     force[:edge], force[n - edge :] = force[edge], force[n - edge - 1]
-    falls = _falls(force, rate)
-    feet = {
-        name: _Foot(track(heel, rate, CUTOFF), track(toes, rate, CUTOFF))
-        for name, (heel, toes) in soles.items()
-    }
+    falls = np.zeros(n, dtype=bool)
+    for first, stop in mask_runs(force < FALLING):
+        falls[first:stop] = stop - first >= SHORTEST_FALL * rate
+    feet = {name: RecordedSole.of(both, rate, CUTOFF) for name, both in soles.items()}
     table = _Table(feet, list(supports), np.array(surfaces), rate, start, n)
     table.cut(falls)
     table.fill(falls)
     return tuple(table.supports)
 
 
-def _falls(force: FloatArray, rate: float) -> NDArray[np.bool_]:
-    """(n,) whether the body falls."""
-    falls = np.zeros(len(force), dtype=bool)
-    for first, stop in mask_runs(force < FALLING):
-        falls[first:stop] = stop - first >= SHORTEST_FALL * rate
-    return falls
-
-
 @dataclass(eq=False)
 class _Table:
     """Supports, by the frames from and up to which they last."""
 
-    feet: Mapping[str, _Foot]
+    feet: Mapping[str, RecordedSole]
     supports: list[Support]
     surfaces: FloatArray
     rate: float
@@ -172,21 +117,22 @@ class _Table:
 
     def span(self, one: Support) -> tuple[int, int]:
         """First frame of a support and the one after its last."""
-        first, stop = (round((instant - self.start) * self.rate) for instant in (one.start, one.end))
-        return first, stop if one.end_seen else self.frames
+        return one.frames(self.start, self.rate, self.frames)
 
     def during(self, one: Support, first: int, stop: int) -> Support:
         """A support of a foot in other frames."""
-        foot, span = self.feet[one.effector], self.span(one)
-        return replace(
-            one,
-            start=self.start + first / self.rate,
-            end=self.start + min(stop, self.frames - 1) / self.rate,
-            first_contact=one.first_contact if first == span[0] else foot.contact(first),
-            last_contact=one.last_contact if stop == span[1] else foot.contact(stop - 1),
-            start_seen=first > 0,
-            end_seen=stop < self.frames,
-        )
+        span = self.span(one)
+        begins = one.first_contact if first == span[0] else self._lower(one.effector, first)
+        ends = one.last_contact if stop == span[1] else self._lower(one.effector, stop - 1)
+        return self._made(one.effector, first, stop, (one.place, begins, ends))
+
+    def _lower(self, name: str, frame: int) -> FloatArray:
+        """(3,) lower end of a foot."""
+        heel, toes = (end.positions[frame] for end in (self.feet[name].heel, self.feet[name].toes))
+        return heel if heel[2] < toes[2] else toes
+
+    def _made(self, name: str, first: int, stop: int, places: Places) -> Support:
+        return support_in(name, (first, stop), self.frames, self.rate, self.start, places)
 
     def cut(self, falls: NDArray[np.bool_]) -> None:
         """Supports of feet end where a fall begins, and begin where it ends."""
@@ -243,16 +189,14 @@ class _Table:
     def _until(self, number: int, end: int) -> None:
         """A support lasts up to a frame, or as long as its foot is low."""
         first, stop = self.span(self.supports[number])
-        high = np.flatnonzero(self._rises(number, slice(stop, end)))
-        last = stop + int(high[0]) if len(high) else end
-        self.supports[number] = self.during(self.supports[number], first, last)
+        high = self._high(number, stop, end)
+        self.supports[number] = self.during(self.supports[number], first, high[0] if high else end)
 
     def _since(self, number: int, begin: int) -> None:
         """A support lasts from a frame on, or from where its foot is low."""
         first, stop = self.span(self.supports[number])
-        high = np.flatnonzero(self._rises(number, slice(begin, first)))
-        first = begin + int(high[-1]) + 1 if len(high) else begin
-        self.supports[number] = self.during(self.supports[number], first, stop)
+        high = self._high(number, begin, first)
+        self.supports[number] = self.during(self.supports[number], high[-1] + 1 if high else begin, stop)
 
     def _change(self, before: Sequence[int], after: Sequence[int], begin: int, end: int) -> int:
         """Frame between two supports from which the foot of the later one is the slower one."""
@@ -263,16 +207,13 @@ class _Table:
         slower = np.flatnonzero(late < early)
         return begin + int(slower[0]) if len(slower) else end
 
-    def _above(self, number: int) -> FloatArray:
-        """(n,) height of a foot above where it stands during a support of it [m]."""
+    def _high(self, number: int, first: int, stop: int) -> list[int]:
+        """Frames beside a support in which its foot is higher above where it stands than it may be."""
         one = self.supports[number]
         lowest = self.feet[one.effector].lowest
-        return lowest - np.median(lowest[slice(*self.span(one))])
-
-    def _rises(self, number: int, frames: slice) -> NDArray[np.bool_]:
-        """Whether a foot is higher in frames beside a support than it may be and still carry."""
-        cut = frames.start == 0 or frames.stop == self.frames
-        return self._above(number)[frames] > (NEAR if cut else AWAY)
+        above = lowest - np.median(lowest[slice(*self.span(one))])
+        most = NEAR if first == 0 or stop == self.frames else AWAY
+        return [first + k for k in np.flatnonzero(above[first:stop] > most).tolist()]
 
     def _add(self, begin: int, end: int, others: Collection[str] = ()) -> None:
         """A support of the lowest foot, unless it is one of the others."""
@@ -283,13 +224,10 @@ class _Table:
         if name in others or abs(low.min() - height) > AWAY or np.median(low) - height > AWAY:
             return
         near = np.flatnonzero(low < low.min() + NEAR)
-        begin, end = (
-            begin + int(near[0]) if begin == 0 else begin,
-            begin + int(near[-1]) + 1 if end == self.frames else end,
-        )
-        if end - begin < SHORTEST * self.rate:
-            return
-        place = np.append(foot.middle(begin, end)[:2], height)
-        instants = self.start + begin / self.rate, self.start + min(end, self.frames - 1) / self.rate
-        ends = foot.contact(begin), foot.contact(end - 1)
-        self.supports.append(Support(name, *instants, place, *ends, begin > 0, end < self.frames))
+        stop = begin + int(near[-1]) + 1 if end == self.frames else end
+        begin, end = int(near[0]) if begin == 0 else begin, stop
+        if end - begin >= SHORTEST * self.rate:
+            middle = 0.5 * (foot.heel.positions + foot.toes.positions)
+            place = np.append(median_place(middle[begin:end])[:2], height)
+            places = place, self._lower(name, begin), self._lower(name, end - 1)
+            self.supports.append(self._made(name, begin, end, places))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.body.limbs import with_knees_and_elbows
 from manikin.errors import InputError
+from manikin.motion.motion import point_paths
 from manikin.numerics.signals import low_passed, mask_runs
 from manikin.numerics.spatial import FloatArray, frozen_array
 
@@ -19,29 +21,16 @@ JOINTS = ("left_knee", "right_knee", "left_elbow", "right_elbow")
 
 
 def effector_places(body: BodyModel, q: FloatArray, names: Sequence[str]) -> FloatArray:
-    """(k, n, 3) effectors, or else origins of segments, in the world [m].
+    """(k, n, 3) effectors, or else origins of segments, in postures (n, nq) in the world [m].
 
-    Args:
-        body: Who; a human has its knees and elbows as effectors, too.
-        q: (n, nq) postures.
-        names: Of effectors, or of segments.
+    A human has its knees and elbows as effectors, too.
 
     Raises:
         BodyError: If the body has none of a name.
     """
     if set(names) & set(JOINTS) - set(body.effectors):
         body = with_knees_and_elbows(body)
-    model, data = body.pinocchio, body.pinocchio.createData()
-    frames = [
-        body.effector_frame(name) if name in body.effectors else body.segment_frame(name) for name in names
-    ]
-    # Views of Pinocchio's memory: they follow whatever is computed in these data.
-    views = [data.oMf[frame].translation for frame in frames]
-    places = np.empty((len(q), len(names), 3))
-    for number, posture in enumerate(q):
-        pin.framesForwardKinematics(model, data, posture)
-        places[number] = views
-    return np.ascontiguousarray(places.transpose(1, 0, 2))
+    return point_paths(body, q, names)
 
 
 def com_path(body: BodyModel, q: FloatArray) -> FloatArray:
@@ -56,20 +45,14 @@ CUTOFF = 5.0
 REST = 0.12
 """Speed below which a point rests [m/s]."""
 
-TOUCH_SHARE = 0.08
-"""Share of the highest speed of its swing below which a point has touched down."""
-
-LIFT_SHARE = 0.24
-"""Share of the highest speed of its swing above which a point has lifted off."""
+TOUCH_SHARE, LIFT_SHARE = 0.08, 0.24
+"""Shares of the highest speed of its swing below which a point has touched down, above which lifted off."""
 
 NEVER_AT_REST = (2.0 * REST, 4.0 * REST, 8.0 * REST, 16.0 * REST)
 """Speeds at which soles are looked at in turn where none ever rests, as in running [m/s]."""
 
-SHIFT_SPEED = 0.6
-"""Highest speed of a shift, in contrast to a swing [m/s]."""
-
-SHIFT_WAY = 0.08
-"""Longest way of a shift, in contrast to a swing [m]."""
+SHIFT_SPEED, SHIFT_WAY = 0.6, 0.08
+"""Highest speed and longest way of a shift, in contrast to a swing [m/s, m]."""
 
 LEVELS_APART = 0.08
 """Heights of rest within less than this belong to the same surface [m]."""
@@ -123,13 +106,9 @@ class Track:
     def peak_speed(self, rest: float = REST, shift: float = SHIFT_WAY) -> FloatArray:
         """(n,) the highest speed of the swing between two rests [m/s]; infinite where there is none.
 
-        A point that leaves its rest slowly and rests again close to it has shifted, not swung: toes do while
-        the heel lifts, and hands that slide along what they hold. A swing that the recording cuts counts
-        with at least the median of the whole ones.
-
-        Args:
-            rest: Speed below which the point rests [m/s].
-            shift: Longest way of a shift [m]; :data:`SHIFT_WAY` of one that the recording cuts.
+        A point that leaves its rest, at a speed below ``rest`` [m/s], slowly and rests again within ``shift``
+        [m] has shifted, not swung: toes do while the heel lifts, and hands that slide along what they hold. A
+        swing that the recording cuts counts with at least the median of the whole ones.
         """
         peaks, last = np.full(len(self.speed), np.inf), len(self.speed)
         moves = mask_runs(self.speed >= rest)
@@ -146,9 +125,7 @@ class Track:
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """(n,) whether the point is slow enough to have touched down, and fast enough to have lifted off.
 
-        Args:
-            rest: Speed below which the point rests between swings [m/s].
-            shift: Longest way of a shift between two rests [m].
+        Arguments are those of :meth:`peak_speed`.
         """
         peaks = self.peak_speed(rest, shift)
         slow = self.speed < np.maximum(REST, TOUCH_SHARE * peaks)
@@ -162,10 +139,9 @@ class Track:
 
 
 def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
-    """Low-pass the positions of a point and take their speed by central differences.
+    """Low-pass positions (n, 3) of a point [m] and take their speed by central differences.
 
     Args:
-        positions: (n, 3), at least four, in the world [m].
         rate: Frames per second [Hz].
         cutoff: Where each of the two passes halves the power [Hz].
 
@@ -176,9 +152,65 @@ def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
         raise InputError(f"{len(positions)} positions of an effector; valid: at least 4")
     if not 0.0 < cutoff < 0.5 * rate:
         raise InputError(f"cutoff is {cutoff:g} Hz; valid: above 0, below half the rate, {0.5 * rate:g} Hz")
-    smooth = low_passed(positions, cutoff, rate)
-    speed = np.linalg.norm(np.gradient(smooth, 1.0 / rate, axis=0), axis=1)
-    return Track(frozen_array(smooth, "track positions"), frozen_array(speed, "track speed"), rate)
+    return _moving(low_passed(positions, cutoff, rate), rate)
+
+
+def _moving(positions: FloatArray, rate: float) -> Track:
+    speed = np.linalg.norm(np.gradient(positions, 1.0 / rate, axis=0), axis=1)
+    return Track(frozen_array(positions, "track positions"), frozen_array(speed, "track speed"), rate)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSole:
+    """Heel and toes of a foot through a recording."""
+
+    heel: Track
+    toes: Track
+
+    @classmethod
+    def of(cls, ends: Sequence[FloatArray], rate: float, cutoff: float = CUTOFF) -> "RecordedSole":
+        """Of (n, 3) heel and (n, 3) toes [m], by :func:`track`."""
+        return cls(*(track(end, rate, cutoff) for end in ends))
+
+    @cached_property
+    def ball(self) -> Track:
+        """The ball, :data:`BALL` of the way from the heel to the toes: a rising foot turns about it."""
+        return _moving((1.0 - BALL) * self.heel.positions + BALL * self.toes.positions, self.heel.rate)
+
+    @property
+    def lowest(self) -> FloatArray:
+        """(n,) height of the lower end [m]."""
+        return np.minimum(self.heel.positions[:, 2], self.toes.positions[:, 2])
+
+    @cached_property
+    def speed(self) -> FloatArray:
+        """(n,) of that point of the sole, from its heel to its toes, that is slowest [m/s]."""
+        ends = self.heel.positions, self.toes.positions
+        begin, end = (np.gradient(positions, 1.0 / self.heel.rate, axis=0) for positions in ends)
+        way = end - begin
+        share = np.clip(-np.sum(begin * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-12), 0.0, 1.0)
+        return np.linalg.norm(begin + share[:, None] * way, axis=1)
+
+    @cached_property
+    def heel_rise(self) -> FloatArray:
+        """(n,) how far the heel is above the toes over the length of the sole."""
+        way = self.heel.positions - self.toes.positions
+        return way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), 1e-9)
+
+    @property
+    def steep(self) -> NDArray[np.bool_]:
+        """(n,) whether the sole stands on its ball, the toes bent, see :data:`STEEP`."""
+        return np.abs(self.heel_rise) > STEEP
+
+    def height(self, lying: NDArray[np.bool_]) -> FloatArray:
+        """(n,) of the middle, of the ball of a steep sole, or of the lower end of an upright one [m].
+
+        An upright sole stands on its ball unless the person lies or crawls, ``lying`` (n,).
+        """
+        heel, toes = self.heel.positions[:, 2], self.toes.positions[:, 2]
+        upright = (np.abs(self.heel_rise) > UPRIGHT) & lying
+        raised = np.where(upright, self.lowest, (1.0 - BALL) * heel + BALL * toes)
+        return np.where(self.steep, raised, 0.5 * (heel + toes))
 
 
 @dataclass(frozen=True)
@@ -194,18 +226,13 @@ class RestSurface:
     levels: tuple[float, ...]
 
 
-def surfaces_under(
-    feet: Sequence[tuple[Track, Track]], lying: NDArray[np.bool_] | None = None
-) -> tuple[RestSurface, ...]:
+def surfaces_under(feet: Sequence[RecordedSole], lying: NDArray[np.bool_]) -> tuple[RestSurface, ...]:
     """Surfaces on which feet stand, lowest first.
 
     A foot that rests while another one moves carries the body, so it rests on a surface; so does the lowest
     one, and any that rests as level as on those. A foot that hangs still in the air is on none. Where no sole
-    ever rests, as in running, slow ones are taken.
-
-    Args:
-        feet: Heel and toes of each.
-        lying: (n,) whether the person lies or crawls, when feet show the lowest surface only; None for never.
+    ever rests, as in running, slow ones are taken. While the person lies or crawls, ``lying`` (n,), feet show
+    the lowest surface only.
     """
     rests: list[_Rest] = []
     for limit in (REST, *NEVER_AT_REST):
@@ -218,61 +245,18 @@ def surfaces_under(
     return tuple(_surface([rest.height for rest in group]) for group in kept)
 
 
-def ball_of(heel: Track, toes: Track) -> Track:
-    """The ball of a foot, :data:`BALL` of the way from its heel to its toes: a rising foot turns about it."""
-    positions = (1.0 - BALL) * heel.positions + BALL * toes.positions
-    speed = np.linalg.norm(np.gradient(positions, 1.0 / heel.rate, axis=0), axis=1)
-    return Track(frozen_array(positions, "track positions"), frozen_array(speed, "track speed"), heel.rate)
-
-
-def slowest_speed(heel: Track, toes: Track) -> FloatArray:
-    """(n,) of that point of a sole, from its heel to its toes, that is slowest [m/s]."""
-    begin, end = (np.gradient(point.positions, 1.0 / heel.rate, axis=0) for point in (heel, toes))
-    way = end - begin
-    share = np.clip(-np.sum(begin * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-12), 0.0, 1.0)
-    return np.linalg.norm(begin + share[:, None] * way, axis=1)
-
-
-def sole_height(heel: Track, toes: Track, lying: NDArray[np.bool_] | None = None) -> FloatArray:
-    """(n,) of the middle of a sole, of the ball of a steep one, or of the lower end of an upright one [m].
-
-    Args:
-        lying: (n,) whether the person lies or crawls; otherwise an upright sole stands on its ball. None for
-            never.
-    """
-    ends = heel.positions[:, 2], toes.positions[:, 2]
-    rise = sole_rise(heel, toes)
-    upright = (rise > UPRIGHT) & (False if lying is None else lying)
-    steep = np.where(upright, np.minimum(*ends), (1.0 - BALL) * ends[0] + BALL * ends[1])
-    return np.where(rise > STEEP, steep, 0.5 * (ends[0] + ends[1]))
-
-
-def sole_rise(heel: Track, toes: Track) -> FloatArray:
-    """(n,) difference in height between the ends of a sole over its length."""
-    return np.abs(heel_rise(heel, toes))
-
-
-def heel_rise(heel: Track, toes: Track) -> FloatArray:
-    """(n,) how far the heel is above the toes over the length of the sole."""
-    way = heel.positions - toes.positions
-    return way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), 1e-9)
-
-
-def _rests(
-    feet: Sequence[tuple[Track, Track]], limit: float, lying: NDArray[np.bool_] | None
-) -> list["_Rest"]:
+def _rests(feet: Sequence[RecordedSole], limit: float, lying: NDArray[np.bool_]) -> list["_Rest"]:
     """Times in which both ends of a sole are slower than a limit [m/s]."""
-    resting = [heel.rests(limit) & toes.rests(limit) for heel, toes in feet]
+    resting = [sole.heel.rests(limit) & sole.toes.rests(limit) for sole in feet]
     found = []
-    for number, (heel, toes) in enumerate(feet):
+    for number, sole in enumerate(feet):
         others = [~other for place, other in enumerate(resting) if place != number]
-        shortest = SHORTEST_REST * heel.rate
-        height = sole_height(heel, toes, lying)
-        tilt = toes.positions[:, 2] - heel.positions[:, 2]
+        shortest, height = SHORTEST_REST * sole.heel.rate, sole.height(lying)
+        tilt = sole.toes.positions[:, 2] - sole.heel.positions[:, 2]
         for first, stop in mask_runs(resting[number]):
             if stop - first >= shortest:
                 here = slice(first, stop)
-                down = lying is not None and bool(np.median(lying[here]))
+                down = bool(np.median(lying[here]))
                 alone = not down and any(np.sum(moving[here]) >= shortest for moving in others)
                 heights = float(np.median(height[here])), float(np.median(tilt[here]))
                 found.append(_Rest(number, *heights, alone, down))

@@ -3,11 +3,11 @@
 A figure raises :class:`~manikin.errors.FigureError` if there is nothing for it to show.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -57,7 +57,7 @@ __all__ = [
     "footprint_figure", "holonomic_ends_figure", "holonomic_zone_figure", "margin_figure",
     "phase_durations_figure", "placements_figure", "planes_figure", "postures_figure", "published_lowest",
     "push_map_figure", "scene_figure", "timing_figure", "tracking_figure", "walking_paths_figure",
-    "words_figure", "write_comparison", "write_figures", "zmp_figure",
+    "words_figure", "write_figures", "zmp_figure",
 ]  # fmt: skip
 
 
@@ -88,15 +88,15 @@ COMPARISONS: dict[str, Callable[[RunComparison], Figure]] = {
 }
 """Every figure of two runs by the name of its file."""
 
-T = TypeVar("T")
-
 
 def write_figures(
-    record: RunRecord, folder: str | Path, on_done: Callable[[float], None] | None = None
+    data: RunRecord | RunComparison,
+    folder: str | Path,
+    on_done: Callable[[float], object] = lambda _share: None,
 ) -> list[Path]:
-    """Draw the figures that apply and write them as PNG files, each atomically.
+    """Draw the figures of a run, or of two, that apply and write them as PNG files, each atomically.
 
-    A figure that the run has no data for (no execution, no hand, a wall) is left out.
+    A figure that there is no data for (no execution, no hand, a wall) is left out.
 
     Args:
         on_done: Told the share of figures done after each.
@@ -107,18 +107,14 @@ def write_figures(
     Raises:
         MotionFileError: If the folder cannot be written to.
     """
-    return _write(FIGURES, record, Path(folder), on_done)
-
-
-def write_comparison(
-    comparison: RunComparison, folder: str | Path, on_done: Callable[[float], None] | None = None
-) -> list[Path]:
-    """Draw the figures of two runs that apply, as :func:`write_figures` does for one.
-
-    Raises:
-        MotionFileError: If the folder cannot be written to.
-    """
-    return _write(COMPARISONS, comparison, Path(folder), on_done)
+    figures: dict[str, Callable[[Any], Figure]] = FIGURES if isinstance(data, RunRecord) else COMPARISONS
+    written = []
+    for number, (name, draw) in enumerate(figures.items(), 1):
+        with suppress(FigureError):
+            save_figure(draw(data), path := Path(folder) / f"{name}.png")
+            written.append(path)
+        on_done(number / len(figures))
+    return written
 
 
 def comparison_pictures(comparison: RunComparison) -> dict[str, bytes]:
@@ -128,22 +124,6 @@ def comparison_pictures(comparison: RunComparison) -> dict[str, bytes]:
         with suppress(FigureError):
             result[name.replace("_", " ")] = png_of(draw(comparison))
     return result
-
-
-def _write(
-    figures: Mapping[str, Callable[[T], Figure]],
-    data: T,
-    folder: Path,
-    on_done: Callable[[float], None] | None,
-) -> list[Path]:
-    written = []
-    for number, (name, draw) in enumerate(figures.items()):
-        with suppress(FigureError):
-            save_figure(draw(data), path := folder / f"{name}.png")
-            written.append(path)
-        if on_done is not None:
-            on_done((number + 1) / len(figures))
-    return written
 
 
 def save_figure(figure: Figure, path: Path) -> None:

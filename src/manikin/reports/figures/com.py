@@ -37,11 +37,7 @@ from manikin.runtime.display import COLOURS, colours_of, readable
 
 
 def planes_figure(record: RunRecord) -> Figure:
-    """Draw the CoM's path with supports and obstacles on xy, xz and yz ([Qiu2012]_ Fig. 5.16, 7.8, 7.18).
-
-    Args:
-        record: With a planned CoM, or at least one motion.
-    """
+    """Draw the CoM's path with supports and obstacles on xy, xz and yz ([Qiu2012]_ Fig. 5.16, 7.8, 7.18)."""
     tracks = need(record.tracks, "a motion of the centre of mass")
     phases = need(record.phases, "phases")
     contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
@@ -205,16 +201,12 @@ def com_distances_figure(
                 axes.plot(item.time - item.time[0], item.distance, color=colours[clip.group], linewidth=1.0,
                           alpha=0.8)  # fmt: skip
         for number, group in enumerate(groups):
-            each = [
-                max(
-                    float(item.distance.max())
-                    for of, item in result
-                    if of is clip and item.effector == effector
-                )
-                for clip in clips
-                if clip.group == group and effector in {item.effector for of, item in result if of is clip}
-            ]
-            most.plot([number] * len(each), each, "o", color=colours[group], markersize=4)
+            largest: dict[int, float] = {}
+            for clip, item in result:
+                if clip.group == group and item.effector == effector:
+                    most_yet = largest.get(id(clip), 0.0)
+                    largest[id(clip)] = max(most_yet, float(item.distance.max()))
+            most.plot([number] * len(largest), [*largest.values()], "o", color=colours[group], markersize=4)
         if effector in known:
             spread = known[effector]
             most.axhspan(spread.smallest, spread.largest, color=COLOURS["shade"], zorder=0)
@@ -280,14 +272,15 @@ def _draw(side: Axes, above: Axes, clip: RecordedClip, origin: Origin, colour: s
     if "head" in clip.tops:
         head = _seen(clip, origin, clip.tops["head"])
         side.plot(head[:, 0], head[:, 2], color=colour, linewidth=0.9, linestyle=":", alpha=0.7)
-    lowest = com[int(np.argmin(com[:, 2]))]
-    side.plot(lowest[0], lowest[2], "v", color=colour, markeredgecolor=COLOURS["ink"], zorder=5)
-    above.plot(lowest[0], lowest[1], "v", color=colour, markeredgecolor=COLOURS["ink"], zorder=5)
+    x, y, z = com[int(np.argmin(com[:, 2]))]
+    for axes, height in ((side, z), (above, y)):
+        axes.plot(x, height, "v", color=colour, markeredgecolor=COLOURS["ink"], zorder=5)
     colours = colours_of(item.effector for item in clip.supports.supports)
     for item in clip.supports.supports:
-        place = _seen(clip, origin, item.place[None])[0]
-        above.plot(place[0], place[1], "s", color=colours[item.effector], markersize=4, alpha=0.45, zorder=1)
-        side.plot(place[0], place[2], "|", color=colours[item.effector], markersize=7, alpha=0.7, zorder=1)
+        x, y, z = _seen(clip, origin, item.place[None])[0]
+        look = {"color": colours[item.effector], "zorder": 1}
+        above.plot(x, y, "s", markersize=4, alpha=0.45, **look)
+        side.plot(x, z, "|", markersize=7, alpha=0.7, **look)
 
 
 def _seen(clip: RecordedClip, origin: Origin, places: FloatArray) -> FloatArray:
@@ -302,11 +295,7 @@ LEAST_SPAN = 4e-3
 
 
 def com_figure(record: RunRecord) -> Figure:
-    """Draw the CoM along each axis, planned and executed ([Qiu2012]_ Fig. 5.12, 5.22, 6.9, 7.8, 7.14).
-
-    Args:
-        record: With a planned CoM, or at least one motion.
-    """
+    """Draw the CoM along each axis, planned and executed ([Qiu2012]_ Fig. 5.12, 5.22, 6.9, 7.8, 7.14)."""
     tracks = need(record.tracks, "a motion of the centre of mass")
     shown = timeline(
         record, (14.0, 7.0), "Centre of mass", 3, len(QUANTITIES), strip=0.14, top=0.75, between=0.22,

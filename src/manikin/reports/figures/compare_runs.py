@@ -11,7 +11,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.pipeline.run_directory import ComTrack
 from manikin.reports.alignment import TimingRow
-from manikin.reports.comparison import STAGES, RunComparison, tracks_of
+from manikin.reports.comparison import RunComparison, shared_tracks
 from manikin.reports.figures.com import draw_paths, frame_plane, mark_instants, planes_grid
 from manikin.reports.figures.scene import (
     GAP,
@@ -43,11 +43,8 @@ def compare_margin_figure(comparison: RunComparison) -> Figure:
     """Draw the margins of each stage over matched phases, each phase drawn equally wide."""
     rows = [row for row in comparison.rows if row.first is not None and row.second is not None]
     need(rows, "a phase that both runs have", "two runs")
-    first, second = tracks_of(comparison.first), tracks_of(comparison.second)
-    stages = [
-        stage for stage in STAGES
-        if stage in first and stage in second and first[stage].margin_unit == second[stage].margin_unit
-    ]  # fmt: skip
+    shared = shared_tracks(*comparison.runs)
+    stages = [stage for stage, (one, other) in shared.items() if one.margin_unit == other.margin_unit]
     need(stages, "a margin of both runs in the same unit")
     most = max(len(row.supports) for row in rows)
     figure, grid = new_grid(
@@ -56,13 +53,11 @@ def compare_margin_figure(comparison: RunComparison) -> Figure:
     )  # fmt: skip
     for number, stage in enumerate(stages):
         axes = figure.add_subplot(grid[number])
-        for which, (name, track) in enumerate(
-            zip(comparison.names, (first[stage], second[stage]), strict=True)
-        ):
+        for which, (name, track) in enumerate(zip(comparison.names, shared[stage], strict=True)):
             _draw(axes, rows, track, which, name)
         axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
-        unit = first[stage].margin_unit
         last = number == len(stages) - 1
+        unit = shared[stage][0].margin_unit
         dress(axes, f"{stage} [{unit}]", "supports of the phase" if last else "")
         axes.set_xticks(np.arange(len(rows)) + 0.5)
         axes.set_xticklabels([named_below(row.supports) for row in rows] if last else [])
@@ -167,14 +162,13 @@ def _draw_bars(axes: Axes, comparison: RunComparison) -> None:
             alone = row.first is None or row.second is None
             axes.barh(level, phase.duration_s, left=phase.start_s, height=0.5, alpha=0.8, edgecolor="white",
                       color=support_colour(len(row.supports)), hatch="xx" if alone else None)  # fmt: skip
-            axes.text((phase.start_s + phase.end_s) / 2, level, f"{phase.index}", ha="center", va="center",
+            axes.text((phase.start_s + phase.end_s) / 2, level, f"{phase.phase}", ha="center", va="center",
                       fontsize=8, color="white", fontweight="bold")  # fmt: skip
             ends.append(phase.end_s)
         if row.first is not None and row.second is not None:
             for name in ("start_s", "end_s"):
                 instants = getattr(row.first, name), getattr(row.second, name)
                 axes.plot(instants, [0.74, 0.26], color=COLOURS["soft"], linewidth=0.8)
-    axes.set_yticks([1.0, 0.0], list(comparison.names))
     axes.set_ylim(-0.4, 1.4)
     axes.set_xlim(0.0, 1.01 * max(ends))
     dress(axes, "", "time [s]")
@@ -200,10 +194,8 @@ def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str
     axes.tick_params(axis="x", labelsize=7)
     axes.set_ylim(0.0, 1.14 * longest)
     axes.grid(False, axis="x")
-    keys = [
-        Patch(color=colour, alpha=0.85, label=name) for colour, name in zip(RUN_COLOURS, names, strict=True)
-    ]
-    legend_above(axes, keys)
+    named = zip(RUN_COLOURS, names, strict=True)
+    legend_above(axes, [Patch(color=colour, alpha=0.85, label=name) for colour, name in named])
 
 
 def compare_planes_figure(comparison: RunComparison) -> Figure:
@@ -252,6 +244,6 @@ def _tracks(comparison: RunComparison) -> dict[str, ComTrack]:
 
 
 def _styles(comparison: RunComparison) -> dict[str, dict[str, Any]]:
-    thick, thin = {"linewidth": 2.4, "zorder": 3}, {"linewidth": 1.2, "zorder": 4}
-    colours = {"color": RUN_COLOURS[0]}, {"color": RUN_COLOURS[1]}
-    return dict(zip(comparison.names, ({**colours[0], **thick}, {**colours[1], **thin}), strict=True))
+    thick = {"color": RUN_COLOURS[0], "linewidth": 2.4, "zorder": 3}
+    thin = {"color": RUN_COLOURS[1], "linewidth": 1.2, "zorder": 4}
+    return dict(zip(comparison.names, (thick, thin), strict=True))

@@ -110,12 +110,10 @@ def _draw(
 
 def _box(body: BodyModel, panels: Sequence[ChoicePanel]) -> tuple[FloatArray, FloatArray]:
     """Corners of a box around all bodies [m]."""
-    places = [
-        Configuration(body, panel.q).segment_placement(segment.name)[1]
-        for panel in panels
-        for segment in body.segments
-    ]
-    places += [contact.position for panel in panels for contact in panel.contacts]
+    places = [contact.position for panel in panels for contact in panel.contacts]
+    for panel in panels:
+        posture = Configuration(body, panel.q)
+        places += [posture.segment_placement(segment.name)[1] for segment in body.segments]
     return np.min(places, axis=0) - MARGIN, np.max(places, axis=0) + MARGIN
 
 
@@ -126,31 +124,15 @@ _SHADE = 0.45
 """Brightness of what faces away from the light, as a share."""
 
 
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """Triangles of one colour.
-
-    Attributes:
-        triangles: (n, 3, 3) corners in the world [m].
-        colour: Of all of them.
-        alpha: Opacity in [0, 1].
-    """
-
-    triangles: FloatArray
-    colour: str
-    alpha: float = 1.0
+Solid = tuple[FloatArray, str, float]
+"""Triangles (n, 3, 3) in the world [m], their colour, and their opacity in [0, 1]."""
 
 
-def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> list[Solid]:
-    """Shapes of a body in one configuration.
-
-    Args:
-        q: (nq,) configuration.
-        marked: Names of segments drawn in the executed motion's colour.
-    """
+def body_solids(body: BodyModel, q: FloatArray, marked: Sequence[str]) -> list[Solid]:
+    """Shapes of a body in a configuration (nq,); ``marked`` segments in the executed motion's colour."""
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, q)
-    result, wanted = [], set(marked)
+    result = []
     for segment in body.segments:
         triangles = segment_triangles(segment, rounds=10)
         if triangles is None:
@@ -158,8 +140,7 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> l
         vertices, faces = triangles
         place = data.oMf[body.segment_frame(segment.name)]
         world = vertices @ place.rotation.T + place.translation
-        colour = COLOURS["executed"] if segment.name in wanted else "#7F8FA6"
-        result.append(Solid(world[faces], colour))
+        result.append((world[faces], COLOURS["executed"] if segment.name in marked else "#7F8FA6", 1.0))
     return result
 
 
@@ -171,21 +152,20 @@ def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]
         finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
         triangles = np.asarray(finer[0])[np.asarray(finer[1])]
         inside = ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
-        result.append(Solid(np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
+        result.append((np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
     return result
 
 
 def draw_solids(axes: Axes3D, solids: Iterable[Solid]) -> None:
     """Draw solids in one collection, so that all triangles are sorted by depth together."""
-    parts = [item for item in solids if len(item.triangles)]
-    triangles = np.concatenate([item.triangles for item in parts])
+    solids = list(solids)
+    triangles = np.concatenate([part for part, _, _ in solids])
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     light = (normals / np.maximum(lengths, 1e-15)) @ (_LIGHT / np.linalg.norm(_LIGHT))
     bright = _SHADE + (1.0 - _SHADE) * 0.5 * (1.0 + light)
-    colours = np.concatenate(
-        [np.tile([*to_rgb(item.colour), item.alpha], (len(item.triangles), 1)) for item in parts]
-    )
+    counts = [len(part) for part, _, _ in solids]
+    colours = np.repeat([[*to_rgb(colour), alpha] for _, colour, alpha in solids], counts, axis=0)
     colours[:, :3] *= bright[:, None]
     axes.add_collection3d(Poly3DCollection(triangles, facecolors=colours, edgecolors="none", linewidths=0.0))
 
@@ -221,9 +201,6 @@ def contacts_figure(record: RunRecord) -> Figure:
 
     Held contacts are filled; dashed ones have been left or are made in the next phase. The
     view is from above, or along the walls when the contacts are on walls.
-
-    Args:
-        record: With a schedule; the CoM is drawn when there is one.
     """
     schedule = need(record.schedule, "a contact schedule")
     need(len(schedule.sequence) <= MOST, f"at most {MOST} phases")
@@ -252,7 +229,9 @@ def contacts_figure(record: RunRecord) -> Figure:
         (left, bottom), (right, top) = place(low), place(high)
         axes.add_patch(Rectangle((left, bottom), right - left, top - bottom, fill=False, edgecolor="#C4C9D1",
                                  linewidth=0.7, zorder=0.4, clip_on=False))  # fmt: skip
-        axes.annotate(_title(schedule, number), (left, top), (0, 3), textcoords="offset points", fontsize=8.5)
+        start, end = schedule.instants[number : number + 2]
+        title = f"{number}: {start:.2f}–{end:.2f} s"
+        axes.annotate(title, (left, top), (0, 3), textcoords="offset points", fontsize=8.5)
         if record.scene is not None:
             draw_obstacles(axes, record.scene, place, low, high)
         _draw_phase(axes, schedule, number, place, track)
@@ -266,7 +245,13 @@ def contacts_figure(record: RunRecord) -> Figure:
     axes.set_yticks(*panel_ticks(bottom, top, ups))
     axes.set(xlim=(left, right + rights[-1]), ylim=(bottom + ups[-1], top + 0.25 * width / panel))
     axes.set_aspect("equal", adjustable="box", anchor="W")
-    _legend(figure, schedule)
+    for name, colour in colours_of(schedule.sequence.effectors).items():
+        axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
+    keys = [
+        Line2D([], [], color=COLOURS["ink"], linewidth=2.0, label="centre of mass"),
+        Patch(fill=False, linestyle="--", label="dashed or pale: left, or made next"),
+    ]
+    legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))
     return figure
 
 
@@ -284,24 +269,7 @@ def _draw_phase(
         draw_contact(axes, contact, view, colours[contact.effector])
     if track is not None:
         start, end = schedule.instants[number : number + 2]
-        times = np.linspace(float(start), float(end), 40)
-        path = view(track.at(times))
+        path = view(track.at(np.linspace(start, end, 40)))
         axes.plot(*view(track.position).T, color=COLOURS["soft"], linewidth=0.6, zorder=2.5)
         axes.plot(*path.T, color=COLOURS["ink"], linewidth=2.0, zorder=4)
         axes.plot(*path[-1], "o", color=COLOURS["ink"], markersize=3.5, zorder=5)
-
-
-def _title(schedule: ContactSchedule, number: int) -> str:
-    start, end = (float(instant) for instant in schedule.instants[number : number + 2])
-    return f"{number}: {start:.2f}–{end:.2f} s"
-
-
-def _legend(figure: Figure, schedule: ContactSchedule) -> None:
-    axes = figure.axes[0]
-    for name, colour in colours_of(schedule.sequence.effectors).items():
-        axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
-    keys = [
-        Line2D([], [], color=COLOURS["ink"], linewidth=2.0, label="centre of mass"),
-        Patch(fill=False, linestyle="--", label="dashed or pale: left, or made next"),
-    ]
-    legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))

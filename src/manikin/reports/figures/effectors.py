@@ -3,7 +3,6 @@
 from collections import Counter
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -27,32 +26,25 @@ _AXIS_COLOURS = ("#0072B2", "#009E73", "#E69F00")
 
 
 def tracking_figure(record: RunRecord) -> Figure:
-    """Draw the errors of the CoM, the feet and the hands in contact [mm] ([Qiu2012]_ Fig. 6.9, 6.10).
-
-    Args:
-        record: With both motions, and the body.
-    """
-    planned = need(record.motions.get("planned"), "a planned motion")
+    """Draw the errors of the CoM, the feet and the hands in contact [mm] ([Qiu2012]_ Fig. 6.9, 6.10)."""
+    need(record.motions.get("planned"), "a planned motion")
     executed = need(record.motions.get("executed"), "an executed motion")
     paths = need(record.effector_paths, "a body")
     shown = timeline(record, (11.0, 6.0), "Tracking errors of the execution", 2)
     shown.strip()
     axes = shown.panel(1)
-    error = 1000.0 * (executed.com - interpolated(executed.time, planned.time, planned.com))
+    error = 1000.0 * (executed.com - record.tracks["planned"].at(executed.time))
     for index, axis in enumerate("xyz"):
         axes.plot(executed.time, error[:, index], color=_AXIS_COLOURS[index], linewidth=1.0, label=axis)
     size = np.linalg.norm(error, axis=1)
-    root_mean_square = float(np.sqrt(np.mean(size**2)))
-    label = f"distance (RMS {root_mean_square:.2g} mm, largest {size.max():.2g} mm)"
+    label = f"distance (RMS {np.sqrt(np.mean(size**2)):.2g} mm, largest {size.max():.2g} mm)"
     axes.plot(executed.time, size, color=COLOURS["ink"], linewidth=1.4, label=label)
     shown.label(axes, "centre of mass [mm]")
     legend_above(axes)
     feet = shown.panel(2)
-    wanted, result = paths["planned"], paths["executed"]
-    colours = colours_of(result)
-    for name in result:
-        plan = interpolated(executed.time, planned.time, wanted[name])
-        gap = 1000.0 * np.linalg.norm(result[name] - plan, axis=1)
+    colours = colours_of(paths["executed"])
+    for name in paths["executed"]:
+        gap = _errors(record, name)
         label = f"{readable(name)} (largest {gap.max():.2g} mm)"
         feet.plot(executed.time, gap, color=colours[name], linewidth=1.2, label=label)
     shown.label(feet, "effectors [mm]")
@@ -60,9 +52,12 @@ def tracking_figure(record: RunRecord) -> Figure:
     return shown.figure
 
 
-def interpolated(times: FloatArray, known_times: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, 3) values interpolated at other times; held before the first and after the last."""
-    return np.column_stack([np.interp(times, known_times, column) for column in values.T])
+def _errors(record: RunRecord, name: str) -> FloatArray:
+    """(n,) distances of an effector in the execution from its plan [mm]."""
+    wanted, known = (record.motions[kind].time for kind in ("executed", "planned"))
+    plan, executed = (record.effector_paths[kind][name] for kind in ("planned", "executed"))
+    plan = np.column_stack([np.interp(wanted, known, column) for column in plan.T])
+    return 1000.0 * np.linalg.norm(executed - plan, axis=1)
 
 
 def flights_figure(record: RunRecord) -> Figure:
@@ -70,9 +65,6 @@ def flights_figure(record: RunRecord) -> Figure:
 
     The points drawn are the origins of the contact frames (the middle of the sole), not the
     ankles as in the thesis. Solid: planned by a smooth curve; dashed: by the search.
-
-    Args:
-        record: With a planned motion, the body and a schedule.
     """
     schedule = need(record.schedule, "a contact schedule")
     planned = need(record.motions.get("planned"), "a planned whole-body motion")
@@ -94,8 +86,11 @@ def flights_figure(record: RunRecord) -> Figure:
         label = f"{readable(swing.effector)}, {where}" + (f", {method}" if method else "")
         space.plot(*path.T, color=colour, linestyle=dash, linewidth=2.2, zorder=8)
         height.plot(time, path[:, 2], color=colour, linestyle=dash, linewidth=1.8, label=label)
-        _add_executed(record, height, schedule, swing)
         seen.append(path)
+        if executed := record.effector_paths.get("executed"):
+            motion = record.motions["executed"]
+            time, path = _part(schedule, swing, motion.time, executed[swing.effector])
+            height.plot(time, path[:, 2], **_EXECUTED)
     frame(space, np.vstack(seen), corners)
     space.view_init(18.0, -62.0)
     if "executed" in record.effector_paths:
@@ -106,14 +101,6 @@ def flights_figure(record: RunRecord) -> Figure:
 
 
 _EXECUTED = {**STYLES["executed"], "linestyle": (0, (1, 1.5))}
-
-
-def _add_executed(record: RunRecord, axes: Axes, schedule: ContactSchedule, swing: Swing) -> None:
-    if "executed" in record.effector_paths:
-        time = record.motions["executed"].time
-        path = record.effector_paths["executed"][swing.effector]
-        time, path = _part(schedule, swing, time, path)
-        axes.plot(time, path[:, 2], **_EXECUTED)
 
 
 def _methods(record: RunRecord, swings: list[Swing]) -> list[str]:
@@ -141,11 +128,7 @@ LEAST_SPAN = 0.02
 
 
 def effectors_figure(record: RunRecord) -> Figure:
-    """Draw the coordinates of every foot and hand in contact ([Qiu2012]_ Fig. 6.10, 7.15).
-
-    Args:
-        record: With a motion and the body; the largest error is named when there are both motions.
-    """
+    """Draw the coordinates of every foot and hand in contact ([Qiu2012]_ Fig. 6.10, 7.15)."""
     paths = need(record.effector_paths, "a whole-body motion and the body")
     names = list(next(iter(paths.values())))
     need(names, "an effector in contact")
@@ -169,7 +152,4 @@ def _title(record: RunRecord, name: str) -> str:
     title = readable(name).capitalize()
     if len(record.effector_paths) < 2:
         return title
-    planned, executed = record.motions["planned"], record.motions["executed"]
-    plan = interpolated(executed.time, planned.time, record.effector_paths["planned"][name])
-    error = np.linalg.norm(record.effector_paths["executed"][name] - plan, axis=1)
-    return f"{title} (largest error {1000.0 * error.max():.2g} mm)"
+    return f"{title} (largest error {_errors(record, name).max():.2g} mm)"

@@ -13,7 +13,6 @@ from matplotlib.ticker import MaxNLocator
 
 from manikin.balance.zmp import ZmpPath
 from manikin.contact import Contact, ContactKind, ContactSchedule
-from manikin.errors import FigureError
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.reports.figures.style import (
@@ -29,9 +28,9 @@ from manikin.reports.figures.style import (
     white_edge,
 )
 from manikin.reports.figures.timeline import timeline
-from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, sections
+from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, finite_obstacles, sections
 from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
-from manikin.scene import HalfSpace, Plane, Scene
+from manikin.scene import Scene
 from manikin.simulation import PushMap
 from manikin.simulation.push_map import told_apart
 
@@ -50,15 +49,13 @@ def zmp_figure(record: RunRecord) -> Figure:
 
     The distance is drawn firm where it decides about balance: all supports in one plane, no
     grasp. Elsewhere it is dotted, measured in the level plane at their mean height.
-
-    Args:
-        record: With a schedule and a motion or a planned CoM.
     """
     schedule = need(record.schedule, "a contact schedule")
     paths = need(record.zmp, "a motion of the centre of mass")
-    if not any(np.any(path.decisive) for path in paths.values()):
-        need(None, "a phase that stands on one plane without grasping")
-    plan = _plan_width(schedule)
+    decisive = any(np.any(path.decisive) for path in paths.values())
+    need(decisive, "a phase that stands on one plane without grasping")
+    spans = np.subtract(*_plan_box(schedule)[::-1])
+    plan = float(np.clip(PLAN_HEIGHT * spans[0] / spans[1], 2.0, 6.5))
     across = label_room(record.effectors) + 0.15
     shown = timeline(
         record, (0.8 + plan + across + DISTANCE_WIDTH, PLAN_HEIGHT + 1.35), "Zero moment point", 1, 2,
@@ -116,12 +113,6 @@ def _plan_box(schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
     return points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
 
 
-def _plan_width(schedule: ContactSchedule) -> float:
-    """Width that the plan takes at its height [inch]."""
-    low, high = _plan_box(schedule)
-    return float(np.clip(PLAN_HEIGHT * (high - low)[0] / (high - low)[1], 2.0, 6.5))
-
-
 def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
     millimetres = 1000.0 * path.distance
     firm = np.where(path.decisive, millimetres, np.nan)
@@ -154,15 +145,11 @@ LEVEL = 0.3
 
 
 def footprint_figure(record: RunRecord) -> Figure:
-    """Draw the soles in their order, the ZMP path and the CoM's projection ([Qiu2012]_ Fig. 5.13, 5.19).
-
-    Args:
-        record: With a planned CoM, or at least one motion, and something to stand on.
-    """
+    """Draw the soles in their order, the ZMP path and the CoM's projection ([Qiu2012]_ Fig. 5.13, 5.19)."""
     tracks = need(record.tracks, "a motion of the centre of mass")
     contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
-    if contacts and all(abs(contact.normal[2]) < LEVEL for contact in contacts):
-        need(None, "a contact that is not on a wall")
+    on_walls = contacts and all(abs(contact.normal[2]) < LEVEL for contact in contacts)
+    need(not on_walls, "a contact that is not on a wall")
     figure = new_figure(8.6, 8.2, "Footprints, zero moment point and centre of mass from above")
     axes = figure.add_subplot()
     colours = colours_of(contact.effector for contact in contacts)
@@ -175,7 +162,11 @@ def footprint_figure(record: RunRecord) -> Figure:
             axes.plot(point[:, 0], point[:, 1], label=f"ZMP, {name}", **STYLES[name])
         dotted = {**STYLES[name], "linestyle": (0, (1.2, 1.6)), "linewidth": 1.6}
         axes.plot(*track.position[:, :2].T, label=f"centre of mass, {name}", **dotted)
-    _mark_ends(axes, next(iter(tracks.values())).position)
+    com = next(iter(tracks.values())).position
+    for point, text, marker in ((com[0], "start", "o"), (com[-1], "goal", "D")):
+        axes.plot(point[0], point[1], marker, color=COLOURS["ink"], markersize=5, zorder=7)
+        look = {"fontsize": 8, "color": COLOURS["ink"], "zorder": 8, "path_effects": [white_edge()]}
+        axes.annotate(text, point[:2], (7, 4), textcoords="offset points", **look)
     everything = np.vstack(seen)
     low, high = everything.min(axis=0) - 0.18, everything.max(axis=0) + 0.18
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -206,34 +197,22 @@ def _draw_obstacles(axes: Axes, scene: Scene) -> None:
     """Outlines; what hangs above is dashed. Names stand in a column below the first corner in view."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     column: dict[tuple[int, int], list[Any]] = {}
-    for obstacle in scene:
+    seen = np.array([left, bottom, -np.inf]), np.array([right, top, np.inf])
+    for obstacle in finite_obstacles(scene, *seen):
         low, high = obstacle.bounds
-        outside = low[0] > right or high[0] < left or low[1] > top or high[1] < bottom
-        if isinstance(obstacle.shape, (HalfSpace, Plane)) or outside:
-            continue
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
         overhead = low[2] > OVERHEAD
         if not overhead:
             axes.add_patch(Polygon(corners, facecolor=COLOURS["obstacle"], alpha=0.22, zorder=0.5))
         line = (0, (5, 3)) if overhead else "solid"
-        outline = Polygon(corners, fill=False, edgecolor=COLOURS["soft"], linewidth=0.9, linestyle=line)
-        outline.set_zorder(0.6)
-        axes.add_patch(outline)
+        look = {"edgecolor": COLOURS["soft"], "linewidth": 0.9, "linestyle": line, "zorder": 0.6}
+        axes.add_patch(Polygon(corners, fill=False, **look))
         corner = max(low[0], left), max(low[1], bottom)
         near = round(corner[0] / 0.1), round(corner[1] / 0.1)
         column.setdefault(near, [corner, 0])[1] += 1
         corner, row = column[near]
         text = f"{obstacle.name}, {'from' if overhead else 'up to'} z = {low[2] if overhead else high[2]:g} m"
         axes.annotate(text, corner, (3, -11 * row), textcoords="offset points", fontsize=7.5, color="#666C77")
-
-
-def _mark_ends(axes: Axes, com: np.ndarray) -> None:
-    for point, text, marker in ((com[0], "start", "o"), (com[-1], "goal", "D")):
-        axes.plot(point[0], point[1], marker, color=COLOURS["ink"], markersize=5, zorder=7)
-        axes.annotate(
-            text, point[:2], (7, 4), textcoords="offset points", fontsize=8, color=COLOURS["ink"], zorder=8,
-            path_effects=[white_edge()],
-        )  # fmt: skip
 
 
 SOLES = 0.3
@@ -259,8 +238,7 @@ def push_map_figure(maps: Sequence[PushMap], soles: Sequence[FloatArray] = ()) -
         maps: At least one with a known direction.
         soles: (k, 2) corners of each, from the centre of mass [m].
     """
-    if not any(np.any(np.isfinite(item.held)) for item in maps):
-        raise FigureError("this figure needs an impulse that was held; valid: a map with one")
+    need(any(np.any(np.isfinite(item.held)) for item in maps), "an impulse that was held", "a map")
     common, names = told_apart([item.conditions for item in maps])
     figure = new_figure(7.4, 7.9, "Largest impulse held, by direction of the push")
     axes = figure.add_subplot(projection="polar")

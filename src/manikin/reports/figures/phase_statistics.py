@@ -71,13 +71,12 @@ def _draw(axes: Axes, found: Sequence[SupportPlacement], colours: Mapping[str, s
         axes.plot(*item.mean, "x", color=colour, markersize=6, zorder=5)
         if len(item.places) >= FEWEST:
             (long, short), turn = item.ellipse(SHARE)
-            middle, angle = (float(item.mean[0]), float(item.mean[1])), float(np.degrees(turn))
             look = {"fill": False, "edgecolor": colour, "linewidth": 1.2, "zorder": 4}
-            axes.add_patch(Ellipse(middle, 2 * long, 2 * short, angle=angle, **look))
-    labels = Labels(axes)
+            angle = float(np.degrees(turn))
+            axes.add_patch(Ellipse(tuple(item.mean), 2 * long, 2 * short, angle=angle, **look))
+    labels, look = Labels(axes), {"ha": "center", "zorder": 6}
     for item in sorted(found, key=lambda each: -len(each.places)):
-        mean = (float(item.mean[0]), float(item.mean[1]))
-        labels.write(f"{item.number}", mean, (0.0, 6.0), ha="center", color=colours[item.effector], zorder=6)
+        labels.write(f"{item.number}", tuple(item.mean), (0.0, 6.0), color=colours[item.effector], **look)
 
 
 WIDTH = 0.8
@@ -116,7 +115,8 @@ def _draw_motions(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]]) -> N
         for item in members:
             begin = item.phases[0].start
             for phase, kind, whole in zip(item.phases, item.kinds, item.whole, strict=True):
-                colour = _colour(kind, len(phase.effectors))
+                flies = kind == FLIGHT
+                colour = COLOURS["right_hand"] if flies else support_colour(len(phase.effectors))
                 kinds[kind] = colour
                 axes.barh(level, phase.duration, left=phase.start - begin, height=0.75, color=colour,
                           alpha=0.85 if whole else 0.3, edgecolor="white", linewidth=0.6)  # fmt: skip
@@ -159,10 +159,6 @@ def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By
         highest = max(spread.largest for spread in spreads)
         axes.set_ylim(0.0, min(1.06 * highest, BEYOND * max(spread.mean for spread in spreads)))
     legend_above(axes, group_keys(colours), most=7)
-
-
-def _colour(kind: str, supports: int) -> str:
-    return COLOURS["right_hand"] if kind == FLIGHT else support_colour(supports)
 
 
 def _in_order(lists: Sequence[Sequence[str]]) -> list[str]:

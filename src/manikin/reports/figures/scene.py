@@ -31,7 +31,7 @@ from manikin.reports.figures.views import (
     panel_ticks,
 )
 from manikin.runtime.display import COLOURS, colours_of, side_colour
-from manikin.scene import Box, Obstacle, Scene
+from manikin.scene import Box, Scene
 
 MOST = 9
 """Largest number of key instants drawn; of more some are left out, evenly."""
@@ -45,9 +45,6 @@ def postures_figure(record: RunRecord) -> Figure:
 
     A motion in one stance has no key instants; it is drawn where much happens. The executed motion is drawn,
     or else the planned one; grey, the path of the CoM.
-
-    Args:
-        record: With a whole-body motion and the body.
     """
     motions = need(record.motions, "a whole-body motion")
     need(record.body, "a body")
@@ -95,12 +92,7 @@ def _draw_posture(
 def draw_moment(
     axes: Axes, record: RunRecord, motion: Motion, sample: int, view: View, box: tuple[FloatArray, FloatArray]
 ) -> None:
-    """Draw the body among the obstacles at one sample of a motion, with its CoM.
-
-    Args:
-        view: The plane that is seen, moved to the panel.
-        box: Lower and upper corner of what is shown [m].
-    """
+    """Draw the body among the obstacles in a box [m] at one sample of a motion, with its CoM."""
     if record.scene is not None:
         draw_obstacles(axes, record.scene, view, *box)
     if record.body is not None:
@@ -114,7 +106,6 @@ def frame_panels(
     """Set ticks and limits of panels side by side in one pair of axes, to one scale.
 
     Args:
-        axes: With the panels.
         across: Both ends of the first panel [m].
         upwards: Both ends of all [m].
         offsets: Where the zero of each panel is drawn [m].
@@ -155,14 +146,12 @@ def _frame(record: RunRecord, com: FloatArray) -> tuple[FloatArray, FloatArray]:
 MOST_TICKS = 9
 """Ticks of the longest axis; the others have fewer."""
 
+_QUADS = np.array([(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)])
+"""Faces of a box by the numbers of its corners."""
+
 
 def scene_figure(record: RunRecord) -> Figure:
-    """Draw the CoM's path, the obstacles, the supports and the body ([Qiu2012]_ Fig. 5.21, 7.7, 7.8).
-
-    Args:
-        record: With a planned CoM, or at least one motion; body, scene and schedule are drawn
-            when they are there.
-    """
+    """Draw the CoM's path, the obstacles, the supports and the body ([Qiu2012]_ Fig. 5.21, 7.7, 7.8)."""
     name, track = list(need(record.tracks, "a motion of the centre of mass").items())[-1]
     motion = record.motions.get(name)
     figure = new_figure(9.5, 8.0, f"Motion in the scene ({name})")
@@ -197,11 +186,12 @@ def _draw_figures(
     samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
     postures = [segment_positions(body, motion.q[sample]) for sample in samples]
     sticks = _sticks(body)
+    sides = [next((s for s in ("left", "right") if s in f"{a} {b}"), None) for a, b in sticks]
     for number, places in enumerate(postures):
         end = number in (0, len(postures) - 1)
         axes.add_collection3d(Line3DCollection(
             [[places[first], places[second]] for first, second in sticks],
-            colors=[_stick_colour(first, second) for first, second in sticks],
+            colors=[COLOURS["ink" if side is None else f"{side}_foot"] for side in sides],
             linewidths=2.6 if end else 1.4, alpha=0.95 if end else 0.3 + 0.3 * number / len(postures),
             capstyle="round", zorder=6,
         ))  # fmt: skip
@@ -250,19 +240,14 @@ def _sticks(body: BodyModel) -> list[tuple[str, str]]:
     return sticks + [(effector.segment, f"effector/{effector.name}") for effector in free]
 
 
-def _stick_colour(start: str, end: str) -> str:
-    for side in ("left", "right"):
-        if side in start or side in end:
-            return COLOURS[f"{side}_foot"]
-    return COLOURS["ink"]
-
-
 def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
     """Draw every finite obstacle; return the corners of their bounds."""
     corners = [np.zeros((0, 3))]
     for obstacle in finite_obstacles(scene):
-        is_box = isinstance(obstacle.shape, Box)
-        faces = _box_faces(obstacle) if is_box else np.asarray(obstacle.to_trimesh().triangles)
+        if isinstance(obstacle.shape, Box):
+            faces = obstacle.to_world(BOX_CORNERS * obstacle.shape.size / 2)[_QUADS]
+        else:
+            faces = np.asarray(obstacle.to_trimesh().triangles)
         low, high = obstacle.bounds
         solid = Poly3DCollection(
             faces, facecolor=COLOURS["obstacle"], edgecolor="#8D94A0", linewidths=0.6, alpha=0.25, zorder=2
@@ -271,12 +256,6 @@ def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
         axes.text(high[0], low[1], high[2], f" {obstacle.name}", fontsize=8, color="#666C77", zorder=3)
         corners.append(np.array([low, high]))
     return np.vstack(corners)
-
-
-def _box_faces(obstacle: Obstacle) -> list[FloatArray]:
-    corners = obstacle.to_world(BOX_CORNERS * obstacle.shape.size / 2)  # type: ignore[union-attr]
-    quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
-    return [corners[list(quad)] for quad in quads]
 
 
 def draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:

@@ -13,9 +13,9 @@ from matplotlib.patches import Patch
 
 from manikin.contact import ContactSchedule
 from manikin.ergonomics import Assessment, Ergonomics, JointStrength
-from manikin.errors import FigureError
 from manikin.motion import Motion
 from manikin.motion.motion import PhaseTable
+from manikin.numerics.signals import mask_runs
 from manikin.pipeline.run_directory import ComTrack, RunRecord
 from manikin.reports.figures.style import (
     STYLES,
@@ -42,11 +42,7 @@ _NAME_SIZE = 6.5
 
 
 def timing_figure(record: RunRecord) -> Figure:
-    """Draw the durations of the phases with their bounds, and the supports in time ([Qiu2012]_ Fig. 5.16).
-
-    Args:
-        record: With a schedule; loaded contacts are drawn when there is an execution.
-    """
+    """Draw the durations of the phases with their bounds, and the supports in time ([Qiu2012]_ Fig. 5.16)."""
     schedule = need(record.schedule, "a contact schedule")
     phases = need(record.phases, "phases")
     executed = record.motions.get("executed")
@@ -126,13 +122,8 @@ def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float,
 
 def _loaded(motion: Motion, name: str) -> list[tuple[float, float]]:
     """Start and length of each interval in which the contact presses."""
-    on = np.concatenate([[False], motion.support[:, motion.contact_names.index(name)], [False]])
-    starts, stops = np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(on[:-1] & ~on[1:])
-    last = len(motion.time) - 1
-    return [
-        (float(motion.time[a]), float(motion.time[min(b, last)] - motion.time[a]))
-        for a, b in zip(starts, stops, strict=True)
-    ]
+    time, runs = motion.time, mask_runs(motion.support[:, motion.contact_names.index(name)])
+    return [(time[start], time[min(stop, len(time) - 1)] - time[start]) for start, stop in runs]
 
 
 POINT_MASS = "planned point mass"
@@ -144,12 +135,10 @@ ZOOM = 2.5
 
 
 def margin_figure(record: RunRecord) -> Figure:
-    """Draw the margins with the minimum of each phase ([Qiu2012]_ Fig. 5.13, 5.16, 5.23, 7.9).
-
-    Args:
-        record: With a planned CoM, or at least one motion.
-    """
-    curves = need(margin_curves(record), "a motion of the centre of mass")
+    """Draw the margins with the minimum of each phase ([Qiu2012]_ Fig. 5.13, 5.16, 5.23, 7.9)."""
+    curves = dict(need(record.tracks, "a motion of the centre of mass"))
+    if record.motions and record.plan is not None:
+        curves = {POINT_MASS: record.plan, **curves}
     phases = need(record.phases, "phases")
     units = list(dict.fromkeys(curve.margin_unit for curve in curves.values()))
     panels: list[tuple[str, float | None]] = [(unit, None) for unit in units]
@@ -169,22 +158,11 @@ def margin_figure(record: RunRecord) -> Figure:
     return drawing.figure
 
 
-def margin_curves(record: RunRecord) -> dict[str, ComTrack]:
-    """Margins by name: of the planned point mass, then of each whole-body motion."""
-    if not record.motions:
-        return dict(record.tracks)
-    curves = {} if record.plan is None else {POINT_MASS: record.plan}
-    return {**curves, **record.tracks}
-
-
-def phase_minima(curve: ComTrack, phases: PhaseTable) -> list[int | None]:
-    """Sample with the smallest margin of each phase, None where the curve has no sample."""
+def phase_minima(curve: ComTrack, phases: PhaseTable) -> list[int]:
+    """Sample with the smallest margin of each phase that has a sample."""
     inside = phases.phase_at(curve.time)
-    result: list[int | None] = []
-    for phase in range(len(phases)):
-        samples = np.flatnonzero(inside == phase)
-        result.append(int(samples[np.argmin(curve.margin[samples])]) if len(samples) else None)
-    return result
+    samples = [np.flatnonzero(inside == phase) for phase in range(len(phases))]
+    return [int(of[np.argmin(curve.margin[of])]) for of in samples if len(of)]
 
 
 def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | None:
@@ -201,8 +179,11 @@ def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | No
 def _draw_curves(axes: Axes, curves: dict[str, ComTrack], phases: PhaseTable, top: float | None) -> None:
     axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
     for name, curve in curves.items():
-        label = f"{name} ({_lowest(curve, phases)})"
-        axes.plot(curve.time, curve.margin, label=label, **STYLES[name])
+        index = int(np.argmin(curve.margin))
+        phase = int(phases.phase_at(curve.time[index : index + 1])[0])
+        where = f"in phase {phase}" if curve.time[index] <= phases.instants[-1] else "at rest"
+        least = f"lowest {curve.margin[index]:.1f} {curve.margin_unit} {where}, {curve.time[index]:.2f} s"
+        axes.plot(curve.time, curve.margin, label=f"{name} ({least})", **STYLES[name])
     low = min(0.0, *(float(curve.margin.min()) for curve in curves.values()))
     high = max(float(curve.margin.max()) for curve in curves.values()) if top is None else top
     low = low if top is None else max(low, -top)
@@ -213,28 +194,21 @@ def _draw_curves(axes: Axes, curves: dict[str, ComTrack], phases: PhaseTable, to
             _mark_minima(axes, labels, curve, phases, name, top)
 
 
-def _lowest(curve: ComTrack, phases: PhaseTable) -> str:
-    index = int(np.argmin(curve.margin))
-    phase = int(phases.phase_at(curve.time[index : index + 1])[0])
-    where = f"in phase {phase}" if curve.time[index] <= phases.instants[-1] else "at rest"
-    return f"lowest {curve.margin[index]:.1f} {curve.margin_unit} {where}, {curve.time[index]:.2f} s"
-
-
 def _mark_minima(
     axes: Axes, labels: Labels, curve: ComTrack, phases: PhaseTable, name: str, top: float | None
 ) -> None:
     """Mark the least margin of each phase, numbered where there is room, and ring the least of all."""
-    result = [index for index in phase_minima(curve, phases) if index is not None]
     offset = (0.0, -11.0 if name == "executed" else 4.0)
-    for index in sorted(result, key=lambda index: curve.margin[index]):
+    first, last = phases.instants[[0, -1]] + 0.01 * np.ptp(phases.instants) * np.array([1.0, -1.0])
+    for index in sorted(phase_minima(curve, phases), key=lambda index: curve.margin[index]):
         time, margin = float(curve.time[index]), float(curve.margin[index])
         if top is not None and margin > top:
             continue
         axes.plot(time, margin, "o", markersize=3.5, color=COLOURS[name], zorder=5)
+        inwards = "left" if time < first else "right" if time > last else "center"
         labels.write(
-            f"{margin:.0f}", (time, margin), offset, size=7, ha=_alignment(time, phases), color=COLOURS[name],
-            zorder=6,
-        )  # fmt: skip
+            f"{margin:.0f}", (time, margin), offset, size=7, ha=inwards, color=COLOURS[name], zorder=6
+        )
     index = int(np.argmin(curve.margin))
     axes.plot(
         curve.time[index], curve.margin[index], "o", markersize=9, markerfacecolor="none",
@@ -242,22 +216,11 @@ def _mark_minima(
     )  # fmt: skip
 
 
-def _alignment(time: float, phases: PhaseTable) -> str:
-    """Alignment of a label that keeps it inside the axes."""
-    first, last = float(phases.instants[0]), float(phases.instants[-1])
-    edge = 0.01 * (last - first)
-    return "left" if time < first + edge else "right" if time > last - edge else "center"
-
-
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """A figure whose first row shows the contacts and whose other rows are panels over time.
+    """A figure whose first row shows the contacts and whose other rows are panels over time, to an end [s].
 
-    Attributes:
-        figure: The figure.
-        grid: Its grid; the strips stand in row 0.
-        phases: The phases, shaded in every panel.
-        end: Last instant that is shown [s].
+    The phases are shaded in every panel.
     """
 
     figure: Figure
@@ -268,7 +231,7 @@ class Timeline:
     def strip(self, column: int = 0, title: str = "", *, named: bool = True) -> None:
         """Draw the contacts over the panels of a column, with the names of the effectors beside them."""
         axes = self.figure.add_subplot(self.grid[0, column])
-        draw_contact_strip(axes, self.phases, self.end)
+        _draw_contact_strip(axes, self.phases, self.end)
         if title:
             axes.set_title(title, fontsize=10, loc="left", pad=15)
         if not named:
@@ -325,7 +288,7 @@ def draw_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
     axes.set_xlim(float(phases.instants[0]), end)
 
 
-def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
+def _draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
     """One bar per effector while it is in contact, and the numbers of the phases, from 0, above."""
     effectors = list(dict.fromkeys(name for supports in phases.supports for name in supports))
     colours = colours_of(effectors)
@@ -337,16 +300,9 @@ def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
     axes.set_xlim(float(phases.instants[0]), end)
     axes.tick_params(length=0, labelbottom=False)
     axes.set_xticks([])
-    for side in ("top", "right", "left", "bottom"):
-        axes.spines[side].set_visible(False)
-    _number_phases(axes, phases, end)
-
-
-def _number_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
-    """Number the phases above a strip where there is room, the long ones first."""
-    labels = Labels(axes)
-    order = np.argsort(-np.diff(phases.instants), kind="stable")
-    for number in order:
+    axes.spines[:].set_visible(False)
+    labels = Labels(axes)  # numbers where there is room, of the long phases first
+    for number in np.argsort(-np.diff(phases.instants), kind="stable"):
         middle = float(phases.instants[number : number + 2].mean())
         labels.write(f"{number}", (middle, 0.0), (0.0, 2.0), size=8, ha="center", color=COLOURS["ink"])
     if end > phases.instants[-1] + 0.2:
@@ -377,15 +333,10 @@ _RULA_ENDS, _REBA_ENDS = (2, 4, 6, 7), (1, 3, 7, 10, 15)
 
 
 def ergonomics_figure(found: Ergonomics, title: str = "Ergonomics") -> Figure:
-    """Draw the scores of both sides over the colours of the action levels, and the largest torque shares.
-
-    Args:
-        found: Of a motion of more than one frame.
-    """
+    """Draw the scores of both sides over the colours of the action levels, and the largest torque shares."""
     posture, strength = found.posture, found.strength
     rows = 2 * (posture is not None) + (strength is not None)
-    if rows == 0 or len(found.time) < 2:
-        raise FigureError("this figure needs scores or torques over time; valid: a motion of a human")
+    need(rows and len(found.time) > 1, "scores or torques over time", "a motion of a human")
     figure, grid = new_grid(11.0, 0.9 + 2.3 * rows, title, rows, 1, between=0.45, left=0.6)
     panels = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
     if posture is not None:

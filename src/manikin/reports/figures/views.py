@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -137,13 +138,7 @@ def finite_obstacles(
 
 
 def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: FloatArray) -> None:
-    """Draw the outlines of the finite obstacles near the box from ``low`` to ``high``, and the floor.
-
-    Args:
-        scene: Obstacles and floor.
-        low: (3,) lower corner of what is looked at [m].
-        high: (3,) upper corner [m].
-    """
+    """Draw the outlines of the finite obstacles near the box between two corners (3,) [m], and the floor."""
     outlines = []
     for obstacle in finite_obstacles(scene, low, high):
         shape = obstacle.shape
@@ -155,13 +150,10 @@ def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: 
             points = np.asarray(obstacle.to_trimesh().vertices)
         outlines.append(convex_polygon(view(points)))
     (left, bottom), (right, top) = view(low), view(high)
-    patches = PolyCollection(
-        outlines, facecolor=COLOURS["obstacle"], edgecolor=COLOURS["soft"], linewidth=0.7, alpha=0.3
-    )
-    patches.set_zorder(0.5)
+    look: dict[str, Any] = {"facecolor": COLOURS["obstacle"], "edgecolor": COLOURS["soft"], "zorder": 0.5}
+    patches = PolyCollection(outlines, linewidth=0.7, alpha=0.3, **look)
     axes.add_collection(patches, autolim=False)
-    window = Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData)
-    patches.set_clip_path(window)
+    patches.set_clip_path(Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData))
     if view.name != "xy" and scene.floor_height is not None:
         level = scene.floor_height + view.offset[1]
         if bottom <= level <= top:
@@ -169,31 +161,21 @@ def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: 
 
 
 def draw_body(axes: Axes, body: BodyModel, q: FloatArray, view: View) -> None:
-    """Draw the silhouettes of a body's shapes, the farthest first.
-
-    Args:
-        body: Who.
-        q: (nq,) configuration.
-    """
+    """Draw the silhouettes of a body's shapes in a configuration (nq,), the farthest first."""
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, np.asarray(q))
-    outlines, colours, depths = [], [], []
+    drawn = []
     for segment in body.segments:
         placement = data.oMf[body.segment_frame(segment.name)]
         for shape in segment.shapes:
             centre = placement.translation + placement.rotation @ shape.translation
             outline = _outline(shape, placement.rotation @ shape.rotation, centre, view)
-            outlines.append(outline)
-            colours.append(side_colour(segment.name))
             # Seen from +z or +x, but from -y, so that x points to the right.
-            depths.append(centre[view.depth] * (-1.0 if view.name == "xz" else 1.0))
-    order = np.argsort(depths, kind="stable")
-    drawn = PolyCollection(
-        [outlines[i] for i in order], facecolors=[colours[i] for i in order], edgecolors="white",
-        linewidths=0.4, alpha=0.85,
-    )  # fmt: skip
-    drawn.set_zorder(3)
-    axes.add_collection(drawn, autolim=False)
+            depth = centre[view.depth] * (-1.0 if view.name == "xz" else 1.0)
+            drawn.append((depth, outline, side_colour(segment.name)))
+    _, outlines, colours = zip(*sorted(drawn, key=lambda item: item[0]), strict=True)
+    look: dict[str, Any] = {"edgecolors": "white", "linewidths": 0.4, "alpha": 0.85, "zorder": 3}
+    axes.add_collection(PolyCollection(outlines, facecolors=colours, **look), autolim=False)
 
 
 def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list[float], list[str]]:

@@ -10,6 +10,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
+from scipy.spatial.distance import cdist
 
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
@@ -41,11 +42,7 @@ BESIDE = 0.7
 
 
 def walk_paths_figure(record: RunRecord) -> Figure:
-    """Draw the ways of all who walk, with shoulders every half second, and what stands in the way.
-
-    Args:
-        record: Of a run with a walk.
-    """
+    """Draw the ways of all who walk, with shoulders every half second, and what stands in the way."""
     walks = need(dict(record.walks), "a way over the floor")
     figure = new_figure(8.6, 6.4, "Ways over the floor, from above")
     axes = figure.add_subplot()
@@ -58,9 +55,7 @@ def walk_paths_figure(record: RunRecord) -> Figure:
             _write_times(axes, way, name)
     places = np.vstack([way[:, 1:3] for way in walks.values()])
     low, high = places.min(axis=0) - BESIDE, places.max(axis=0) + BESIDE
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal", adjustable="box")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     dress(axes, "y [m]", "x [m]")
     keys = _kind_keys("shoulders, and standing", 1.0)
     figure.legend(handles=keys, loc="outside lower right", ncols=3, fontsize=8.5, frameon=False)
@@ -119,22 +114,12 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
     """Draw goals around the start, which looks up ([Truong2010]_ Fig. 4.23).
 
     Filled marks are goals reached wholly holonomically, open ones others; drawn are goals that count.
-
-    Args:
-        zones: By the title of their panel.
     """
     shown = {name: zone for name, zone in zones.items() if np.any(zone.considered)}
     need(shown, "a goal aside or ahead of a start that counts", "a zone")
     far = max(float(zone.distances[zone.considered].max()) for zone in shown.values()) + 0.15
-    figure, grid = new_grid(
-        0.8 + 4.3 * len(shown),
-        4.1,
-        "Goals reached wholly holonomically",
-        1,
-        len(shown),
-        top=0.75,
-        bottom=0.95,
-    )
+    title, count = "Goals reached wholly holonomically", len(shown)
+    figure, grid = new_grid(0.8 + 4.3 * count, 4.1, title, 1, count, top=0.75, bottom=0.95)
     circle = np.linspace(0.0, np.pi, 91)
     for number, (name, zone) in enumerate(shown.items()):
         axes = figure.add_subplot(grid[0, number])
@@ -151,9 +136,7 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
             axes.plot(x, y, line, color=COLOURS["ink"], linewidth=1.0, label=label)
         axes.plot(0.0, 0.0, "^", color=COLOURS["ink"], markersize=7)
         dress(axes, "ahead [m]" if number == 0 else "", "to the right [m]", f"{name}: {zone.radius:.2f} m")
-        axes.set_aspect("equal")
-        axes.set_xlim(-far, far)
-        axes.set_ylim(-0.15, far)
+        axes.set(xlim=(-far, far), ylim=(-0.15, far), aspect="equal")
     figure.legend(
         *figure.axes[0].get_legend_handles_labels(), loc="lower center", ncols=4, fontsize=8.5, frameon=False
     )
@@ -161,11 +144,7 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
 
 
 def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figure:
-    """Draw PLO and PLG by category as bars: mean, AD and MD ([Truong2010]_ Fig. 4.20, 4.21).
-
-    Args:
-        statistics: By category.
-    """
+    """Draw PLO and PLG by category as bars: mean, AD and MD ([Truong2010]_ Fig. 4.20, 4.21)."""
     need(statistics, "a walk of a category", "statistics")
     figure = new_figure(8.4, 5.2, "Holonomic ends of walks by category")
     places = np.arange(len(statistics))
@@ -187,22 +166,16 @@ KINDS = {"holonomic": COLOURS["executed"], "nonholonomic": COLOURS["planned"]}
 _PANEL = 3.4
 """Width of a panel [inch]."""
 
-_BESIDE = 0.6
-"""Room shown beside the paths [m]."""
-
 
 def walking_paths_figure(groups: Mapping[str, Sequence[WalkingPath]], title: str = "Walking paths") -> Figure:
     """Draw paths from above, one panel for each group.
 
     Short bars are shoulders every half second; colours tell where the body goes ahead and where it does not.
-
-    Args:
-        groups: Paths by the title of their panel.
     """
     shown = {name: paths for name, paths in groups.items() if paths}
     need(shown, "a walking path", "a group")
     points = np.vstack([path.place[:, :2] for paths in shown.values() for path in paths])
-    low, high = points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE
+    low, high = points.min(axis=0) - 0.6, points.max(axis=0) + 0.6  # room beside the paths [m]
     columns = min(4, len(shown))
     rows = -(-len(shown) // columns)
     tall = _PANEL * (high[1] - low[1]) / (high[0] - low[0])
@@ -216,9 +189,7 @@ def walking_paths_figure(groups: Mapping[str, Sequence[WalkingPath]], title: str
             draw_obstacle(axes, obstacle)
         first, last = number % columns == 0, number // columns == rows - 1
         dress(axes, "y [m]" if first else "", "x [m]" if last else "", name)
-        axes.set_aspect("equal", adjustable="box")
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     legend_in_title(figure, handles=_kind_keys("shoulders, half width", 0.8))
     return figure
 
@@ -240,14 +211,10 @@ def draw_obstacle(axes: Axes, obstacle: WalkObstacle) -> None:
     outline = corners + obstacle.radius * circle
     last = len(obstacle.times) - 1
     for index in sorted({0, last}):
-        moved = outline + obstacle.displacements[index]
         dashed = index == last and obstacle.moves
-        axes.add_patch(
-            Polygon(
-                moved, facecolor="none" if dashed else COLOURS["obstacle"], edgecolor=COLOURS["soft"],
-                linestyle="--" if dashed else "-", linewidth=0.9, zorder=1,
-            )
-        )  # fmt: skip
+        line, face = ("--", "none") if dashed else ("-", COLOURS["obstacle"])
+        look = {"facecolor": face, "edgecolor": COLOURS["soft"], "linestyle": line, "linewidth": 0.9}
+        axes.add_patch(Polygon(outline + obstacle.displacements[index], zorder=1, **look))
 
 
 WORD_COLOURS = {
@@ -286,11 +253,7 @@ def words_figure(slices: Sequence[WordSlice]) -> Figure:
 
 
 def equal_paths_figure(pairs: Sequence[EqualPaths]) -> Figure:
-    """Draw two paths to one goal that cost the same, and their curvatures ([Truong2010]_ Fig. 3.7).
-
-    Args:
-        pairs: One row of the figure each.
-    """
+    """Draw two paths to one goal that cost the same, and their curvatures ([Truong2010]_ Fig. 3.7)."""
     need(pairs, "a pair of paths of equal cost", "a partition")
     figure, grid = new_grid(
         9.6, 0.8 + 4.6 * len(pairs), "Two best paths to one goal", len(pairs), 2, width_ratios=[1.0, 1.25],
@@ -361,24 +324,15 @@ def _dress_ways(axes: Axes, title: str) -> None:
 
 def _representatives(one: WordSlice) -> list[tuple[int, int]]:
     """Place of each word that is farthest from places of other words and from the edge of the grid."""
-    rows, columns = np.indices(one.grid.shape)
-    places = np.column_stack([rows.ravel(), columns.ravel()])
+    places = np.argwhere(np.ones(one.grid.shape))
     labels = one.words.ravel()
-    edge = np.minimum.reduce(
-        [
-            places[:, 0],
-            one.grid.shape[0] - 1 - places[:, 0],
-            places[:, 1],
-            one.grid.shape[1] - 1 - places[:, 1],
-        ]
-    )
+    edge = np.minimum(places, np.array(one.grid.shape) - 1 - places).min(axis=1)
     chosen = []
     for word in sorted(set(labels.tolist()), key=_order):
         own, other = labels == word, places[labels != word]
         room = edge[own] + 1.0
         if len(other):
-            apart = np.hypot(*(places[own][:, None] - other[None]).transpose(2, 0, 1)).min(axis=1)
-            room = np.minimum(room, apart)
+            room = np.minimum(room, cdist(places[own], other).min(axis=1))
         row, column = places[own][int(np.argmax(room))]
         chosen.append((int(row), int(column)))
     return chosen

@@ -32,39 +32,14 @@ FARTHEST = 10.0
 Range = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Person:
-    """A person of any size in the stated ranges, woman or man.
-
-    Attributes:
-        stature: [m].
-        mass: [kg].
-        sex: ``"female"`` or ``"male"``.
-    """
-
-    stature: float
-    mass: float
-    sex: str
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator) -> "Person":
-        """Draw a person: sex, stature and body mass index are independent and evenly distributed."""
-        sex = ("female", "male")[int(rng.integers(2))]
-        stature = round(float(rng.uniform(*STATURES)), 2)
-        return cls(stature, round(float(rng.uniform(*BODY_MASS_INDICES)) * stature**2, 1), sex)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Section ``body`` of a scenario."""
-        return {"model": "human", "stature_m": self.stature, "mass_kg": self.mass, "sex": self.sex}
-
-
 class Sketch:
     """A scene while it is drawn, in a frame of its own: z up, the body starts near the origin.
 
     Attributes:
         rng: Source of all that is random in the scene.
-        person: Whose way it is, unless :attr:`body` says something else.
-        body: Section ``body`` of the scenario.
+        stature: Of the person whose way it is, unless :attr:`body` says something else [m].
+        body: Section ``body`` of the scenario: a person whose sex, stature and body mass index are
+            independent and evenly distributed.
         floor: Height of the floor [m], None for none.
         keys: Further keys of the scenario.
         meshes: What is written beside the scenario, by file name.
@@ -72,8 +47,10 @@ class Sketch:
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
-        self.person = Person.drawn(rng)
-        self.body: dict[str, Any] = self.person.as_dict()
+        sex = ("female", "male")[int(rng.integers(2))]
+        self.stature = round(float(rng.uniform(*STATURES)), 2)
+        mass = round(float(rng.uniform(*BODY_MASS_INDICES)) * self.stature**2, 1)
+        self.body = {"model": "human", "stature_m": self.stature, "mass_kg": mass, "sex": sex}
         self.floor: float | None = 0.0
         self.keys: dict[str, Any] = {}
         self.meshes: dict[str, trimesh.Trimesh] = {}
@@ -119,9 +96,8 @@ class Sketch:
         low, high = (np.asarray(end, dtype=np.float64) for end in ends)
         way = high - low
         along = way / np.linalg.norm(way)
-        roll, pitch = (
-            (90.0, 0.0) if abs(along[1]) > 0.5 else (0.0, np.degrees(np.arctan2(along[0], along[2])))
-        )
+        level = abs(along[1]) > 0.5
+        roll, pitch = (90.0, 0.0) if level else (0.0, np.degrees(np.arctan2(along[0], along[2])))
         shape = {"radius_m": radius, "length_m": round(float(np.linalg.norm(way)), 4)}
         self.add(name, cylinder=shape, position=0.5 * (low + high), rpy_deg=(roll, round(pitch, 2), 0.0))
 
@@ -158,10 +134,8 @@ class Sketch:
     def data(self, name: str, description: str) -> dict[str, Any]:
         """Content of the scenario's file."""
         floor = {} if self.floor == 0.0 else {"floor_height_m": self.floor}
-        scene = [
-            {**entry, "mesh": f"{name}-{entry['mesh']}"} if "mesh" in entry else entry
-            for entry in self._scene
-        ]
+        meshes = ({"mesh": f"{name}-{item['mesh']}"} if "mesh" in item else {} for item in self._scene)
+        scene = [item | mesh for item, mesh in zip(self._scene, meshes, strict=True)]
         return {
             "name": name, "description": description, "body": self.body, **floor, "scene": scene, **self.keys,
             "task": self._ends,

@@ -15,7 +15,7 @@ def chairs(sketch: Sketch) -> None:
     back.
     """
     seat = sketch.between(0.38, 0.52)
-    high = seat > 0.25 * sketch.person.stature
+    high = seat > 0.25 * sketch.stature
     front = sketch.between(0.12, 0.14) if high else sketch.between(0.13, 0.2)
     deep, thick = sketch.between(0.40, 0.46), sketch.between(0.03, 0.08)
     arms, padded = sketch.coin(), sketch.coin()

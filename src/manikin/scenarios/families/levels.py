@@ -47,9 +47,7 @@ def platforms(sketch: Sketch) -> None:
     height, away, turn = sketch.between(0.15, 0.45), sketch.between(0.4, 0.8), sketch.between(-30.0, 30.0, 1)
     deep, side = sketch.between(1.0, 1.6), 0.5 * sketch.between(1.0, 2.0)
     about = (away, 0.0)
-    sketch.box(
-        "platform", (away, away + deep), (-side, side), (0.0, height), yaw_deg=turn, about=about
-    )  # fmt: skip
+    sketch.box("platform", (away, away + deep), (-side, side), (0.0, height), yaw_deg=turn, about=about)
     sketch.start(away * (1.0 - np.cos(np.deg2rad(turn))), -away * np.sin(np.deg2rad(turn)))
     sketch.goal(away + 0.5 * deep * np.cos(np.deg2rad(turn)), 0.5 * deep * np.sin(np.deg2rad(turn)), turn)
     if sketch.coin():
@@ -65,7 +63,7 @@ def roofs(sketch: Sketch) -> None:
     """
     height, away, turn = sketch.between(0.15, 0.3), sketch.between(0.4, 0.7), sketch.between(-40.0, 40.0, 1)
     deep, side = sketch.between(1.0, 1.4), 0.5 * sketch.between(1.2, 1.8)
-    roof = height + sketch.between(0.72, 0.95) * sketch.person.stature
+    roof = height + sketch.between(0.72, 0.95) * sketch.stature
     turned = {"yaw_deg": turn, "about": (away, 0.0)}
     sketch.box("platform", (away, away + deep), (-side, side), (0.0, height), **turned)
     sketch.box("roof", (away, away + deep), (-side, side), (roof, roof + 0.05), **turned)
@@ -120,9 +118,8 @@ def stones(sketch: Sketch) -> None:
     for number in range(sketch.whole(3, 5)):
         x += sketch.between(0.10, 0.35)
         wide, top, aside = sketch.between(0.30, 0.45), sketch.between(-0.08, 0.08), sketch.between(-0.1, 0.1)
-        sketch.box(
-            f"stone_{number + 1}", (x, x + wide), (aside - 0.5 * wide, aside + 0.5 * wide), (-0.5, top)
-        )  # fmt: skip
+        y = (aside - 0.5 * wide, aside + 0.5 * wide)
+        sketch.box(f"stone_{number + 1}", (x, x + wide), y, (-0.5, top))
         x += wide
     x += sketch.between(0.10, 0.35)
     sketch.box("far_bank", (x, x + 1.2), (-1.0, 1.0), (-0.5, 0.0))
@@ -177,11 +174,8 @@ def draw_rubble(sketch: Sketch, *, away: float, beyond: float) -> None:
         # The highest corner of a tilted block is below the limit, too.
         raised = 0.5 * float(sizes @ np.abs(np.sin(np.deg2rad(tilts[::-1]))))
         top, turn = sketch.between(0.02, 0.15 - raised), sketch.between(-90.0, 90.0, 1)
-        (x0, x1), (y0, y1) = (
-            (x - 0.5 * sizes[0], x + 0.5 * sizes[0]),
-            (y - 0.5 * sizes[1], y + 0.5 * sizes[1]),
-        )
-        sketch.box(f"block_{number}", (x0, x1), (y0, y1), (-0.1, top), yaw_deg=turn, tilt_deg=tilts)
+        along, aside = ((at - 0.5 * size, at + 0.5 * size) for at, size in zip((x, y), sizes, strict=True))
+        sketch.box(f"block_{number}", along, aside, (-0.1, top), yaw_deg=turn, tilt_deg=tilts)
     ends = (-0.8, away + long + beyond + 0.8)
     sketch.box("left_wall", ends, (side, side + 0.1), (0.0, 1.0))
     sketch.box("right_wall", ends, (-side - 0.1, -side), (0.0, 1.0))
@@ -232,9 +226,9 @@ def around(sketch: Sketch) -> None:
             if min(away + apart) < 0.0:
                 continue
             placed.append((at, radius))
-            (x0, x1), (y0, y1) = ((at[k] - 0.5 * sizes[k], at[k] + 0.5 * sizes[k]) for k in (0, 1))
+            along, across = ((at[k] - 0.5 * sizes[k], at[k] + 0.5 * sizes[k]) for k in (0, 1))
             height, turn = sketch.between(0.4, 1.8), sketch.between(-90.0, 90.0, 1)
-            sketch.box(f"box_{number + 1}", (x0, x1), (y0, y1), (0.0, height), yaw_deg=turn)
+            sketch.box(f"box_{number + 1}", along, across, (0.0, height), yaw_deg=turn)
             break
     sketch.start(0.0, 0.0)
     sketch.goal(way, 0.0)
@@ -258,7 +252,7 @@ def bars(sketch: Sketch) -> None:
 
     0.04 to 0.3 m high, 0.04 to 0.6 m deep. Possible: people squat and waddle at less than half their stature.
     """
-    low = sketch.between(0.65, 0.90) * sketch.person.stature
+    low = sketch.between(0.65, 0.90) * sketch.stature
     deep, high, away = sketch.between(0.04, 0.6), sketch.between(0.04, 0.3), sketch.between(0.6, 1.0)
     turn = sketch.between(-20.0, 20.0, 1)
     sketch.box("bar", (away, away + deep), (-WIDE, WIDE), (low, low + high), yaw_deg=turn)
@@ -273,7 +267,7 @@ def hatches(sketch: Sketch) -> None:
     Possible: that is more than a person is high who sits on the sill, 52 %, and wider than the shoulders.
     """
     sill, thick, away = sketch.between(0.15, 0.4), sketch.between(0.04, 0.2), sketch.between(0.5, 0.9)
-    lintel = sill + sketch.between(0.55, 0.75) * sketch.person.stature
+    lintel = sill + sketch.between(0.55, 0.75) * sketch.stature
     side = 0.5 * sketch.between(0.65, 0.9)
     x = (away, away + thick)
     sketch.box("sill", x, (-side, side), (0.0, sill))

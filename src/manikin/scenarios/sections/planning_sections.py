@@ -29,6 +29,7 @@ from manikin.scenarios.validation import (
     optional,
     preset,
     refuse,
+    refuse_if,
     required,
 )
 
@@ -227,10 +228,9 @@ class BodySection(Section):
             if key not in valid and getattr(self, key) is not None:
                 keys = ", ".join(("model", *valid))
                 raise refuse(key, f"does not apply to {WORDS[self.model]}; valid: {keys}")
-        if self.model == "urdf":
-            for key in ("urdf", "limbs"):
-                if not getattr(self, key):
-                    raise refuse(key, "is missing; valid: urdf: FILE and limbs: {NAME: {tip: LINK}}")
+        for key in ("urdf", "limbs") if self.model == "urdf" else ():
+            problem = "is missing; valid: urdf: FILE and limbs: {NAME: {tip: LINK}}"
+            refuse_if(not getattr(self, key), key, problem)
         return self
 
     @model_serializer(mode="wrap")
@@ -301,9 +301,10 @@ class PlanningSection(Section):
 
     @model_validator(mode="after")
     def _recorded(self) -> Self:
-        if self.method == "keyframes" and self.recording is None:
-            raise refuse("recording", "is missing; valid: a run directory or motion file for keyframes")
+        missing = self.method == "keyframes" and self.recording is None
+        problem = "is missing; valid: a run directory or motion file for keyframes"
+        refuse_if(missing, "recording", problem)
+        problem = f"is given for the method {self.method}; valid: only with keyframes"
         for key in ("recording", "recording_frame", "control_points"):
-            if self.method != "keyframes" and getattr(self, key) is not None:
-                raise refuse(key, f"is given for the method {self.method}; valid: only with keyframes")
+            refuse_if(self.method != "keyframes" and getattr(self, key) is not None, key, problem)
         return self

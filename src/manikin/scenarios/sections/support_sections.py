@@ -15,22 +15,16 @@ from manikin.scenarios.validation import (
     optional,
     preset,
     refuse,
+    refuse_if,
     required,
     rule_error,
 )
 
+_POINT_KEYS = ("normal", "friction", "normal_force_cap_N")
+
 _KIND_KEYS: dict[str, tuple[str, ...]] = {
-    "sole": (
-        "normal",
-        "sole",
-        "polygon",
-        "friction",
-        "normal_force_cap_N",
-        "torsion_limit_Nm",
-        "settle_s",
-        "edge_radius_m",
-    ),
-    "point": ("normal", "friction", "normal_force_cap_N"),
+    "sole": (*_POINT_KEYS, "sole", "polygon", "torsion_limit_Nm", "settle_s", "edge_radius_m"),
+    "point": _POINT_KEYS,
     "grasp": ("max_force_N", "planning_max_force_N", "max_moment_Nm", "rpy_deg"),
 }
 """Keys of a contact that only some kinds have."""
@@ -46,7 +40,9 @@ class SoleSection(Section):
 class ContactSection(Section):
     """One contact; what it leaves out comes from the section around it."""
 
-    kind: Literal["sole", "point", "grasp"] | None = optional("default: sole for a foot, grasp for a hand")
+    kind: Literal["sole", "point", "grasp"] | None = optional(
+        "default: sole for a foot, grasp for a hand, point for a fist or a knee"
+    )
     position: Annotated[Vector3, FrameMoves.POINT] = required(
         "of the contact (centre of a sole) in the world [m]"
     )
@@ -90,7 +86,8 @@ class ContactSection(Section):
 
     def kind_for(self, effector: str) -> str:
         """Kind of the contact when ``effector`` makes it."""
-        return self.kind or ("grasp" if "hand" in effector else "sole")
+        usual = {"hand": "grasp", "fist": "point", "knee": "point"}
+        return self.kind or usual.get(effector.rpartition("_")[2], "sole")
 
     def check_for(self, effector: str, path: str = "") -> None:
         """Refuse keys that the contact's kind does not have.
@@ -107,20 +104,24 @@ class ContactSection(Section):
             raise refuse(f"{path}max_force_N", "is missing; valid: a number > 0 [N] for a grasp")
 
 
-EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand", "buttocks")
+EFFECTORS = (
+    "left_foot", "right_foot", "left_hand", "right_hand", "left_fist", "right_fist", "left_knee",
+    "right_knee", "buttocks",
+)  # fmt: skip
 """Effectors of a human that a phase may put in contact, in the order of the contact tables."""
 
 MASSLESS_FEET = ("left_front_foot", "right_front_foot", "left_hind_foot", "right_hind_foot")
 """Feet that only a point mass has, besides those of a human."""
 
 
-def _contact_tag(value: Any) -> str:
+def contact_tag(value: Any) -> str:
+    """Which of both an entry for an effector is: ``"same"`` or ``"contact"``."""
     return "same" if isinstance(value, str) else "contact"
 
 
 ContactEntry = Annotated[
     Annotated[Literal["same"], Tag("same")] | Annotated[ContactSection, Tag("contact")],
-    Discriminator(_contact_tag),
+    Discriminator(contact_tag),
 ]
 """A contact, or the word ``same`` for the one of the phase before."""
 
@@ -135,6 +136,10 @@ class PhaseSection(Section):
     right_foot: ContactEntry | None = optional("contact of the right foot, or 'same'")
     left_hand: ContactEntry | None = optional("contact of the left hand, or 'same'")
     right_hand: ContactEntry | None = optional("contact of the right hand, or 'same'")
+    left_fist: ContactEntry | None = optional("contact of the end of the left hand, or 'same'")
+    right_fist: ContactEntry | None = optional("contact of the end of the right hand, or 'same'")
+    left_knee: ContactEntry | None = optional("contact of the left knee, or 'same'")
+    right_knee: ContactEntry | None = optional("contact of the right knee, or 'same'")
     left_front_foot: ContactEntry | None = optional(_MASSLESS)
     right_front_foot: ContactEntry | None = optional(_MASSLESS)
     left_hind_foot: ContactEntry | None = optional(_MASSLESS)
@@ -157,15 +162,12 @@ class PhaseSection(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.max_duration_s is not None and self.max_duration_s < self.min_duration_s:
-            raise refuse(
-                "max_duration_s", f"is {self.max_duration_s:g}; valid: at least min_duration_s = "
-                f"{self.min_duration_s:g}"
-            )  # fmt: skip
-        if min(self.com_within_m) <= 0.0:
-            raise refuse("com_within_m", f"is {list(self.com_within_m)}; valid: three numbers > 0 [m]")
-        if not self.entries():
-            raise refuse("", f"has no contact; valid: at least one of {', '.join(EFFECTORS)}")
+        least, longest, room = self.min_duration_s, self.max_duration_s, list(self.com_within_m)
+        if longest is not None and longest < least:
+            problem = f"is {longest:g}; valid: at least min_duration_s = {least:g}"
+            raise refuse("max_duration_s", problem)
+        refuse_if(min(room) <= 0.0, "com_within_m", f"is {room}; valid: three numbers > 0 [m]")
+        refuse_if(not self.entries(), "", f"has no contact; valid: at least one of {', '.join(EFFECTORS)}")
         for effector, entry in self.entries().items():
             if not isinstance(entry, str):
                 entry.check_for(effector, f"{effector}.")
@@ -209,8 +211,8 @@ class SupportsSection(Section):
         if self.planning_sole is not None:
             for key in ("length_m", "width_m"):
                 ours, real = getattr(self.planning_sole, key), getattr(self.sole, key)
-                if ours > real:
-                    raise refuse(f"planning_sole.{key}", f"is {ours:g}; valid: at most sole.{key} = {real:g}")
+                problem = f"is {ours:g}; valid: at most sole.{key} = {real:g}"
+                refuse_if(ours > real, f"planning_sole.{key}", problem)
         for key, real in (
             ("planning_friction", "friction"),
             ("planning_normal_force_cap_N", "normal_force_cap_N"),
@@ -218,26 +220,23 @@ class SupportsSection(Section):
             ours, limit = getattr(self, key), getattr(self, real)
             if ours is not None and limit is not None and ours > limit:
                 raise refuse(key, f"is {ours:g}; valid: at most {real} = {limit:g}")
-        if self.phases[0].com_near is not None:
-            raise refuse("phases[0].com_near", "is given; valid: task.start.com says where the motion begins")
-        if self.foot == "rolling" and any(phase.com_near is not None for phase in self.phases):
-            raise refuse("foot", "is rolling beside a phase with com_near; valid: flat, or no com_near")
+        near = [phase.com_near is not None for phase in self.phases]
+        problem = "is given; valid: task.start.com says where the motion begins"
+        refuse_if(near[0], "phases[0].com_near", problem)
+        problem = "is rolling beside a phase with com_near; valid: flat, or no com_near"
+        refuse_if(self.foot == "rolling" and any(near), "foot", problem)
+        problem = "is 'same' but the phase before has no such contact; valid: a contact with a position"
         for number, phase in enumerate(self.phases):
             before = self.phases[number - 1].entries() if number else {}
             for effector, entry in phase.entries().items():
-                if entry == "same" and effector not in before:
-                    raise refuse(
-                        f"phases[{number}].{effector}", "is 'same' but the phase before has no such contact; "
-                        "valid: a contact with a position"
-                    )  # fmt: skip
+                missing = entry == "same" and effector not in before
+                refuse_if(missing, f"phases[{number}].{effector}", problem)
         return self
 
     def resolved_phases(self) -> list[dict[str, ContactSection]]:
         """Contacts of each phase with every ``same`` replaced by what it stands for."""
         phases: list[dict[str, ContactSection]] = []
         for phase in self.phases:
-            contacts: dict[str, ContactSection] = {}
-            for effector, entry in phase.entries().items():
-                contacts[effector] = phases[-1][effector] if isinstance(entry, str) else entry
-            phases.append(contacts)
+            given = phase.entries().items()
+            phases.append({name: phases[-1][name] if isinstance(e, str) else e for name, e in given})
         return phases

@@ -20,6 +20,8 @@ from manikin.scenarios.validation import (
     optional,
     preset,
     refuse,
+    refuse_if,
+    refuse_repeated,
     required,
     rule_error,
 )
@@ -40,10 +42,8 @@ class PushSection(Section):
     direction_deg: Number = required("of the force, counter-clockwise from the body's forward axis [deg]")
     duration_s: Duration = required("how long [s]")
     at_s: NonNegative = required("when it begins [s]")
-    frequency_hz: Positive | None = Field(
-        default=None,
-        le=LARGEST_FREQUENCY,
-        description="of a sine that begins with the push [Hz] (default: a constant force)",
+    frequency_hz: Annotated[Positive, Field(le=LARGEST_FREQUENCY)] | None = optional(
+        "of a sine that begins with the push [Hz] (default: a constant force)"
     )
 
 
@@ -134,8 +134,8 @@ class ObstacleSection(Section):
             result = f"has {' and '.join(given)}" if given else "has no shape"
             raise refuse("", f"{result}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
         for key in ("scale", "unit", "convex"):
-            if getattr(self, key) is not None and given[0] != "mesh":
-                raise refuse(key, f"is given for a {given[0]}; valid: only with mesh")
+            other = getattr(self, key) is not None and given[0] != "mesh"
+            refuse_if(other, key, f"is given for a {given[0]}; valid: only with mesh")
         for key in ("plane", "half_space"):
             normal = getattr(self, key)
             if normal is not None and not any(normal):
@@ -217,15 +217,10 @@ class WalkingSection(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        names = [other.name for other in self.others]
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                raise refuse(f"others[{index}].name", f"is {name!r} again; valid: a unique name")
-            if self.others[index].via[-1].speed_m_s > 0.0:
-                raise refuse(
-                    f"others[{index}].via[{len(self.others[index].via) - 1}].speed_m_s",
-                    "is not 0; valid: the last one is a stop, 0",
-                )
+        refuse_repeated([other.name for other in self.others], "others[{}].name")
+        for index, other in enumerate(self.others):
+            key = f"others[{index}].via[{len(other.via) - 1}].speed_m_s"
+            refuse_if(other.via[-1].speed_m_s > 0.0, key, "is not 0; valid: the last one is a stop, 0")
         return self
 
 
@@ -241,18 +236,17 @@ class ExpectSection(Section):
     @model_validator(mode="after")
     def _check(self) -> Self:
         for key in ("stage", "because"):
-            if self.outcome == "success" and getattr(self, key) is not None:
-                raise refuse(key, "is given beside outcome: success; valid: beside outcome: failure")
+            beside = self.outcome == "success" and getattr(self, key) is not None
+            refuse_if(beside, key, "is given beside outcome: success; valid: beside outcome: failure")
         return self
-
-
-def _mapping(value: Any) -> Any:
-    return {"outcome": value} if isinstance(value, str) else value
 
 
 Expectation = Annotated[
     ExpectSection,
-    BeforeValidator(_mapping, json_schema_input_type=Literal["success", "failure"] | ExpectSection),
+    BeforeValidator(
+        lambda value: {"outcome": value} if isinstance(value, str) else value,
+        json_schema_input_type=Literal["success", "failure"] | ExpectSection,
+    ),
 ]
 """``success``, ``failure``, or a mapping with the outcome, the stage and the reason."""
 

@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import Delaunay, QhullError
+from trimesh.triangles import closest_point, points_to_barycentric
 
 from manikin.body import BodyModel
 from manikin.errors import BodyError, InputError
@@ -35,12 +36,7 @@ class SteadyMotion:
 
 
 def travelled(velocity: FloatArray, time: FloatArray) -> FloatArray:
-    """(..., 3) x, y, heading reached from the origin with constant velocities after times.
-
-    Args:
-        velocity: (..., 3) forward, left [m/s], angular [rad/s].
-        time: (...) [s].
-    """
+    """(..., 3) x, y, heading reached from the origin with velocities (..., 3) after times (...) [s]."""
     turn = velocity[..., 2] * time
     # sin(a)/a and (1 - cos a)/a, as series where a is small and the circle a line.
     small = np.abs(turn) < 1e-6
@@ -126,14 +122,14 @@ class ControlSpace:
     straight ahead gives a symmetric walk.
     """
 
-    def __init__(self, library: MotionLibrary, radius: float = TURN_RADIUS) -> None:
-        """Build the tetrahedra, with a radius [m] as :data:`TURN_RADIUS`.
+    def __init__(self, library: MotionLibrary) -> None:
+        """Build the tetrahedra.
 
         Raises:
             InputError: If the velocities of the library span no volume.
         """
         self.library = library
-        self.scale = np.array([1.0, 1.0, radius])
+        self.scale = np.array([1.0, 1.0, TURN_RADIUS])
         self._points = library.velocities * self.scale
         try:
             self._cells = Delaunay(self._points)
@@ -188,40 +184,17 @@ class ControlSpace:
 
     def _on_faces(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
         """Corners (n, 4) and weights (n, 4) of the nearest points on the triangles of the hull."""
-        faces = self._cells.convex_hull
-        shares = _nearest_on_triangles(points, self._points[faces])
-        places = np.einsum("nfk,fki->nfi", shares, self._points[faces])
+        faces, n = self._cells.convex_hull, len(points)
+        triangles = np.tile(self._points[faces], (n, 1, 1))
+        places = closest_point(triangles, np.repeat(points, len(faces), axis=0)).reshape(n, -1, 3)
         best = np.linalg.norm(places - points[:, None], axis=2).argmin(axis=1)
-        corners = faces[best][:, [0, 1, 2, 2]].astype(np.int64)
-        return corners, np.hstack([shares[np.arange(len(best)), best], np.zeros((len(best), 1))])
+        corners = faces[best].astype(np.int64)
+        shares = points_to_barycentric(self._points[corners], places[np.arange(n), best])
+        return corners[:, [0, 1, 2, 2]], np.hstack([shares, np.zeros((n, 1))])
 
 
 _control_space = lru_cache(maxsize=4)(ControlSpace)
 """The control space of a library, built once."""
-
-
-def _nearest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """(n, f, 3) weights of the corners that give the point of each triangle nearest to each of n points."""
-    a, b, c = (triangles[None, :, k] for k in range(3))
-    p = points[:, None]
-    u, v, w = b - a, c - a, p - a
-    uu, uv, vv = (np.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
-    wu, wv = np.sum(w * u, axis=-1), np.sum(w * v, axis=-1)
-    area = np.maximum(uu * vv - uv**2, 1e-300)
-    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    nearest = np.stack([1.0 - s - t, s, t], axis=-1)
-    best = np.where((nearest >= 0.0).all(axis=-1), 0.0, np.inf)
-    for first, second, begin, end in ((0, 1, a, b), (1, 2, b, c), (2, 0, c, a)):
-        edge = end - begin
-        share = np.sum((p - begin) * edge, axis=-1) / np.maximum(np.sum(edge * edge, axis=-1), 1e-300)
-        share = np.clip(share, 0.0, 1.0)
-        away = np.linalg.norm(begin + share[..., None] * edge - p, axis=-1)
-        weights = np.zeros_like(nearest)
-        weights[..., first], weights[..., second] = 1.0 - share, share
-        nearer = away < best
-        nearest = np.where(nearer[..., None], weights, nearest)
-        best = np.where(nearer, away, best)
-    return nearest
 
 
 def _partners(library: MotionLibrary) -> NDArray[np.int64] | None:
@@ -285,14 +258,9 @@ class Gait:
         self.scale = leg_length(body) / library.leg
         self._to_velocity = np.array([self.scale, self.scale, 1.0])
 
-    @cached_property
-    def space(self) -> ControlSpace:
-        """Control space of the library."""
-        return _control_space(self.library)
-
     def blend(self, velocity: FloatArray) -> Blend:
         """Weights for (n, 3) velocities of this body, forward, left [m/s] and angular [rad/s]."""
-        blend = self.space.blend(velocity / self._to_velocity)
+        blend = _control_space(self.library).blend(velocity / self._to_velocity)
         return replace(blend, velocity=blend.velocity * self._to_velocity)
 
     def period(self, blend: Blend) -> FloatArray:
@@ -300,13 +268,7 @@ class Gait:
         return np.einsum("nk,nk->n", blend.weights, self.library.periods[blend.cycles])
 
     def frames(self, blend: Blend, phase: FloatArray, place: FloatArray) -> GaitFrames:
-        """Postures of a blend of n instants.
-
-        Args:
-            blend: Weights of the cycles.
-            phase: (n,) shares of the cycle [-].
-            place: (n, 3) x, y [m], heading [rad] of the line or circle.
-        """
+        """Postures of a blend at n shares of the cycle (n,) and places (n, 3) of the line or circle."""
         signals = self._signals(blend, phase)
         root = signals[:, : len(ROOT)]
         heading = place[:, 2]

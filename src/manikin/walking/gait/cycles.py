@@ -169,14 +169,10 @@ _ARMS, _LEGS = ("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot", "toes"
 
 
 def spread(body: BodyModel, coefficients: FloatArray) -> FloatArray:
-    """Coefficients with both arms, and both legs, abducted until they touch neither the body nor each other.
+    """Cycle (2 k + 1, s) with arms and legs abducted until they touch neither the body nor each other.
 
     By equal angles on both sides and the same throughout the cycle: 7.5 to 20 degrees for arms, 1.5 to 5.25
     for legs. Legs that cross in a turn may still touch.
-
-    Args:
-        body: The reference body.
-        coefficients: (2 k + 1, s) of one cycle.
     """
     coefficients = np.array(coefficients)
     data, geometry = body.pinocchio.createData(), pin.GeometryData(body.geometry)
@@ -235,7 +231,7 @@ _FIRST = ROOT.index("roll")
 def as_one_person(
     body: BodyModel, cycles: Sequence[MotionLibrary], persons: Sequence[str]
 ) -> list[MotionLibrary]:
-    """Cycles with the mean postures of the person who has most of them, equal on both sides.
+    """Libraries of one cycle each with the mean postures of the person who has most, equal on both sides.
 
     People hold arms, back and head in their own ways, and skeletons are fitted to them in different ways;
     blends of neighbouring cycles of two people would change with the speed from one habit to another. The
@@ -243,11 +239,6 @@ def as_one_person(
     of the person. What is equal on both sides is an even function of lateral and angular
     velocity, what is opposite an odd one; each is fitted by linear least squares. Only offsets are taken
     out, and only of mean angles; the movement stays that of the person.
-
-    Args:
-        body: The reference body.
-        cycles: Libraries of one cycle each.
-        persons: Name of the person who made each.
     """
     everyone = sorted(set(persons))
     main = Counter(persons).most_common(1)[0][0]
@@ -309,15 +300,11 @@ _HEIGHT = ROOT.index("height")
 
 
 def tilted(body: BodyModel, q: FloatArray, within: NDArray[np.bool_] | None = None) -> FloatArray:
-    """Postures with the mean pelvis tilt that goes with the trunk's lean; trunk and legs stay as they are.
+    """(n, nq) postures with the mean pelvis tilt that goes with the trunk's lean; trunk and legs stay.
 
     Joint centres of a skeleton tell the pelvis' tilt loosely: recordings differ by 15 degrees. The first
-    hinges of hips and lumbar spine are parallel to the axis of the tilt and undo it.
-
-    Args:
-        body: A human.
-        q: (n, nq) postures.
-        within: (n,) postures whose mean counts; all if omitted.
+    hinges of hips and lumbar spine are parallel to the axis of the tilt and undo it. The mean is over the
+    postures ``within`` (n,), all if omitted.
     """
     pelvis = Rotation.from_quat(q[:, 3:7])
     lumbar, thorax = (7 + body.joint_index(f"{name}_flexion") for name in ("lumbar", "thorax"))
@@ -334,15 +321,11 @@ def tilted(body: BodyModel, q: FloatArray, within: NDArray[np.bool_] | None = No
 
 
 def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> FloatArray:
-    """Coefficients with soles that are flat in the middle of the stance and, in the median, on the floor.
+    """Cycle (2 k + 1, s) with soles that are flat in mid-stance and, in the median, on the floor.
 
     Joint angles of a person with other proportions put the feet of the reference body a little higher or
-    lower, and at other angles; the means of ankle and height make up for it.
-
-    Args:
-        body: The reference body.
-        coefficients: (2 k + 1, s) of one cycle.
-        events: (3,) phases as of :class:`manikin.walking.gait.motion_library.MotionLibrary`.
+    lower, and at other angles; the means of ankle and height make up for it. Events are (3,) phases as of
+    :class:`manikin.walking.gait.motion_library.MotionLibrary`.
     """
     level = np.array(coefficients)
     landing, off, other = events
@@ -363,17 +346,10 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
 def on_the_floor(
     body: BodyModel, coefficients: FloatArray, events: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Cycle and events whose stances begin and end with the sole on the floor.
+    """Levelled cycle (2 k + 1, s) and events (3,) whose stances begin and end with the sole on the floor.
 
-    The recorded toes leave the floor later than the ball of the foot, over which ours rolls.
-
-    Args:
-        body: The reference body.
-        coefficients: (2 k + 1, s) of one cycle, levelled.
-        events: (3,) phases.
-
-    Returns:
-        Coefficients that begin where the left sole leaves the floor, and (3,) phases.
+    The recorded toes leave the floor later than the ball of the foot, over which ours rolls. The cycle begins
+    where the left sole leaves the floor.
     """
     landing, off, other = events
     (left_on, left_off), (right_on, right_off) = (

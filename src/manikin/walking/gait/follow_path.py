@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.body import BodyModel
 from manikin.errors import InputError
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.blend import Blend, Gait, travelled
@@ -30,13 +31,8 @@ from manikin.walking.path.walking_path import WalkingPath
 def stance_slides(body: BodyModel, q: FloatArray, standing: NDArray[np.bool_]) -> FloatArray:
     """(stances,) largest displacements over the floor in every stance of either foot [m].
 
-    From frame to frame, that of the lower end of the sole, heel or ball of the foot, is added up: a foot that
-    rolls over its ends does not slide.
-
-    Args:
-        body: A human.
-        q: (n, nq) postures.
-        standing: (2, n) whether the left and the right foot stand.
+    Of postures (n, nq) whose left and right foot stand or not, (2, n). From frame to frame, that of the lower
+    end of the sole, heel or ball of the foot, is added up: a foot that rolls over its ends does not slide.
     """
     slides = []
     for points, stands in zip(sole_points(body, q).values(), standing, strict=True):
@@ -126,7 +122,8 @@ class WalkController:
         self._velocity, self._phase, self._sink = np.zeros(3), FIRST_PHASE, 0.0
         blend = self._gait.blend(np.zeros((1, 3)))
         frames = self._gait.frames(blend, np.array([self._phase]), self._place[None])
-        self._feet = [FootState.at(pose) for pose in poses(self._legs.feet(frames))[:, 0]]
+        none = np.zeros(3)
+        self._feet = [FootState(pose, none, none, none) for pose in poses(self._legs.feet(frames))[:, 0]]
         self._asked: tuple[bytes, Blend] | None = None
 
     def step(self, dt: float, directive: ArrayLike) -> WalkFrame:
@@ -179,7 +176,7 @@ class WalkController:
                 state.lifted(share, self._next_offset(blend, number, frames.events[0]))
             state.update(path[number], share)
         offset = np.array([[state.offset] for state in self._feet])
-        distance = np.array([[state.corrected_by] for state in self._feet])
+        distance = np.array([[np.hypot(*(state.after - state.before)[:2])] for state in self._feet])
         feet = corrected(wanted, swing, offset, distance)
         least = self._sink * float(np.exp(-dt / RISE_TIME))
         q, sink = self._legs.reached(frames, feet, least)
@@ -276,16 +273,13 @@ class Walk:
         n, dt = len(self.time), float(self.time[1] - self.time[0])
         steps = np.array([pin.difference(model, a, b) for a, b in zip(self.q[:-1], self.q[1:], strict=True)])
         v = np.vstack([steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]]) / dt
-        data = model.createData()
-        com, momentum = np.empty((n, 3)), np.empty((n, 3))
-        for i, (q, rate) in enumerate(zip(self.q, v, strict=True)):
-            pin.computeCentroidalMomentum(model, data, q, rate)
-            com[i], momentum[i] = data.com[0], data.hg.angular
+        a = np.gradient(v, dt, axis=0)
+        centroidal = centroidal_motion(body, self.q, v, a)
         tau = np.full((n, body.nv), np.nan)
         tau[:, :6] = 0.0
         return Motion(
-            time=self.time, q=self.q, v=v, a=np.gradient(v, dt, axis=0), tau=tau, com=com,
-            angular_momentum=momentum, margin=np.full(n, np.nan), support=self.support,
+            time=self.time, q=self.q, v=v, a=a, tau=tau, com=centroidal.com,
+            angular_momentum=centroidal.angular_momentum, margin=np.full(n, np.nan), support=self.support,
             contact_force=np.full((n, 2, 6), np.nan), contact_names=self.feet,
             joint_names=body.joint_names,
         )  # fmt: skip

@@ -108,14 +108,6 @@ SYMMETRIC = ("walk straight", "run straight", "backward", STAND)
 
 
 @dataclass(frozen=True, eq=False)
-class _Person:
-    """A recording as a motion of the reference body."""
-
-    q: FloatArray
-    rate: float
-
-
-@dataclass(frozen=True, eq=False)
 class LibraryBuild:
     """A library and the windows that were not used for it.
 
@@ -148,7 +140,7 @@ def build_library(
     without: list[Window] = []
     for number, window in enumerate(windows):
         report(number / len(windows), window.file)
-        cycle = _cycle(body, window, person(window.file))
+        cycle = _cycle(body, window, *person(window.file))
         if cycle is None or _slide(body, cycle) > MOST_SLIDE:
             without.append(window)
         else:
@@ -167,39 +159,38 @@ def build_library(
     return LibraryBuild(library, tuple(without), near)
 
 
-def _person(body: BodyModel, file: Path) -> _Person:
+def _person(body: BodyModel, file: Path) -> tuple[FloatArray, float]:
+    """A recording as (n, nq) postures of the reference body, and its rate [Hz]."""
     recording = read_recording(file)
     if not isinstance(recording, Recording):
         raise InputError(f"{file} holds no skeleton; valid: BVH or AMC")
     reconstruction = reconstruct(recording)
     q = np.array(reconstruction.q)
     q[:, :3] *= leg_length(body) / leg_length(reconstruction.body)
-    return _Person(q, recording.rate)
+    return q, recording.rate
 
 
-def _cycle(body: BodyModel, window: Window, person: _Person) -> MotionLibrary | None:
+def _cycle(body: BodyModel, window: Window, q: FloatArray, rate: float) -> MotionLibrary | None:
     """The cycle of a window that closes best, or None.
 
     Raises:
         InputError: If the recording ends before the window does.
     """
-    if window.last > len(person.q):
-        raise InputError(
-            f"{window.file} has {len(person.q)} frames; valid: at least {window.last}, by {TABLE}"
-        )
+    if window.last > len(q):
+        raise InputError(f"{window.file} has {len(q)} frames; valid: at least {window.last}, by {TABLE}")
     if window.kind == STAND:
-        return _standing(body, window, person)
-    events = foot_events(body, person.q, person.rate)
-    cuts = cycle_cuts(events, window.first / person.rate, window.last / person.rate)
-    time = np.arange(len(person.q)) / person.rate
-    signals = CubicSpline(time, _signals(person.q))
+        return _standing(body, window, q)
+    events = foot_events(body, q, rate)
+    cuts = cycle_cuts(events, window.first / rate, window.last / rate)
+    time = np.arange(len(q)) / rate
+    signals = CubicSpline(time, _signals(q))
     inside = [cut for cut in cuts if cut.end <= time[-1]]
     best = min(inside, key=lambda cut: _gap(signals, cut), default=None)
     if best is None or _gap(signals, best) > NOT_CLOSED:
         return None
     within = (time >= best.start) & (time <= best.end)
-    signals = CubicSpline(time, _signals(tilted(body, person.q, within)))
-    return _coded(body, window, signals, best, person.rate)
+    signals = CubicSpline(time, _signals(tilted(body, q, within)))
+    return _coded(body, window, signals, best, rate)
 
 
 def _signals(q: FloatArray) -> FloatArray:
@@ -247,9 +238,9 @@ def _slide(body: BodyModel, cycle: MotionLibrary) -> float:
     return float(stance_slides(body, frames.q, frames.swing() < 0.0).max())
 
 
-def _standing(body: BodyModel, window: Window, person: _Person) -> MotionLibrary:
+def _standing(body: BodyModel, window: Window, q: FloatArray) -> MotionLibrary:
     """The mean posture of a window, with the period and events of a slow walk to put feet in place."""
-    values = _signals(tilted(body, person.q[window.first : window.last])).mean(axis=0)
+    values = _signals(tilted(body, q[window.first : window.last])).mean(axis=0)
     values[[0, 1, 5]] = 0.0
     coefficients = fourier_coefficients(np.tile(values, (SAMPLES, 1)))
     name = f"{Path(window.file).stem} {window.first}-{window.last}"

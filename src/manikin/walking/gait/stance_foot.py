@@ -39,27 +39,14 @@ class FootState:
     after: FloatArray
     standing: bool = True
 
-    @classmethod
-    def at(cls, pose: FloatArray) -> "FootState":
-        """A foot that stands at a pose (3,)."""
-        return cls(pose, np.zeros(3), np.zeros(3), np.zeros(3))
-
     def lifted(self, swing: float, target: FloatArray) -> None:
-        """Begin a swing towards a correction (3,).
-
-        After half of the swing the foot keeps its correction: it stood a moment ago.
-        """
+        """Begin a swing to a correction (3,); after half of it the foot, which just stood, keeps its own."""
         self.standing = False
         self.before = self.offset
         self.after = self.offset if swing > 0.5 else target
 
     def update(self, wanted: FloatArray, swing: float) -> None:
-        """Go on to the next instant.
-
-        Args:
-            wanted: (3,) x, y [m], yaw [rad] where the gait has the foot.
-            swing: Share of the swing [-], -1 while it stands.
-        """
+        """Go on to where the gait has the foot (3,), at a share of the swing, -1 while it stands."""
         if swing >= 0.0:
             share = float(smooth_step(np.array(swing)))
             self.offset = (1.0 - share) * self.before + share * self.after
@@ -68,11 +55,6 @@ class FootState:
             self.pose, self.standing = wanted + self.after, True
         self.offset = self.pose - wanted
         self.offset[2] = (self.offset[2] + np.pi) % (2.0 * np.pi) - np.pi
-
-    @property
-    def corrected_by(self) -> float:
-        """Distance between the corrections of one step and the next [m]."""
-        return float(np.hypot(*(self.after - self.before)[:2]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,13 +322,10 @@ def poses(feet: FootPlacement) -> FloatArray:
 
 
 def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
-    """The feet of a whole walk: in every stance at the mean of where the gait has them.
+    """The feet (2, n) of a whole walk: in every stance at the mean of where the gait has them.
 
-    In the first stance they are where they were at the start, in the last one where they come to rest.
-
-    Args:
-        wanted: (2, n) placements in the gait.
-        swing: (2, n) shares of the swing [-], -1 while they stand.
+    In the first stance they are where they were at the start, in the last one where they come to rest. The
+    swing (2, n) is as of :func:`corrected`.
     """
     both = [_steps(path, share) for path, share in zip(poses(wanted), swing, strict=True)]
     offset, distance = (np.array(values) for values in zip(*both, strict=True))

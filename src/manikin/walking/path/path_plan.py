@@ -54,17 +54,9 @@ def kinds_of_guesses(start: FloatArray, goal: FloatArray) -> list[str]:
 def guess_path(
     structure: PathStructure, kind: str, start: FloatArray, goal: FloatArray, via: Sequence[FloatArray] = ()
 ) -> FloatArray:
-    """Control points of a guess; the last one's heading may differ from the goal's by whole turns.
+    """(n, 3) control points of a guess of one of :data:`GUESSES`, past places ``via`` (2,) in order [m].
 
-    Args:
-        structure: Structure of the programme.
-        kind: One of :data:`GUESSES`.
-        start: (3,) x, y [m], heading [rad].
-        goal: (3,) x, y [m], heading [rad].
-        via: (2,) places to pass, in order [m].
-
-    Returns:
-        (n, 3).
+    The last one's heading may differ from the goal's by whole turns.
     """
     knots = structure.knots
     shares = np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(structure.pieces + DEGREE)])
@@ -91,12 +83,8 @@ def detours(
 ) -> Iterator[list[FloatArray]]:
     """Ways around obstacles, each a list of places to pass in order [m].
 
-    Args:
-        obstacles: Obstacles in the way; of more than two, all are passed on the same side.
-        times: Instants at which the walker is nearest to each [s].
-        walker: Extent of the walker.
-        start: (3,) x, y [m], heading [rad].
-        goal: (3,) x, y [m], heading [rad].
+    Of more than two obstacles, all are passed on the same side. ``times`` are the instants at which the
+    walker is nearest to each [s].
     """
     along = (goal[:2] - start[:2]) / np.hypot(*(goal[:2] - start[:2]))
     left = np.array([-along[1], along[0]])
@@ -161,27 +149,21 @@ class Grid:
         return self._cell * np.sqrt(0.5)
 
     def way(self, room: float) -> FloatArray | None:
-        """The shortest way whose cells keep their centres this far from all obstacles.
+        """(k, 2) centres of the cells of the shortest way with this much room [m]; None if there is none.
 
-        Args:
-            room: [m]; start and goal themselves may have less.
-
-        Returns:
-            (k, 2) centres of its cells between start and goal [m], or None if there is no way.
+        Start and goal, which are left out, may have less.
         """
         free = self._room >= room
         free[self._ends] = True
         index = np.arange(free.size).reshape(self._shape)
-        firsts, seconds, lengths = [], [], []
+        edges = []
         for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
             a = index[: self._shape[0] - dx, max(0, -dy) : self._shape[1] - max(0, dy)].ravel()
             b = a + dx * self._shape[1] + dy
             both = free[a] & free[b]
-            firsts.append(a[both])
-            seconds.append(b[both])
-            lengths.append(np.full(int(both.sum()), np.hypot(dx, dy)))
-        edges = (np.concatenate(lengths), (np.concatenate(firsts), np.concatenate(seconds)))
-        graph = coo_matrix(edges, shape=(free.size, free.size)).tocsr()
+            edges.append(np.stack([a[both], b[both], np.full(int(both.sum()), np.hypot(dx, dy))]))
+        first, second, length = np.concatenate(edges, axis=1)
+        graph = coo_matrix((length, (first, second)), shape=(free.size, free.size)).tocsr()
         _, before = dijkstra(graph, directed=False, indices=self._ends[0], return_predecessors=True)
         cells = [self._ends[1]]
         while cells[-1] != self._ends[0]:

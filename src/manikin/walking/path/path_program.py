@@ -72,23 +72,16 @@ class PathProgram:
     @cached_property
     def solver(self) -> ca.Function:
         """IPOPT on the programme."""
-        options = {
+        quiet = {
             "print_time": False,
             "error_on_fail": False,
             "calc_lam_p": False,
             "show_eval_warnings": False,
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "tol": 1e-6,
-                "max_iter": 100,
-                "bound_relax_factor": 0.0,
-                "mu_strategy": "adaptive",
-                "linear_solver": "mumps",
-            },
         }
+        ipopt = {"print_level": 0, "sb": "yes", "tol": 1e-6, "max_iter": 100, "bound_relax_factor": 0.0}
+        ipopt |= {"mu_strategy": "adaptive", "linear_solver": "mumps"}
         problem = {name: self.symbols[name] for name in ("x", "p", "f", "g")}
-        return ca.nlpsol("walking_path", "ipopt", problem, options)
+        return ca.nlpsol("walking_path", "ipopt", problem, quiet | {"ipopt": ipopt})
 
     def pack_parameters(self, values: dict[str, Any]) -> FloatArray:
         """Parameter vector from arrays by name."""
@@ -116,13 +109,11 @@ class PathProgram:
 def obstacle_parameters(index: int, obstacle: WalkObstacle) -> dict[str, FloatArray]:
     """Parameters of one obstacle: its track is a place, first a velocity of zero, and changes of velocity."""
     velocity = np.diff(obstacle.displacements, axis=0) / np.diff(obstacle.times)[:, None]
-    zero = np.zeros((1, 2))
-    changes = np.diff(np.vstack([zero, velocity, zero]), axis=0)
     return {
         f"corners{index}": obstacle.corners + obstacle.displacements[0],
         f"radius{index}": np.array([obstacle.radius]),
         f"times{index}": obstacle.times,
-        f"changes{index}": changes,
+        f"changes{index}": np.diff(np.pad(velocity, ((1, 1), (0, 0))), axis=0),
     }
 
 
@@ -263,13 +254,10 @@ def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
 
 
 def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatArray) -> dict[str, Any]:
-    """Parameters of the programme by name.
+    """Parameters of the programme by name, with the goal (3,) turned by whole turns as the guess arrives.
 
-    Args:
-        task: Task of the path.
-        tightening: (obstacles + 1,) further distance to keep at the samples [m], and further below the speed
-            limit [m/s].
-        turned_goal: (3,) the goal, its heading by whole turns as the guess arrives.
+    ``tightening`` (obstacles + 1,) is further distance to keep at the samples [m], and further speed below
+    the limit [m/s].
     """
     values: dict[str, Any] = {
         "start": task.start,
@@ -290,13 +278,8 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
 def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
     """Optimise from one guess, again with more room where the path between the samples had too little.
 
-    Args:
-        task: Task of the path.
-        guess: Start of the solver, with as many control points as the programme has.
-        finer: Factor of the number of pieces.
-
-    Returns:
-        The last iterate; ``failure`` says if that is not a solution.
+    The result is the last iterate, whose ``failure`` says if it is no solution. The number of pieces is
+    ``finer`` times the usual one; the guess has as many control points.
     """
     programme = programme_of(task, finer)
     tightening = np.zeros(len(task.obstacles) + 1)

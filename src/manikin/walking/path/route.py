@@ -82,12 +82,6 @@ class WalkRoute(SampledWalk):
     waits: tuple[float, ...]
     blocked: str | None = None
 
-    def __post_init__(self) -> None:
-        if not self.legs:
-            raise InputError("route has no leg; valid: at least one")
-        if len(self.waits) != len(self.legs) + 1:
-            raise InputError(f"route has {len(self.waits)} waits; valid: {len(self.legs) + 1}")
-
     @property
     def failure(self) -> str | None:
         """Why a leg is no solution of its task, or there is no room to stand; None for a success."""

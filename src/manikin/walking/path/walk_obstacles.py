@@ -75,15 +75,13 @@ class WalkObstacle:
         moved = frozen_array(displacements, f"{where} displacements [m]", (len(instants), 2))
         if len(instants) == 0 or np.any(np.diff(instants) <= 0):
             raise InputError(f"{where} times are {instants.tolist()}; valid: at least one, increasing")
-        values = {
-            "name": name,
-            "corners": _convex(frozen_array(corners, f"{where} corners [m]", (None, 2)), where),
-            "radius": finite_number(radius, f"{where} radius [m]", at_least=0.0),
-            "times": instants,
-            "displacements": moved,
-        }
-        for key, value in values.items():
-            object.__setattr__(self, key, value)
+        vars(self).update(
+            name=name,
+            corners=_convex(frozen_array(corners, f"{where} corners [m]", (None, 2)), where),
+            radius=finite_number(radius, f"{where} radius [m]", at_least=0.0),
+            times=instants,
+            displacements=moved,
+        )
 
     @classmethod
     def disc(cls, name: str, centre: ArrayLike, radius: float) -> Self:
@@ -113,9 +111,7 @@ class WalkObstacle:
             displacements=transform.directions(self.displacements).round(decimals),
         )
         first = int(np.lexsort(moved.corners.T[::-1])[0])
-        ordered = np.roll(moved.corners, -first, axis=0)
-        ordered.setflags(write=False)
-        object.__setattr__(moved, "corners", ordered)
+        object.__setattr__(moved, "corners", frozen_array(np.roll(moved.corners, -first, axis=0), "corners"))
         return moved
 
     @property
@@ -177,9 +173,7 @@ def _convex(corners: FloatArray, where: str) -> FloatArray:
         raise InputError(
             f"{where} has {len(corners)} corners without area; valid: one, or a polygon"
         ) from None
-    ordered = corners[hull.vertices].copy()
-    ordered.setflags(write=False)
-    return ordered
+    return frozen_array(corners[hull.vertices], where)
 
 
 STEPPED_ON = 0.02

@@ -92,13 +92,11 @@ def goal_direction(place: FloatArray, goal: FloatArray) -> FloatArray:
 def cost_rates(
     place: FloatArray, acceleration: FloatArray, goal: FloatArray, objective: WalkObjective
 ) -> FloatArray:
-    """(n, 5) integrands of the terms, without their weights.
+    """(n, 5) integrands of the terms without their weights, on the way to a goal (3,).
 
     Args:
         place: (n, 3) x, y [m], heading [rad].
         acceleration: (n, 3) forward, left [m/s^2], angular [rad/s^2].
-        goal: (3,) x, y [m], heading [rad].
-        objective: For its fade.
     """
     square = np.sum((goal[:2] - place[:, :2]) ** 2, axis=1)
     faded = square / (square + objective.goal_fade**2) * goal_direction(place, goal) ** 2
@@ -107,9 +105,6 @@ def cost_rates(
 
 START = (0.0, 0.0, float(np.pi / 2))
 """Where every subject stood: x, y [m], heading [rad] ([Truong2010]_ Fig. 4.14)."""
-
-TEST_TARGETS = ((1.0, 0.0, 0.0), (-1.0, 1.0, float(np.pi / 4)))
-"""Targets on which the thesis tests its cost ([Truong2010]_ 5.5.2)."""
 
 
 def experiment_targets() -> FloatArray:
@@ -133,15 +128,11 @@ def experiment_targets() -> FloatArray:
 
 
 def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
-    """Rate of a state under accelerations ([Truong2010]_ 5.5, with left positive).
+    """(..., 6) rate of a state under accelerations ([Truong2010]_ 5.5, with left positive).
 
     Args:
         state: (..., 6) x, y [m], heading [rad], forward and left velocity [m/s], angular velocity [rad/s].
-        control: (..., 3) forward and left acceleration [m/s^2], angular acceleration [rad/s^2]: the rates of
-            the body velocities.
-
-    Returns:
-        (..., 6).
+        control: (..., 3) rates of these velocities: forward, left [m/s^2], angular [rad/s^2].
     """
     z, u = _last(state, 6, "walking state"), _last(control, 3, "walking control")
     rate = np.empty((*np.broadcast_shapes(z.shape[:-1], u.shape[:-1]), 6))
@@ -194,18 +185,10 @@ def to_body(heading: ArrayLike, rate: ArrayLike) -> FloatArray:
 
 
 def body_motion(place: ArrayLike, rate: ArrayLike, second: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Velocities and accelerations that move the body along a given path.
+    """(..., 3) velocities and (..., 3) accelerations that move the body along a given path.
 
-    x, y and heading as functions of time are flat outputs of the model: its other states and its controls
-    follow from them and their derivatives, for any twice differentiable path.
-
-    Args:
-        place: (..., 3) x, y [m] and heading [rad].
-        rate: (..., 3) first derivatives.
-        second: (..., 3) second derivatives.
-
-    Returns:
-        (..., 3) forward, left and angular velocities, and (..., 3) accelerations.
+    x, y and heading (..., 3) as functions of time, with their first and second derivatives, are flat outputs
+    of the model: its other states and its controls follow from them, for any twice differentiable path.
     """
     heading = _last(place, 3, "place")[..., 2]
     velocity, acceleration = to_body(heading, rate), to_body(heading, second)

@@ -1,8 +1,7 @@
 """A walking path: where a walker is and how it moves from start to goal, with its cost and residuals."""
 
-import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -259,25 +258,6 @@ class _Dense(NamedTuple):
     place: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
-
-
-def walked(path: WalkingPath, least: float = 0.03) -> Sequence[tuple[str, float, float]]:
-    """Kind (``"holonomic"``, ``"nonholonomic"``), begin and end [s] of the stretches of a path, in order.
-
-    They are told apart by the angle between heading and motion alone. Stretches shorter than ``least``, as a
-    share of the duration, count to the one before [-].
-    """
-    kinds, times = path.holonomic, path.time
-    borders = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), len(kinds) - 1]
-    stretches: list[tuple[str, float, float]] = []
-    for first, last in itertools.pairwise(borders):
-        kind = "holonomic" if kinds[first] else "nonholonomic"
-        short = times[last] - times[first] < least * path.duration
-        if stretches and (short or stretches[-1][0] == kind):
-            stretches[-1] = (stretches[-1][0], stretches[-1][1], float(times[last]))
-        else:
-            stretches.append((kind, float(times[first]), float(times[last])))
-    return stretches
 
 
 def _frozen(array: FloatArray) -> FloatArray:

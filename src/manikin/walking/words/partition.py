@@ -126,12 +126,7 @@ class EqualPaths:
 
 
 def bent_to(path: WordPath, goal: FloatArray) -> WordPath | None:
-    """The local minimum that a path becomes when its goal moves straight to another one, or None if it ends.
-
-    Args:
-        path: A local minimum.
-        goal: (3,) x, y [m], heading with whole turns [rad].
-    """
+    """The local minimum that one becomes as its goal moves straight to another (3,), or None if it ends."""
     shape, cost, length = path.shape[None], path.cost, path.length
     for share in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         end = path.goal + share * (goal - path.goal)
@@ -145,9 +140,7 @@ def bent_to(path: WordPath, goal: FloatArray) -> WordPath | None:
 def equal_paths(one: WordPath, other: WordPath) -> EqualPaths:
     """Find the goal between two goals that both ways to go reach at the same cost, by bisection.
 
-    Args:
-        one: Best path to a goal.
-        other: Best path to another goal nearby, of another branch, from the same start.
+    Both are best paths from the same start, to goals that are near each other, of two branches.
 
     Raises:
         InputError: If both bend into each other, or one ends before the other's goal.
@@ -263,13 +256,9 @@ class WordSlice:
 
 
 def solve_slice(heading_deg: float, grid: WordGrid = THESIS_GRID) -> WordSlice:
-    """Best paths to all places of a grid with one final heading.
+    """Best paths to all places of a grid with one final heading; 90 deg is that of the start.
 
     After all guesses, the paths of neighbours are bent to each place until nothing gets cheaper.
-
-    Args:
-        heading_deg: Final heading, 90 is that of the start [deg].
-        grid: Places of the goals.
 
     Raises:
         InputError: If a place was not reached by any guess.
@@ -326,15 +315,10 @@ def shares(counts: Mapping[str, int]) -> dict[str, float]:
 def solve_slices(
     headings_deg: Sequence[float], grid: WordGrid = THESIS_GRID, *, jobs: int = 1
 ) -> Iterator[WordSlice]:
-    """Solve slices side by side; each depends on nothing but itself, so any number of jobs finds the same.
+    """Solve the slices of final headings [deg] side by side; yield them in the order in which they are done.
 
-    Args:
-        headings_deg: Final heading of each [deg].
-        grid: Places of the goals.
-        jobs: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
-
-    Yields:
-        The slices in the order in which they are done.
+    Each depends on nothing but itself, so any number of jobs (:func:`manikin.runtime.parallel.side_by_side`)
+    finds the same.
 
     Raises:
         InputError: If ``jobs`` is less than 1, or a slice cannot be solved.

@@ -26,12 +26,8 @@ DEGREE = 20
 def basis(share: FloatArray, integrals: int, degree: int = DEGREE) -> FloatArray:
     """(n, degree) Legendre polynomials of degree 1, 2, ... on [0, 1], integrated from 0 so many times.
 
-    Degree 0 is left out: the integrals of all others vanish at 1, so that the curvature ends at zero.
-
-    Args:
-        share: (n,) where, as a share of the length [-].
-        integrals: How often they are integrated.
-        degree: The highest.
+    They are taken at shares of the length (n,). Degree 0 is left out: the integrals of all others vanish at
+    1, so that the curvature ends at zero.
     """
     return np.column_stack([_integrated(number, integrals)(share) for number in range(1, degree + 1)])
 
@@ -124,11 +120,8 @@ def minimise(goals: Goals, shapes: FloatArray) -> Minima:
 
     A step is kept if it makes the cost, with an exact penalty on the direction missed, smaller; else it is
     damped more. A result counts only if the Hessian of the Lagrangian is positive definite along the
-    constraint: so it is a strict local minimum.
-
-    Args:
-        goals: Goals and turns, k of them.
-        shapes: (k, degree) where to begin; the first coefficient is set from the turns.
+    constraint: so it is a strict local minimum. It begins at ``shapes`` (k, degree), whose first coefficient
+    is set from the turns.
     """
     shapes = shapes.copy()
     shapes[:, 0] = -6.0 * goals.turn

@@ -159,13 +159,9 @@ class WordResiduals:
 
 
 def residuals(start: FloatArray, goals: FloatArray, shapes: FloatArray, lengths: FloatArray) -> WordResiduals:
-    """Integrate (3.2) by Runge and Kutta's rule and fit the adjoint to every path.
+    """Integrate (3.2) by Runge and Kutta's rule and fit the adjoint to paths as of :class:`WordPath`.
 
-    Args:
-        start: (3,) x, y [m], heading [rad].
-        goals: (k, 3) the same, with whole turns.
-        shapes: (k, degree) of the paths.
-        lengths: (k,) of the paths [m].
+    Start (3,), goals (k, 3) with whole turns, shapes (k, degree) and lengths (k,) [m].
     """
     share = np.linspace(0.0, 1.0, 2 * _STEPS + 1)
     rates = shapes @ basis(share, 0, shapes.shape[1]).T / lengths[:, None] ** 2
@@ -258,15 +254,9 @@ def guesses() -> list[tuple[float, ...]]:
 def cheapest(
     start: FloatArray, goals: FloatArray, amplitudes: Sequence[Sequence[float]]
 ) -> tuple[FloatArray, Minima]:
-    """For every goal the cheapest minimum from any guess with any turn.
+    """(k, 3) goals with the turns of their paths, and for each the cheapest minimum of any guess and turn.
 
-    Args:
-        start: (3,) x, y [m], heading [rad].
-        goals: (k, 3) the same, modulo whole turns.
-        amplitudes: Largest headings of the free polynomials of each guess, in order [rad].
-
-    Returns:
-        (k, 3) goals with the turns of their paths, and the paths.
+    A guess has the largest headings of the free polynomials, in order [rad].
     """
     size = len(goals)
     turned, shapes = goals.copy(), np.zeros((size, DEGREE))
@@ -274,20 +264,15 @@ def cheapest(
     for some, ends in _turns(start, goals):
         asked = Goals.of(start, ends)
         for guess in amplitudes:
-            minima = minimise(asked, np.tile(guessed_shape(guess), (len(ends), 1)))
+            shape = np.zeros(DEGREE)
+            free = slice(1, 1 + len(guess))
+            shape[free] = np.asarray(guess) / np.abs(quadrature()[0]).max(axis=0)[free]
+            minima = minimise(asked, np.tile(shape, (len(ends), 1)))
             better = minima.cost < cost[some] - _CHEAPER * minima.length
             chosen = some[better]
             turned[chosen], shapes[chosen] = ends[better], minima.shapes[better]
             cost[chosen], length[chosen] = minima.cost[better], minima.length[better]
     return turned, Minima(shapes, cost, length)
-
-
-def guessed_shape(amplitudes: Sequence[float]) -> FloatArray:
-    """(degree,) coefficients of a heading whose free polynomials have these largest values [rad]."""
-    shape = np.zeros(DEGREE)
-    free = slice(1, 1 + len(amplitudes))
-    shape[free] = np.asarray(amplitudes) / np.abs(quadrature()[0]).max(axis=0)[free]
-    return shape
 
 
 def _turns(start: FloatArray, goals: FloatArray) -> Iterator[tuple[NDArray[np.intp], FloatArray]]:

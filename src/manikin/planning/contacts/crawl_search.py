@@ -1,0 +1,515 @@
+"""Contacts of a body that crawls under what it cannot walk below: it kneels down, crawls, and gets up again.
+
+The order of the limbs is that of most four-legged animals that creep: a knee, the hand of its side, the other
+knee, its hand, so that three of them carry at any time.  Each goes to where the way over the ground has it,
+on whatever surface is there.  Getting up is planned from hands and knees to two feet; kneeling down is the
+same backwards, as every posture at rest is at rest backwards as well.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.balance.criteria import static_torque_share
+from manikin.body import BodyModel, Configuration
+from manikin.contact import Contact, Stance, point
+from manikin.kinematics import Placement, Preferences
+from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
+from manikin.planning.contacts.best_first import Extension
+from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
+from manikin.planning.contacts.endpoint import Endpoints, Habit
+from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.planning.contacts.footsteps import LOW_STEP, low_way
+from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
+from manikin.planning.contacts.seat import FEET
+from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
+from manikin.scene import Box, Obstacle, Scene
+
+ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")
+"""Order in which limbs go."""
+
+CRAWLING = (0.2, 0.05, 0.45)
+"""Radius, lowest and highest end of what has to be free to crawl, of a body of 1.75 m [m]."""
+
+APART = {"knee": 0.10, "fist": 0.17}
+"""Distance of limbs to the middle of the way, of a body of 1.75 m [m]; our choice, as the next ones."""
+
+WHEELBASE = {"knee": -0.65, "fist": 0.65}
+"""Place of limbs along the way, of a body of 1.75 m, twice [m]."""
+
+RESTING = (0.35, 0.2, 0.5)
+"""Places of the centre of mass that are tried, as shares of the way from the knees to the fists: arms are
+weaker than thighs."""
+
+EASE = 0.9
+"""Largest share of the strength for which a posture at rest may ask; the motion asks for more."""
+
+ROOM = 0.72
+"""Height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]."""
+
+GAITS = ((0.42, 0.60), (0.42, 0.70), (0.28, 0.52), (0.28, 0.70))
+"""Strides and distances of hands before knees that are tried, of a body of 1.75 m [m]."""
+
+KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
+"""Distances of hands before knees, and of knees before the feet, with which the body kneels down and gets up
+that are tried, of a body of 1.75 m [m]."""
+
+NEARBY = ((1.0, 0.0), (0.6, 0.0), (1.0, -0.05), (1.0, 0.05), (0.6, -0.05))
+"""Shares of a step, and ways outwards [m], that are tried for a limb."""
+
+BEFORE, BEHIND = 0.85, 0.45
+"""Distances of feet before what is low and behind it at which the body kneels and gets up, of a body of
+1.75 m [m]."""
+
+NEAR_END = 0.8
+"""Way to the start or goal up to which the body kneels or gets up there, and does not walk [m]."""
+
+TURNED = math.radians(25.0)
+"""Angle up to which it does so with feet as they are."""
+
+STEEPEST = math.radians(30.0)
+"""Largest slope of a surface for hands and knees."""
+
+INSET = 0.03
+"""Distance of hands and knees to the edges of what they are on [m]."""
+
+LIFT = 0.05
+"""Height of a limb in flight [m]."""
+
+LEVEL = {"knee": 0.3, "fist": 6.0}
+"""Weights with which shanks are level and hands upright [1/rad^2]."""
+
+TILT = 0.19
+"""Sine of the largest angle of a hand on its fist: its edge is not pressed into the ground."""
+
+TURNING = 1.2
+"""Time in which a leg goes from its knee onto its foot or back [s]."""
+
+_ON_ALL_FOURS = {
+    "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 80.0,
+    "elbow_flexion": 10.0, "wrist_flexion": -65.0, "neck_flexion": -30.0,
+}  # fmt: skip
+_PITCH = math.radians(80.0)
+_PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
+
+Walk = Callable[[Stage, Stage], Extension]
+"""Plans a walk between two stages on feet."""
+
+
+def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
+    """Posture on fists and knees on a level floor, the middle between them at the origin."""
+    q = np.array(body.standing_posture())
+    names = (name.removeprefix("left_").removeprefix("right_") for name in body.joint_names)
+    q[7:] = [math.radians(_ON_ALL_FOURS.get(name, 0.0)) for name in names]
+    q[:3], q[3:7] = 0.0, quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
+    q[2] = -Configuration(body, q).effector_placement(ORDER[0])[1][2]
+    size = stature_of(body) / 1.75
+    held = {}
+    for name in ORDER:
+        side, _, part = name.partition("_")
+        place = size * np.array([0.5 * WHEELBASE[part], (1.0 if side == "left" else -1.0) * APART[part], 0.0])
+        held[name] = point(name, place, friction=1.0, rotation=np.eye(3))
+    ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * ROOM + 0.5))
+    finder = PostureFinder(body, Scene([ceiling]), q, settings)
+    at = np.zeros(2)
+    return finder.pose(held, held, q, place=at, placements=_level(held), preferences=_PREFERENCES)
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """Way over the ground.
+
+    Attributes:
+        places: (n, 3) [m].
+        along: (n,) length of the way up to each [m].
+    """
+
+    places: FloatArray
+    along: FloatArray
+
+    @classmethod
+    def of(cls, places: FloatArray) -> "_Way":
+        return cls(places, np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))))
+
+    def at(self, along: float) -> tuple[FloatArray, float]:
+        """Place (3,) [m] and heading [rad], on the straight beyond both ends."""
+        row = int(np.clip(np.searchsorted(self.along, along) - 1, 0, len(self.along) - 2))
+        start, end = self.places[row : row + 2]
+        ahead = (end - start) / (self.along[row + 1] - self.along[row])
+        return start + (along - self.along[row]) * ahead, math.atan2(ahead[1], ahead[0])
+
+
+class CrawlSearch:
+    """Search for the contacts of a way that is crawled in part."""
+
+    def __init__(
+        self, poser: PostureFinder, endpoints: Endpoints, start: Stage, goal: Stage, friction: float,
+        walk: Walk, settings: WalkSettings | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare a search.
+
+        Args:
+            poser: Of the body in its scene; postures on all fours are found with its settings.
+            endpoints: Finds where the body stands before and behind what is low.
+            start: On feet.
+            goal: On feet.
+            friction: Coulomb coefficient.
+            walk: Plans what is walked before and behind.
+            settings: Paces.
+        """
+        self._body, self._scene = poser.body, poser.scene
+        crawling = on_all_fours(poser.body, poser.settings)
+        self._fault = f"no posture on all fours: {crawling.reason}" if crawling.q is None else ""
+        self._reference = poser.body.standing_posture() if crawling.q is None else crawling.q
+        self._poser = PostureFinder(self._body, self._scene, self._reference, poser.settings)
+        self._endpoints, self._walk = endpoints, walk
+        self._start, self._goal, self._friction = start, goal, friction
+        self._settings = settings or WalkSettings()
+        self._size = stature_of(self._body) / 1.75
+        self._surfaces = self._scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
+
+    def run(self) -> Extension:
+        """The plan, or why there is none."""
+        found = self._fault or self._planned()
+        if isinstance(found, str):
+            return Extension(None, self._poser.searches, 0, found)
+        return Extension(found, self._poser.searches, 0)
+
+    def _planned(self) -> ContactPlan | str:
+        start, goal = (
+            (Foothold.of(stage.contacts[FEET[0]]), Foothold.of(stage.contacts[FEET[1]]))
+            for stage in (self._start, self._goal)
+        )
+        footholds = Footholds(self._body, self._scene, steepest=STEEPEST)
+        low, high = (
+            (self._size * radius, self._size * bottom, self._size * top)
+            for radius, bottom, top in (CRAWLING, COLUMN)
+        )
+        found = low_way(self._scene, footholds, (start, goal), low, high)
+        if found is None:
+            return "no way over the ground has room for the body on hands and knees"
+        way, under = _Way.of(found[0]), np.flatnonzero(~found[1])
+        if not len(under):
+            return "the body can walk all the way"
+        first, last = float(way.along[under[0]]), float(way.along[under[-1]])
+        before = self._standing(way, first - BEFORE * self._size, self._start, "before")
+        behind = self._standing(way, last + BEHIND * self._size, self._goal, "behind")
+        if isinstance(before, str) or isinstance(behind, str):
+            return before if isinstance(before, str) else str(behind)
+        down, up = self._risen(way, before), self._risen(way, behind)
+        if isinstance(down, str) or isinstance(up, str):
+            return down if isinstance(down, str) else str(up)
+        reason = ""
+        for gait in GAITS:
+            crawl = self._on_hands_and_knees(way, down, up, gait)
+            if not isinstance(crawl, str):
+                # The crawl begins with the stage that kneeling down ends with.
+                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages]
+                return self._joined(before, crawled, behind)
+            reason = reason or crawl
+        return reason
+
+    def _standing(self, way: _Way, along: float, end: Stage, side: str) -> Stage | str:
+        """Where the body stands to kneel down, or gets up; the start or goal itself where it is near."""
+        middle = np.mean([end.contacts[foot].position for foot in FEET], axis=0)
+        own = 0.0 if side == "before" else float(way.along[-1])
+        heading = way.at(own)[1]
+        turned = [abs(math.remainder(end.contacts[foot].yaw - heading, 2.0 * math.pi)) for foot in FEET]
+        if abs(own - along) < NEAR_END and max(turned) < TURNED:
+            return end
+        along = float(np.clip(along, 0.0, way.along[-1]))
+        place, heading = way.at(along)
+        place = middle if abs(own - along) < LOW_STEP else place
+        result = self._endpoints.find(place[:2], heading, Habit.STANDING, float(place[2]))
+        return result.stage or f"{side} what is low: {result.failure}"
+
+    def _joined(self, before: Stage, crawled: list[Stage], behind: Stage) -> ContactPlan | str:
+        """The crawl with what is walked before and behind it."""
+        stages, goal = list(crawled), behind.q
+        if before is not self._start:
+            walk = self._walk(self._start, before).plan
+            if walk is None:
+                return "no walk leads to where the body would kneel down"
+            stages = [*walk.stages, *stages[1:]]
+        if behind is not self._goal:
+            walk = self._walk(behind, self._goal).plan
+            if walk is None:
+                return "no walk leads on from where the body would get up"
+            stages, goal = [*stages, *walk.stages[1:]], walk.goal
+        return ContactPlan.of(self._body, stages, goal, self._settings.hinge_pace)
+
+    # --- kneeling down and getting up -------------------------------------------------------------
+
+    def _risen(self, way: _Way, standing: Stage) -> "_Rise | str":
+        """Stages from hands and knees to the feet of a stage, or why there are none."""
+        feet = {foot: standing.contacts[foot] for foot in FEET}
+        middle = np.mean([contact.position for contact in feet.values()], axis=0)
+        along = float(way.along[int(np.argmin(np.linalg.norm(way.places - middle, axis=1)))])
+        reason = ""
+        for (base, behind), lead in product(KNEELING, ("right", "left")):
+            at = along + behind * self._size
+            held = self._contacts(way, (at, at + base * self._size))
+            rise = held if isinstance(held, str) else self._got_up(held, feet, lead, standing.q)
+            if isinstance(rise, _Rise):
+                return replace(rise, along=at, base=base * self._size)
+            reason = reason or rise
+        return f"cannot kneel down at {np.round(middle, 2).tolist()} m: {reason}"
+
+    def _got_up(
+        self, held: dict[str, Contact], feet: Mapping[str, Contact], lead: str, standing: FloatArray
+    ) -> "_Rise | str":
+        """From four contacts onto two feet, the leading one first."""
+        other = "left" if lead == "right" else "right"
+        posed = self._posed(held, held, self._guide(held))
+        stages: list[Stage] = []
+        changes = [
+            (f"{lead}_knee", None), (None, f"{lead}_foot"), (f"{other}_knee", None), (None, f"{other}_foot"),
+            ("left_fist", None), ("right_fist", None),
+        ]  # fmt: skip
+        contacts, first = dict(held), posed.q
+        for leaving, landing in changes:
+            after = {name: contact for name, contact in contacts.items() if name != leaving}
+            if landing is not None:
+                after[landing] = feet[landing]
+            both = {**contacts, **after}
+            staying = {name: contact for name, contact in after.items() if name in contacts}
+            if posed.q is not None:
+                posed = self._posed(both, staying, None, posed.q)
+            if posed.q is None:
+                return f"{leaving or landing} cannot {'be put down' if landing else 'leave'}: {posed.reason}"
+            contacts = after
+            time = TURNING if len(after) == 3 and landing is None else self._settings.reach_duration
+            stages.append(Stage.of(self._body, contacts, posed.q, time))
+        assert first is not None
+        kneeling = Stage.of(self._body, held, first, self._settings.shift_duration)
+        return _Rise(kneeling, tuple(stages), standing)
+
+    # --- on hands and knees -----------------------------------------------------------------------
+
+    def _on_hands_and_knees(
+        self, way: _Way, down: "_Rise", up: "_Rise", gait: tuple[float, float]
+    ) -> list[Stage] | str:
+        """Stages from one place on hands and knees to another, or why there are none."""
+        stride, base = (self._size * value for value in gait)
+        total, contacts, q = up.along - down.along, dict(down.kneeling.contacts), down.kneeling.q
+        stages = [down.kneeling]
+        begin = {"knee": down.along, "fist": down.along + base}
+        end = {"knee": up.along, "fist": up.along + up.base}
+        reached = {name: self._along(name, down) for name in ORDER}
+        for number in range(4 * (2 + math.ceil(total / (0.5 * stride)))):
+            name = ORDER[number % 4]
+            part = name.partition("_")[2]
+            ahead = begin[part] + 0.25 * (number + 1) * stride
+            target = up.kneeling.contacts[name] if ahead >= end[part] else None
+            if contacts[name] is not target:
+                step = self._stepped(way, name, (reached[name], min(ahead, end[part])), target, contacts, q)
+                if isinstance(step, str):
+                    return step
+                stages += step.stages
+                reached[name], q = step.along, step.stages[-1].q
+                contacts = dict(step.stages[-1].contacts)
+            if all(contacts[each] is up.kneeling.contacts[each] for each in ORDER):
+                return stages
+        return "does not arrive on hands and knees"
+
+    def _along(self, name: str, end: "_Rise") -> float:
+        return end.along + (end.base if name.endswith("fist") else 0.0)
+
+    def _stepped(
+        self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None,
+        contacts: Mapping[str, Contact], q: FloatArray,
+    ) -> "_Step | str":  # fmt: skip
+        """One limb goes on: to a contact, or to where the way has it, or near there."""
+        staying = {other: contact for other, contact in contacts.items() if other != name}
+        lifted = self._posed(contacts, staying, self._guide(contacts), q)
+        if lifted.q is None:
+            return f"{name} cannot leave {_spot(contacts[name])}: {lifted.reason}"
+        reason = f"there is nothing to put {name} on beyond {_spot(contacts[name])}"
+        for along, contact in self._offers(way, name, ends, target):
+            landed = {**staying, name: contact}
+            landing = self._posed(landed, staying, self._guide(landed), lifted.q)
+            if landing.q is None:
+                reason = f"{name} cannot be put down at {_spot(contact)}: {landing.reason}"
+                continue
+            via = self._between(staying, name, (contacts[name], contact), (lifted.q, landing.q))
+            if via is None:
+                reason = f"{name} finds no way to {_spot(contact)}"
+                continue
+            settings = self._settings
+            way_there = float(np.linalg.norm(contact.position - contacts[name].position))
+            flight = max(settings.swing_duration, way_there / settings.swing_speed)
+            return _Step(along, (
+                Stage.of(self._body, staying, lifted.q, flight, via=via),
+                Stage.of(self._body, landed, landing.q, settings.shift_duration),
+            ))  # fmt: skip
+        return reason
+
+    def _offers(
+        self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None
+    ) -> Iterator[tuple[float, Contact]]:
+        """Contacts for a limb, where it should be first."""
+        if target is not None:
+            yield ends[1], target
+        for share, out in NEARBY:
+            along = ends[0] + share * (ends[1] - ends[0])
+            contact = self._contact(way, name, along, out)
+            if contact is not None:
+                yield along, contact
+
+    def _between(
+        self, staying: Mapping[str, Contact], name: str, ends: tuple[Contact, Contact],
+        postures: tuple[FloatArray, FloatArray],
+    ) -> FloatArray | None:  # fmt: skip
+        """(nq,) posture in the middle of a flight, the limb off the line between its contacts."""
+        middle = 0.5 * (ends[0].position + ends[1].position) + LIFT * ends[1].normal
+        start = 0.5 * (postures[0] + postures[1])
+        start[3:7] = postures[1][3:7]
+        wish = {name: Placement(middle, None, None, 0.5 / LIFT**2)}
+        return self._posed(staying, staying, None, start, wish).q
+
+    # --- contacts and postures --------------------------------------------------------------------
+
+    def _contacts(self, way: _Way, ends: tuple[float, float]) -> dict[str, Contact] | str:
+        """Knees and hands at two places along the way."""
+        found: dict[str, Contact] = {}
+        for name in ORDER:
+            contact = self._contact(way, name, ends[name.endswith("fist")])
+            if contact is None:
+                return f"there is nothing for {name} at {np.round(way.at(ends[0])[0], 2).tolist()} m"
+            found[name] = contact
+        return found
+
+    def _contact(self, way: _Way, name: str, along: float, out: float = 0.0) -> Contact | None:
+        """Contact of a limb beside the way, on the surface that is nearest to its height."""
+        place, heading = way.at(along)
+        side, _, part = name.partition("_")
+        turn = rotation_from_yaw(heading)
+        wanted = place + (1.0 if side == "left" else -1.0) * (APART[part] * self._size + out) * turn[:, 1]
+        best: Contact | None = None
+        least = 0.25 * self._size
+        for surface in self._surfaces:
+            base = surface.polygon[0]
+            height = base[2] - float((wanted - base)[:2] @ surface.normal[:2]) / surface.normal[2]
+            spot = np.array([wanted[0], wanted[1], height])
+            around = spot + INSET * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+            if abs(height - wanted[2]) < least and surface.outside(around).max() <= 0.0:
+                least, frame = abs(height - wanted[2]), onto_normal(turn, surface.normal)
+                best = point(name, spot, friction=self._friction, rotation=frame)
+        return best
+
+    def _guide(self, contacts: Mapping[str, Contact]) -> FloatArray:
+        """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
+        knees, hands = (
+            np.mean([contacts[f"{side}_{part}"].position for side in ("left", "right")], axis=0)
+            for part in ("knee", "fist")
+        )
+        ahead, q = hands - knees, np.array(self._reference)
+        yaw = math.atan2(ahead[1], ahead[0])
+        pitch = -math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
+        turn = rotations(np.array(yaw), np.array(pitch), np.array(0.0))
+        root = pin.XYZQUATToSE3(q[:7])
+        q[:7] = pin.SE3ToXYZQUAT(pin.SE3(turn, 0.5 * (knees + hands)) * root)
+        return q
+
+    def _posed(
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], guide: FloatArray | None,
+        start: FloatArray | None = None, wishes: Mapping[str, Placement] | None = None,
+    ) -> Posed:  # fmt: skip
+        """A posture that the strength can hold, palms flat and shanks level as far as they can be."""
+        begin = guide if start is None else start
+        assert begin is not None
+        first: Posed | None = None
+        for share in RESTING if guide is not None else (None,):
+            place = None if share is None else self._place(held, carrying, share)
+            posed = self._poser.pose(
+                held, carrying, begin, guide, place=place, placements={**_level(held), **(wishes or {})},
+                preferences=_PREFERENCES, restarts=guide is None and not wishes,
+            )  # fmt: skip
+            posed = self._held_easily(posed, held, carrying)
+            if posed.q is not None:
+                return posed
+            first = first or posed
+        return first or Posed(None)
+
+    def _place(
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], share: float
+    ) -> FloatArray | None:
+        """(2,) where the centre of mass rests, a share of the way from the knees to the fists [m]."""
+        knees, fists = (
+            np.mean([contact.position[:2] for name, contact in held.items() if name.endswith(part)], axis=0)
+            for part in ("knee", "fist")
+        )
+        return self._poser.resting_place(
+            carrying, knees + share * (fists - knees), self._poser.settings.inset
+        )
+
+    def _held_easily(
+        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact]
+    ) -> Posed:
+        """The posture, or that a hand is not upright in it, or that it asks for too much of the strength."""
+        if posed.q is None:
+            return posed
+        state = Configuration(self._body, posed.q)
+        for name, contact in held.items():
+            if name.endswith("fist"):
+                up = state.effector_placement(name)[0][:, 2]
+                if np.linalg.norm(np.cross(up, contact.normal)) > TILT:
+                    return Posed(None, f"{name} is not upright")
+        share = static_torque_share(self._body, posed.q, Stance(list(carrying.values())))
+        if share <= EASE:
+            return posed
+        return Posed(None, f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength")
+
+
+def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
+    """Wishes for shanks that are level and hands that are upright."""
+    return {
+        name: Placement(None, contact.rotation_contact_to_world, LEVEL[name.partition("_")[2]])
+        for name, contact in held.items() if name in ORDER
+    }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Rise:
+    """Getting up.
+
+    Attributes:
+        kneeling: On hands and knees.
+        stages: After that, up to that on two feet.
+        q: (nq,) standing posture at the end.
+        along: Where the knees are along the way [m].
+        base: Distance of the hands before them [m].
+    """
+
+    kneeling: Stage
+    stages: tuple[Stage, ...]
+    q: FloatArray
+    along: float = 0.0
+    base: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Stages of one limb's step, and where it is along the way then [m]."""
+
+    along: float
+    stages: tuple[Stage, ...]
+
+
+def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
+    """Kneeling down: the stages of getting up in the other order of time."""
+    stages = [rise.kneeling, *rise.stages]
+    begins = [*(stage.q for stage in stages[1:]), rise.q]
+    return [
+        Stage.of(body, stage.contacts, q, stage.min_duration)
+        for stage, q in zip(reversed(stages), reversed(begins), strict=True)
+    ]
+
+
+def _spot(contact: Contact) -> str:
+    return f"{np.round(contact.position, 2).tolist()} m"
