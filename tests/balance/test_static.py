@@ -1,12 +1,14 @@
 """Balance at rest by contact forces: against the polygon of point feet and hand calculation."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.balance import StaticRegion, static_room, static_torque_share
-from manikin.body import Configuration, insect
+from manikin.balance.criteria import torque_share_gradient
+from manikin.body import Configuration, human, insect
 from manikin.contact import FRICTION_MODELS, ContactModel, Stance, grasp, point, sole
 from manikin.numerics.polytope import signed_distance
 
@@ -58,3 +60,28 @@ def test_the_torque_share_of_an_insect_scales_with_its_strength():
         assert static_torque_share(body, q, Stance(feet[:2])) == np.inf
     assert 0.0 < shares[0] < 1.0
     assert shares[0] == pytest.approx(shares[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("feet", [("left_foot",), ("left_foot", "right_foot")])
+def test_the_gradient_of_the_share_is_its_slope_along_motions_that_keep_the_contacts(feet):
+    """Central differences over 2e-5 agree to 1e-5: the multipliers of the optimum times slopes of torques.
+
+    The soles are large, so that any posture can rest.
+    """
+    body, rng = human(1.75, 70.0, "male"), np.random.default_rng(len(feet))
+    q = np.array(body.standing_posture())
+    q[7:] = np.clip(q[7:] + 0.3 * rng.normal(size=len(q) - 7), body.lower, body.upper)
+    state = Configuration(body, q)
+    placed = {foot: state.effector_placement(foot) for foot in feet}
+    stance = Stance([
+        sole(foot, position, length=1.5, width=1.5, friction=2.0, rotation=rotation)
+        for foot, (rotation, position) in placed.items()
+    ])  # fmt: skip
+    share, gradient = torque_share_gradient(body, q, stance)
+    assert share == static_torque_share(body, q, stance)
+    rows = np.vstack([state.effector_jacobian(foot) for foot in feet])
+    move = rng.normal(size=body.nv)
+    move -= np.linalg.pinv(rows) @ (rows @ move)
+    ends = [pin.integrate(body.pinocchio, q, sign * 1e-5 * move) for sign in (1.0, -1.0)]
+    slope = np.subtract(*(static_torque_share(body, end, stance) for end in ends)) / 2e-5
+    assert gradient @ move == pytest.approx(slope, rel=1e-5)

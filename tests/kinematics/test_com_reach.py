@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from manikin.body import Configuration, human, insect
 from manikin.contact import point, sole
@@ -104,6 +105,16 @@ def test_places_of_a_foot_grow_with_the_body_and_are_mirrored():
     np.testing.assert_allclose(tall.room(scaled), 1.2 * short.room(places), rtol=1e-6, atol=1e-9)
     reflected = places * [1.0, -1.0, 1.0, -1.0]
     np.testing.assert_allclose(short.room(reflected, "left_foot"), short.room(places))
+
+
+@pytest.mark.parametrize("heels", ["down", "both up"])
+def test_a_foot_reaches_as_far_down_as_up(heels):
+    """Whoever has one foot up has the other down; to the 32 bits of the table."""
+    reach = StepReach.of(human(1.75, 70.0, "male"), heels)
+    free = [(None, None)] * 4
+    up, down = (linprog([0.0, 0.0, sign, 0.0], reach.A, reach.b, bounds=free).fun for sign in (-1.0, 1.0))
+    assert up < -0.7
+    assert down == pytest.approx(up, rel=1e-5)
 
 
 def test_the_shipped_places_are_those_that_sampling_finds():

@@ -237,16 +237,28 @@ def static_torque_share(
     Returns:
         The share; infinite where the contacts cannot hold the posture.
     """
+    return torque_share_gradient(body, q, stance, acceleration)[0]
+
+
+def torque_share_gradient(
+    body: BodyModel, q: FloatArray, stance: Stance, acceleration: FloatArray | None = None
+) -> tuple[float, FloatArray | None]:
+    """The share of :func:`static_torque_share`, and its gradient (nv,) along motions that keep the contacts.
+
+    The gradient is that of the optimal value of a linear program: its multipliers times the derivatives of
+    the torques under constant contact forces.  It leaves the acceleration out, and is None where the share is
+    infinite.
+    """
     if not len(stance):
-        return np.inf
+        return np.inf, None
     generators, state = ContactGenerators.of(stance), Configuration(body, q)
     origins = np.array([contact.position for contact in stance])[generators.contact]
     wrenches = generators.about(origins).T
-    model = body.pinocchio
+    model, data, q = body.pinocchio, body.pinocchio.createData(), np.asarray(q)
     moving = np.zeros(model.nv)
     if acceleration is not None:
-        moving[:3] = pin.XYZQUATToSE3(np.asarray(q)[:7]).rotation.T @ acceleration
-    gravity = pin.rnea(model, model.createData(), np.asarray(q), np.zeros(model.nv), moving)
+        moving[:3] = pin.XYZQUATToSE3(q[:7]).rotation.T @ acceleration
+    gravity = pin.rnea(model, data, q, np.zeros(model.nv), moving)
     jacobians = [state.effector_jacobian(contact.effector) for contact in stance]
     columns = np.column_stack(
         [jacobians[number].T @ wrench for number, wrench in zip(generators.contact, wrenches, strict=True)]
@@ -261,7 +273,19 @@ def static_torque_share(
         A_eq=np.column_stack([columns[:6], np.zeros(6)]), b_eq=gravity[:6],
         bounds=[*((0.0, limit) for limit in generators.upper), (0.0, None)], method="highs",
     )  # fmt: skip
-    return float(solution.x[-1]) if solution.success else np.inf
+    if not solution.success:
+        return np.inf, None
+    upper, lower = solution.ineqlin.marginals[:-1].reshape(2, -1)
+    multipliers = np.concatenate([solution.eqlin.marginals, upper - lower])
+    forces = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
+    for number, contact in enumerate(stance):
+        mine = generators.contact == number
+        frame = model.frames[body.effector_frame(contact.effector)]
+        turn = pin.SE3(state.effector_placement(contact.effector)[0], np.zeros(3))
+        wrench = turn.actInv(pin.Force(solution.x[:-1][mine] @ wrenches[mine]))
+        forces[frame.parentJoint] += frame.placement.act(wrench)
+    slopes = pin.computeStaticTorqueDerivatives(model, data, q, forces)
+    return float(solution.x[-1]), slopes.T @ multipliers
 
 
 def _cap(stance: Stance, mass: float) -> float:

@@ -120,6 +120,8 @@ class Controller:
         inset = self.settings.supports.sole_inset
         self._geometry = {key: contact_geometry(body, item, inset) for key, item in contacts.items()}
         self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
+        contacts = [contact for phase in schedule.sequence for contact in phase.stance]
+        self._points = {c.effector for c in contacts if c.kind is ContactKind.POINT}
         self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
         carriers = {
             name for phase in schedule.sequence if phase.load is not None for name in phase.load.masses
@@ -268,11 +270,10 @@ class Controller:
             return swing_task(name, frame, planned, gain, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
-        if support.mode is SupportMode.LANDING:
-            target = landing_reference(support, planned)
-            return swing_task(name, frame, target, gains.swing, weight)
-        target = lifted(planned, support)
-        return swing_task(name, frame, target, gains.swing, weight, support.follow)
+        landing = support.mode is SupportMode.LANDING
+        target = landing_reference(support, planned) if landing else lifted(planned, support)
+        follow, point = 1.0 if landing else support.follow, name in self._points
+        return swing_task(name, frame, target, gains.swing, weight, follow, point=point)
 
     def _posture_weight(self, supports: Mapping[str, SupportState]) -> FloatArray:
         weight = np.full(self.body.nv - 6, self.settings.weights.posture)

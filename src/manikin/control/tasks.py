@@ -108,9 +108,13 @@ def orientation_task(
 
 def swing_task(
     name: str, frame: FrameState, reference: EffectorReference, gains: Impedance, weight: float,
-    follow: float = 1.0,
+    follow: float = 1.0, *, point: bool = False,
 ) -> AccelerationTask:  # fmt: skip
-    """Follow placement, twist and acceleration of a flying effector; the gains times ``follow``."""
+    """Follow placement, twist and acceleration of a flying effector; the gains times ``follow``.
+
+    What touches in a point follows its place alone: held to its planned attitude as well, a leg of three
+    joints goes down to a late contact with the whole body.
+    """
     turn = orientation_error(reference.rotation, frame.rotation)
     error = np.concatenate((reference.position - frame.position, turn))
     wanted = (
@@ -118,7 +122,8 @@ def swing_task(
         + follow * gains.stiffness * error
         + follow * gains.damping * (reference.twist - frame.twist)
     )
-    return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
+    rows = 3 if point else 6
+    return AccelerationTask(name, frame.jacobian[:rows], (wanted - frame.drift)[:rows], np.full(rows, weight))
 
 
 def lifted(reference: EffectorReference, support: SupportState) -> EffectorReference:

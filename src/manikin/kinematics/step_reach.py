@@ -156,6 +156,7 @@ class _StepSampler(ReachSampler):
         self._width = body.sole_width or 0.12 * scale
         self._half = half - 0.5 * self._width
         inset = REST_INSET * scale
+        self._alike = heels != "standing up" and rest == "anywhere"
         self._rest, self._room = rest, np.array([half - inset, max(0.5 * self._width - inset, 0.0)])
 
     def polytope(self) -> tuple[FloatArray, FloatArray]:
@@ -164,7 +165,10 @@ class _StepSampler(ReachSampler):
         if held.missed > 0.0:
             raise BodyError(f"body {self._parts.body.name!r} cannot stand on both feet; valid: legs that can")
         outermost = np.unique(np.argmax(held.projections, axis=0))
-        rows = ConvexHull(self._places(held.unknowns[outermost])).equations
+        places = self._places(held.unknowns[outermost])
+        if self._alike:  # what one foot reaches from the other, the other reaches from it
+            places = np.vstack([places, _from_the_other(places)])
+        rows = ConvexHull(places).equations
         A = rows[:, :4] * [1.0, 1.0, 1.0, TURN_LENGTH]
         lengths = np.linalg.norm(rows[:, :4], axis=1)
         return frozen_array(A / lengths[:, None], "A"), frozen_array(-rows[:, 4] / lengths, "b")
@@ -215,3 +219,11 @@ class _StepSampler(ReachSampler):
         low[:3], high[:3] = (-radius, -radius, 0.25 * radius), radius
         far = np.array([1.3 * scale, 1.0 * scale, 0.9 * scale, 1.5])
         return np.concatenate([low, -far]), np.concatenate([high, far * [1.0, 0.0, 1.0, 1.0]])
+
+
+def _from_the_other(places: FloatArray) -> FloatArray:
+    """(n, 4) places of the foot that stood in the frame of the other, mirrored; the turn as a length [m]."""
+    turn = places[:, 3] / TURN_LENGTH
+    c, s = np.cos(turn), np.sin(turn)
+    ahead, aside = c * places[:, 0] + s * places[:, 1], c * places[:, 1] - s * places[:, 0]
+    return np.column_stack([-ahead, aside, -places[:, 2], places[:, 3]])

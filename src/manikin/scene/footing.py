@@ -70,6 +70,10 @@ class Places:
     positions: FloatArray
     rotations: FloatArray
 
+    def __getitem__(self, chosen: IntArray | NDArray[np.bool_]) -> "Places":
+        """Some of them, by index or mask."""
+        return Places(self.rows[chosen], self.numbers[chosen], self.positions[chosen], self.rotations[chosen])
+
 
 class FootingTable:
     """The surfaces of a scene, prepared for soles of one shape that are placed on them by the thousand.

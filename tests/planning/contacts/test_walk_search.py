@@ -43,6 +43,16 @@ def planned(scene, at, heading=0.0, body=BODY, **options):
     return search.run(), start, goal
 
 
+def test_a_foothold_keeps_the_clearance_of_a_foot_to_what_is_beside_it():
+    """A curb 1 cm from the toes is too near, 2 cm is not; 1.5 cm are kept."""
+    for gap, free in ((0.01, False), (0.02, True)):
+        beside = 0.5 * BODY.sole_length + gap + 0.1
+        curb = Obstacle("curb", Box((0.2, 1.0, 0.002)), translation=(beside, 0.0, 0.001))
+        footholds = Footholds(BODY, Scene([curb]))
+        laid = footholds.lay(np.zeros((1, 2)), np.zeros(1), 0.0, 0.001)
+        assert footholds.is_free(footholds.hold(laid, 0)) is free
+
+
 @pytest.fixture(scope="module")
 def climbed():
     found, _, _ = planned(STEPS, (1.5, 0.0))

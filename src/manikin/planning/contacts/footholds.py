@@ -37,6 +37,8 @@ ON_PLANE = 0.02
 """Height up to which a neighbouring surface is no hindrance to a foot [m]; the foot has a test of its own."""
 
 _REQUEST = coal.CollisionRequest()
+_CLEAR = coal.CollisionRequest()
+_CLEAR.security_margin = FOOT_CLEARANCE
 _SHIFTS = np.array(
     [[x, 0.0] for x in (0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0)]
     + [[x, y] for y in (-0.5, 0.5) for x in (0.0, 0.5, -0.5)]
@@ -53,7 +55,6 @@ class Foothold:
         position: (3,) of the sole's middle in the world [m].
         yaw: Heading of the toes [rad].
         rotation: (3, 3) sole-to-world; z along the surface's normal.
-        polygon: (k, 2) what of the sole touches, in its own frame [m].
         share: Share of its area that lies on the surface.
         surface: Number of the surface; -1 for one that was given.
     """
@@ -61,14 +62,13 @@ class Foothold:
     position: FloatArray
     yaw: float
     rotation: FloatArray
-    polygon: FloatArray
     share: float = 1.0
     surface: int = -1
 
     @classmethod
     def of(cls, contact: Contact) -> "Foothold":
         """Foothold of a contact that is given."""
-        return cls(contact.position, contact.yaw, contact.rotation_contact_to_world, contact.points[:, :2])
+        return cls(contact.position, contact.yaw, contact.rotation_contact_to_world)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,12 +112,13 @@ class Footholds:
             scene.surfaces_facing((0.0, 0.0, 1.0), steepest), half * [[1, 1], [1, -1], [-1, -1], [-1, 1]]
         )
         self._parts = [
-            (part.geometry, coal.Transform3s(part.rotation, part.translation))
+            (part.obstacle, part.geometry, coal.Transform3s(part.rotation, part.translation))
             for item in scene
             for part in collision_parts(item)
         ]
         gap = 2.0 * FOOT_CLEARANCE
-        self._foot = coal.Box(self.size[0] + gap, self.size[1] + gap, FOOT_HEIGHT)
+        self._foot = coal.Box(*self.size, FOOT_HEIGHT)
+        self._wide_foot = coal.Box(self.size[0] + gap, self.size[1] + gap, FOOT_HEIGHT)
         self._point = FootingTable(
             self._table.surfaces, 1e-6 * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
         )
@@ -145,17 +146,15 @@ class Footholds:
             rise: Largest difference in height to there [m].
         """
         put = self._put(places, yaws, level, rise)
-        shares = self._shares(put)
-        blocked = self._blocked(put)
-        value = np.where(blocked, 0.0, shares)
-        partly = np.flatnonzero((shares < WHOLE) | blocked)
+        value = self._lies(put)
+        partly = np.flatnonzero(value < WHOLE)
         if len(partly):
             turn = put.rotations[partly, :2, 0]
             turn /= np.linalg.norm(turn, axis=1, keepdims=True)
             side = np.stack([-turn[:, 1], turn[:, 0]], axis=-1)
             away = SHIFT * (_SHIFTS[:, :1] * turn[:, None] + _SHIFTS[:, 1:] * side[:, None])
             moved = self._moved(put, np.repeat(partly, len(_SHIFTS)), away.reshape(-1, 2))
-            lies = np.where(self._blocked(moved), 0.0, self._shares(moved)).reshape(len(partly), -1)
+            lies = self._lies(moved).reshape(len(partly), -1)
             # A shift has to gain something.
             pick = np.argmax(lies - 0.2 * SHIFT * np.linalg.norm(_SHIFTS, axis=1), axis=1)
             rows = np.arange(len(partly)) * len(_SHIFTS) + pick
@@ -169,20 +168,24 @@ class Footholds:
 
     def hold(self, laid: Laid, row: int) -> Foothold:
         """One of several footholds."""
-        position, rotation = laid.positions[row], laid.rotations[row]
-        number = laid.surfaces[row : row + 1]
-        polygon = self._table.place(number, position[None], rotation[None]).polygon(0)
         return Foothold(
-            position, float(laid.yaws[row]), rotation, polygon, float(laid.shares[row]), int(number[0])
-        )
+            laid.positions[row], float(laid.yaws[row]), laid.rotations[row], float(laid.shares[row]),
+            int(laid.surfaces[row]),
+        )  # fmt: skip
 
     def is_free(self, hold: Foothold) -> bool:
-        """Whether nothing of the scene stands where the foot would be."""
-        lift = 0.5 * FOOT_HEIGHT + 2e-3
-        pose = coal.Transform3s(hold.rotation, hold.position + lift * hold.rotation[:, 2])
-        for geometry, place in self._parts:
-            result = coal.CollisionResult()
-            coal.collide(self._foot, pose, geometry, place, _REQUEST, result)
+        """Whether the foot there keeps its clearance to the scene.
+
+        What it stands on may be as near as it is, but not beside the foot.
+        """
+        touched = self._table.surfaces[hold.surface].obstacles if hold.surface >= 0 else ()
+        for name, geometry, place in self._parts:
+            foot, request, lift = (
+                (self._wide_foot, _REQUEST, 2e-3) if name in touched else (self._foot, _CLEAR, 0.0)
+            )
+            above = (0.5 * FOOT_HEIGHT + lift) * hold.rotation[:, 2]
+            pose, result = coal.Transform3s(hold.rotation, hold.position + above), coal.CollisionResult()
+            coal.collide(foot, pose, geometry, place, request, result)
             if result.isCollision():
                 return False
         return True
@@ -205,22 +208,27 @@ class Footholds:
 
     def contact(self, foot: str, hold: Foothold, friction: float) -> Contact:
         """Contact of a foot on a foothold, with a Coulomb coefficient."""
-        length, width = self.size
+        (length, width), polygon = self.size, None
+        if hold.share < WHOLE:
+            laid = self._table.place([hold.surface], hold.position[None], hold.rotation[None])
+            polygon = laid.polygon(0)
         return sole(
             foot, hold.position, length=length, width=width, friction=friction, rotation=hold.rotation,
-            polygon=None if hold.share >= WHOLE else hold.polygon,
+            polygon=polygon,
         )  # fmt: skip
 
     def _put(self, places: FloatArray, yaws: FloatArray, level: float, rise: float) -> Places:
         """Candidates on the surfaces within a rise."""
         put = self._table.under(places, yaws)
-        rows = np.flatnonzero(np.abs(put.positions[:, 2] - level) <= rise)
-        return Places(put.rows[rows], put.numbers[rows], put.positions[rows], put.rotations[rows])
+        return put[np.abs(put.positions[:, 2] - level) <= rise]
 
-    def _shares(self, put: Places) -> FloatArray:
-        """(k,) share of each sole on its surface; 0 where it cannot stand."""
+    def _lies(self, put: Places) -> FloatArray:
+        """(k,) share of each sole on its surface; 0 where it cannot stand or something is in its way."""
         found = self._table.place(put.numbers, put.positions, put.rotations)
-        return np.where(found.stands, found.share, 0.0)
+        shares = np.where(found.stands, found.share, 0.0)
+        some = np.flatnonzero(shares)
+        shares[some[self._blocked(put[some])]] = 0.0
+        return shares
 
     def _blocked(self, put: Places) -> NDArray[np.bool_]:
         """(k,) whether another surface rises in the way of each foot, seen from above."""

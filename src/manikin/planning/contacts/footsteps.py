@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from manikin.kinematics.step_reach import StepReach
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import Graph
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
@@ -84,6 +84,9 @@ SAME_GREED = 3
 
 ALIKE = 0.08
 """Distance of footholds up to which a step is much like one that was refused [m]; our choice."""
+
+SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1
+"""Differences of the way [m], turn [rad] and slopes up to which a step is as hard as another; our choice."""
 
 TURN_COST = 0.9
 """Cost of a turn [s/rad]: two steps turn a body by a right angle."""
@@ -147,6 +150,7 @@ class FootstepSearch:
         self._next: dict[tuple[int, int], list[tuple[int, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
         self._refused: list[tuple[FloatArray, FloatArray]] = []
+        self._too_hard: list[FloatArray] = []
         self._offsets = _offsets(self.scale)
         self._first_greed = self._ways = 0
         self._field = _Field(
@@ -166,6 +170,32 @@ class FootstepSearch:
         """Close all steps that are much like one, with which a later stage failed."""
         self._refused.append((self._holds[stand].position, self._holds[step].position))
         self._pairs = {pair: cost for pair, cost in self._pairs.items() if not self._is_refused(*pair)}
+
+    def refuse_everywhere(self, stand: int, step: int) -> None:
+        """Close all steps like one for which the joints are too weak, and longer ones, wherever they are."""
+        self._too_hard.append(self._shape(stand, step))
+        self._pairs = {pair: cost for pair, cost in self._pairs.items() if not self._is_refused(*pair)}
+
+    def _shape(self, stand: int, step: int) -> FloatArray:
+        """(8,) way, turn and normals of a step in the heading frame of the foot that stands, of a right foot.
+
+        Each is in units up to which steps are alike.
+        """
+        first, last = self._holds[stand], self._holds[step]
+        frame = rotation_from_yaw(first.yaw)
+        way, normals = (last.position - first.position) @ frame, [first.rotation[:, 2], last.rotation[:, 2]]
+        turn = math.remainder(last.yaw - first.yaw, 2.0 * math.pi)
+        out = 1.0 if way[1] >= 0.0 else -1.0
+        slopes = (np.array(normals) @ frame)[:, :2] * [1.0, out] / SAME_SLOPE
+        return np.concatenate([way * [1.0, out, 1.0] / SAME_WAY, [out * turn / SAME_TURN], slopes.ravel()])
+
+    def _harder(self, shape: FloatArray) -> bool:
+        """Whether a step is like one that is too hard, or goes farther ahead, up or down than it."""
+        hard = np.array(self._too_hard)
+        beyond = shape - hard
+        way = np.sign(hard[:, :3]) * (np.abs(hard[:, :3]) > 1.0) * [1.0, 0.0, 1.0]
+        beyond[:, :3] = np.where(way == 0.0, beyond[:, :3], np.minimum(way * beyond[:, :3], 0.0))
+        return bool((np.abs(beyond) <= 1.0).all(axis=1).any())
 
     def hold(self, number: int) -> Foothold:
         """Foothold of a number."""
@@ -226,6 +256,8 @@ class FootstepSearch:
         return self._pairs[pair]
 
     def _is_refused(self, stand: int, step: int) -> bool:
+        if self._too_hard and self._harder(self._shape(stand, step)):
+            return True
         first, last = self._holds[stand].position, self._holds[step].position
         return any(
             np.linalg.norm(first - a) < ALIKE and np.linalg.norm(last - b) < ALIKE for a, b in self._refused

@@ -10,6 +10,7 @@ closed, what is much like it costs more, and the search goes on with the next be
 A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
 """
 
+import heapq
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,8 +19,6 @@ from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from manikin.balance.criteria import static_torque_share
@@ -57,6 +56,12 @@ REST = 0.06
 
 SHARES = np.linspace(0.0, 1.0, 9)
 """Shares of the way of the trunk to the middle of the limbs that stay that are tried."""
+
+WIDE = 0.12
+"""Distance to the edges of where it rests at which a trunk is at ease, by the reach; our choice."""
+
+NARROW = 3.0
+"""Cost of a move over contacts on one line, between whose edges there is no room, in moves; our choice."""
 
 OVERREACH = 30.0
 """Cost of a limb that is beyond its reach then by as much as that, in moves; our choice."""
@@ -236,10 +241,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._trees = [cKDTree(item.positions) if len(item.positions) else None for item in holds]
         self._wanted = np.array([item.wanted for item in holds])
         self._contacts: dict[tuple[int, int], Contact] = {}
-        self._grasps = [
-            bool(len(item.positions)) and self._contact(k, 1).kind is ContactKind.GRASP
-            for k, item in enumerate(holds)
-        ]
+        kinds = [self._contact(k, 1).kind if len(item.positions) else None for k, item in enumerate(holds)]
+        self._grasps = [kind is ContactKind.GRASP for kind in kinds]
+        self._tips = [kind is ContactKind.POINT for kind in kinds]
         self._free: dict[tuple[int, int], bool] = {}
         self._next: dict[State, list[tuple[State, float]]] = {}
         self._later: dict[State, list[tuple[State, float]]] = {}
@@ -248,8 +252,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._dearer: dict[int, FloatArray] = {}  # (n, 2, 3) places of a limb and the root, by limb
         self._roots: dict[State, FloatArray] = {}
         self._turns: dict[State, FloatArray] = {}
+        self._onward: dict[State, FloatArray] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
         self._beyond: dict[tuple[State, State], float] = {}
+        self._resting: dict[tuple[State, int], tuple[tuple[FloatArray, FloatArray] | None, float]] = {}
         self._state = Configuration(poser.body, start.q)
 
     def _best(self) -> list[State] | str:
@@ -268,20 +274,26 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """Why no chain of places leads from the start to the goal; empty where one does."""
         shared = {id(item.positions): item.positions for item in self.holds}
         places = np.vstack([self._at((0,) * len(self.holds)), *shared.values()])
-        tree = cKDTree(places)
-        near = tree.query_ball_point(self.goal[:3], GOAL_REACH * self.size)
+        there, enough = self.goal[:3], GOAL_REACH * self.size
         # Hands alone carry nobody for long: what stands has to have places there.
         standing = [item for k, item in enumerate(self.holds) if not self._grasps[k]] or self.holds
-        there = self.goal[:3]
         away = [np.linalg.norm(item.positions - there, axis=1).min(initial=np.inf) for item in standing]
-        if min(away) > GOAL_REACH * self.size:
+        if min(away) > enough:
             names = ", ".join(item.effector for item in standing)
             return f"the goal is walled off from the start: none of {names} has a place within reach of it"
-        pairs = tree.query_pairs(self.size, output_type="ndarray")
-        graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(places),) * 2)
-        part = connected_components(graph, directed=False)[1]
-        if set(part[: len(self.holds)]) & set(part[near]):
-            return ""
+        tree, left = cKDTree(places), np.linalg.norm(places - there, axis=1)
+        known = np.arange(len(places)) < len(self.holds)
+        open_ = list(zip(left[known].tolist(), np.flatnonzero(known).tolist(), strict=True))
+        heapq.heapify(open_)
+        while open_:
+            near, row = heapq.heappop(open_)
+            if near <= enough:
+                return ""
+            around = np.array(tree.query_ball_point(places[row], self.size))
+            around = around[~known[around]]
+            known[around] = True
+            for item in zip(left[around].tolist(), around.tolist(), strict=True):
+                heapq.heappush(open_, item)
         return f"the goal is walled off from the start: a gap is wider than {self.size:.2f} m"
 
     def _farthest(self) -> str:
@@ -337,7 +349,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         for k, item in enumerate(self.holds):
             beyond = np.where(held[:, k], -item.room(local[:, k]) / self.size, 0.0)
             cost += np.where(beyond > self.settings.beyond, np.inf, 4.0 * np.maximum(beyond, 0.0))
-        away, off_way = np.linalg.norm(roots - self.goal[:3], axis=1), self._ahead_of(roots)[0]
+        away, (off_way, onward) = np.linalg.norm(roots - self.goal[:3], axis=1), self._ahead_of(roots)
         off_heading = np.abs(np.mod(yaw - self._yaws[1] + math.pi, 2.0 * math.pi) - math.pi)
         n, stride = len(self.holds), self.settings.stride
         near = (away <= self.settings.goal_distance) & (off_heading <= self.settings.goal_turn)
@@ -346,11 +358,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         for k, item in enumerate(self.holds if self.settings.retreats else ()):
             near &= ~held[:, k] | (-item.room(there[:, k]) <= self.settings.beyond * self.size)
         ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
-        rows = zip(states, ahead.tolist(), near.tolist(), roots, turn, strict=True)
-        for state, left, there, root, frame in rows:
-            self._turns[state] = frame
-            self._ahead.setdefault(state, 0.0 if there else left + 1e-6)
-            self._roots[state] = root
+        self._roots.update(zip(states, roots, strict=True))
+        self._turns.update(zip(states, turn, strict=True))
+        self._onward.update(zip(states, onward, strict=True))
+        for state, left in zip(states, np.where(near, 0.0, ahead + 1e-6).tolist(), strict=True):
+            self._ahead.setdefault(state, left)
         return cost
 
     @cached_property
@@ -374,10 +386,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """States after one move, with what it costs."""
         if state in self._next:
             return self._next[state]
-        root, yaw, pitch = (value[0] for value in self._frames([state]))
-        turn = rotations(yaw, pitch, np.array(0.0))
-        away = self._ahead_of(root[None])[1][0] - root
-        onward = min(1.0, 0.5 * self.settings.stride / max(float(np.linalg.norm(away)), 1e-9)) * away
+        root, turn, stride = self._roots[state], self._turns[state], self.settings.stride
+        away = self._onward[state] - root
+        onward = min(1.0, 0.5 * stride / max(float(np.linalg.norm(away)), 1e-9)) * away
         states: list[State] = []
         steps: list[float] = []
         for k, tree in enumerate(self._trees):
@@ -388,20 +399,15 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 steps.append(1.0)
             here, wanted = self._places[k][state[k]], root + turn @ self._wanted[k]
             # From behind where it should be to ahead of it.
-            rows = set[int]()
-            for ahead in (0.0, 1.0, 2.0):
-                rows |= set(
-                    tree.query_ball_point(
-                        wanted + ahead * onward, self.settings.around * self.settings.stride
-                    )
-                )
+            centres = wanted + np.outer((0.0, 1.0, 2.0), onward)
+            rows = set[int]().union(*tree.query_ball_point(centres, self.settings.around * stride))
             if not rows or not any(self._grasps):
                 rows |= set(tree.query(wanted + onward, k=min(3, tree.n))[1].ravel().tolist())
-            for row in sorted(rows):
-                way = float(np.linalg.norm(self._places[k][row + 1] - here))
-                if row + 1 != state[k] and way > 0.15 * self.settings.stride:
-                    states.append((*state[:k], row + 1, *state[k + 1 :]))
-                    steps.append(1.0 + 0.5 * (way / (2.0 * self.settings.stride)) ** 2)
+            places = np.array(sorted(rows)) + 1
+            ways = np.linalg.norm(self._places[k][places] - here, axis=1)
+            far = (places != state[k]) & (ways > 0.15 * stride)
+            states += [(*state[:k], row, *state[k + 1 :]) for row in places[far].tolist()]
+            steps += (1.0 + 0.5 * (ways[far] / (2.0 * stride)) ** 2).tolist()
         costs = self._frame_costs(states) if states else np.zeros(0)
         moves = [
             (after, step + cost)
@@ -409,8 +415,12 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             if math.isfinite(cost)
         ]
         # A limb that is still free comes first ([Tonneau2015]_ 7.2), as long as it finds a place.
-        first = [item for item in moves if self._fills(state, item[0])]
-        self._later[state] = [item for item in moves if not self._fills(state, item[0])] if first else []
+        whole = all(self._held(k, row) for k, row in enumerate(state))
+        fills = [not whole and self._fills(state, after) for after, _ in moves]
+        first = [item for item, fill in zip(moves, fills, strict=True) if fill]
+        self._later[state] = (
+            [item for item, fill in zip(moves, fills, strict=True) if not fill] if first else []
+        )
         self._next[state] = first or moves
         return self._next[state]
 
@@ -436,25 +446,42 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """What a move of limb k costs whose limbs come to the ends of their reach; infinite without room."""
         if after[k] != FREE and not (self._has_room(k, after[k]) and self._beside(k, after)):
             return math.inf
+        if (before, k) not in self._resting:
+            self._resting[before, k] = self._rest_without(k, before)
+        rest, cost = self._resting[before, k]
+        return cost if rest is None or math.isinf(cost) else cost + self._stretched(after, *rest)
+
+    def _rest_without(self, k: int, before: State) -> tuple[tuple[FloatArray, FloatArray] | None, float]:
+        """Middle (2,) and hull (m, 2) of what stays when limb k moves [m], and what that costs.
+
+        Middle and hull are None where hands hold on, which keep the balance anywhere.
+        """
         staying = [j for j in range(len(self.holds)) if j != k and self._held(j, before[j])]
         if any(self._grasps[j] for j in staying):
-            return 0.0
-        cost, at = 0.0, self._at(after)
-        hull = convex_polygon(at[staying, :2])
-        for state in (before, after):
-            root = self._roots[state]
-            # On its way over the limbs that stay the trunk takes the others to the ends of their reach.
-            ways = root[:2] + SHARES[:, None] * (at[staying, :2].mean(axis=0) - root[:2])
-            rooms = signed_distance(ways, hull)
-            if rooms[0] < -self.settings.sway * self.size:
-                return math.inf
-            shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
-            local = (self._at(state) - shifted) @ self._turns[state]
-            beyond = [
-                -float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])
-            ]
-            cost += OVERREACH * max(0.0, *beyond) / self.size
-        return cost
+            return None, 0.0
+        at = self._at(before)[staying, :2]
+        middle, hull = at.mean(axis=0), convex_polygon(at)
+        cost = self._stretched(before, middle, hull)
+        if all(self._tips[j] for j in staying):
+            # On tips nearly on one line the trunk comes to rest far off its way, and nothing may go wrong.
+            room = float(signed_distance(middle, hull))
+            cost += NARROW * max(0.0, 1.0 - room / (WIDE * self.size))
+        return (middle, hull), cost
+
+    def _stretched(self, state: State, middle: FloatArray, hull: FloatArray) -> float:
+        """What it costs that limbs come to the ends of their reach where the trunk rests; infinite beyond.
+
+        On its way over the limbs that stay the trunk takes the others there.
+        """
+        root = self._roots[state]
+        ways = root[:2] + SHARES[:, None] * (middle - root[:2])
+        rooms = signed_distance(ways, hull)
+        if rooms[0] < -self.settings.sway * self.size:
+            return math.inf
+        shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
+        local = (self._at(state) - shifted) @ self._turns[state]
+        beyond = [-float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])]
+        return OVERREACH * max(0.0, *beyond) / self.size
 
     def _has_room(self, k: int, row: int) -> bool:
         if (k, row) not in self._free:

@@ -74,10 +74,12 @@ class Posed:
     Attributes:
         q: (nq,) or None.
         reason: In one line, where there is none.
+        too_hard: Whether the reason is the strength of the joints.
     """
 
     q: FloatArray | None
     reason: str = ""
+    too_hard: bool = False
 
 
 class PostureFinder:

@@ -12,13 +12,15 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
-from manikin.balance.criteria import static_torque_share
-from manikin.body import BodyModel
+from manikin.balance.criteria import torque_share_gradient
+from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.kinematics import Placement
 from manikin.kinematics.step_reach import StepReach
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage
@@ -36,16 +38,18 @@ COLUMN = (0.12, 0.5, 0.9)
 """Radius, lowest and highest end above the ground of what has to be free, of a body of 1.75 m [m]."""
 
 
-STRONG_TRIES = 8
+STRONG_TRIES = 16
 """Ways that are refused because a posture at rest asks for more than the strength.
 
 A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so
 after that many ways the later stages decide."""
 
-EASIER = (0.4, 0.2, 0.55)
-"""Places of the centre of mass over the sole that carries, from its middle ahead, as shares of half its
-length, at which a posture is tried that asks for less strength: a thigh that is more upright turns less under
-the pelvis, and a knee has less before it."""
+EASIER_MOVES = 8
+EASIER_TURN = 0.2
+"""Moves in which a posture may come to ask for less strength, and the most a joint turns in each [rad]."""
+
+EASY = 0.95
+"""Share of the strength at which they aim."""
 
 NEAR_TRIES = 12
 """Ways after which a pair without a posture closes all that are much like it."""
@@ -128,11 +132,6 @@ class BodyRoom:
         posture = self._postures[number]
         q = posture.at(self._place(left, right))
         return q[:7] if posture.cost <= 1.0 else q
-
-    def stooped(self, number: int) -> list[int]:
-        """A posture and up to three in which the trunk is bent more, the cheapest first."""
-        heights = [item.height for item in self._postures]
-        return [number, *(n for n, high in enumerate(heights) if high < 0.97 * heights[number])][:4]
 
     def _place(self, left: Foothold, right: Foothold) -> FloatArray:
         """(4,) x, y and height of the ground [m] and heading [rad] between two feet."""
@@ -233,7 +232,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             changes, held, step = self._moved((leaving, standing, landing), before, after, hands, q)
             if step.lifted is None or step.landed is None:
                 first = k if step.lifted is None else k + 1
-                return self._refuse(way[first], way[first + 1], step.reason)
+                return self._refuse(way[first], way[first + 1], step.reason, too_hard=step.too_hard)
             distance = float(np.linalg.norm(landing.position - leaving.position))
             flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
             lifted = Stage.of(body, {standing.effector: standing, **held}, step.lifted, flight)
@@ -255,10 +254,12 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             return None
         return ContactPlan.of(self.poser.body, stages, posed.q, self.settings.hinge_pace)
 
-    def _refuse(self, stand: int, step: int, reason: str) -> None:
+    def _refuse(self, stand: int, step: int, reason: str, *, too_hard: bool = False) -> None:
         self.reasons[reason] += 1
         rise = abs(float(self.search.hold(stand).position[2] - self.search.hold(step).position[2]))
-        if self.replanned < (NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES):
+        if too_hard:
+            self.search.refuse_everywhere(stand, step)
+        elif self.replanned < (NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES):
             self.search.close(stand, step)
         else:
             self.search.refuse(stand, step)
@@ -360,10 +361,10 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         carrying = {standing.effector: standing, **hands}
         lifted = self._posed({leaving.effector: leaving, **carrying}, carrying, before, q)
         if lifted.q is None:
-            return _Step(None, None, f"{leaving.effector} cannot be lifted: {lifted.reason}")
+            return _Step(None, None, f"{leaving.effector} cannot be lifted: {lifted.reason}", lifted.too_hard)
         landed = self._posed({**carrying, landing.effector: landing}, carrying, after, lifted.q)
         why = f"{landing.effector} cannot be put down: {landed.reason}"
-        return _Step(lifted.q, landed.q, why if landed.q is None else "")
+        return _Step(lifted.q, landed.q, why if landed.q is None else "", landed.too_hard)
 
     def _guide(self, place: "_Place") -> FloatArray:
         return self._room.guide(place.trunk, place.left, place.right)
@@ -385,37 +386,59 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             start = np.concatenate([guide, q[len(guide) :]])
             posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone, placements=flat)
         if posed.q is not None:
-            posed = self._easier(posed, held, carrying, place, flat)
+            posed = self._easier(posed, held, carrying, flat)
         self._postures[key] = posed
         self._kept += held.values()  # so that no other contact gets its id
         return posed
 
     def _easier(
-        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: "_Place",
+        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact],
         flat: Mapping[str, Placement],
     ) -> Posed:  # fmt: skip
-        """A posture that the joints can hold at rest: the given one, or one on its foot that leans ahead."""
-        body, stance = self.poser.body, Stance(list(carrying.values()))
+        """A posture that the joints can hold at rest: the given one, or one near it that asks for less.
 
-        def share_of(item: Posed) -> float:
-            return math.inf if item.q is None else static_torque_share(body, item.q, stance)
-
-        best, least = posed, share_of(posed)
-        feet = [contact for name, contact in carrying.items() if name in FEET]
-        tries = self._room.stooped(place.trunk) if len(feet) == 1 else ()
-        turn = feet[0].rotation_contact_to_world
-        middle, ahead = feet[0].position + turn @ feet[0].centre, 0.5 * feet[0].length * turn[:, 0]
-        for number, part in ((n, part) for n in tries for part in EASIER):
-            if least <= 1.0 or best.q is None:
+        Each move is the shortest that keeps contacts and joint ranges and takes the share of the strength to
+        :data:`EASY` along its gradient; it is put back onto what else is required.
+        """
+        assert posed.q is not None
+        body, stance, q = self.poser.body, Stance(list(carrying.values())), posed.q
+        lower, upper = (
+            body.lower + self.poser.settings.range_margin,
+            body.upper - self.poser.settings.range_margin,
+        )
+        share, slope = torque_share_gradient(body, q, stance)
+        size = 1.0
+        for _ in range(EASIER_MOVES):
+            if share <= 1.0 or slope is None:
                 break
-            at, guide = (middle + part * ahead)[:2], self._guide(replace(place, trunk=number))
-            other = self.poser.pose(held, carrying, best.q, guide, place=at, placements=flat)
-            share = share_of(other)
-            if share < least:
-                best, least = other, share
-        if least > 1.0 and self.replanned < STRONG_TRIES:
-            return Posed(None, f"resting on {' and '.join(carrying)} asks for {least:.2f} of the strength")
-        return best
+            state, widest = Configuration(body, q), np.full(body.nv, size * EASIER_TURN)
+            rows = np.vstack([
+                state.effector_jacobian(name)[: 3 if contact.kind is ContactKind.POINT else 6]
+                for name, contact in held.items()
+            ])  # fmt: skip
+            low, high = -widest, np.array(widest)
+            low[6:], high[6:] = np.clip(lower - q[7:], low[6:], 0.0), np.clip(upper - q[7:], 0.0, high[6:])
+            wanted, still = size * (share - EASY), np.zeros(len(rows))
+            move = solve_qp(
+                np.eye(body.nv) + 1e3 * np.outer(slope, slope), 1e3 * wanted * slope, rows, still, still,
+                (low, high), equalities=len(rows),
+            )  # fmt: skip
+            if not move.solved or slope @ move.x > -0.005:
+                break
+            near = pin.integrate(body.pinocchio, q, move.x)
+            other = self.poser.pose(held, carrying, near, near, placements=flat)
+            after = (math.inf, None) if other.q is None else torque_share_gradient(body, other.q, stance)
+            if other.q is not None and after[0] < share:
+                q, (share, slope), size = other.q, after, min(1.0, 1.5 * size)
+            else:
+                size *= 0.4
+        if share > 1.0 and self.replanned < STRONG_TRIES:
+            return Posed(
+                None,
+                f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength",
+                too_hard=True,
+            )
+        return Posed(q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -434,3 +457,4 @@ class _Step:
     lifted: FloatArray | None
     landed: FloatArray | None
     reason: str = ""
+    too_hard: bool = False
