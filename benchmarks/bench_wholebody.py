@@ -39,7 +39,7 @@ def linearisation(planner, swings):
     """Objective, basis, control points at rest in the first posture, and no multipliers."""
     time, basis = planner.job.samples(planner.job.knots(planner.trajectory.schedule))
     scales = planner.settings.fit
-    objective = _Goal(planner, swings, planner.guide(swings, READY), READY, True).objective(
+    objective = _Goal(planner, swings, planner.guide(swings, READY, None, False), READY, True).objective(
         time, basis, scales
     )
     points = np.tile(objective.targets.reference[0], (basis.size, 1))
@@ -59,14 +59,14 @@ def test_swings(benchmark, planner):
 
 def test_guide_postures(benchmark, planner, swings):
     def guide():
-        planner._guides.clear()
-        return planner.guide(swings, READY)
+        planner.guide.cache_clear()
+        return planner.guide(swings, READY, None, False)
 
     benchmark.pedantic(guide, rounds=3, iterations=1)
 
 
 def test_fit(benchmark, planner, swings):
-    goal = _Goal(planner, swings, planner.guide(swings, READY), READY, True)
+    goal = _Goal(planner, swings, planner.guide(swings, READY, None, False), READY, True)
     benchmark.pedantic(planner.job.solve, args=(goal, planner.settings.fit), rounds=3, iterations=1)
 
 

@@ -64,7 +64,13 @@ class FitLinearisation:
         The derivatives are by the first ``k`` coordinates; for the first residuals of an order, by all.
         """
         transposed = jacobian.transpose(0, 2, 1)
-        self._add_terms(order, transposed @ jacobian, (transposed @ residual[:, :, None])[:, :, 0])
+        hessian, gradient = transposed @ jacobian, (transposed @ residual[:, :, None])[:, :, 0]
+        if order in self.hessian:
+            count = gradient.shape[1]
+            self.hessian[order][:, :count, :count] += hessian
+            self.gradient[order][:, :count] += gradient
+        else:
+            self.hessian[order], self.gradient[order] = hessian, gradient
         self.sample_cost += 0.5 * np.sum(residual**2, axis=1)
 
     def add_diagonal(self, order: int, weight: FloatArray, residual: FloatArray) -> None:
@@ -93,14 +99,6 @@ class FitLinearisation:
             system.add_diagonal(weight, gradient, order)
         if self.momentum is not None:
             system.add_coupled(self.momentum.jacobians, self.momentum.value)
-
-    def _add_terms(self, order: int, hessian: FloatArray, gradient: FloatArray) -> None:
-        if order in self.hessian:
-            count = gradient.shape[1]
-            self.hessian[order][:, :count, :count] += hessian
-            self.gradient[order][:, :count] += gradient
-        else:
-            self.hessian[order], self.gradient[order] = hessian, gradient
 
 
 class MotionObjective:

@@ -8,6 +8,7 @@ centre of pressure as the true one does; between several supports the forces are
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.body.strength import with_masses
-from manikin.contact import Contact, ContactSchedule
+from manikin.contact import CarriedLoad, Contact, ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples
 from manikin.numerics.spatial import FloatArray, skew
@@ -76,15 +77,14 @@ class HeldForces:
             model.joints[model.frames[body.segment_frame(toe.name)].parentJoint].idx_v - 6
             for toe in toes if toe is not None
         }  # fmt: skip
-        models = {id(None): model}
-        loads = [schedule.sequence[int(phase)].load for phase in phases]
-        for load in loads:
-            if load is not None and id(load) not in models:
-                models[id(load)] = with_masses(body, load.masses).pinocchio
-        return cls(
-            joints, known, wrench, sharing, tuple(k for k in range(body.nv - 6) if k not in left_out),
-            tuple(models[id(load)] for load in loads),
-        )  # fmt: skip
+
+        @cache
+        def loaded(load: CarriedLoad | None) -> pin.Model:
+            return model if load is None else with_masses(body, load.masses).pinocchio
+
+        models = tuple(loaded(schedule.sequence[int(phase)].load) for phase in phases)
+        hinges = tuple(k for k in range(body.nv - 6) if k not in left_out)
+        return cls(joints, known, wrench, sharing, hinges, models)
 
 
 def compliance(contact: Contact) -> FloatArray:

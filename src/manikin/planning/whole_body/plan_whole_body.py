@@ -8,7 +8,7 @@ and centre of mass as one spline, and the result is certified at 1 kHz.
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -277,16 +277,20 @@ class _Planner:
             settings.knot_spacing, settings.samples_per_span, sudden=True, penalties=PENALTIES,
             patience=LATER_DECREASE, gives_up=True,
         )  # fmt: skip
-        self._guides: dict[tuple[tuple[PlannedSwing, ...], PostureStyle, Guide | None, bool], Guide] = {}
+        self.guide = cache(self._guide)
 
     def run(self, began: float, progress: Progress) -> WholeBodyResult:
         swings = tuple(self.flights.plan(swing) for swing in self.flights.flights())
         progress(0.2)
-        manner = self.settings.manner
+        manner, body = self.settings.manner, self.body
+        arms = (_limb_of(body, name) for name in body.effectors if "hand" in name)
+        hanging = (hanging_segment(body, body.effector(name).segment) for name in body.effectors)
+        toes = [segment.name for segment in hanging if segment is not None]
         best = self._attempt(swings, manner, progress)
-        if manner is READY and best.is_too_near(self._arms):  # Raised arms may have to pass through a thigh.
+        # Raised arms may have to pass through a thigh.
+        if manner is READY and best.is_too_near(frozenset[str]().union(*arms)):
             best = self.job.better(best, self._attempt(swings, CLOSE, progress))
-        if best.is_too_near(self._toes):  # Straight toes may be in the way of a flight.
+        if best.is_too_near(toes):  # Straight toes may be in the way of a flight.
             best = self.job.better(best, self._attempt(swings, manner, progress, straight_toes=False))
         searched = self._search_again(swings, best)
         if searched is not None:
@@ -334,7 +338,7 @@ class _Planner:
         first: FitAttempt[_Goal] | None = None
         ways = (self.known,) if self.waypoints is None else (self.known, self.waypoints)
         for known, restarts in ((way, again) for again in (False, True) for way in ways):
-            if restarts and not self.guide(swings, manner, known).misses_many:
+            if restarts and not self.guide(swings, manner, known, False).misses_many:
                 continue
             goal = _Goal(self, swings, self.guide(swings, manner, known, restarts), manner, straight_toes)
             progress(0.4)
@@ -368,28 +372,21 @@ class _Planner:
         schedule, instant = self.trajectory.schedule, np.array([time])
         return any(schedule.settling(instant, name)[0] for name in schedule.sequence.effectors)
 
-    def guide(
-        self,
-        swings: tuple[PlannedSwing, ...],
-        manner: PostureStyle,
-        known: Guide | None = None,
-        restarts: bool = False,
+    def _guide(
+        self, swings: tuple[PlannedSwing, ...], manner: PostureStyle, known: Guide | None, restarts: bool
     ) -> Guide:
-        """The guide to the swings, found once for each manner, set of known postures and way of search."""
-        key = swings, manner, known, restarts
-        if key not in self._guides:
-            schedule = self.trajectory.schedule
-            time = split_spans(schedule.instants, self.settings.guide_spacing)
-            toes, reference = self.toes(swings, time), self._reference(time, manner, known)
-            lay_toes_flat(toes, reference)
-            com = self.trajectory.position(time)
-            com[~self.trajectory.binds(time)] = np.nan  # The body is safe without one.
-            self._guides[key] = plan_guide(
-                self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time), com,
-                ignored_pairs(self.body, self.scene, schedule, time), reference,
-                self.settings.fit.safe_distance, manner.preferences, tuple(toes), restarts,
-            )  # fmt: skip
-        return self._guides[key]
+        """The guide to the swings for a manner, a set of known postures and a way of search."""
+        schedule = self.trajectory.schedule
+        time = split_spans(schedule.instants, self.settings.guide_spacing)
+        toes, reference = self.toes(swings, time), self._reference(time, manner, known)
+        lay_toes_flat(toes, reference)
+        com = self.trajectory.position(time)
+        com[~self.trajectory.binds(time)] = np.nan  # The body is safe without one.
+        return plan_guide(
+            self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time), com,
+            ignored_pairs(self.body, self.scene, schedule, time), reference,
+            self.settings.fit.safe_distance, manner.preferences, tuple(toes), restarts,
+        )  # fmt: skip
 
     def toes(self, swings: tuple[PlannedSwing, ...], time: FloatArray) -> dict[int, FloatArray]:
         """Angles (n,) of the joints of toes that stay flat [rad], see :func:`toe_angles`."""
@@ -399,18 +396,6 @@ class _Planner:
     def _reference(self, time: FloatArray, manner: PostureStyle, known: Guide | None) -> FloatArray:
         """(n, nq) preferred postures: between those that are known, or the manner's."""
         return reference_motion(self.body, self.trajectory, time, manner) if known is None else known.at(time)
-
-    @cached_property
-    def _arms(self) -> frozenset[str]:
-        """Names of the arms' segments."""
-        hands = (name for name in self.body.effectors if "hand" in name)
-        return frozenset[str]().union(*(_limb_of(self.body, name) for name in hands))
-
-    @cached_property
-    def _toes(self) -> frozenset[str]:
-        """Names of the segments that hang on the end of a limb."""
-        found = (hanging_segment(self.body, self.body.effector(name).segment) for name in self.body.effectors)
-        return frozenset(segment.name for segment in found if segment is not None)
 
     @cached_property
     def polytopes(self) -> list[WrenchPolytope]:

@@ -79,50 +79,43 @@ def point_mass_forces(trajectory: CentroidalTrajectory, time: FloatArray) -> Flo
     Args:
         time: (n,) [s].
     """
-    names = trajectory.schedule.sequence.effectors
-    schedule = trajectory.schedule
-    corners = [_Corners(phase.stance, names) for phase in schedule.sequence]
+    schedule, names = trajectory.schedule, trajectory.schedule.sequence.effectors
+    forces = np.zeros((len(time), len(names), 6))
     wrench, phases = trajectory.pseudo_wrench(time), schedule.phase_at(time)
     shares = load_shares(schedule, time, names)
-    forces = np.zeros((len(time), len(names), 6))
-    for sample, phase in enumerate(phases):
-        forces[sample] = corners[phase].share(wrench[sample], shares[sample])
+    for number, phase in enumerate(schedule.sequence):
+        corners, columns = _Corners(phase.stance), [names.index(name) for name in phase.stance.effectors]
+        for sample in np.flatnonzero(phases == number):
+            forces[sample, columns] = corners.share(wrench[sample], shares[sample, columns])
     return forces
 
 
 class _Corners:
     """The edges of the friction pyramids at every corner of one stance."""
 
-    def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
-        self._count = len(names)
+    def __init__(self, stance: Stance) -> None:
         generators = ContactGenerators.of(stance, grasp_moments=False)
-        owners = [names.index(contact.effector) for contact in stance]
-        self._owner = np.array(owners, dtype=np.int64)[generators.contact]
+        self._owner = generators.contact
         limited = np.isfinite(generators.upper)
         self._unit, self._upper = np.where(limited, generators.upper, 1.0), np.where(limited, 1.0, 1e30)
         self._wrenches = self._unit * generators.about(np.zeros(3))
-        self._normal = generators.normal
-        origin = {names.index(contact.effector): contact.position for contact in stance}
-        self._origin = origin
-        self._limits, self._caps = self._rows(stance, names)
-
-    def _rows(self, stance: Stance, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-        """Sums of the normal forces, and what caps each."""
-        rows, caps = [], []
-        for contact in stance:
-            if contact.kind is not ContactKind.GRASP and contact.normal_force_cap is not None:
-                rows.append((self._owner == names.index(contact.effector)).astype(float))
-                caps.append(contact.normal_force_cap)
+        self._places = [contact.position for contact in stance]
+        # Sums of the normal forces, and what caps each.
+        capped = [
+            (self._owner == number, contact.normal_force_cap)
+            for number, contact in enumerate(stance)
+            if contact.kind is not ContactKind.GRASP and contact.normal_force_cap is not None
+        ]
         if stance.normal_force_cap is not None:
-            rows.append(self._normal)
-            caps.append(stance.normal_force_cap)
-        return np.array(rows).reshape(-1, len(self._owner)), np.array(caps)
+            capped.append((generators.normal, stance.normal_force_cap))
+        self._limits = np.array([row for row, _ in capped], dtype=float).reshape(-1, len(self._owner))
+        self._caps = np.array([cap for _, cap in capped])
 
     def share(self, wrench: FloatArray, shares: FloatArray) -> FloatArray:
         """(c, 6) forces and moments that supply the wrench about the world origin."""
-        size = len(self._owner)
+        size, out = len(self._owner), np.zeros((len(self._places), 6))
         if not size:
-            return np.zeros((self._count, 6))
+            return out
         cost = np.diag(1.0 / shares[self._owner])
         solution = solve_qp(
             cost, np.zeros(size), np.vstack([self._wrenches, self._limits]),
@@ -132,8 +125,7 @@ class _Corners:
         magnitude = solution.x
         if not solution.solved:  # on the edge of what is possible rounding decides; least squares are near
             magnitude = np.maximum(np.linalg.lstsq(self._wrenches, wrench, rcond=None)[0], 0.0)
-        out = np.zeros((self._count, 6))
-        for index, origin in self._origin.items():
+        for index, origin in enumerate(self._places):
             total = self._wrenches[:, self._owner == index] @ magnitude[self._owner == index]
             out[index, :3] = total[:3]
             out[index, 3:] = total[3:] - skew(origin) @ total[:3]

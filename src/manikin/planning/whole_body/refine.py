@@ -9,7 +9,7 @@ that breaks a requirement is repeated with other weights, knots, contacts or tim
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from types import MappingProxyType
 
 import numpy as np
@@ -20,6 +20,7 @@ from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
+from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.contacts.efort import Task
@@ -56,7 +57,7 @@ from manikin.planning.whole_body.refine_measures import (
     sample_uniformly,
 )
 from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
-from manikin.planning.whole_body.refine_physics import least_slack
+from manikin.planning.whole_body.refine_physics import contact_slack
 from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.scene import Proximity, Scene
@@ -181,7 +182,7 @@ class _RefineGoal:
         )
         if self.forces is not None:
             held = HeldForces.of(job.body, self.schedule, self.forces, time)
-            targets = replace(targets, fit=replace(targets.fit, forces=held))
+            targets = replace(targets, forces=held)
         wanted = job.rooms(self.schedule.sequence, job.settings.friction_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
@@ -262,19 +263,18 @@ class Refinement:
             goal = _RefineGoal(self, *stretched_for_speed(self.body, path, schedule, share))
         if self.settings.contact_variables:
             goal = self._chosen(goal, goal.at_rest())
-
-        def remedy(number: int, last: FitAttempt[_RefineGoal]) -> FitAttempt[_RefineGoal]:
-            progress((number + 1) / (REPAIRS + 1))
-            return self._remedy(number, last)
-
-        best = self._job.repair(self._job.attempt(goal, self.settings.scales), remedy, REPAIRS)
+        first = self._job.attempt(goal, self.settings.scales)
+        best = self._job.repair(first, partial(self._remedy, progress), REPAIRS)
         if self.settings.speed_share is not None and not best.broken:
             best = self._hurried(best, self.settings.speed_share)
         progress(1.0)
         return self._result(best, path.duration, schedule, began)
 
-    def _remedy(self, number: int, last: FitAttempt[_RefineGoal]) -> FitAttempt[_RefineGoal]:
+    def _remedy(
+        self, progress: Progress, number: int, last: FitAttempt[_RefineGoal]
+    ) -> FitAttempt[_RefineGoal]:
         """The next fit after one that breaks requirements: other contacts, weights, timing or knots."""
+        progress((number + 1) / (REPAIRS + 1))
         goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
         if self.settings.contact_variables:
             chosen = self._chosen(goal, goal.moving(last.result.spline), goal.at_rest())
@@ -357,7 +357,9 @@ class Refinement:
             )
             for samples in (path.at(time), smoothed.evaluate(time).q, spline.evaluate(time).q)
         )  # fmt: skip
-        slack, when = least_slack(self.body, schedule, spline, time)
+        slacks = contact_slack(schedule, time, centroidal_motion(self.body, *spline.evaluate(time)).wrench)
+        worst = int(np.argmin(slacks))
+        slack, when = float(slacks[worst]), float(time[worst])
         table = RequirementTable((
             *found.certificate.required,
             Requirement("min_contact_slack", "least slack of the contacts' limits", "N, N.m", slack, ">=",

@@ -150,14 +150,11 @@ def contact_targets(
         for number, phase in enumerate(schedule.sequence):
             if name in phase.stance:
                 start, end = schedule.instants[number : number + 2]
-                _hold(target, (time >= start) & (time <= end), phase.stance[name])
+                rows, contact = (time >= start) & (time <= end), phase.stance[name]
+                target.put(rows, contact)
+                target.weight[rows], target.rotation_weight[rows] = 1.0, _turn_weight(contact)
+                target.along[rows] = np.eye(3)
     return targets
-
-
-def _hold(target: EffectorTarget, rows: NDArray[np.bool_], contact: Contact) -> None:
-    target.put(rows, contact)
-    target.weight[rows], target.rotation_weight[rows] = 1.0, _turn_weight(contact)
-    target.along[rows] = np.eye(3)
 
 
 def _approach(target: EffectorTarget, rows: NDArray[np.bool_], contact: Contact, weight: FloatArray) -> None:

@@ -46,18 +46,16 @@ KNEES = "knee_flexion", "_knee"
 """End of the names of knee joints."""
 
 
-@dataclass(frozen=True, eq=False)
-class RefineTargets:
-    """Targets of the refinement at its samples.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RefineTargets(FitTargets):
+    """Targets of the refinement at its samples: those of the whole-body fit, without a centre of mass.
 
     Attributes:
-        fit: Contacts, reference and obstacles as the whole-body fit knows them.
         variables: (n,) contact variable of each effector of the sequence.
-        load: (n, effectors) readiness of each to carry load, in the order of ``fit.effectors``.
+        load: (n, effectors) readiness of each to carry load, in the order of ``effectors``.
         obstacles: What may touch, and how far flights keep off.
     """
 
-    fit: FitTargets
     variables: dict[str, FloatArray]
     load: FloatArray
     limbs: dict[str, LimbDirections]
@@ -88,7 +86,7 @@ def refine_targets(
     guide[:3] = np.inf
     for joint in sole_toes(body, schedule):
         reference[:, 7 + joint], guide[6 + joint] = 0.0, scales.toes
-    fit = FitTargets(
+    return RefineTargets(
         time=time,
         effectors=contact_targets(schedule, time, variables, scales.position / scales.approach),
         com=np.zeros((n, 3)),
@@ -98,9 +96,12 @@ def refine_targets(
         reference=reference,
         reference_scale=guide,
         ignored=obstacles.ignored,
+        variables=variables,
+        load=load,
+        limbs=limb_directions(body, path, schedule, time, task),
+        obstacles=obstacles,
+        schedule=schedule,
     )
-    limbs = limb_directions(body, path, schedule, time, task)
-    return RefineTargets(fit, variables, load, limbs, obstacles, schedule)
 
 
 def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
@@ -156,11 +157,10 @@ class RefineObjective(MotionObjective):
         basis: SampledBasis,
         rooms: tuple[MarginCost, ...],
     ) -> None:
-        super().__init__(body, proximity, targets.fit, basis)
+        super().__init__(body, proximity, targets, basis)
         self._refine = targets
-        schedule, self._names = targets.schedule, tuple(targets.fit.effectors)
-        time = targets.fit.time
-        com = _centres_of_mass(body, targets.fit.reference)
+        schedule, self._names, time = targets.schedule, tuple(targets.effectors), targets.time
+        com = _centres_of_mass(body, targets.reference)
         # At a key instant the stances on both sides of it have to do.
         self._stances = [
             (
@@ -172,7 +172,6 @@ class RefineObjective(MotionObjective):
             for phase, room, (start, end) in zip(schedule.sequence, rooms, _relied_on(schedule), strict=True)
             for rows in (np.flatnonzero((time >= start) & (time <= end)),)
         ]
-        self._load = targets.load
         self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEES)]
         model = body.pinocchio
         moves = moves_by_joint(model)
@@ -232,7 +231,8 @@ class RefineObjective(MotionObjective):
         penalty = scales.margin_violation, scales.margin_softness
         force = scales.force * (self._body.mass * 9.81)
         for rows, forces, room, wanted in self._stances:
-            share = forces.share(wrench[rows], self._load[rows], tolerance=scales.missing_wrench, force=force)
+            load = self._refine.load[rows]
+            share = forces.share(wrench[rows], load, tolerance=scales.missing_wrench, force=force)
             margin = room.cost(wrench[rows], com[rows], wanted(scales.margin), *penalty)
             for out, one, other in zip(total, share.cost, margin, strict=True):
                 out[rows] += one + other

@@ -36,10 +36,8 @@ from manikin.balance import stability_margins, wrench_polytope
 from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.balance.friction import contact_limits
 from manikin.balance.margin import wrench_levers
-from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
-from manikin.motion.configuration_spline import ConfigurationSpline
-from manikin.motion.dynamics import MotionSamples, centroidal_motion
+from manikin.motion.dynamics import MotionSamples
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, skew, wrench_map
 from manikin.planning.whole_body.fit_objective import to_raw
 
@@ -310,13 +308,3 @@ def _limits(contact: Contact, model: FrictionModel) -> tuple[FloatArray, FloatAr
         kept = np.any(limits.A[:, :3] != 0.0, axis=1)
         return limits.A[kept], limits.b[kept]
     return limits.A, limits.b
-
-
-def least_slack(
-    body: BodyModel, schedule: ContactSchedule, spline: ConfigurationSpline, time: FloatArray
-) -> tuple[float, float]:
-    """Least slack of the contacts' limits at samples (n,) [s] of a motion, and when [s]."""
-    wrench = centroidal_motion(body, *spline.evaluate(time)).wrench
-    slack = contact_slack(schedule, time, wrench)
-    worst = int(np.argmin(slack))
-    return float(slack[worst]), float(time[worst])

@@ -57,10 +57,20 @@ def continue_seated(
     Args:
         trajectory: Centre of mass up to the touch of the seat.
     """
-    posture = final_posture(body, scene, phases, trajectory)
+    contacts, reference = tuple(phases[len(phases) - 1].stance), SITTING.posture(body)
+    end = trajectory.duration
+    reference[:3] = trajectory.position(end)
+    final = PostureProblem(  # its centre of mass is left free
+        body, contacts, proximity=Proximity(body, scene), self_clearance=CLEARANCES[-1],
+        ignore=frozenset().union(*(touch_pairs(body, scene, contact) for contact in contacts)),
+        reference=reference,
+    )  # fmt: skip
+    roomy, narrow = (replace(final, clearance=clearance) for clearance in CLEARANCES)
+    posture = generate_posture(roomy)
+    if not posture.succeeded:
+        posture = generate_posture(narrow)
     if not posture.succeeded:
         return SeatedContinuation(None, posture, None, f"no final sitting posture: {posture.failure}")
-    end = trajectory.duration
     problem = CentroidalProblem(
         trajectory.mass, phases, trajectory.position(end), Configuration(body, posture.q).com,
         start_velocity=trajectory.velocity(end), start_acceleration=trajectory.acceleration(end),
@@ -74,19 +84,3 @@ def continue_seated(
         return SeatedContinuation(None, posture, result, f"no centre of mass on the seat: {reason}")
     joined = replace(trajectory.followed_by(result.trajectory), binding_until=end)
     return SeatedContinuation(joined, posture, result, None)
-
-
-def final_posture(
-    body: BodyModel, scene: Scene, phases: StanceSequence, trajectory: CentroidalTrajectory
-) -> PostureResult:
-    """The sitting posture on the contacts of the last phase, its centre of mass left free."""
-    contacts, reference = tuple(phases[len(phases) - 1].stance), SITTING.posture(body)
-    reference[:3] = trajectory.position(trajectory.duration)
-    problem = PostureProblem(
-        body, contacts, proximity=Proximity(body, scene), self_clearance=CLEARANCES[-1],
-        ignore=frozenset().union(*(touch_pairs(body, scene, contact) for contact in contacts)),
-        reference=reference,
-    )  # fmt: skip
-    first, second = (replace(problem, clearance=clearance) for clearance in CLEARANCES)
-    found = generate_posture(first)
-    return found if found.succeeded else generate_posture(second)

@@ -125,7 +125,7 @@ def plan_swing(
             start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
             start_normal=normals[0], end_normal=normals[1], pitch=pitch,
         )
-        for height, lateral, apex in _choices(heights, laterals)
+        for height, lateral, apex in sorted(itertools.product(heights, laterals, APEXES), key=_exertion)
     )  # fmt: skip
     best = _first_clear(family, clearance, limits)
     free = _free_directions(normals, len(best.curve.control_position))
@@ -207,12 +207,9 @@ class _Slack:
         return self._clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
 
 
-def _choices(heights: Sequence[float], laterals: Sequence[float]) -> list[tuple[float, float, float]]:
-    """Heights, lateral offsets and apexes of the family, from the least to the most effort."""
-    return sorted(
-        itertools.product(heights, laterals, APEXES),
-        key=lambda choice: choice[0] + 0.5 * abs(choice[1]) + 0.2 * abs(choice[2] - 0.5),
-    )
+def _exertion(choice: tuple[float, float, float]) -> float:
+    """Order of the heights, lateral offsets and apexes of the family, from the least to the most effort."""
+    return choice[0] + 0.5 * abs(choice[1]) + 0.2 * abs(choice[2] - 0.5)
 
 
 def _instants(curve: SwingCurve, limits: SwingLimits, count: int | None = None) -> FloatArray:

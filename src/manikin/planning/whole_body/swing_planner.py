@@ -180,13 +180,8 @@ class FlightPlanner:
     ) -> None:  # fmt: skip
         self._body, self._scene, self._trajectory = body, scene, trajectory
         self._limits, self._rng, self._reference = limits, rng, reference
-        self._proximity = Proximity(body, scene)
+        self.schedule, self._proximity = trajectory.schedule, Proximity(body, scene)
         self._touching = cache(partial(touch_pairs, body, scene))
-
-    @property
-    def schedule(self) -> ContactSchedule:
-        """Contacts in time."""
-        return self._trajectory.schedule
 
     def flights(self) -> tuple[Swing, ...]:
         """Every flight from a contact or to one; the trunk is not flown."""
