@@ -2,10 +2,8 @@
 
 Run ``python docs/generate.py`` after a change; a test compares the result with the files.
 ``python docs/generate.py REPORT.json ...`` first takes over new results: what ``manikin run all --json``
-printed, reduced to what the page shows.  Each report replaces the kept one of the same stature or seed,
-the one without either the main one.  Reports that do not say it are told:
-``python docs/generate.py report.json --stature 1.65 small.json --seed 3 third.json``.
-What ``manikin benchmark --json`` printed, or its ``benchmark.json``, is taken over likewise.
+printed, reduced to what the page shows.  What ``manikin benchmark --json`` printed, or its
+``benchmark.json``, is taken over likewise.
 A page marks a generated table with ``<!-- generated: NAME -->`` ... ``<!-- end generated -->``.
 """
 
@@ -180,33 +178,17 @@ def dataset_table() -> str:
 
 
 def take_over_results(arguments: Sequence[str]) -> None:
-    """Keep the numbers of reports that the tables of results show.
+    """Keep the numbers of reports that the tables show.
 
     Args:
-        arguments: Report files; ``--stature M`` or ``--seed N`` before a file holds for it alone.
-
-    Raises:
-        SystemExit: One line, if an option lacks its value or its file.
+        arguments: Report files of ``manikin run all`` or ``manikin benchmark``.
     """
-    kept, told = kept_results(), {}
-    waiting = iter(arguments)
-    for word in waiting:
-        if word in OPTIONS:
-            key, read = OPTIONS[word]
-            try:
-                told[key] = read(next(waiting, ""))
-            except ValueError:
-                raise SystemExit(f"{word} has no number after it; valid: {word} NUMBER REPORT.json") from None
-            continue
-        given = json.loads(Path(word).read_text(encoding="utf-8"))
+    for file in arguments:
+        given = json.loads(Path(file).read_text(encoding="utf-8"))
         if "families" in given:
             take_over_benchmark(given)
-            continue
-        report = {"stature_m": None, "seed": None, **given}
-        kept, told = result_tables.filed(kept, report | told), {}
-    if told:
-        raise SystemExit(f"{told} has no report after it; valid: [--stature M] [--seed N] REPORT.json")
-    RESULTS.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+        else:
+            RESULTS.write_text(json.dumps(result_tables.reduced(given), indent=1) + "\n", encoding="utf-8")
 
 
 def take_over_benchmark(report: dict[str, Any]) -> None:
@@ -218,20 +200,14 @@ def take_over_benchmark(report: dict[str, Any]) -> None:
     BENCHMARK.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 
-OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
-    "--stature": ("stature_m", float), "--seed": ("seed", int),
-}  # fmt: skip
-"""Options of a report that does not say itself what it was run with."""
-
-
 def kept_results() -> dict[str, Any]:
-    """What was taken over so far; see :func:`result_tables.filed`."""
+    """What was taken over last; see :func:`result_tables.reduced`."""
     return json.loads(RESULTS.read_text(encoding="utf-8"))
 
 
 def results_table() -> str:
     """The kept results, with their summary."""
-    report = kept_results()["main"]
+    report = kept_results()
     total = f"{counts_line(report)}."
     return f"{result_tables.markdown_table(report)}\n{total}\n"
 
@@ -239,26 +215,9 @@ def results_table() -> str:
 def beams_table() -> str:
     """Lowest centre of mass and head clearance under the beams beside the published heights."""
     published = json.loads((DOCS / "published.json").read_text(encoding="utf-8"))
-    table = result_tables.beam_table(kept_results()["main"], published)
+    table = result_tables.beam_table(kept_results(), published)
     people, beams = published["source"], published["beam_height_source"]
     return f"{table}\nPeople: {people}. Heights of the beams: {beams}.\n"
-
-
-def statures_table() -> str:
-    """Every kept report of another stature."""
-    found = kept_results()["statures"]
-    return result_tables.stature_table(found.values()) if found else NOT_YET
-
-
-def seeds_table() -> str:
-    """What the kept seeds have in common."""
-    found = kept_results()["seeds"]
-    if not found:
-        return NOT_YET
-    return f"{result_tables.seed_table(found)}\nSeeds: {', '.join(found)}.\n"
-
-
-NOT_YET = "No report has been taken over yet.\n"
 
 
 # --- benchmark ---------------------------------------------------------------------------------
@@ -278,7 +237,7 @@ def benchmark_table(stage: str) -> str:
     """Counts of the kept benchmark of a stage."""
     kept = json.loads(BENCHMARK.read_text(encoding="utf-8")) if BENCHMARK.exists() else {}
     if stage not in kept:
-        return NOT_YET
+        return "No report has been taken over yet.\n"
     report = kept[stage]
     first, count = report["first_seed"], report["seeds"]
     table = result_tables.markdown_rows(summary_table.FAMILY_HEADER, summary_table.family_rows(report))
@@ -445,8 +404,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "datasets": dataset_table,
     "results": results_table,
     "beams": beams_table,
-    "statures": statures_table,
-    "seeds": seeds_table,
     "families": families_table,
     "benchmark-contacts": lambda: benchmark_table("contacts"),
     "benchmark-all": lambda: benchmark_table("all"),

@@ -1,20 +1,16 @@
 """Tables of many runs for the documentation, in Markdown, and what is kept of a report to make them.
 
-A report is what ``manikin run all --json`` printed. It says with which stature and seed it was asked for; one
-without either is the main report.
+A report is what ``manikin run all --json`` printed.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from manikin.reports.summary_table import HEADER, NOTHING, UNITS, number, result, result_rows
+from manikin.reports.summary_table import HEADER, NOTHING, UNITS, number, result_rows
 
 BEAM = "beam-"
 """First letters of the scenarios of the table of beams."""
-
-_EXACT = (("centroidal", "min_margin"), ("wholebody", "min_margin"), ("execution", "min_margin"))
-"""What has to be the same to the last bit for two runs to count as the same."""
 
 Report = Mapping[str, Any]
 
@@ -23,7 +19,7 @@ def beam_table(report: Report, published: Mapping[str, Any]) -> str:
     """Lowest CoM and clearance of the head of every passage that succeeded, beside the published heights.
 
     Args:
-        report: The main report, or :func:`reduced`.
+        report: A report, or :func:`reduced`.
         published: ``lowest_com_m`` and ``beam_height_m`` of ``H1`` to ``H3`` [m].
     """
     heads = [
@@ -52,104 +48,8 @@ def _beam_row(run: Mapping[str, Any], published: Mapping[str, Any]) -> list[str]
     ]
 
 
-def stature_table(reports: Iterable[Report]) -> str:
-    """Result and executed margin of every run of a body with a stature; the reports have theirs."""
-    heads = ["scenario", "variant", "stature [m]", "mass [kg]", "result", "executed margin [N.m]"]
-    rows = [
-        [
-            _scenario(run), run["variant"] or NOTHING, number(report["stature_m"], 2),
-            number(run["mass_kg"], 0), result(run), number((run["execution"] or {}).get("min_margin"), 1),
-        ]
-        for report in reports
-        for run in report["runs"]
-        if run["stature_m"] is not None or run["seed"] is None  # a run that broke off knows neither
-    ]  # fmt: skip
-    return markdown_rows(heads, sorted(rows, key=lambda row: (row[0], row[1] != NOTHING, row[1], row[2])))
-
-
-def seed_record(report: Report) -> dict[str, list[Any]]:
-    """What the table of seeds needs of one report: per run whether it was as expected, and exact margins.
-
-    Returns:
-        By ``NAME`` or ``NAME@VARIANT``: whether it ended as expected, the three margins (None
-        where a stage did not run), the reason of a failure, and whether a random number was drawn.
-    """
-    return {
-        _name(run): [
-            run["as_expected"],
-            *((run[stage] or {}).get(key) for stage, key in _EXACT),
-            None if run["failure"] is None else run["failure"]["reason"],
-            (run["wholebody"] or {}).get("seed_matters"),
-        ]
-        for run in report["runs"]
-    }
-
-
-def seed_table(records: Mapping[str, Mapping[str, Sequence[Any]]]) -> str:
-    """How many seeds ended as expected, and how many different results they gave.
-
-    Seeds that give the same bits are one result: only different ones are evidence.
-
-    Args:
-        records: :func:`seed_record` by seed.
-    """
-    heads = [
-        "scenario", "variant", "as expected", "random", "different results", "executed margin [N.m]",
-    ]  # fmt: skip
-    names = dict.fromkeys(name for record in records.values() for name in record)
-    found = {name: [record[name] for record in records.values() if name in record] for name in names}
-    return markdown_rows(heads, [_seed_row(name, entries) for name, entries in found.items()])
-
-
-def _seed_row(name: str, entries: Sequence[Sequence[Any]]) -> list[str]:
-    scenario, _, variant = name.partition("@")
-    margins = [entry[3] for entry in entries if entry[3] is not None]
-    ends = sorted({number(margin, 1) for margin in margins}, key=float)
-    different = {tuple(entry[:-1]) for entry in entries}
-    return [
-        scenario,
-        variant or NOTHING,
-        f"{sum(bool(entry[0]) for entry in entries)} of {len(entries)} seeds",
-        "yes" if any(entry[-1] for entry in entries) else "no",
-        str(len(different)),
-        " to ".join([ends[0], ends[-1]] if len(ends) > 1 else ends) or NOTHING,
-    ]
-
-
-def filed(kept: Mapping[str, Any], report: Report) -> dict[str, Any]:
-    """The kept results with one more report in its place, which it replaces.
-
-    Args:
-        kept: ``main``: the reduced main report; ``statures``: reduced reports by stature; ``seeds``:
-            :func:`seed_record` by seed.  Keys may be missing.
-        report: With ``stature_m`` and ``seed``: None, or what it was asked for.
-
-    Returns:
-        The same with the report added; the main one counts as the seed that all its runs had, if any.
-    """
-    changed = {"main": None, "statures": {}, "seeds": {}, **kept}
-    stature, seed = report.get("stature_m"), report.get("seed")
-    if stature is not None:
-        return changed | {"statures": _ordered({**changed["statures"], f"{stature:g}": reduced(report)})}
-    own = {run.get("seed") for run in report["runs"]} - {None}
-    if seed is None:
-        changed["main"] = reduced(report)
-        seed = own.pop() if len(own) == 1 else None
-    if seed is not None:
-        changed["seeds"] = _ordered({**changed["seeds"], str(seed): seed_record(report)})
-    return changed
-
-
-def _ordered(entries: Mapping[str, Any]) -> dict[str, Any]:
-    return dict(sorted(entries.items(), key=lambda item: float(item[0])))
-
-
 def _scenario(run: Mapping[str, Any]) -> str:
     return str(run["scenario"]).partition("@")[0]
-
-
-def _name(run: Mapping[str, Any]) -> str:
-    return _scenario(run) if run["variant"] is None else f"{_scenario(run)}@{run['variant']}"
 
 
 ASKED = ("stature_m", "seed")

@@ -70,25 +70,12 @@ def test_schemas_and_tables_are_up_to_date(generated):
     assert [path.name for path, text in generated.items() if path.read_text(encoding="utf-8") != text] == []
 
 
-def test_several_reports_are_taken_over_at_once(generator, tmp_path, monkeypatch):
-    """Those that do not say their stature or seed are told; an option holds for one report."""
-    kept = json.loads((DOCS / "results.json").read_text(encoding="utf-8"))["main"]
-    small = {**kept, "stature_m": None, "seed": None, "runs": kept["runs"][:2]}
-    (tmp_path / "results.json").write_text('{"main": null, "statures": {}, "seeds": {}}')
-    (tmp_path / "report.json").write_text(json.dumps(small))
-    (tmp_path / "tall.json").write_text(json.dumps({**small, "stature_m": 1.85}))
+def test_a_report_replaces_the_one_before(generator, tmp_path, monkeypatch):
+    kept = json.loads((DOCS / "results.json").read_text(encoding="utf-8"))
+    (tmp_path / "report.json").write_text(json.dumps({**kept, "runs": kept["runs"][:2]}))
     monkeypatch.setattr(generator, "RESULTS", tmp_path / "results.json")
-    report, tall = str(tmp_path / "report.json"), str(tmp_path / "tall.json")
-    generator.take_over_results(["--stature", "1.65", report, tall, "--seed", "3", report, report])
-    found = generator.kept_results()
-    assert len(found["main"]["runs"]) == 2
-    assert [*found["statures"]] == ["1.65", "1.85"]
-    assert "3" in found["seeds"]
-    assert "| beam-H1C1 | - | 1.65 |" in generator.statures_table()
-    assert "of 1 seeds |" in generator.seeds_table() or "of 2 seeds |" in generator.seeds_table()
-    for wrong in (["--stature", report], [report, "--seed", "3"]):
-        with pytest.raises(SystemExit, match="valid: "):
-            generator.take_over_results(wrong)
+    generator.take_over_results([str(tmp_path / "report.json")])
+    assert len(generator.kept_results()["runs"]) == 2
 
 
 def test_every_generated_block_was_found(generated):

@@ -1,10 +1,8 @@
-"""Tables of the documentation: results, beams beside people, other statures, seeds."""
+"""Tables of the documentation: results, and beams beside people."""
 
-import copy
 import importlib.util
 from pathlib import Path
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -54,7 +52,6 @@ def cells(table):
 
 MISSED = {"stage": "wholebody", "reason": "no posture", "time_s": 1.0, "where": ""}
 STOPPED = a_run("beam-H1C1", as_expected=False, succeeded=False, failure=MISSED, execution=None)
-POINT_MASS = a_run("walls", stature_m=None, wholebody=None, execution=None)
 
 
 def test_beams_stand_beside_people_and_infeasible_variants_are_left_out():
@@ -67,56 +64,6 @@ def test_what_was_not_measured_is_left_blank():
     assert cells(tables.beam_table(a_report(STOPPED), PUBLISHED))[0][-3:] == ["-", "31.2", "-"]
     old = a_run("beam-H1C1", execution={"min_margin": 1.0})
     assert cells(tables.beam_table(a_report(old), PUBLISHED))[0][-1] == "-"
-
-
-def test_statures_are_side_by_side_and_a_point_mass_has_none():
-    reports = [a_report(a_run("platform"), STOPPED, POINT_MASS, stature_m=s) for s in (1.85, 1.65)]
-    table = cells(tables.stature_table(reports))
-    assert [(row[0], row[2]) for row in table] == [
-        ("beam-H1C1", "1.65"), ("beam-H1C1", "1.85"), ("platform", "1.65"), ("platform", "1.85"),
-    ]  # fmt: skip
-    assert table[0][3:] == ["79", "FAILED (wholebody): no posture", "-"]
-    assert table[3][3:] == ["79", "proved", "17.1"]
-
-
-def test_seeds_with_the_same_bits_are_one_result():
-    other = copy.deepcopy(a_run("platform"))
-    other["execution"]["min_margin"] += 1e-12
-    other["wholebody"]["seed_matters"] = True
-    records = {"0": tables.seed_record(a_report(a_run("platform"), a_run("walk", "slippery")))}
-    same = {**records, "1": records["0"]}
-    assert [row[2:] for row in cells(tables.seed_table(same))] == [["2 of 2 seeds", "no", "1", "17.1"]] * 2
-    records["1"] = tables.seed_record(
-        a_report(other, {**STOPPED, "scenario": "walk@slippery", "variant": "slippery"})
-    )
-    first, second = cells(tables.seed_table(records))
-    assert first == ["platform", "-", "2 of 2 seeds", "yes", "2", "17.1"]
-    assert second == ["walk", "slippery", "1 of 2 seeds", "no", "2", "17.1"]
-
-
-def test_a_spread_of_margins_is_shown():
-    worse = a_run("platform", execution={"min_margin": 8.5})
-    records = {
-        seed: tables.seed_record(a_report(run)) for seed, run in {"0": a_run("platform"), "1": worse}.items()
-    }
-    assert cells(tables.seed_table(records))[0][5] == "8.5 to 17.1"
-
-
-def test_each_report_is_filed_in_its_place_and_replaces_the_old_one_there():
-    kept = {}
-    for asked in ({}, {"stature_m": 1.65}, {"seed": 10}, {"seed": 9}, {"stature_m": 1.65}):
-        kept = tables.filed(kept, a_report(a_run("platform"), **asked))
-    assert [*kept] == ["main", "statures", "seeds"]
-    assert [*kept["statures"]] == ["1.65"]
-    assert [*kept["seeds"]] == ["0", "9", "10"]
-    assert kept["main"]["runs"][0]["centroidal"]["min_margin"] == pytest.approx(30.12, abs=1e-12)
-    assert kept["seeds"]["9"]["platform"][1] == 30.123456
-
-
-def test_a_main_report_of_several_seeds_is_none_of_the_ten():
-    assert tables.filed({}, a_report(a_run("platform"), a_run("walk", seed=4)))["seeds"] == {}
-    unknown = a_report(a_run("platform", seed=None))
-    assert tables.filed({}, unknown)["seeds"] == {}
 
 
 def test_markdown_rows_have_as_many_cells_as_the_header():
