@@ -29,6 +29,7 @@ from manikin.pipeline.stages.whole_body_stage import (
     move_point_mass,
     plan_centre_of_mass,
     with_key_postures,
+    with_rolling_feet,
     with_stricter_key_postures,
 )
 from manikin.planning.whole_body import WholeBodySettings
@@ -98,6 +99,8 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
     planned = _refined if context.scenario.refines else _followed
     result, schedule = planned(with_contacts, report, requirements)
+    if (rolling := with_rolling_feet(with_contacts, report)) is not None:
+        result, schedule = planned(rolling, report, requirements)
     for _ in range(1, context.scenario.contacts.attempts):
         phase = failed_phase(report.failure, schedule)
         again = None if phase is None else plan_contacts_again(with_contacts, report, phase)

@@ -255,7 +255,7 @@ class ScenarioFile(Section):
         """Refuse what cannot be refined."""
         if self.wholebody.method != "refine":
             return
-        rolls = self.supports is not None and self.supports.foot != "flat"
+        rolls = self.supports is not None and self.supports.foot == "rolling"
         for bad, what in (
             (self.body.model == "point_mass", "a point mass, which has no joints"),
             (rolls, "feet that roll, or flat ones"),

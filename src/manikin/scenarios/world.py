@@ -136,7 +136,7 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
         ScenarioError: If there are no supports, or a contact slides between phases.
     """
     sequence, supports = flat_sequence(values, planning=planning), values.explicit_supports()
-    if supports.foot == "flat":
+    if supports.foot != "rolling":
         return sequence
     with values.refusing(("supports", "foot")):
         return roll_feet(sequence, (TOE_HINGE_FROM_HEEL - 0.5) * supports.sole.length_m)

@@ -283,8 +283,8 @@ class Report:
         """
         self.failure = StageFailure(stage, reason_in_world(reason, self.transform), float(time), where)
 
-    def try_again(self, phase: int) -> None:
-        """Begin again with other contacts after a failure in a phase, which is kept among the refused."""
+    def try_again(self, phase: int | None = None) -> None:
+        """Begin again after a failure, which is kept among the refused with the phase it was traced to."""
         if self.failure is not None:
             self.refused.append({"phase": phase, **asdict(self.failure)})
         self.failure, self.planned, self.proved = None, False, False

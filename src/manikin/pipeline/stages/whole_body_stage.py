@@ -10,7 +10,7 @@ import numpy as np
 
 from manikin.balance import motion_margin
 from manikin.balance.contact_forces import friction_use
-from manikin.contact import ContactSchedule, StanceSequence
+from manikin.contact import ContactSchedule, SolePart, StanceSequence
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, place, reason_in_world, trajectory_in_world
 from manikin.planning.com import (
@@ -164,6 +164,23 @@ def _reported(report: Report, found: Eligibility) -> KeyedPlan:
     return KeyedPlan(found.centroidal, trajectory, found.postures, found.replans)
 
 
+def with_rolling_feet(context: RunContext, report: Report) -> RunContext | None:
+    """The task on feet that roll, after the whole body failed on feet that are flat by default, or None.
+
+    A foot that is about to leave, with the legs far apart, stands on its toes then, as a person's does.
+    None where the file says how feet stand, where contacts were searched, and where a phase has ``com_near``.
+    """
+    file = context.scenario.file
+    if report.failure is None or report.failure.stage != "wholebody" or context.plan is not None:
+        return None
+    if file.body.model != "human" or context.scenario.refines or file.supports is None:
+        return None
+    if file.supports.foot is not None or any(phase.com_near is not None for phase in file.supports.phases):
+        return None
+    report.try_again()
+    return context.with_supports(context.scenario.with_overrides(["supports.foot=rolling"]))
+
+
 def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
     """Plan the centre of mass on the supports, freely timed or through the key frames of a recording."""
     report.progress("centroidal", 0.0)
@@ -187,7 +204,8 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
 
 def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[str, Any]) -> None:
     """Take a plan into the report, with its trajectory and its ``centroidal`` block."""
-    report.finish("centroidal", block)
+    on_flat_feet = next((failure for failure in report.refused if failure["phase"] is None), None)
+    report.finish("centroidal", block | {"on_flat_feet": on_flat_feet})
     if result.certificate is not None:
         report.require("centroidal", result.certificate.table(result.problem))
     if result.trajectory is not None:
@@ -198,8 +216,10 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
     """Return the ``centroidal`` block of the summary."""
     trajectory = result.trajectory
     recorded = isinstance(result, KeyframeResult)
+    parts = {contact.part for phase in result.problem.sequence for contact in phase.stance}
     return {
         "method": "keyframes" if recorded else "timing-free",
+        "feet": "flat" if parts.isdisjoint((SolePart.HEEL, SolePart.TOES)) else "rolling",
         "added_key_frames_s": sorted(result.added_times) if recorded else None,
         "duration_s": None if trajectory is None else trajectory.duration,
         "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),

@@ -187,10 +187,9 @@ class SupportsSection(Section):
     planning_sole: SoleSection | None = optional(
         "smaller soles that planning balances on, for robustness (default: the real ones)"
     )
-    foot: Literal["flat", "rolling"] = preset(
-        "flat",
-        "whether a foot lands and leaves with its whole sole, or lands on its heel and leaves "
-        "from its toes while another foot stands",
+    foot: Literal["flat", "rolling"] | None = optional(
+        "whether a foot lands and leaves with its whole sole, or lands on its heel and leaves from its toes "
+        "while another foot stands (default: flat, and rolling where a person cannot follow the plan so)"
     )
     planning_friction: Positive | None = optional(
         "smaller friction that planning balances with (default: the real one)"

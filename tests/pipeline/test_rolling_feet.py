@@ -1,0 +1,66 @@
+"""Feet roll where a person cannot follow the plan on flat ones."""
+
+import time
+
+import pytest
+
+from manikin.contact import SolePart
+from manikin.pipeline.stages import Report, RunContext
+from manikin.pipeline.stages.whole_body_stage import (
+    centroidal_summary,
+    plan_centre_of_mass,
+    with_rolling_feet,
+)
+from manikin.scenarios import load_scenario
+
+
+def failed(scenario, stage="wholebody"):
+    """A context and a report that has failed in a stage."""
+    context = RunContext.of(scenario)
+    report = Report(context, None, None, time.perf_counter())
+    report.fail(stage, "left_foot misses its position", 1.0, "phase 2")
+    return context, report
+
+
+def test_feet_roll_after_a_failure_of_the_whole_body():
+    context, report = failed(load_scenario("platform"))
+    rolling = with_rolling_feet(context, report)
+    assert rolling is not None
+    assert report.failure is None
+    (before,) = report.refused
+    assert (before["phase"], before["stage"], before["time_s"]) == (None, "wholebody", 1.0)
+    parts = {contact.part for phase in rolling.problem.sequence for contact in phase.stance}
+    assert {SolePart.HEEL, SolePart.TOES} <= parts
+    # Rolling only adds phases: every stance of flat feet is among those of rolling ones, in order.
+    places = [{c.effector: tuple(c.position) for c in phase.stance} for phase in rolling.problem.sequence]
+    flat = [{c.effector: tuple(c.position) for c in phase.stance} for phase in context.problem.sequence]
+    assert [place for place, last in zip(places, [None, *places], strict=False) if place != last] == flat
+    assert with_rolling_feet(rolling, report) is None  # nothing has failed since
+    report.fail("wholebody", "again")
+    assert with_rolling_feet(rolling, report) is None  # and once is enough
+
+
+@pytest.mark.parametrize("stage", ["contacts", "centroidal", "execution"])
+def test_other_failures_leave_feet_as_they_are(stage):
+    context, report = failed(load_scenario("platform"), stage)
+    assert with_rolling_feet(context, report) is None
+    assert report.failure.stage == stage
+
+
+@pytest.mark.parametrize(("name", "settings"), [("platform", ["supports.foot=flat"]), ("crouch@refined", [])])
+def test_feet_stay_flat_where_the_file_says_so_and_where_motions_are_refined(name, settings):
+    context, report = failed(load_scenario(name).with_overrides(settings))
+    assert with_rolling_feet(context, report) is None
+    assert report.failure is not None
+
+
+def test_the_summary_says_how_feet_stand_and_why():
+    context, report = failed(load_scenario("platform"))
+    flat = plan_centre_of_mass(context, report)
+    assert centroidal_summary(flat)["feet"] == "flat"
+    assert report.summary["centroidal"]["on_flat_feet"] is None
+    report.fail("wholebody", "left_foot misses its position", 1.0, "phase 2")
+    rolling = plan_centre_of_mass(with_rolling_feet(context, report), report)
+    block = report.summary["centroidal"]
+    assert centroidal_summary(rolling)["feet"] == block["feet"] == "rolling"
+    assert block["on_flat_feet"]["reason"] == "left_foot misses its position"
