@@ -22,13 +22,14 @@ def failed(scenario, stage="wholebody"):
     return context, report
 
 
-def test_feet_roll_after_a_failure_of_the_whole_body():
-    context, report = failed(load_scenario("platform"))
+@pytest.mark.parametrize("stage", ["wholebody", "execution"])
+def test_feet_roll_where_the_body_does_not_follow(stage):
+    context, report = failed(load_scenario("platform"), stage)
     rolling = with_rolling_feet(context, report)
     assert rolling is not None
     assert report.failure is None
     (before,) = report.refused
-    assert (before["phase"], before["stage"], before["time_s"]) == (None, "wholebody", 1.0)
+    assert (before["phase"], before["stage"], before["time_s"]) == (None, stage, 1.0)
     parts = {contact.part for phase in rolling.problem.sequence for contact in phase.stance}
     assert {SolePart.HEEL, SolePart.TOES} <= parts
     # Rolling only adds phases: every stance of flat feet is among those of rolling ones, in order.
@@ -40,7 +41,7 @@ def test_feet_roll_after_a_failure_of_the_whole_body():
     assert with_rolling_feet(rolling, report) is None  # and once is enough
 
 
-@pytest.mark.parametrize("stage", ["contacts", "centroidal", "execution"])
+@pytest.mark.parametrize("stage", ["contacts", "centroidal", "act"])
 def test_other_failures_leave_feet_as_they_are(stage):
     context, report = failed(load_scenario("platform"), stage)
     assert with_rolling_feet(context, report) is None

@@ -165,15 +165,18 @@ def _reported(report: Report, found: Eligibility) -> KeyedPlan:
 
 
 def with_rolling_feet(context: RunContext, report: Report) -> RunContext | None:
-    """The task on feet that roll, after the whole body failed on feet that are flat by default, or None.
+    """The task on feet that roll, after the body failed to follow it on feet flat by default, or None.
 
     A foot that is about to leave, with the legs far apart, stands on its toes then, as a person's does.
-    None where the file says how feet stand, where contacts were searched, and where a phase has ``com_near``.
+    None where the file says how feet stand, where contacts were searched or recorded, under a push, in an
+    act, and where a phase has ``com_near``.
     """
-    file = context.scenario.file
-    if report.failure is None or report.failure.stage != "wholebody" or context.plan is not None:
+    file, failure = context.scenario.file, report.failure
+    if failure is None or failure.stage not in ("wholebody", "execution") or file.supports is None:
         return None
-    if file.body.model != "human" or context.scenario.refines or file.supports is None:
+    if file.body.model != "human" or file.push is not None or file.task.act is not None:
+        return None
+    if context.plan is not None or context.scenario.refines or isinstance(context.problem, KeyframeProblem):
         return None
     if file.supports.foot is not None or any(phase.com_near is not None for phase in file.supports.phases):
         return None
