@@ -1,8 +1,8 @@
 """Find a smooth swing that keeps clear of everything: simple curves first, then a local optimisation.
 
 The first way of [Qiu2012]_ 6.2.3 to move a flying effector, made stronger: a small family of curves over
-one apex is tried from the least to the most effort; where none keeps the wanted clearance, sequential quadratic
-programming (least squared jerk, linearised distances) moves the best one's control points until it does.
+one apex is tried from the least to the most effort; where none keeps the wanted clearance, the best one is
+moved by sequential quadratic programming (least squared jerk, linearised distances) until it does.
 """
 
 import itertools
@@ -109,21 +109,19 @@ def plan_swing(
         InputError: If the times or normals are not usable.
     """
     limits = limits or SwingLimits()
-    normals = tuple(
-        frozen_array(normal, f"swing {end}_normal", (3,))
-        for end, normal in (("start", start_normal), ("end", end_normal))
-    )
+    leaving = frozen_array(start_normal, "swing start_normal", (3,))
+    reaching = frozen_array(end_normal, "swing end_normal", (3,))
     if end_time <= start_time:
         raise InputError(f"swing ends at {end_time} s; valid: after its start at {start_time} s")
     family = (
         SwingCurve.lift(
             start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
-            start_normal=normals[0], end_normal=normals[1], pitch=pitch,
+            start_normal=leaving, end_normal=reaching, pitch=pitch,
         )
         for height, lateral, apex in sorted(itertools.product(heights, laterals, APEXES), key=_exertion)
     )  # fmt: skip
     best = _first_clear(family, clearance, limits)
-    curve, free = best.curve, _free_directions(*normals, len(best.curve.control_position))
+    curve, free = best.curve, _free_directions(leaving, reaching, len(best.curve.control_position))
     for _ in range(refine):
         step = _best_step(curve, clearance, limits, free)
         moved = curve.control_position + (free @ step).reshape(-1, 3)

@@ -1,9 +1,9 @@
 """A smooth flight of an effector between two poses, in closed form.
 
 Positions are a clamped B-spline of degree 5 on uniform knots, rotations the cumulative B-spline of the same
-degree on SO(3) ([Kim1995]_: products of exponentials, so a turn about one axis is exactly the shortest rotation,
-SLERP).  The first four and the last four control poses are equal, so velocity, acceleration and jerk vanish at
-both ends; the fifth one from either end lies on the surface normal, along which the curve leaves and arrives.
+degree on SO(3) ([Kim1995]_: products of exponentials, so a turn about one axis is exactly the shortest one).
+The first four and the last four control poses are equal, so velocity, acceleration and jerk vanish at both
+ends; the fifth one from either end lies on the surface normal, along which the curve leaves and arrives.
 """
 
 from dataclasses import dataclass
