@@ -1,9 +1,8 @@
 """Every term of the refinement, measured on samples of a motion without its spline or solver.
 
-Velocities and accelerations are differences of the sampled configurations, so that the input, whose
-velocity jumps at its keys, and the refined motion are measured in the same way.  An effector may touch what
-it holds, and that alone.  In flight it begins and ends at distance zero from its supports; in between it has
-to keep off them like everything else.
+Velocities and accelerations are differences of the sampled configurations, so that the input, whose velocity
+jumps at its keys, and the refined motion are measured in the same way.  An effector may touch what it holds,
+and that alone; in flight it begins and ends at distance zero from its supports.
 """
 
 import itertools
@@ -68,26 +67,19 @@ class RefineObstacles:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        schedule: ContactSchedule,
-        time: FloatArray,
+        self, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray,
         padded: Sequence[str] = (),
-    ) -> None:
+    ) -> None:  # fmt: skip
         leaning = leaning_pairs(body, padded)
         held = [
             leaning.union(*(touch_pairs(body, scene, contact) for contact in phase.stance))
             for phase in schedule.sequence
         ]
         self.ignored: tuple[Ignored, ...] = tuple(held[phase] for phase in schedule.phase_at(time))
-        self._obstacles = [obstacle.name for obstacle in scene]
-        self._ends = {name: end_segments(body, name) for name in schedule.sequence.effectors}
-        self._sides = list[_Side]()
-        self._near = {
-            name: np.where(schedule.support(time, (name,))[:, 0], 0.0, 1.0)
-            for name in schedule.sequence.effectors
-        }
+        self._obstacles, self._sides = [obstacle.name for obstacle in scene], list[_Side]()
+        names = schedule.sequence.effectors
+        self._ends = {name: end_segments(body, name) for name in names}
+        self._near = dict(zip(names, np.where(schedule.support(time, names), 0.0, 1.0).T, strict=True))
         for swing in schedule.sequence.swings():
             start, end = schedule.swing_interval(swing)
             rows = (time >= start) & (time < end)
@@ -103,8 +95,8 @@ class RefineObstacles:
 
     def touching(self) -> tuple[Ignored, ...]:
         """Pairs that may go into each other at each sample: those in contact, and a hand about a grasp."""
-        grasped = [side for side in self._sides if side.grasped]
-        return with_pairs(self.ignored, [(side.pairs, side.away < 1.0) for side in grasped])
+        near = [(side.pairs, side.away < 1.0) for side in self._sides if side.grasped]
+        return with_pairs(self.ignored, near)
 
     def during_flights(self) -> tuple[Ignored, ...]:
         """Pairs that do not count as clearance at each sample: in contact, leaving it or reaching it."""
@@ -196,17 +188,15 @@ def differences(body: BodyModel, time: FloatArray, q: FloatArray) -> tuple[Float
     Before and after the motion the body rests.
     """
     model, step = body.pinocchio, float(time[1] - time[0])
-    extended = [q[0], *q, q[-1]]
-    rate = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(extended)])
-    rate /= step
+    extended = itertools.pairwise([q[0], *q, q[-1]])
+    rate = np.array([pin.difference(model, a, b) for a, b in extended]) / step
     return 0.5 * (rate[1:] + rate[:-1]), (rate[1:] - rate[:-1]) / step
 
 
 def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray:
     """(n,) distance of wrenches (n, 6) about the mean contact point to the polytope of a stance [N].
 
-    The polytope holds what all admissible contact forces can supply; the nearest point of it is found
-    by a quadratic program for each wrench outside.
+    The nearest point of it is found by a quadratic program for each wrench outside.
     """
     H, h = room.polytope.H, room.polytope.h
     missing = np.zeros(len(stance_wrench))
@@ -232,12 +222,9 @@ def room_of(stance: Stance, friction_share: float = 1.0) -> MarginCost:
 
 
 def balance_of(
-    schedule: ContactSchedule,
-    rooms: tuple[MarginCost, ...],
-    time: FloatArray,
-    wrench: FloatArray,
+    schedule: ContactSchedule, rooms: tuple[MarginCost, ...], time: FloatArray, wrench: FloatArray,
     com: FloatArray,
-) -> tuple[MotionMargin, FloatArray]:
+) -> tuple[MotionMargin, FloatArray]:  # fmt: skip
     """Margins and (n,) physics violation of wrenches (n, 6) about the world origin with CoM (n, 3)."""
     phases, violation = schedule.phase_at(time), np.zeros(len(time))
     for number, (phase, room) in enumerate(zip(schedule.sequence, rooms, strict=True)):
@@ -264,8 +251,7 @@ def measure(
         q: (n, nq) configurations.
         task: As for :func:`~manikin.planning.whole_body.refine.refine_motion`.
     """
-    v, a = differences(body, time, q)
-    step = float(time[1] - time[0])
+    (v, a), step = differences(body, time, q), float(time[1] - time[0])
     found = centroidal_motion(body, q, v, a)
     margin, violation = balance_of(schedule, rooms, time, found.wrench, found.com)
     error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
@@ -307,8 +293,7 @@ def _contact_terms(
     variables, limbs = contact_variables(schedule, time), limb_directions(body, path, schedule, time, task)
     moves, phases = moves_by_joint(model), schedule.phase_at(time)
     error = slide = cost = 0.0
-    for column, name in enumerate(names):
-        variable = variables[name]
+    for column, (name, variable) in enumerate(variables.items()):
         for number, phase in enumerate(schedule.sequence):
             if name in phase.stance:
                 away = place[phases == number, column] - phase.stance[name].position

@@ -7,8 +7,7 @@ form of [Mordatch2012]_):
 
 with the wrench ``b`` that the whole body needs, the edges ``A`` of the friction pyramids and the axes of
 the grasps, and the contact variable ``c_j`` of each: the larger it is, the less its force costs.  Here it
-rises and falls within the time that the contact is held, so that load passes smoothly from one contact to
-the next.  Caps on sums of forces are left to the margin.
+rises and falls within the time that the contact is held.  Caps on sums of forces are left to the margin.
 
 What this program allows may lie on the very edge of what friction and soles admit.  Therefore the distance
 to every facet of the stance's wrench polytope ([Qiu2012]_ 4.36), its caps included and moments about the CoM,
@@ -98,8 +97,7 @@ class WrenchCost(NamedTuple):
     by_com: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class ForceShare:
+class ForceShare(NamedTuple):
     """Contact forces of many samples of one stance.
 
     Attributes:
@@ -124,22 +122,20 @@ class RefinedForces:
     """
 
     def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
-        self.centre = centre_of(stance)
-        generators = ContactGenerators.of(stance)
+        self.centre, generators = centre_of(stance), ContactGenerators.of(stance)
         columns = [names.index(contact.effector) for contact in stance]
-        scale = np.repeat([1.0, 1.0 / ARM], 3)
-        self._to_local = scale[:, None] * wrench_map(self.centre)
-        self._matrix = scale[:, None] * generators.about(self.centre)
-        self._limit = generators.upper
+        scale = np.repeat([1.0, 1.0 / ARM], 3)[:, None]
+        self._to_local, self._limit = scale * wrench_map(self.centre), generators.upper
+        self._matrix = scale * generators.about(self.centre)
         self.columns = np.array(columns, dtype=np.int64)[generators.contact]
 
     def share(
         self, wrench: FloatArray, variables: FloatArray, *, tolerance: float, force: float
     ) -> ForceShare:
-        """Solve the program for many samples at once.
+        """Solve the program for many samples at once, see :func:`~manikin.balance.contact_forces.share`.
 
-        See :func:`~manikin.balance.contact_forces.share`. The gradient of the least value by ``b`` is the
-        multiplier of the wrench, its second derivative the inverse of Newton's matrix.
+        The gradient of the least value by ``b`` is the multiplier of the wrench, its second derivative the
+        inverse of Newton's matrix.
 
         Args:
             wrench: (n, 6) needed, about the world origin.
@@ -158,13 +154,6 @@ class RefinedForces:
         return ForceShare(magnitude, tolerance**2 * multiplier, cost)
 
 
-FLAT = 1.0
-"""Radius of the largest ball in a polytope below which it is flat: it has no inside to stay in [N.m]."""
-
-SHARE = 0.4
-"""Most of the largest margin of any wrench that is wanted as margin."""
-
-
 class MarginCost:
     """The margin of one stance.
 
@@ -176,23 +165,18 @@ class MarginCost:
     def __init__(self, stance: Stance) -> None:
         self._to_local = wrench_map(centre_of(stance))
         self.polytope = wrench_polytope(stance, reference=centre_of(stance))
-        self.is_flat = self.polytope.inscribed_ball()[1] < FLAT
+        # Radius of the largest ball in it below which it has no inside to stay in [N.m].
+        self.is_flat = self.polytope.inscribed_ball()[1] < 1.0
 
     def wanted(self, margin: float, com: FloatArray) -> float:
-        """A wanted margin, or :data:`SHARE` of the largest one of any wrench when that is less [N.m].
-
-        Args:
-            margin: [N.m].
-            com: (3,) where the CoM is about, about which the moments are [m].
-        """
+        """A wanted margin, or 0.4 of the largest one of any wrench about a CoM (3,) if that is less [N.m]."""
         if self.is_flat:
             return margin
-        return min(margin, SHARE * self.polytope.at_reference(com).inscribed_ball()[1])
+        return min(margin, 0.4 * self.polytope.at_reference(com).inscribed_ball()[1])
 
     def margin(self, wrench: FloatArray, com: FloatArray) -> FloatArray:
         """(n,) margin about the CoM (n, 3) of wrenches (n, 6) about the world origin [N.m]."""
-        found = stability_margins(self.polytope, wrench @ self._to_local.T, com)
-        return found.wrench_about_com
+        return stability_margins(self.polytope, wrench @ self._to_local.T, com).wrench_about_com
 
     def cost(
         self, wrench: FloatArray, com: FloatArray, wanted: float, violation: float, softness: float
@@ -209,18 +193,15 @@ class MarginCost:
         n = len(wrench)
         if self.is_flat:
             return WrenchCost(np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6)), np.zeros((n, 3)))
-        H = self.polytope.H
-        arm = com - self.polytope.reference
+        H, arm = self.polytope.H, com - self.polytope.reference
         length = wrench_levers(H, arm)
         distance = self.polytope.distances(wrench @ self._to_local.T) / length
         near = np.flatnonzero(np.any(distance < wanted + 6.0 * softness, axis=0))
         rows, missing = H[near] @ self._to_local, (wanted - distance[:, near]) / softness
-        residual = softness * np.logaddexp(0.0, missing) / violation
-        length = length[:, near]
+        residual, length = softness * np.logaddexp(0.0, missing) / violation, length[:, near]
         slope = expit(missing) / violation / length
         # A row's length l has the derivative (H1 + H2 arm^) x H2 / l by the CoM.
-        moment = H[near, 3:]
-        at_com = H[near, :3] + cross(moment, arm[:, None, :])
+        moment, at_com = H[near, 3:], H[near, :3] + cross(H[near, 3:], arm[:, None, :])
         by_length = residual * slope * distance[:, near] / length
         outer = (rows[:, :, None] * rows[:, None, :]).reshape(len(near), 36)
         return WrenchCost(
@@ -231,28 +212,23 @@ class MarginCost:
         )
 
 
-TOGETHER = 50
-"""Instants that one program holds side by side."""
-
-
 def contact_slack(schedule: ContactSchedule, time: FloatArray, wrench: FloatArray) -> FloatArray:
     """(n,) room that the limits of all contacts have in common, in the units of their rows [N, N.m].
+
+    It is negative where no admissible contact forces supply the wrench; minus infinity without any contact.
 
     Args:
         time: (n,) [s].
         wrench: (n, 6) needed by the whole body, about the world origin.
-
-    Returns:
-        Negative where no admissible contact forces supply the wrench; minus infinity without any contact.
     """
     phases, slack = schedule.phase_at(time), np.full(len(time), -np.inf)
     for number, phase in enumerate(schedule.sequence):
-        rows = np.flatnonzero(phases == number)
         if len(phase.stance) == 0:
             continue
+        rows = np.flatnonzero(phases == number)
         program, to_centre = _slack_program(phase.stance), wrench_map(centre_of(phase.stance)).T
-        for start in range(0, len(rows), TOGETHER):
-            part = rows[start : start + TOGETHER]
+        for start in range(0, len(rows), 50):  # one program holds several instants side by side
+            part = rows[start : start + 50]
             slack[part] = _solve_slack(program, wrench[part] @ to_centre)
     return slack
 
@@ -261,14 +237,13 @@ def _slack_program(stance: Stance) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rows of the balance and of the limits, and bounds of these, on the contacts' wrenches and the slack."""
     maps = [_map(contact, centre_of(stance)) for contact in stance]
     parts = [_limits(contact, stance.friction_model) for contact in stance]
-    widths = [item.shape[1] for item in maps]
-    blocks = [left[:, :width] for (left, _), width in zip(parts, widths, strict=True)]
+    blocks = [left[:, : item.shape[1]] for (left, _), item in zip(parts, maps, strict=True)]
     limits = np.asarray(linalg.block_diag(*blocks), dtype=np.float64)
     bound = np.concatenate([right for _, right in parts])
     if stance.normal_force_cap is not None:
         normal = [
-            (contact.kind is not ContactKind.GRASP) * np.eye(width)[2]
-            for contact, width in zip(stance, widths, strict=True)
+            (contact.kind is not ContactKind.GRASP) * np.eye(item.shape[1])[2]
+            for contact, item in zip(stance, maps, strict=True)
         ]
         limits = np.vstack([limits, np.concatenate(normal)])
         bound = np.append(bound, stance.normal_force_cap)
