@@ -155,10 +155,6 @@ class MotionCertificate(RequirementTable):
         return requirement_table(row for row in self if (row.key, row.measured) not in idle)
 
 
-Worst = dict[str, tuple[float, float]]
-"""Worst value of each quantity and when it was measured [s], by key."""
-
-
 def certify(
     body: BodyModel, proximity: Proximity, trajectory: CentroidalTrajectory, motion: Motion,
     ignored: tuple[Ignored, ...], wrench: FloatArray, meeting: SlidingTouchdown | None = None,
@@ -174,18 +170,18 @@ def certify(
     """
     schedule = trajectory.schedule
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
-    worst = _worst(motion, {
-        **_kinematic_series(body, schedule, motion),
+    series = {
         "max_com_error_m": np.where(trajectory.binds(motion.time), com, 0.0),
         "max_meeting_error_m": sliding_touchdown_errors(proximity, meeting, motion),
         "max_missing_wrench": np.linalg.norm(motion.tau[:, :6], axis=1),
-    })  # fmt: skip
-    worst["max_scuff_m"] = deepest_penetration(body, proximity, schedule, motion, ignored)
+    }
+    worst = {"max_scuff_m": deepest_penetration(body, proximity, schedule, motion, ignored)}
     stances, phases = [phase.stance for phase in schedule.sequence], schedule.phase_at(motion.time)
-    balance = motion_margin(stances, phases, wrench, motion.com, polytopes=polytopes)
     return _certificate(
-        body, proximity, schedule, motion, ignored, worst, balance, requirements or WholeBodyRequirements()
-    )
+        body, proximity, schedule, motion, ignored, series, worst,
+        motion_margin(stances, phases, wrench, motion.com, polytopes=polytopes),
+        requirements or WholeBodyRequirements(),
+    )  # fmt: skip
 
 
 def certify_refined(
@@ -200,55 +196,47 @@ def certify_refined(
         violation: (n,) its physics violation [N].
         flat: Of each phase, whether its stance's wrenches fill no volume: margins do not count there.
     """
-    worst = _worst(motion, {**_kinematic_series(body, schedule, motion), "max_physics_violation": violation})
     without = np.array(flat)[schedule.phase_at(motion.time)]
     margin = np.where(without, np.inf, motion.margin)
     lowest = int(np.argmin(margin))
-    worst["min_margin"] = float(margin[lowest]), float(motion.time[lowest])
     flying = proximity.minimum_over(motion.q, obstacles.touching(), tolerance=1e-5)
-    worst["max_penetration_m"] = max(0.0, -float(flying.distance)), float(motion.time[flying.sample])
-    balance = replace(balance, force=np.where(without, np.inf, balance.force))
+    worst = {
+        "min_margin": (float(margin[lowest]), float(motion.time[lowest])),
+        "max_penetration_m": (max(0.0, -float(flying.distance)), float(motion.time[flying.sample])),
+    }
     return _certificate(
-        body, proximity, schedule, motion, obstacles.during_flights(), worst, balance,
+        body, proximity, schedule, motion, obstacles.during_flights(), {"max_physics_violation": violation},
+        worst, replace(balance, force=np.where(without, np.inf, balance.force)),
         requirements or RefineRequirements(),
     )  # fmt: skip
 
 
-def _kinematic_series(body: BodyModel, schedule: ContactSchedule, motion: Motion) -> dict[str, FloatArray]:
-    """(n,) errors of contacts and use of the joints' ranges, speeds and torques."""
-    support, turn = support_errors(body, schedule, motion)
-    beyond = np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper)
-    return {
-        "max_support_error_m": support,
-        "max_support_turn_rad": turn,
-        "max_joint_limit_violation_rad": beyond.max(axis=1, initial=0.0),
-        "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
-        "max_torque_share": body.torque_share(motion.tau[:, 6:]).max(axis=1, initial=0.0),
-    }
-
-
-def _worst(motion: Motion, series: Mapping[str, FloatArray]) -> Worst:
-    return {
-        key: (float(values.max()), float(motion.time[int(np.argmax(values))]))
-        for key, values in series.items()
-    }
-
-
 def _certificate(
     body: BodyModel, proximity: Proximity, schedule: ContactSchedule, motion: Motion,
-    ignored: tuple[Ignored, ...], worst: Worst, balance: MotionMargin, requirements: WholeBodyRequirements,
+    ignored: tuple[Ignored, ...], series: Mapping[str, FloatArray], worst: dict[str, tuple[float, float]],
+    balance: MotionMargin, requirements: WholeBodyRequirements,
 ) -> MotionCertificate:  # fmt: skip
-    """The table of what was measured, with the clearance and the impacts."""
+    """The table of series (n,), of worst values with their times [s], and of what any motion is asked."""
+    support, turn = support_errors(body, schedule, motion)
+    share = body.torque_share(motion.tau[:, 6:])
+    beyond = np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper)
+    measured = {
+        **series, "max_support_error_m": support, "max_support_turn_rad": turn,
+        "max_joint_limit_violation_rad": beyond.max(axis=1, initial=0.0),
+        "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
+        "max_torque_share": share.max(axis=1, initial=0.0),
+    }  # fmt: skip
+    for key, values in measured.items():
+        worst[key] = float(values.max()), float(motion.time[int(np.argmax(values))])
     closest = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     pair = closest.pair or ("", "")
     worst["min_clearance_m"] = float(closest.distance), float(motion.time[closest.sample])
-    share = body.torque_share(motion.tau[:, 6:])
-    tightest = body.joint_names[int(np.argmax(share.max(axis=0)))]
-    beyond = np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper).max(axis=0, initial=0.0)
+    farthest = beyond.max(axis=0, initial=0.0)
     where = {
-        "min_clearance_m": " and ".join(pair), "max_torque_share": tightest,
-        "max_joint_limit_violation_rad": body.joint_names[int(np.argmax(beyond))] if len(beyond) else "",
-    }  # fmt: skip
+        "min_clearance_m": " and ".join(pair),
+        "max_torque_share": body.joint_names[int(np.argmax(share.max(axis=0)))],
+        "max_joint_limit_violation_rad": body.joint_names[int(np.argmax(farthest))] if len(farthest) else "",
+    }
     rows = tuple(
         Requirement(
             key, name, unit, worst[key][0], sense, getattr(requirements, field) if field else np.inf,

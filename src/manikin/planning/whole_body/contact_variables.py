@@ -35,11 +35,8 @@ from manikin.planning.whole_body.refine_measures import room_of
 from manikin.planning.whole_body.refine_physics import LEAST_VARIABLE, MarginCost, RefinedForces
 from manikin.scene import Scene
 
-RELEASE = 0.5
-"""Contact variable below which a contact that is not needed is let go."""
-
-LEAST = LEAST_VARIABLE**2
-"""Smallest variable: below, a force gets no costlier."""
+RELEASE, LEAST = 0.5, LEAST_VARIABLE**2
+"""Variable below which a contact that is not needed is let go, and below which a force gets no costlier."""
 
 TOUCHING = 0.02
 """Distance to a surface up to which a contact counts as lying on it [m]."""

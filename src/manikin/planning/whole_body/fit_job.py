@@ -7,7 +7,6 @@ recording are three goals of the same job; each gives its objective, and the fir
 import itertools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -26,9 +25,7 @@ from manikin.scene.distance import segment_of
 CLEARANCE = frozenset({"min_clearance_m"})
 """Key of the clearance in a certificate."""
 
-UNITS = MappingProxyType(
-    {"min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0}
-)
+UNITS = {"min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0}
 """Size at which a broken requirement counts as one, where that is not its limit."""
 
 MOST_EXCESS, MUCH_EXCESS, A_LOT = 10.0, 4.0, 0.6
@@ -228,13 +225,7 @@ class FitJob:
         return second if second.excess < first.excess else first
 
     def updated(self, scales: S, broken: frozenset[str], narrow: bool = False) -> S:
-        """Scales at which broken requirements weigh more.
-
-        Args:
-            scales: Those of the fit before.
-            broken: Keys of the certificate.
-            narrow: Whether to count on less room where clearance is missed.
-        """
+        """Scales at which broken requirements weigh more; narrow ones count on less clearance if missed."""
         if narrow and broken & CLEARANCE:  # What is far enough no longer pushes.
             safe = max(NEARER * scales.safe_distance, LEAST_SAFE_DISTANCE)
             scales = replace(scales, safe_distance=safe, softness=NEARER * scales.softness)
@@ -289,5 +280,5 @@ def refined(knots: FloatArray, instants: FloatArray, within: float = 0.1) -> Flo
 def sample_times(knots: FloatArray, per_span: int) -> FloatArray:
     """Times that split every knot span into ``per_span`` equal parts, both ends included [s]."""
     breaks = np.unique(knots)
-    spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in itertools.pairwise(breaks)]
+    spans = [np.linspace(*span, per_span, endpoint=False) for span in itertools.pairwise(breaks)]
     return np.append(np.concatenate(spans), breaks[-1])

@@ -20,15 +20,12 @@ from manikin.contact import ContactSchedule, SolePart, Swing
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.swing_path import Pose
 
-PUSH_OFF_PITCH = float(np.deg2rad(24.0))
-"""Pitch at lift-off on the level, heel up [rad]."""
+PUSH_OFF_PITCH, HEEL_STRIKE_PITCH = float(np.deg2rad(24.0)), float(np.deg2rad(10.0))
+"""Pitch at lift-off on the level, heel up, and at landing, toes up [rad]."""
 
 HIGHEST_PITCH, HIGH_STEP = float(np.deg2rad(48.0)), 0.22
 """Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature: with the
 heel down no leg bends far enough for the body to be over the lower foot."""
-
-HEEL_STRIKE_PITCH = float(np.deg2rad(10.0))
-"""Pitch at landing, toes up [rad]."""
 
 PIVOT_SHIFT = (0.2, 0.85)
 """Shares of the flight between which the point that the curve describes moves from hinge to heel: while

@@ -222,20 +222,12 @@ def _tilted(contact: Contact, time: float, rolls: Sequence[FootRoll]) -> Placeme
     return Placement(contact.position, contact.rotation_contact_to_world)
 
 
-Realise = Callable[[CentroidalTrajectory], CentroidalTrajectory | None]
-"""Complete a plan (real supports, a seated part); None ends the search."""
-
-Look = Callable[[CentroidalTrajectory], KeyPostures]
-"""Find the key postures of a completed plan."""
-
-
 @dataclass(frozen=True)
 class IneligiblePlan:
-    """Reason why no plan has all its key postures.
+    """Reason why no plan has all its key postures, and the first one that fails.
 
     Attributes:
         stage: ``"wholebody"``, or ``"centroidal"`` when no plan keeps the tightened constraints.
-        posture: The first key posture that fails.
     """
 
     stage: str
@@ -263,12 +255,15 @@ class Eligibility:
 
 
 def find_eligible_plan(
-    first: CentroidalResult, realise: Realise, look: Look, *, replan: bool = True
-) -> Eligibility:
+    first: CentroidalResult, realise: Callable[[CentroidalTrajectory], CentroidalTrajectory | None],
+    look: Callable[[CentroidalTrajectory], KeyPostures], *, replan: bool = True,
+) -> Eligibility:  # fmt: skip
     """Test a plan at its key instants; plan again, three times at most, with tightened constraints.
 
     Args:
         first: A plan that succeeded.
+        realise: Complete a plan (real supports, a seated part); None ends the search.
+        look: Find the key postures of a completed plan.
         replan: Whether its problem may be solved again; a recorded centre of mass is what it is.
     """
     plan, replans = first, 0

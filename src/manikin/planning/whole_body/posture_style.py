@@ -259,26 +259,24 @@ def foot_lead(schedule: ContactSchedule, time: FloatArray) -> FloatArray:
     """(n,) how far the left foot is ahead of the right one along the heading [m]; 0 without both."""
     heading = heading_of(schedule, time)
     forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    places = [_foot_path(schedule, f"{side}_foot", time) for side in ("left", "right")]
-    if places[0] is None or places[1] is None:
+    left, right = (_foot_path(schedule, f"{side}_foot", time) for side in ("left", "right"))
+    if left is None or right is None:
         return np.zeros(len(time))
-    return np.sum(forward * (places[0] - places[1]), axis=1)
+    return np.sum(forward * (left - right), axis=1)
 
 
 def _foot_path(schedule: ContactSchedule, effector: str, time: FloatArray) -> FloatArray | None:
     """(n, 2) where an effector is, seen from above; smoothly from one contact to the next."""
-    known, places = list[float](), list[FloatArray]()
-    for index, phase in enumerate(schedule.sequence):
-        if effector in phase.stance:
-            known.extend(schedule.instants[index : index + 2])
-            places.extend([phase.stance[effector].position[:2]] * 2)
-    if not known:
+    held = [index for index, phase in enumerate(schedule.sequence) if effector in phase.stance]
+    if not held:
         return None
+    known = np.concatenate([schedule.instants[index : index + 2] for index in held])
+    places = np.repeat([schedule.sequence[index].stance[effector].position[:2] for index in held], 2, axis=0)
     after = np.clip(np.searchsorted(known, time, side="right"), 1, len(known) - 1)
-    start, end = np.array(known)[after - 1], np.array(known)[after]
+    start, end = known[after - 1], known[after]
     share = np.clip((time - start) / np.maximum(end - start, 1e-9), 0.0, 1.0)[:, None]
     blend = share**2 * (3.0 - 2.0 * share)
-    return (1.0 - blend) * np.array(places)[after - 1] + blend * np.array(places)[after]
+    return (1.0 - blend) * places[after - 1] + blend * places[after]
 
 
 def reference_motion(

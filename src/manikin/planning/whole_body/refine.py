@@ -171,8 +171,7 @@ class _RefineGoal:
             job.body, job.scene, self.path, self.schedule, time, scales, job.task, job.padded, job.variables
         )
         if self.forces is not None:
-            held = HeldForces.of(job.body, self.schedule, self.forces, time)
-            targets = replace(targets, forces=held)
+            targets = replace(targets, forces=HeldForces.of(job.body, self.schedule, self.forces, time))
         wanted = job.rooms(self.schedule.sequence, job.settings.friction_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
@@ -191,11 +190,8 @@ class _RefineGoal:
 
     def samples(self, spline: ConfigurationSpline | None = None) -> VariableSamples:
         """Samples of a motion, or of the keys at rest, for the choice of the contacts."""
-        time, body, names = (
-            sample_uniformly(self.schedule, 0.03),
-            self.job.body,
-            self.schedule.sequence.effectors,
-        )
+        body, names = self.job.body, self.schedule.sequence.effectors
+        time = sample_uniformly(self.schedule, 0.03)
         if spline is not None:
             return VariableSamples.of(body, names, time, spline.evaluate(time))
         still, path = np.zeros((len(time), body.nv)), self.path

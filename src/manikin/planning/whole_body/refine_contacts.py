@@ -29,9 +29,6 @@ from manikin.planning.whole_body.refine_input import KeyPath
 LEAST = 0.1
 """Smallest alpha; below it the cost is constant [N per N.m]."""
 
-STILL = 1.0e-3
-"""A pelvis that moves less than this during a phase has no direction [m]."""
-
 
 @dataclass(frozen=True, eq=False)
 class LimbDirections:
@@ -57,8 +54,9 @@ def limb_directions(
     """
     phases = schedule.phase_at(time)
     moved = np.diff(path.at(schedule.instants)[:, :3], axis=0)
-    length = np.linalg.norm(moved, axis=1, keepdims=True)
-    forward = np.where(length > STILL, moved / np.maximum(length, STILL), 0.0)
+    # A pelvis that moves less than this during a phase has no direction [m].
+    length, still = np.linalg.norm(moved, axis=1, keepdims=True), 1.0e-3
+    forward = np.where(length > still, moved / np.maximum(length, still), 0.0)
     found = {}
     for limb in body.limbs:
         if limb.effector not in schedule.sequence.effectors:

@@ -37,21 +37,6 @@ GRASPED = -0.05
 """Distance at which a hand that holds on to something begins to be pushed off it [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One end of a flight.
-
-    Attributes:
-        pairs: Segments and the obstacle that they leave or reach.
-        away: (n,) 0 at the contact, 1 far from it; 1 outside the flight.
-        grasped: Whether the hand has its fingers around the obstacle.
-    """
-
-    pairs: Ignored
-    away: FloatArray
-    grasped: bool
-
-
 class RefineObstacles:
     """Pairs that may be near each other, at samples of a motion.
 
@@ -76,8 +61,10 @@ class RefineObstacles:
             for phase in schedule.sequence
         ]
         self.ignored: tuple[Ignored, ...] = tuple(held[phase] for phase in schedule.phase_at(time))
-        self._obstacles, self._sides = [obstacle.name for obstacle in scene], list[_Side]()
-        names = schedule.sequence.effectors
+        self._obstacles, names = [obstacle.name for obstacle in scene], schedule.sequence.effectors
+        # Of each end of a flight the segments and the obstacle that they leave or reach; (n,) 0 at the
+        # contact, 1 far from it or outside the flight; and whether a hand has its fingers around it.
+        self._sides = list[tuple[Ignored, FloatArray, bool]]()
         self._ends = {name: end_segments(body, name) for name in names}
         self._near = dict(zip(names, np.where(schedule.support(time, names), 0.0, 1.0).T, strict=True))
         for swing in schedule.sequence.swings():
@@ -91,27 +78,22 @@ class RefineObstacles:
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
                     self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
                     grasped = contact.kind is ContactKind.GRASP
-                    self._sides.append(_Side(touch_pairs(body, scene, contact), away, grasped))
+                    self._sides.append((touch_pairs(body, scene, contact), away, grasped))
 
     def touching(self) -> tuple[Ignored, ...]:
         """Pairs that may go into each other at each sample: those in contact, and a hand about a grasp."""
-        near = [(side.pairs, side.away < 1.0) for side in self._sides if side.grasped]
+        near = [(pairs, away < 1.0) for pairs, away, grasped in self._sides if grasped]
         return with_pairs(self.ignored, near)
 
     def during_flights(self) -> tuple[Ignored, ...]:
         """Pairs that do not count as clearance at each sample: in contact, leaving it or reaching it."""
-        return with_pairs(self.ignored, [(side.pairs, side.away < 1.0) for side in self._sides])
+        return with_pairs(self.ignored, [(pairs, away < 1.0) for pairs, away, _ in self._sides])
 
     def wanted(self, found: ProximitySamples, safe: float, touching: float) -> FloatArray:
-        """(k,) wanted distance of close pairs [m].
+        """(k,) wanted distance of close pairs: far from contacts, and where a flight begins or ends [m].
 
         Where an effector is held its distance to other obstacles is given as well, and less of it is wanted:
         a push that ended with the contact would tear it off.
-
-        Args:
-            found: The pairs.
-            safe: Wanted far from contacts [m].
-            touching: Wanted where a flight begins or ends [m].
         """
         wanted = np.full(len(found.distance), safe)
         named = np.array([(segment_of(shape), segment_of(other)) for shape, other in found.pairs])
@@ -120,12 +102,11 @@ class RefineObstacles:
             # Share of the wanted clearance that an effector in contact has to keep from other obstacles.
             share = np.maximum(self._near[name][found.sample[rows]], 0.4)
             wanted[rows] = np.minimum(wanted[rows], share * safe)
-        for side in self._sides:
+        for pairs, away, grasped in self._sides:
             rows = np.zeros(len(wanted), dtype=bool)
-            for segment, obstacle in side.pairs:
+            for segment, obstacle in pairs:
                 rows |= (named[:, 0] == segment) & (named[:, 1] == obstacle)
-            share = side.away[found.sample[rows]]
-            inside = GRASPED if side.grasped else touching
+            share, inside = away[found.sample[rows]], GRASPED if grasped else touching
             wanted[rows] = np.minimum(wanted[rows], share * safe + (1.0 - share) * inside)
         return wanted
 
@@ -262,17 +243,13 @@ def measure(
         duration_s=float(time[-1] - time[0]),
         squared_accelerations=step * float(np.sum(a[:, 6:] ** 2)),
         squared_pelvis_accelerations=step * float(np.sum(a[:, :3] ** 2)),
-        physics_violation=float(violation.mean()),
-        max_physics_violation=float(violation.max()),
-        min_clearance_m=float(clearance.distance),
-        max_penetration_m=max(0.0, -float(flying.distance)),
-        contact_error_m=error,
-        contact_slide_mps=slide,
-        efort_cost=cost,
+        physics_violation=float(violation.mean()), max_physics_violation=float(violation.max()),
+        min_clearance_m=float(clearance.distance), max_penetration_m=max(0.0, -float(flying.distance)),
+        contact_error_m=error, contact_slide_mps=slide, efort_cost=cost,
         max_joint_limit_violation_rad=max(0.0, float(outside)),
         max_velocity_share=float((np.abs(v[:, 6:]) / body.velocity_limit).max(initial=0.0)),
         min_margin=float(margin.margin.min()),
-    )
+    )  # fmt: skip
 
 
 def _contact_terms(

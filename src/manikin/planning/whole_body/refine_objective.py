@@ -40,7 +40,7 @@ from manikin.planning.whole_body.refine_contacts import (
 )
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.refine_measures import RefineObstacles
-from manikin.planning.whole_body.refine_physics import MarginCost, RefinedForces, WrenchCost, WrenchSamples
+from manikin.planning.whole_body.refine_physics import MarginCost, RefinedForces, WrenchCost, needed_wrench
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint
 
@@ -182,11 +182,11 @@ class RefineObjective(MotionObjective):
     def _add_dynamics(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
         """Physics violation and balance, which depend on the wrench that the whole body needs."""
         assert isinstance(scales, RefineScales)
-        wrench = WrenchSamples.of(motion, self._body.mass)
+        wrench, com_jacobian = needed_wrench(motion, self._body.mass)
         cost = self.wrench_cost(wrench.value, motion.com, scales)
         out.sample_cost += cost.value
         # The lengths of the rows change little with the CoM; the gradient alone has it.
-        out.gradient[0] += np.einsum("nc,ncq->nq", cost.by_com, wrench.com_jacobian)
+        out.gradient[0] += np.einsum("nc,ncq->nq", cost.by_com, com_jacobian)
         # With the curvature L L^T, the rows L^T db and the residual L^-1 gradient have its gradient
         # and its Gauss-Newton matrix.
         size = np.abs(cost.curvature).max(axis=(1, 2))

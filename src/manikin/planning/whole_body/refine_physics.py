@@ -22,7 +22,6 @@ limits ([Qiu2012]_ 4.2.2),
 where ``s >= 0`` exactly where the margin of ``b`` in the stance's wrench polytope is not negative.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +35,7 @@ from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.balance.friction import contact_limits
 from manikin.balance.margin import wrench_levers
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
-from manikin.motion.dynamics import MotionSamples
+from manikin.motion.dynamics import MomentumRate, MotionSamples
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, skew, wrench_map
 from manikin.planning.whole_body.fit_objective import to_raw
 
@@ -47,33 +46,20 @@ LEAST_VARIABLE = 0.05
 """Contact variables below this do not make a force any costlier."""
 
 
-@dataclass(frozen=True, eq=False)
-class WrenchSamples:
-    """Wrench that the whole body needs at samples of a motion, moments about the world origin.
+def needed_wrench(motion: MotionSamples, mass: float) -> tuple[MomentumRate, FloatArray]:
+    """``[m (c'' - g); c x m (c'' - g) + L']`` (n, 6) [N, N.m] ([Qiu2012]_ 4.51) with its derivatives.
 
-    Attributes:
-        value: (n, 6) force and moment [N, N.m].
-        jacobians: Three (n, 6, nq) derivatives, by the raw coordinates, their rates and second derivatives.
-        com_jacobian: (n, 3, nq) derivative of the CoM by the raw coordinates.
+    The second result is (n, 3, nq), the derivative of the CoM by the raw coordinates.
     """
-
-    value: FloatArray
-    jacobians: tuple[FloatArray, FloatArray, FloatArray]
-    com_jacobian: FloatArray
-
-    @classmethod
-    def of(cls, motion: MotionSamples, mass: float) -> "WrenchSamples":
-        """``[m (c'' - g); c x m (c'' - g) + L']`` ([Qiu2012]_ 4.51) with its derivatives."""
-        rate = motion.momentum
-        force = rate.value[:, :3] - mass * GRAVITY_VECTOR
-        moment = rate.value[:, 3:] + np.cross(motion.com, force)
-        arm = skew(motion.com)
-        jacobians = [
-            np.concatenate([part[:, :3], part[:, 3:] + arm @ part[:, :3]], axis=1) for part in rate.jacobians
-        ]
-        by_com = to_raw(motion.com_jacobian, motion.tangent)
-        jacobians[0][:, 3:] -= skew(force) @ by_com
-        return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]), by_com)
+    rate, arm = motion.momentum, skew(motion.com)
+    force = rate.value[:, :3] - mass * GRAVITY_VECTOR
+    moment = rate.value[:, 3:] + np.cross(motion.com, force)
+    first, second, third = (
+        np.concatenate([part[:, :3], part[:, 3:] + arm @ part[:, :3]], axis=1) for part in rate.jacobians
+    )
+    by_com = to_raw(motion.com_jacobian, motion.tangent)
+    first[:, 3:] -= skew(force) @ by_com
+    return MomentumRate(np.hstack([force, moment]), (first, second, third)), by_com
 
 
 def centre_of(stance: Stance) -> FloatArray:
@@ -184,8 +170,7 @@ class MarginCost:
         """Softened squares of what the distances to the facets lack, with derivatives by wrench and CoM.
 
         Args:
-            wrench: (n, 6) about the world origin.
-            com: (n, 3) CoM [m].
+            wrench: (n, 6) about the world origin, with CoM (n, 3).
             wanted: Margin, see :meth:`wanted` [N.m].
             violation: Missing margin that costs one unit [N.m].
             softness: Width of the bend of the penalty [N.m].
@@ -235,11 +220,10 @@ def contact_slack(schedule: ContactSchedule, time: FloatArray, wrench: FloatArra
 
 def _slack_program(stance: Stance) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rows of the balance and of the limits, and bounds of these, on the contacts' wrenches and the slack."""
-    maps = [_map(contact, centre_of(stance)) for contact in stance]
-    parts = [_limits(contact, stance.friction_model) for contact in stance]
-    blocks = [left[:, : item.shape[1]] for (left, _), item in zip(parts, maps, strict=True)]
+    parts = [_contact_rows(contact, centre_of(stance), stance.friction_model) for contact in stance]
+    maps, blocks, bounds = zip(*parts, strict=True)
     limits = np.asarray(linalg.block_diag(*blocks), dtype=np.float64)
-    bound = np.concatenate([right for _, right in parts])
+    bound = np.concatenate(bounds)
     if stance.normal_force_cap is not None:
         normal = [
             (contact.kind is not ContactKind.GRASP) * np.eye(item.shape[1])[2]
@@ -267,19 +251,18 @@ def _solve_slack(program: tuple[FloatArray, FloatArray, FloatArray], wrench: Flo
     return np.concatenate([_solve_slack(program, row[None]) for row in wrench])
 
 
-def _map(contact: Contact, centre: FloatArray) -> FloatArray:
-    """(6, 3 or 6) from a contact's wrench in the frame of its limits to one about the centre."""
-    grasped = contact.kind is ContactKind.GRASP
+def _contact_rows(
+    contact: Contact, centre: FloatArray, model: FrictionModel
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Map (6, m) of a contact's wrench to one about the centre, rows (k, m) and bounds (k,) of its limits.
+
+    The wrench is in the frame of the limits, without moments, m = 3, where the contact has none.
+    """
+    grasped, limits = contact.kind is ContactKind.GRASP, contact_limits(contact, model)
     rotation = np.eye(3) if grasped else contact.rotation_contact_to_world
     moved = wrench_map(centre - contact.position) @ np.kron(np.eye(2), rotation)
-    forces_only = contact.kind is ContactKind.POINT or (grasped and contact.max_moment == 0.0)
-    return moved[:, :3] if forces_only else moved
-
-
-def _limits(contact: Contact, model: FrictionModel) -> tuple[FloatArray, FloatArray]:
-    """Rows (k, 6) and bounds (k,) of a contact, without those of moments that it does not have."""
-    limits = contact_limits(contact, model)
-    if contact.kind is ContactKind.GRASP and contact.max_moment == 0.0:
+    if grasped and contact.max_moment == 0.0:
         kept = np.any(limits.A[:, :3] != 0.0, axis=1)
-        return limits.A[kept], limits.b[kept]
-    return limits.A, limits.b
+        return moved[:, :3], limits.A[kept][:, :3], limits.b[kept]
+    width = 3 if contact.kind is ContactKind.POINT else 6
+    return moved[:, :width], limits.A[:, :width], limits.b

@@ -30,9 +30,6 @@ Samples = NDArray[np.bool_]
 SITTING_DOWN = 0.15
 """Time before a seat is touched in which the trunk may come close to it [s]."""
 
-_REACH = 0.1
-"""Distances beyond this are not measured [m]."""
-
 
 def with_pairs(held: Sequence[Ignored], more: Sequence[tuple[Ignored, Samples]]) -> tuple[Ignored, ...]:
     """The pairs held at each sample, with further ones where these count."""
@@ -123,10 +120,10 @@ def sliding_touchdown_errors(
     errors = np.zeros(len(motion.time))
     if meeting is None:
         return errors
-    samples = np.flatnonzero(meeting.near)
+    samples, reach = np.flatnonzero(meeting.near), 0.1  # distances beyond are not measured [m]
     others = frozenset(compress(proximity.pairs, considered(proximity.pairs, meeting.pairs)))
-    found = proximity.evaluate_over(motion.q[samples], _REACH, others)
-    least = np.full(len(samples), _REACH)
+    found = proximity.evaluate_over(motion.q[samples], reach, others)
+    least = np.full(len(samples), reach)
     np.minimum.at(least, found.sample, found.distance)
     errors[samples] = np.where(meeting.sliding[samples], np.abs(least), np.maximum(-least, 0.0))
     return errors

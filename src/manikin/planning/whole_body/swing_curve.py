@@ -294,16 +294,13 @@ def _least_jerk(controls: int, conditions: bytes) -> FloatArray:
     return np.asarray(np.linalg.solve(system, targets)[: 3 * controls], dtype=np.float64)
 
 
-PITCH_DECLINE = 2.0
-"""Time in which the extra pitch fades relative to that in which it grows: it peaks at a third."""
-
-
 def _turning(start: FloatArray, goal: FloatArray, pitch: float, controls: int) -> FloatArray:
     """Control rotations of the shortest turn, timed like a straight flight, and the extra pitch."""
     share = _straight_shares(controls)
     turn = Rotation.from_matrix(start.T @ goal).as_rotvec()
-    peak = 1.0 / (1.0 + PITCH_DECLINE)
-    bell = share * (1.0 - share) ** PITCH_DECLINE / (peak * (1.0 - peak) ** PITCH_DECLINE)
+    decline = 2.0  # time in which the extra pitch fades relative to that in which it grows
+    peak = 1.0 / (1.0 + decline)
+    bell = share * (1.0 - share) ** decline / (peak * (1.0 - peak) ** decline)
     straight = Rotation.from_rotvec(share[:, None] * turn)
     nod = Rotation.from_rotvec(bell[:, None] * np.array([0.0, pitch, 0.0]))
     rotations = start @ (straight * nod).as_matrix()

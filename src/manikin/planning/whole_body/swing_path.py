@@ -117,9 +117,6 @@ Placed = tuple[Any, Any]
 OwnShape = tuple[Any, FloatArray, FloatArray]
 """A Coal geometry, its rotation and translation in the effector frame."""
 
-_ENDLESS = 1.0e9
-"""Half the extent of what has no end (a floor) [m]."""
-
 
 class EffectorClearance:
     """Callable ``(time, pose) -> signed distance [m]`` for one flying effector.
@@ -237,7 +234,7 @@ def _local_box(geometry: Any) -> tuple[FloatArray, FloatArray]:
 def _world_box(geometry: Any, placement: Any) -> tuple[FloatArray, FloatArray]:
     """Corners (3,) of an axis-aligned box around a placed geometry [m]; boundless for half-spaces."""
     if isinstance(geometry, (coal.Halfspace, coal.Plane)):
-        return np.full(3, -_ENDLESS), np.full(3, _ENDLESS)
+        return np.full(3, -1.0e9), np.full(3, 1.0e9)
     middle, half = _local_box(geometry)
     rotation = np.array(placement.getRotation())
     centre, half = rotation @ middle + np.array(placement.getTranslation()), np.abs(rotation) @ half

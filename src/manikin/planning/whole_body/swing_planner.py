@@ -34,9 +34,6 @@ SHARES = (0.25, 0.5, 0.75)
 ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
 
-SETTINGS = SolverSettings(tolerance=1e-3, explain=False)
-"""A flight without such a posture needs no reason, and a guess no exact contacts."""
-
 
 def with_mid_flights(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, padded: Sequence[str] = ()
@@ -55,8 +52,6 @@ def with_mid_flights(
     limits = SwingLimits(clearance=distance, time_step=0.02)
     keys = dict(zip(path.time.tolist(), path.q, strict=True))
     for swing in schedule.sequence.swings():
-        if swing.start is None or swing.end is None or not hangs(body, swing.effector):
-            continue
         curve = _curve(body, scene, schedule, path, swing, limits)
         if curve is None:
             continue
@@ -76,7 +71,8 @@ def with_mid_flights(
                 # Share of the wanted distance that the posture keeps from everything that is not touched.
                 proximity=proximity, clearance=0.75 * distance, ignore=touched, reference=guess,
             )  # fmt: skip
-            found = generate_posture(problem, guess, settings=SETTINGS)
+            # A flight without such a posture needs no reason, and a guess no exact contacts.
+            found = generate_posture(problem, guess, settings=SolverSettings(tolerance=1e-3, explain=False))
             if found.succeeded:
                 # A given posture this near to a new one is replaced by it [s].
                 keys = {other: q for other, q in keys.items() if abs(other - time) > 0.01}
@@ -89,8 +85,8 @@ def _curve(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, swing: Swing, limits: SwingLimits
 ) -> SwingCurve | None:
     """A curve of the effector that keeps off everything; None where there is none, or none is needed."""
-    assert swing.start is not None
-    assert swing.end is not None
+    if swing.start is None or swing.end is None or not hangs(body, swing.effector):
+        return None
     interval = schedule.swing_interval(swing)
     # A flight that is clear already at these instants needs no curve.
     times = np.linspace(*interval, 13)
