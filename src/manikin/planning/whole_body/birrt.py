@@ -1,9 +1,8 @@
 """Bidirectional RRT of a flying effector in configuration-time space ([Qiu2012]_ 6.2.4).
 
-Two trees grow from the pose at lift-off (forwards in time) and the pose at touch-down
-(backwards in time), alternately, until an edge joins them.  A node is a pose and an
-instant; an edge is a straight flight with a shortest turn.  Algorithms 4 and 5 are
-corrected: the speed limits are checked towards the sampled point, whose direction the
+Two trees grow from the poses at lift-off (forwards in time) and touch-down (backwards), alternately, until an
+edge joins them.  A node is a pose and an instant; an edge is a straight flight with a shortest turn.
+Algorithms 4 and 5 are corrected: the speed limits are checked towards the sampled point, whose direction the
 candidate keeps, and a candidate whose edge fails a check is not added.
 """
 
@@ -24,20 +23,12 @@ Feasible = Callable[[Pose, float, Any], Any]
 """``feasible(pose, time, hint) -> hint``: None when no posture exists there, otherwise anything
 (such as the posture found) that is handed back with the neighbouring question for a warm start."""
 
-RESOLUTION = 0.05
-"""Metric distance between two checked points of an edge."""
+RESOLUTION, STEP, CONNECT = 0.05, 0.2, 0.5
+"""Metric distance between two checked points of an edge, and largest metric lengths of a new edge (d_lim) and
+of the one that joins the trees."""
 
-STEP = 0.2
-"""Largest metric length of a new edge (d_lim)."""
-
-CONNECT = 0.5
-"""Largest metric length of the edge that joins the trees."""
-
-MARGIN = 0.3
-"""Positions are drawn from the box around both ends, with this added to each side [m]."""
-
-ABOVE = 0.5
-"""Added above [m]."""
+MARGIN, ABOVE = 0.3, 0.5
+"""Positions are drawn from the box around both ends, with these added to each side and above [m]."""
 
 SPREAD = 0.2
 """Largest random turn about each axis away from the shortest turn between the ends [rad]."""
@@ -53,11 +44,7 @@ def slow_enough(
 
 @dataclass(frozen=True, eq=False)
 class BiRrtResult:
-    """Path found, or why none was.
-
-    Attributes:
-        hints: What the feasibility check returned at each node of the path.
-    """
+    """Path found, with what the feasibility check returned at each of its nodes, or why there is none."""
 
     path: EffectorPath | None
     hints: tuple[Any, ...]
@@ -84,24 +71,17 @@ def plan_flight(
         raise InputError(f"flight ends at {end_time} s; valid: after its start at {start_time} s")
     search = _Search((start, goal), (start_time, end_time), feasible, limits, iterations)
     failure = search.plant()
-    if failure:
-        return BiRrtResult(None, (), failure)
-    for _ in range(iterations):
+    for _ in range(0 if failure else iterations):
         joint = search.grow(rng)
         if joint is not None:
             return BiRrtResult(*search.path(*joint))
-    return BiRrtResult(None, (), search.explain(iterations))
+    return BiRrtResult(None, (), failure or search.explain(iterations))
 
 
 def walk(feasible: Feasible, edge: EffectorPath, hint: Any, *, backwards: bool = False) -> Any:
-    """CHECK-PG of a straight edge: the hint at the far end, or None where a point has no posture.
+    """CHECK-PG of an edge of two nodes: the hint at its far end, or None where a point has no posture.
 
-    The end the walk sets out from is not asked again; the one it arrives at is.
-
-    Args:
-        edge: A path of two nodes.
-        hint: Hint at the node the walk sets out from: the first, or the last when backwards.
-        backwards: Walk against the time.
+    The node the walk sets out from, the last when backwards in time, has ``hint`` and is not asked again.
     """
     count = max(1, int(np.ceil(edge.length / RESOLUTION)))
     shares = np.arange(1, count + 1) / count
@@ -117,8 +97,7 @@ class _Tree:
     """Nodes of one tree: position, quaternion and time in a row; ``direction`` is -1 backwards in time."""
 
     def __init__(self, direction: int, most: int) -> None:
-        self.direction = direction
-        self._rows = np.empty((most, 8))
+        self.direction, self._rows = direction, np.empty((most, 8))
         self.parent: list[int] = []
         self.hint: list[Any] = []
 
@@ -139,11 +118,12 @@ class _Tree:
         angle = 2.0 * np.arccos(np.minimum(np.abs(self.nodes[:, 3:7] @ node[3:7]), 1.0))
         return distance, angle, self.direction * (node[7] - self.nodes[:, 7])
 
-    def branch(self, index: int) -> list[int]:
-        """Indices from a node to the root."""
-        line = [index]
-        while self.parent[line[-1]] >= 0:
-            line.append(self.parent[line[-1]])
+    def branch(self, index: int) -> list[tuple[FloatArray, Any]]:
+        """Nodes with their hints from one to the root."""
+        line = []
+        while index >= 0:
+            line.append((self.nodes[index], self.hint[index]))
+            index = self.parent[index]
         return line
 
 
@@ -249,11 +229,10 @@ class _Search:
 
     def path(self, forward: int, backward: int) -> tuple[EffectorPath, tuple[Any, ...]]:
         """CONSTRUCT-PATH: from the first root through the joint to the second root."""
-        nodes = [(self.trees[0], i) for i in reversed(self.trees[0].branch(forward))]
-        nodes += [(self.trees[1], i) for i in self.trees[1].branch(backward)]
-        rows = np.array([tree.nodes[i] for tree, i in nodes])
+        nodes, hints = zip(*self.trees[0].branch(forward)[::-1], *self.trees[1].branch(backward), strict=True)
+        rows = np.array(nodes)
         path = EffectorPath(rows[:, 7], rows[:, :3], Rotation.from_quat(rows[:, 3:7]).as_matrix())
-        return path, tuple(tree.hint[i] for tree, i in nodes)
+        return path, hints
 
     def explain(self, iterations: int) -> str:
         """Reason why the iterations were not enough."""

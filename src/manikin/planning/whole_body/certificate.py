@@ -1,10 +1,8 @@
 """Certificates of whole-body motions: every quantity measured afresh on dense samples, beside its limit.
 
-Nothing here comes from the solver: placements, centre of mass, distances and dynamics are
-computed again from the samples of the finished motion, planned or refined.
-
-Feet and hands in flight begin and end at distance zero from their supports, which does not count as
-clearance; how deep they go into them is measured apart.
+Nothing here comes from the solver: all is computed again from the samples of the finished motion.  Feet and
+hands in flight begin and end at distance zero from their supports, which does not count as clearance; how
+deep they go into them is measured apart.
 """
 
 from collections.abc import Mapping, Sequence
@@ -69,25 +67,21 @@ class RefineRequirements(WholeBodyRequirements):
     clearance: float = 0.0
 
 
-QUANTITIES: Mapping[str, tuple[str, str, Sense, str]] = MappingProxyType(
-    {
-        "max_support_error_m": ("support error", "m", "<=", "support_error"),
-        "max_support_turn_rad": ("support turn", "rad", "<=", "support_turn"),
-        "max_meeting_error_m": (
-            "distance of a sliding contact from its surface", "m", "<=", "meeting_error",
-        ),
-        "max_com_error_m": ("centre-of-mass error", "m", "<=", "com_error"),
-        "min_clearance_m": ("clearance", "m", ">=", "clearance"),
-        "max_scuff_m": ("depth of a flight in what it leaves or reaches", "m", "<=", ""),
-        "max_penetration_m": ("penetration", "m", "<=", "penetration"),
-        "max_joint_limit_violation_rad": ("joint range violation", "rad", "<=", "joint_limit"),
-        "max_velocity_share": ("share of a velocity limit", "", "<=", "velocity_share"),
-        "max_missing_wrench": ("missing wrench", "N, N.m", "<=", "missing_wrench"),
-        "max_physics_violation": ("wrench without contact force", "N", "<=", "physics_violation"),
-        "min_margin": ("margin of the whole body", "N.m", ">=", "margin"),
-        "max_torque_share": ("share of a torque limit", "", "<=", "torque_share"),
-    }
-)  # fmt: skip
+QUANTITIES: Mapping[str, tuple[str, str, Sense, str]] = MappingProxyType({
+    "max_support_error_m": ("support error", "m", "<=", "support_error"),
+    "max_support_turn_rad": ("support turn", "rad", "<=", "support_turn"),
+    "max_meeting_error_m": ("distance of a sliding contact from its surface", "m", "<=", "meeting_error"),
+    "max_com_error_m": ("centre-of-mass error", "m", "<=", "com_error"),
+    "min_clearance_m": ("clearance", "m", ">=", "clearance"),
+    "max_scuff_m": ("depth of a flight in what it leaves or reaches", "m", "<=", ""),
+    "max_penetration_m": ("penetration", "m", "<=", "penetration"),
+    "max_joint_limit_violation_rad": ("joint range violation", "rad", "<=", "joint_limit"),
+    "max_velocity_share": ("share of a velocity limit", "", "<=", "velocity_share"),
+    "max_missing_wrench": ("missing wrench", "N, N.m", "<=", "missing_wrench"),
+    "max_physics_violation": ("wrench without contact force", "N", "<=", "physics_violation"),
+    "min_margin": ("margin of the whole body", "N.m", ">=", "margin"),
+    "max_torque_share": ("share of a torque limit", "", "<=", "torque_share"),
+})  # fmt: skip
 """Quantities of a certificate in the order in which they are reported: name, unit, sense of the limit, and
 the field of :class:`WholeBodyRequirements` that has it; none where nothing is required."""
 
@@ -157,16 +151,8 @@ class MotionCertificate(RequirementTable):
     @property
     def required(self) -> RequirementTable:
         """The quantities that have a limit here: margins on stances with a volume, contacts met at speed."""
-        return requirement_table(
-            row
-            for row in self
-            if not (row.key == "max_meeting_error_m" and row.measured == 0.0)
-            and not (row.key == "min_margin" and row.measured == np.inf)
-        )
-
-
-Worst = dict[str, tuple[float, float]]
-"""Worst value of each quantity and when it was measured [s], by key."""
+        idle = ("max_meeting_error_m", 0.0), ("min_margin", np.inf)
+        return requirement_table(row for row in self if (row.key, row.measured) not in idle)
 
 
 def certify(
@@ -184,19 +170,18 @@ def certify(
     """
     schedule = trajectory.schedule
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
-    worst = _worst(motion, {
-        **_kinematic_series(body, schedule, motion),
+    series = {
         "max_com_error_m": np.where(trajectory.binds(motion.time), com, 0.0),
         "max_meeting_error_m": sliding_touchdown_errors(proximity, meeting, motion),
         "max_missing_wrench": np.linalg.norm(motion.tau[:, :6], axis=1),
-    })  # fmt: skip
-    worst["max_scuff_m"] = deepest_penetration(body, proximity, schedule, motion, ignored)
-    stances = [phase.stance for phase in schedule.sequence]
-    phases = schedule.phase_at(motion.time)
-    balance = motion_margin(stances, phases, wrench, motion.com, polytopes=polytopes)
+    }
+    worst = {"max_scuff_m": deepest_penetration(body, proximity, schedule, motion, ignored)}
+    stances, phases = [phase.stance for phase in schedule.sequence], schedule.phase_at(motion.time)
     return _certificate(
-        body, proximity, schedule, motion, ignored, worst, balance, requirements or WholeBodyRequirements()
-    )
+        body, proximity, schedule, motion, ignored, series, worst,
+        motion_margin(stances, phases, wrench, motion.com, polytopes=polytopes),
+        requirements or WholeBodyRequirements(),
+    )  # fmt: skip
 
 
 def certify_refined(
@@ -211,58 +196,47 @@ def certify_refined(
         violation: (n,) its physics violation [N].
         flat: Of each phase, whether its stance's wrenches fill no volume: margins do not count there.
     """
-    series = {**_kinematic_series(body, schedule, motion), "max_physics_violation": violation}
-    worst = _worst(motion, series)
     without = np.array(flat)[schedule.phase_at(motion.time)]
     margin = np.where(without, np.inf, motion.margin)
     lowest = int(np.argmin(margin))
-    worst["min_margin"] = float(margin[lowest]), float(motion.time[lowest])
     flying = proximity.minimum_over(motion.q, obstacles.touching(), tolerance=1e-5)
-    worst["max_penetration_m"] = max(0.0, -float(flying.distance)), float(motion.time[flying.sample])
-    balance = replace(balance, force=np.where(without, np.inf, balance.force))
+    worst = {
+        "min_margin": (float(margin[lowest]), float(motion.time[lowest])),
+        "max_penetration_m": (max(0.0, -float(flying.distance)), float(motion.time[flying.sample])),
+    }
     return _certificate(
-        body, proximity, schedule, motion, obstacles.during_flights(), worst, balance,
+        body, proximity, schedule, motion, obstacles.during_flights(), {"max_physics_violation": violation},
+        worst, replace(balance, force=np.where(without, np.inf, balance.force)),
         requirements or RefineRequirements(),
     )  # fmt: skip
 
 
-def _kinematic_series(body: BodyModel, schedule: ContactSchedule, motion: Motion) -> dict[str, FloatArray]:
-    """(n,) errors of contacts and use of the joints' ranges, speeds and torques."""
-    support, turn = support_errors(body, schedule, motion)
-    angles = motion.q[:, 7:]
-    return {
-        "max_support_error_m": support,
-        "max_support_turn_rad": turn,
-        "max_joint_limit_violation_rad": np.maximum(body.lower - angles, angles - body.upper).max(
-            axis=1, initial=0.0
-        ),
-        "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
-        "max_torque_share": body.torque_share(motion.tau[:, 6:]).max(axis=1, initial=0.0),
-    }
-
-
-def _worst(motion: Motion, series: Mapping[str, FloatArray]) -> Worst:
-    return {
-        key: (float(values.max()), float(motion.time[int(np.argmax(values))]))
-        for key, values in series.items()
-    }
-
-
 def _certificate(
     body: BodyModel, proximity: Proximity, schedule: ContactSchedule, motion: Motion,
-    ignored: tuple[Ignored, ...], worst: Worst, balance: MotionMargin, requirements: WholeBodyRequirements,
+    ignored: tuple[Ignored, ...], series: Mapping[str, FloatArray], worst: dict[str, tuple[float, float]],
+    balance: MotionMargin, requirements: WholeBodyRequirements,
 ) -> MotionCertificate:  # fmt: skip
-    """The table of what was measured, with the clearance and the impacts."""
+    """The table of series (n,), of worst values with their times [s], and of what any motion is asked."""
+    support, turn = support_errors(body, schedule, motion)
+    share = body.torque_share(motion.tau[:, 6:])
+    beyond = np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper)
+    measured = {
+        **series, "max_support_error_m": support, "max_support_turn_rad": turn,
+        "max_joint_limit_violation_rad": beyond.max(axis=1, initial=0.0),
+        "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
+        "max_torque_share": share.max(axis=1, initial=0.0),
+    }  # fmt: skip
+    for key, values in measured.items():
+        worst[key] = float(values.max()), float(motion.time[int(np.argmax(values))])
     closest = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     pair = closest.pair or ("", "")
     worst["min_clearance_m"] = float(closest.distance), float(motion.time[closest.sample])
-    share = body.torque_share(motion.tau[:, 6:])
-    tightest = body.joint_names[int(np.argmax(share.max(axis=0)))]
-    beyond = np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper).max(axis=0, initial=0.0)
+    farthest = beyond.max(axis=0, initial=0.0)
     where = {
-        "min_clearance_m": " and ".join(pair), "max_torque_share": tightest,
-        "max_joint_limit_violation_rad": body.joint_names[int(np.argmax(beyond))] if len(beyond) else "",
-    }  # fmt: skip
+        "min_clearance_m": " and ".join(pair),
+        "max_torque_share": body.joint_names[int(np.argmax(share.max(axis=0)))],
+        "max_joint_limit_violation_rad": body.joint_names[int(np.argmax(farthest))] if len(farthest) else "",
+    }
     rows = tuple(
         Requirement(
             key, name, unit, worst[key][0], sense, getattr(requirements, field) if field else np.inf,
@@ -283,20 +257,14 @@ IMPACT = 0.03
 def _impacts(
     body: BodyModel, schedule: ContactSchedule, time: FloatArray, share: FloatArray
 ) -> tuple[Impact, ...]:
-    """Torques just after each contact that is made at speed, in time.
-
-    Args:
-        time: (n,) [s].
-        share: (n, nv - 6) shares of the torque limits.
-    """
+    """Torques just after each contact that is made at speed, in time, of shares (n, nv - 6) of the limits."""
     found = []
     for name in schedule.sequence.effectors:
         settling = schedule.settling(time, name)
         for first in np.flatnonzero(settling & ~np.append(False, settling[:-1])):
-            rows = np.arange(first, int(np.searchsorted(time, time[first] + IMPACT)))
-            sample, joint = np.unravel_index(int(np.argmax(share[rows])), share[rows].shape)
-            largest = float(share[rows][sample, joint])
-            at = float(time[rows[sample]])
+            shortly = share[first : int(np.searchsorted(time, time[first] + IMPACT))]
+            sample, joint = np.unravel_index(int(np.argmax(shortly)), shortly.shape)
+            largest, at = float(shortly[sample, joint]), float(time[first + sample])
             found.append(Impact(name, float(time[first]), largest, body.joint_names[joint], at))
     return tuple(sorted(found, key=lambda impact: impact.time_s))
 
@@ -316,65 +284,55 @@ def support_errors(
         pin.forwardKinematics(model, data, q)
         pin.updateFramePlacements(model, data)
         for contact in schedule.sequence[int(phases[k])].stance:
-            if contact.rolls:
-                here = data.oMf[body.effector_frame(contact.effector)]
-                moved, turned = contact.rolled_away(here.rotation, here.translation)
-            else:
-                measure = _placement_error if contact.part is SolePart.FULL else _part_error
-                moved, turned = measure(body, data, contact)
+            here, turned = data.oMf[body.effector_frame(contact.effector)], 0.0
+            away = here.translation - contact.position
             if settling[contact.effector][k]:
-                place = data.oMf[body.effector_frame(contact.effector)].translation
-                moved, turned = -float(contact.normal @ (place - contact.position)), 0.0
+                moved = -float(contact.normal @ away)
+            elif contact.rolls:
+                moved, turned = contact.rolled_away(here.rotation, here.translation)
+            elif contact.part is SolePart.FULL:
+                moved = float(np.linalg.norm(away))
+                if contact.kind is ContactKind.SOLE:
+                    error = pin.log3(contact.rotation_contact_to_world.T @ here.rotation)
+                    turned = float(np.linalg.norm(error))
+            else:
+                moved = _part_error(body, data, contact)
             position[k], turn[k] = max(position[k], moved), max(turn[k], turned)
     return position, turn
 
 
-def _placement_error(body: BodyModel, data: pin.Data, contact: Contact) -> tuple[float, float]:
-    """Distance [m] and, of a sole, angle [rad] of an effector from its contact."""
-    placement = data.oMf[body.effector_frame(contact.effector)]
-    moved = float(np.linalg.norm(placement.translation - contact.position))
-    if contact.kind is not ContactKind.SOLE:
-        return moved, 0.0
-    return moved, float(np.linalg.norm(pin.log3(contact.rotation_contact_to_world.T @ placement.rotation)))
-
-
-def _part_error(body: BodyModel, data: pin.Data, contact: Contact) -> tuple[float, float]:
+def _part_error(body: BodyModel, data: pin.Data, contact: Contact) -> float:
     """Largest distance of a point of a part from where it touches [m]; tilts show in it too."""
     effector = body.effector(contact.effector)
-    hanging = hanging_segment(body, effector.segment)
-    moved = 0.0
+    hanging, moved = hanging_segment(body, effector.segment), 0.0
     for local, wanted in zip(contact.points, contact.points_in_world, strict=True):
-        inside = effector.translation + effector.rotation @ local
-        segment = effector.segment
+        inside, segment = effector.translation + effector.rotation @ local, effector.segment
         if contact.part is SolePart.TOES and hanging is not None:
             segment, inside = hanging.name, inside - hanging.origin
         actual = data.oMf[body.segment_frame(segment)].act(inside)
         moved = max(moved, float(np.linalg.norm(actual - wanted)))
-    return moved, 0.0
+    return moved
 
 
 def deepest_penetration(
-    body: BodyModel,
-    proximity: Proximity,
-    schedule: ContactSchedule,
-    motion: Motion,
+    body: BodyModel, proximity: Proximity, schedule: ContactSchedule, motion: Motion,
     ignored: Sequence[Ignored],
-) -> tuple[float, float]:
-    """Measure every flight at every sample.
+) -> tuple[float, float]:  # fmt: skip
+    """Largest depth of a flight [m], zero where nothing goes in, and its time [s].
 
     Args:
         ignored: Pairs of segment and obstacle that may touch, per sample; what every segment may
             touch is padded, and not measured.
-
-    Returns:
-        Largest depth [m], zero where nothing goes in, and its time [s].
     """
     deepest, worst = 0.0, float(motion.time[0])
     for swing in schedule.sequence.swings():
         start, end = schedule.swing_interval(swing)
         rows = np.flatnonzero((motion.time >= start) & (motion.time < end))
-        ends = frozenset(segment for segment, _ in touching_pairs(body, [(swing.effector, "")]))
-        obstacles = _supports(body, ends, [ignored[row] for row in rows.tolist()])
+        ends = {segment for segment, _ in touching_pairs(body, [(swing.effector, "")])}
+        # What the segments may touch at some time, that apart which every segment may touch.
+        pairs = frozenset[tuple[str, str]]().union(*(ignored[row] for row in rows.tolist()))
+        near = {obstacle for segment, obstacle in pairs if segment in ends}
+        obstacles = {one for one in near if any((other.name, one) not in pairs for other in body.segments)}
         if not obstacles:
             continue
         others = frozenset(
@@ -385,11 +343,3 @@ def deepest_penetration(
         if -found.distance > deepest:
             deepest, worst = -float(found.distance), float(motion.time[rows[found.sample]])
     return deepest, worst
-
-
-def _supports(body: BodyModel, ends: frozenset[str], ignored: Sequence[Ignored]) -> frozenset[str]:
-    """Obstacles that the segments may touch at some time, those apart that every segment may touch."""
-    pairs = frozenset[tuple[str, str]]().union(*ignored)
-    near = {obstacle for segment, obstacle in pairs if segment in ends}
-    padded = {name for name in near if all((segment.name, name) in pairs for segment in body.segments)}
-    return frozenset(near - padded)

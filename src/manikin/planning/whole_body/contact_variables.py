@@ -18,6 +18,7 @@ in that phase, but only where the others keep the wanted balance without it.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -34,11 +35,8 @@ from manikin.planning.whole_body.refine_measures import room_of
 from manikin.planning.whole_body.refine_physics import LEAST_VARIABLE, MarginCost, RefinedForces
 from manikin.scene import Scene
 
-RELEASE = 0.5
-"""Contact variable below which a contact that is not needed is let go."""
-
-LEAST = LEAST_VARIABLE**2
-"""Smallest variable: below, a force gets no costlier."""
+RELEASE, LEAST = 0.5, LEAST_VARIABLE**2
+"""Variable below which a contact that is not needed is let go, and below which a force gets no costlier."""
 
 TOUCHING = 0.02
 """Distance to a surface up to which a contact counts as lying on it [m]."""
@@ -86,7 +84,15 @@ class VariableSamples:
                 those of the motion when omitted.
         """
         key_time, q, v = keys or (time, *states[:2])
-        place, speed = _effectors(body, names, q, v)
+        model, data, axes = body.pinocchio, body.pinocchio.createData(), pin.LOCAL_WORLD_ALIGNED
+        frames = {name: body.effector_frame(name) for name in names}
+        place = {name: np.empty((len(q), 3)) for name in names}
+        speed = {name: np.empty(len(q)) for name in names}
+        for k, (state, rate) in enumerate(zip(q, v, strict=True)):
+            pin.forwardKinematics(model, data, state, rate)
+            for name, frame in frames.items():
+                place[name][k] = pin.updateFramePlacement(model, data, frame).translation
+                speed[name][k] = np.linalg.norm(pin.getFrameVelocity(model, data, frame, axes).linear)
         found = centroidal_motion(body, *states)
         return cls(time, found.wrench, found.com, key_time, place, speed)
 
@@ -118,10 +124,9 @@ class VariableChoice:
                 may have been bent towards the very contact that cannot be made.
         """
         variables, phases = list[Mapping[str, float]](), list[Phase]()
-        for number, phase in enumerate(schedule.sequence):
-            start, end = schedule.instants[number : number + 2]
-            motions = [item.during(start, end) for item in (samples, resting) if item is not None]
-            errors = self.errors(phase.stance, samples, (start, end))
+        for phase, interval in zip(schedule.sequence, pairwise(schedule.instants), strict=True):
+            motions = [item.during(*interval) for item in (samples, resting) if item is not None]
+            errors = self.errors(phase.stance, samples, interval)
             chosen, kept = self._of_phase(phase.stance, motions, errors)
             variables.append(MappingProxyType(chosen))
             phases.append(replace(phase, stance=kept))
@@ -148,15 +153,14 @@ class VariableChoice:
     def _of_phase(
         self, stance: Stance, motions: Sequence[tuple[FloatArray, FloatArray]], errors: Mapping[str, float]
     ) -> tuple[dict[str, float], Stance]:
-        wrench, _ = motions[0]
-        kept, needed, chosen = stance, set[str](), dict[str, float]()
+        (wrench, _), kept, needed, chosen = motions[0], stance, set[str](), dict[str, float]()
         while len(kept) and len(wrench):
             free = [name for name in kept.effectors if name not in needed]
             chosen.update(best_variables(kept, wrench, errors, free, self._scales, self._body.mass))
             loose = sorted((name for name in free if chosen[name] < RELEASE), key=lambda name: chosen[name])
             if not loose:
                 break
-            fewer = _without(kept, loose[0])
+            fewer = kept.with_contacts(contact for contact in kept if contact.effector != loose[0])
             if any(self._carries(fewer, *item) for item in motions):
                 kept = fewer
             else:
@@ -171,10 +175,10 @@ class VariableChoice:
         key = frozenset(stance)
         if key not in self._rooms:
             self._rooms[key] = room_of(stance, self._friction_share)
-        room = self._rooms[key]
-        if room.is_flat:
-            return False
-        return bool(room.margin(wrench, com).min() >= room.wanted(self._scales.margin, com.mean(axis=0)))
+        room, wanted = self._rooms[key], self._scales.margin
+        return not room.is_flat and bool(
+            room.margin(wrench, com).min() >= room.wanted(wanted, com.mean(axis=0))
+        )
 
     def _distance_off(self, contact: Contact) -> float:
         """Distance of a contact from the nearest obstacle; 0 where it lies on one [m]."""
@@ -187,13 +191,9 @@ class VariableChoice:
 
 
 def best_variables(
-    stance: Stance,
-    wrench: FloatArray,
-    errors: Mapping[str, float],
-    free: Sequence[str],
-    scales: RefineScales,
-    mass: float,
-) -> dict[str, float]:
+    stance: Stance, wrench: FloatArray, errors: Mapping[str, float], free: Sequence[str],
+    scales: RefineScales, mass: float,
+) -> dict[str, float]:  # fmt: skip
     """Solve the problem of one phase for its variables, all others of the stance being 1.
 
     Args:
@@ -206,10 +206,8 @@ def best_variables(
     names = stance.effectors
     columns = np.array([names.index(name) for name in free], dtype=np.int64)
     penalty = np.array([errors[name] for name in free])
-    cost = partial(
-        mean_cost, RefinedForces(stance, names), wrench, scales.missing_wrench, scales.force * mass * 9.81
-    )
-    ones = np.ones(len(names))
+    forces, weight, ones = RefinedForces(stance, names), scales.force * mass * 9.81, np.ones(len(names))
+    cost = partial(mean_cost, forces, wrench, scales.missing_wrench, weight)
     _, slope = cost(ones)
     if not len(free) or np.all(slope[columns] + penalty <= 0.0):
         return dict.fromkeys(free, 1.0)  # the corner is the minimum of a convex function
@@ -238,28 +236,6 @@ def mean_cost(
     shared = forces.share(wrench, np.tile(np.sqrt(c), (len(wrench), 1)), tolerance=tolerance, force=force)
     by_contact = np.bincount(forces.columns, np.mean(shared.magnitude**2, axis=0) / force**2, len(c))
     return float(shared.cost.value.mean()), -0.5 * by_contact / c**2
-
-
-def _without(stance: Stance, name: str) -> Stance:
-    return stance.with_contacts(contact for contact in stance if contact.effector != name)
-
-
-def _effectors(
-    body: BodyModel, names: Sequence[str], q: FloatArray, v: FloatArray
-) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Places (n, 3) [m] and speeds (n,) [m/s] of effectors."""
-    model, data = body.pinocchio, body.pinocchio.createData()
-    frames = {name: body.effector_frame(name) for name in names}
-    place = {name: np.empty((len(q), 3)) for name in names}
-    speed = {name: np.empty(len(q)) for name in names}
-    for k, (state, rate) in enumerate(zip(q, v, strict=True)):
-        pin.forwardKinematics(model, data, state, rate)
-        for name, frame in frames.items():
-            place[name][k] = pin.updateFramePlacement(model, data, frame).translation
-            speed[name][k] = np.linalg.norm(
-                pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
-            )
-    return place, speed
 
 
 def released(given: ContactSchedule, kept: ContactSchedule) -> Iterator[tuple[int, str]]:

@@ -1,15 +1,15 @@
 """Fit one smooth whole-body spline to contacts, swings and a centre-of-mass path.
 
-All samples of the motion are solved together by damped Gauss-Newton over the control points of
-a clamped quintic spline.  Unlike a posture-by-posture solution ([Qiu2012]_ 6.2) the result is
-smooth by construction, and the rate of its centroidal momentum follows what the point-mass
-plan assumes, so that the whole body keeps the balance that was planned for its centre of mass.
+All samples of the motion are solved together by damped Gauss-Newton over the control points of a clamped
+quintic spline.  Unlike a posture-by-posture solution ([Qiu2012]_ 6.2) the result is smooth by construction,
+and the rate of its centroidal momentum follows what the point-mass plan assumes, so that the whole body keeps
+the balance that was planned for its centre of mass.
 
 Contacts and a required centre of mass are constraints. Penalties show the way to them; then every step is
 the best one that meets their linearisation, and a last one restores what its curvature left.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,32 +22,17 @@ from manikin.planning.whole_body.fit_scales import MotionScales
 DEGREE = 5
 """Degree of every whole-body spline: four continuous derivatives."""
 
-LEAST_DAMPING = 1.0
-"""Smallest Levenberg damping of a control point."""
+LEAST_DAMPING, FIRST_DAMPING, RESTORING_DAMPING, MOST_DAMPING = 1.0, 30.0, 100.0, 1.0e6
+"""Levenberg damping of a control point: the smallest one, that with which a fit begins, the largest one of a
+step that only restores the contacts, and the largest one."""
 
-FIRST_DAMPING = 30.0
-"""The one that a fit begins with."""
-
-MOST_DAMPING = 1.0e6
-"""Largest one."""
-
-RESTORING_DAMPING = 100.0
-"""Largest one of a step that only restores the contacts."""
-
-LENGTHS = 1.0, 0.5, 0.25
-"""Shares of a constrained step that are tried, until one makes the objective less."""
-
-REFUSED = 4
-"""Constrained steps in a row that make nothing better, after which no more are tried."""
+LENGTHS, REFUSED = (1.0, 0.5, 0.25), 4
+"""Shares of a constrained step that are tried, until one makes the objective less, and constrained steps in a
+row that make nothing better, after which no more are tried."""
 
 
-@dataclass(frozen=True, eq=False)
-class FitResult:
-    """A fitted spline.
-
-    Attributes:
-        iterations: Gauss-Newton steps taken.
-    """
+class FitResult(NamedTuple):
+    """A fitted spline, and how many Gauss-Newton steps were taken."""
 
     spline: ConfigurationSpline
     iterations: int
@@ -101,8 +86,8 @@ class MotionFit:
             step, after = self._system.factorised(self._damping).constrained(
                 self._system.right, *self._constraints(current), before, scales.multiplier_rounds
             )
-            current.shift_tasks(before, after)
             step = _within_reach(step)
+            current.shift_tasks(before, after)
             for length in LENGTHS:
                 trial_points = points + length * step
                 trial = self._objective.linearise(trial_points, scales, after)
@@ -131,10 +116,11 @@ class MotionFit:
             # A step this small needs little damping, which would keep it from the constraints.
             factor = self._system.factorised(np.minimum(self._damping, RESTORING_DAMPING))
             step = factor.smallest(*self._constraints(current), scales.multiplier_rounds)
-            trial = self._objective.linearise(points + _within_reach(step), scales, self._multiplier)
+            trial_points = points + _within_reach(step)
+            trial = self._objective.linearise(trial_points, scales, self._multiplier)
             if self._missed(trial) >= self._missed(current):
                 break
-            points, current = points + _within_reach(step), trial
+            points, current = trial_points, trial
         return points, taken
 
     def _missed(self, state: FitLinearisation) -> float:
@@ -157,8 +143,7 @@ class MotionFit:
         while taken < scales.max_iterations:
             taken += 1
             current.assemble(self._system)
-            step = self._system.solve(self._damping)
-            trial_points = points + _within_reach(step)
+            trial_points = points + _within_reach(self._system.solve(self._damping))
             trial = self._objective.linearise(trial_points, scales, self._multiplier)
             self._adapt_damping(current, trial)
             if trial.cost < current.cost:
@@ -184,9 +169,7 @@ def _within_reach(step: FloatArray) -> FloatArray:
 
 def spline_through(configurations: FloatArray, basis: SampledBasis, knots: FloatArray) -> ConfigurationSpline:
     """Least-squares spline with clamped knots [s] through configurations (n, nq) at the basis's samples."""
-    system = BlockBandedSystem(basis, 1)
-    n = len(configurations)
-    points = []
+    system, n, points = BlockBandedSystem(basis, 1), len(configurations), []
     for column in configurations.T:
         system.reset()
         system.add(np.ones((n, 1, 1)), -column[:, None])

@@ -7,7 +7,6 @@ recording are three goals of the same job; each gives its objective, and the fir
 import itertools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -23,35 +22,19 @@ from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import MotionScales
 from manikin.scene.distance import segment_of
 
-CAUGHT = -0.02
-"""Below this clearance a part of the body is caught on the wrong side of another, and no small step leads
-out: the fit begins again from its first guess, with more weight on clearance [m]."""
-
 CLEARANCE = frozenset({"min_clearance_m"})
 """Key of the clearance in a certificate."""
 
-UNITS = MappingProxyType(
-    {"min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0}
-)
+UNITS = {"min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0}
 """Size at which a broken requirement counts as one, where that is not its limit."""
 
-MOST_EXCESS = 10.0
-"""Excess of a fit of which no repair is tried: its contacts, or their times, are not the body's."""
+MOST_EXCESS, MUCH_EXCESS, A_LOT = 10.0, 4.0, 0.6
+"""Excess of a fit of which no repair is tried: its contacts, or their times, are not the body's. Excess above
+which a repair has to help a lot, and the share of it that it may leave then."""
 
-MUCH_EXCESS = 4.0
-"""Excess above which a repair has to help a lot."""
-
-A_LOT = 0.6
-"""Share of the excess that it may leave then."""
-
-STRONGER = 0.5
-"""Factor of the scales of what was missed."""
-
-NEARER = 0.75
-"""Factor of the wanted clearance where the required one is missed."""
-
-LEAST_SAFE_DISTANCE = 0.014
-"""Wanted clearance that this leaves [m]: more than the required one."""
+STRONGER, NEARER, LEAST_SAFE_DISTANCE = 0.5, 0.75, 0.014
+"""Factor of the scales of what was missed; factor of the wanted clearance where the required one is missed,
+and the wanted clearance that this leaves [m]: more than the required one."""
 
 SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
 """Knots added around a touch-down at speed, relative to it [s]."""
@@ -59,11 +42,7 @@ SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09,
 CLOSEST_KNOTS = 4.0e-3
 """Knots closer than this are one [s]."""
 
-NEAR_INSTANT = 0.1
-"""Distance from a key instant up to which refined knots lie closer [s]."""
-
 S = TypeVar("S", bound=MotionScales)
-
 
 Progress = Callable[[float], None]
 """Takes the share of the work that is done, in [0, 1]."""
@@ -136,8 +115,11 @@ class FitAttempt(Generic[G]):
 
     @property
     def is_caught(self) -> bool:
-        """Whether a part of the body is on the wrong side of another or of an obstacle."""
-        return self.certificate.value("min_clearance_m") < CAUGHT
+        """Whether a part of the body is on the wrong side of another or of an obstacle.
+
+        No small step leads out: the fit begins again from its first guess, with more weight on clearance.
+        """
+        return self.certificate.value("min_clearance_m") < -0.02
 
 
 @dataclass(eq=False)
@@ -210,7 +192,6 @@ class FitJob:
         """Repeat a remedy until every requirement is kept.
 
         Args:
-            first: The attempt that may break requirements.
             remedy: Makes the next attempt from the number of remedies tried and the last attempt; None where
                 nothing helps.
             most: Most remedies.
@@ -225,7 +206,9 @@ class FitJob:
             following = remedy(number, last)
             if following is None:
                 break
-            hopeless = self.gives_up and _hopeless(last.excess, following.excess)
+            # Another repair is in vain where one changed the excess so little, or made it worse.
+            share = A_LOT if following.excess > MUCH_EXCESS else 1.0
+            hopeless = self.gives_up and following.excess > share * last.excess
             last = following
             best = self.better(best, last)
             if hopeless:
@@ -242,13 +225,7 @@ class FitJob:
         return second if second.excess < first.excess else first
 
     def updated(self, scales: S, broken: frozenset[str], narrow: bool = False) -> S:
-        """Scales at which broken requirements weigh more.
-
-        Args:
-            scales: Those of the fit before.
-            broken: Keys of the certificate.
-            narrow: Whether to count on less room where clearance is missed.
-        """
+        """Scales at which broken requirements weigh more; narrow ones count on less clearance if missed."""
         if narrow and broken & CLEARANCE:  # What is far enough no longer pushes.
             safe = max(NEARER * scales.safe_distance, LEAST_SAFE_DISTANCE)
             scales = replace(scales, safe_distance=safe, softness=NEARER * scales.softness)
@@ -263,34 +240,20 @@ class FitJob:
         return FitAttempt(goal, scales, fine, continued, fit, result, *goal.measure(result.spline))
 
 
-def _hopeless(before: float, after: float) -> bool:
-    """Whether a repair changed the excess so little, or made it worse, that another one is in vain."""
-    return after > (A_LOT if after > MUCH_EXCESS else 1.0) * before
-
-
 def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:
     """(k,) times at which a contact is made that still has to settle [s]."""
-    times = [
-        float(start)
-        for number, (phase, start) in enumerate(zip(schedule.sequence, schedule.instants, strict=False))
-        if any(
-            item.settle > 0.0 and (number == 0 or item.effector not in schedule.sequence[number - 1].stance)
-            for item in phase.stance
-        )
+    stances = [phase.stance for phase in schedule.sequence]
+    settles = [
+        any(item.settle > 0.0 and (before is None or item.effector not in before) for item in stance)
+        for before, stance in zip([None, *stances], stances, strict=False)
     ]
-    return np.array(times)
+    return schedule.instants[:-1][settles]
 
 
 def phase_knots(
     instants: FloatArray, spacing: float, sudden: FloatArray | Sequence[float] = ()
 ) -> FloatArray:
-    """Clamped knots with every key instant among them and at most ``spacing`` apart [s].
-
-    Args:
-        instants: (phases + 1,) key instants [s].
-        spacing: Largest distance of two knots [s].
-        sudden: Times around which the knots lie closer, because the motion changes suddenly [s].
-    """
+    """Clamped knots [s] with key instants among them, ``spacing`` apart at most, closer at sudden times."""
     fine = np.concatenate([np.zeros(0), *(time + SUDDEN_KNOTS for time in sudden)])
     breaks = np.unique(np.concatenate([instants, fine[(fine > instants[0]) & (fine < instants[-1])]]))
     breaks = breaks[np.append(True, np.diff(breaks) > CLOSEST_KNOTS)]
@@ -305,7 +268,7 @@ def split_spans(breaks: FloatArray, spacing: float) -> FloatArray:
     return np.append(np.concatenate([np.linspace(*part, endpoint=False) for part in parts]), breaks[-1])
 
 
-def refined(knots: FloatArray, instants: FloatArray, within: float = NEAR_INSTANT) -> FloatArray:
+def refined(knots: FloatArray, instants: FloatArray, within: float = 0.1) -> FloatArray:
     """Clamped knots [s] with every span split in two whose middle is near a key instant, ``within`` [s]."""
     breaks = np.unique(knots)
     middle = 0.5 * (breaks[:-1] + breaks[1:])
@@ -317,5 +280,5 @@ def refined(knots: FloatArray, instants: FloatArray, within: float = NEAR_INSTAN
 def sample_times(knots: FloatArray, per_span: int) -> FloatArray:
     """Times that split every knot span into ``per_span`` equal parts, both ends included [s]."""
     breaks = np.unique(knots)
-    spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in itertools.pairwise(breaks)]
+    spans = [np.linspace(*span, per_span, endpoint=False) for span in itertools.pairwise(breaks)]
     return np.append(np.concatenate(spans), breaks[-1])

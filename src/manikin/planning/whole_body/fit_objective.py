@@ -27,9 +27,6 @@ from manikin.scene.distance_bounds import KnownDistances
 LEAST_ROLL = 2.0e-3
 """Angle below which a contact that rolls is pushed forward [rad]."""
 
-_RADIAL_SCALE = 0.05
-"""Deviation of a raw quaternion's length from one that costs one unit."""
-
 
 @dataclass(eq=False)
 class FitLinearisation:
@@ -37,20 +34,20 @@ class FitLinearisation:
 
     Attributes:
         sample_cost: (n,) half the squared residuals at each sample.
+        task_residual: (n, m) scaled residuals of effectors and centre of mass.
+        task_jacobian: (n, m, nq) their derivatives by the raw coordinates.
         hessian: (n, nq, nq) Gauss-Newton matrices by order of the spline's derivative.
         gradient: (n, nq) gradients by order.
         diagonal: (n, nq) diagonals of the matrices and gradients, for orders without other terms.
-        task_residual: (n, m) scaled residuals of effectors and centre of mass.
-        task_jacobian: (n, m, nq) their derivatives by the raw coordinates.
         momentum: Scaled residual (n, 6) of the momentum's rate with its derivatives.
     """
 
     sample_cost: FloatArray
+    task_residual: FloatArray
+    task_jacobian: FloatArray
     hessian: dict[int, FloatArray] = field(default_factory=dict)
     gradient: dict[int, FloatArray] = field(default_factory=dict)
     diagonal: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
-    task_residual: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    task_jacobian: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 0)))
     momentum: MomentumRate | None = None
 
     @property
@@ -136,9 +133,9 @@ class MotionObjective:
             shift: (n, task_rows) constants added to the scaled task residuals (multipliers).
         """
         motion = self._sampled(points)
-        raw = motion.raw
-        out = FitLinearisation(np.zeros(len(motion.com)))
-        self._add_tasks(out, motion, scales, shift)
+        raw, residual, jacobian = motion.raw, *self._tasks(motion, scales)
+        out = FitLinearisation(np.zeros(len(motion.com)), residual, jacobian)
+        out.add(0, jacobian, residual + shift)
         self._add_clearance(out, motion, scales)
         self._add_reference(out, motion)
         self._add_radial(out, raw[0], motion.tangent)
@@ -154,22 +151,19 @@ class MotionObjective:
             self._last = points.copy(), self._sampler.sample(points)
         return self._last[1]
 
-    def _add_tasks(
-        self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales, shift: FloatArray
-    ) -> None:
-        """Places of the effectors and of the centre of mass."""
+    def _tasks(self, motion: MotionSamples, scales: MotionScales) -> tuple[FloatArray, FloatArray]:
+        """Residuals of the effectors' and the centre of mass's places, with their derivatives."""
         n, nv = motion.com_jacobian.shape[0], motion.com_jacobian.shape[2]
         jacobian, residual = np.zeros((n, self.task_rows, nv)), np.zeros((n, self.task_rows))
         for number, target in enumerate(self.targets.effectors.values()):
-            rows = slice(6 * number, 6 * number + 6)
-            place = motion.frames[:, number]
-            by_joints = self._sampler.frame_jacobian(motion, number)
-            jacobian[:, rows], residual[:, rows] = _effector_rows(target, place, by_joints, scales)
+            rows, by_joints = slice(6 * number, 6 * number + 6), self._sampler.frame_jacobian(motion, number)
+            jacobian[:, rows], residual[:, rows] = _effector_rows(
+                target, motion.frames[:, number], by_joints, scales
+            )
         weight = self._com_weight(scales)
         jacobian[:, -3:] = weight[:, None, None] * motion.com_jacobian
         residual[:, -3:] = weight[:, None] * (motion.com - self.targets.com)
-        out.task_residual, out.task_jacobian = residual, to_raw(jacobian, motion.tangent)
-        out.add(0, out.task_jacobian, residual + shift)
+        return residual, to_raw(jacobian, motion.tangent)
 
     def _com_weight(self, scales: MotionScales) -> FloatArray:
         """(n,) weight of the centre of mass's error [1/m]."""
@@ -205,12 +199,9 @@ class MotionObjective:
         """Deviation from the reference posture; the pelvis' place does not count."""
         q, reference, weight = motion.states.q, self.targets.reference, self._reference_weight
         relative = Rotation.from_quat(reference[:, 3:7]).inv() * Rotation.from_quat(q[:, 3:7])
-        turn = relative.as_rotvec()
-        out.add(
-            0,
-            weight[:, 3:6, None] * (rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]),
-            weight[:, 3:6] * turn,
-        )
+        turn, attitude = relative.as_rotvec(), weight[:, 3:6]
+        by_raw = rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]
+        out.add(0, attitude[:, :, None] * by_raw, attitude * turn)
         diagonal, residual = np.zeros_like(q), np.zeros_like(q)
         diagonal[:, 7:] = weight[:, 6:]
         residual[:, 7:] = weight[:, 6:] * (q[:, 7:] - reference[:, 7:])
@@ -218,8 +209,9 @@ class MotionObjective:
 
     def _add_radial(self, out: FitLinearisation, raw: FloatArray, tangent: FloatArray) -> None:
         """Keep the raw quaternions near unit length, where the spline is well conditioned."""
-        size = np.linalg.norm(raw[:, 3:7], axis=1)
-        out.add(0, tangent[:, 6:] / _RADIAL_SCALE, (size - 1.0)[:, None] / _RADIAL_SCALE)
+        # Deviation from that length that costs one unit.
+        size, scale = np.linalg.norm(raw[:, 3:7], axis=1), 0.05
+        out.add(0, tangent[:, 6:] / scale, (size - 1.0)[:, None] / scale)
 
     def _add_ranges(self, out: FitLinearisation, raw: FloatArray, scales: MotionScales) -> None:
         buffer = np.minimum(scales.joint_buffer, 0.25 * (self._body.upper - self._body.lower))
@@ -293,8 +285,7 @@ def _effector_rows(
     along = (target.weight / scales.position)[:, None, None] * target.along
     error = _missed(target, place)
     jacobian, residual = np.zeros_like(by_joints), np.zeros((len(error), 6))
-    rolls, frame = target.pivot[:, 2] > 0.0, target.rotation
-    moved = by_joints[:, :3]
+    rolls, frame, moved = target.pivot[:, 2] > 0.0, target.rotation, by_joints[:, :3]
     if rolls.any():
         arm = (place[:, :3, :3] @ target.pivot[:, :, None])[:, :, 0]
         cosine, sine, by_turn = _pitch(target, place)
@@ -303,7 +294,7 @@ def _effector_rows(
         moved = moved - (target.pivot[:, 2, None] * frame[:, :, 0])[:, :, None] * pitched
     jacobian[:, :3] = along @ moved
     residual[:, :3] = (along @ error[:, :, None])[:, :, 0]
-    relative = place[:, :3, :3] @ target.rotation.transpose(0, 2, 1)
+    relative = place[:, :3, :3] @ frame.transpose(0, 2, 1)
     turn = rotation_vector(relative)
     weight = np.where(target.weight > 0.0, target.rotation_weight / scales.rotation, 0.0)
     # Turning the world axes is a left perturbation: log(exp(w) E) = log(E exp(E^T w)).

@@ -83,11 +83,8 @@ class FitScales(MotionScales):
         return replace(super().loosened(factor), com=self.com * factor)
 
 
-PERSON_ROOT = 0.92
-"""Height of the root of the person whose scales these are [m]."""
-
-PERSON_MASS = 75.0
-"""Mass of that person [kg]."""
+PERSON_ROOT, PERSON_MASS = 0.92, 75.0
+"""Height of the root [m] and mass [kg] of the person whose scales these are."""
 
 
 @dataclass(frozen=True)

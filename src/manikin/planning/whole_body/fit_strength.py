@@ -1,14 +1,15 @@
 """Joint torques beyond the strength as residuals of the whole-body fit, with their derivatives.
 
 The torques that inverse dynamics asks of the joints with the contact forces of an earlier motion are
-differentiated by the state (:func:`pinocchio.computeRNEADerivatives`). What wrench the root then lacks is
-given by changes of those forces at the points of the contacts, least in the sum of squares, weighed by the
-load of each contact. A single support has one such change, so that a step along these derivatives shifts its
-centre of pressure as the true one does; between several supports the forces are shared anew after each fit.
+differentiated by the state. What wrench the root then lacks is given by changes of those forces at the points
+of the contacts, least in the sum of squares, weighed by the load of each contact. A single support has one
+such change, so that a step along these derivatives shifts its centre of pressure as the true one does;
+between several supports the forces are shared anew after each fit.
 """
 
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -21,12 +22,6 @@ from manikin.contact import CarriedLoad, Contact, ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples
 from manikin.numerics.spatial import FloatArray, skew
-
-MISSING = 1.0
-"""Wrench that contact forces may leave unsupplied where they are held [N, N.m]."""
-
-LEAST_GIVE = 1e-10
-"""Eigenvalue of the contacts' compliance, relative to the largest, below which they give no wrench."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +47,12 @@ class HeldForces:
 
     @classmethod
     def of(cls, body: BodyModel, schedule: ContactSchedule, motion: Motion, time: FloatArray) -> "HeldForces":
-        """Contact forces of a motion at other times.
-
-        Args:
-            time: (n,) samples of the fit [s].
-        """
+        """Contact forces of a motion at the samples (n,) of a fit [s]."""
         rows = np.clip(np.searchsorted(motion.time, time), 0, len(motion.time) - 1)
         names, phases = motion.contact_names, schedule.phase_at(motion.time[rows])
         settling = np.any([schedule.settling(motion.time[rows], name) for name in names], axis=0)
-        known = ~settling & (np.linalg.norm(motion.tau[rows, :6], axis=1) < MISSING)
+        # Wrench that contact forces may leave unsupplied where they are held [N, N.m].
+        known = ~settling & (np.linalg.norm(motion.tau[rows, :6], axis=1) < 1.0)
         wrench = motion.contact_force[rows].copy()
         give = np.zeros((*wrench.shape, 6))
         for number, phase in enumerate(schedule.sequence):
@@ -69,7 +61,8 @@ class HeldForces:
                 wrench[*part, 3:] += np.cross(contact.position, wrench[*part, :3])
                 load = np.linalg.norm(wrench[*part, :3], axis=1)
                 give[part] = load[:, None, None] * compliance(contact)
-        sharing = give @ np.linalg.pinv(give.sum(axis=1), rcond=LEAST_GIVE, hermitian=True)[:, None]
+        # Eigenvalues of the contacts' compliance below this share of the largest give no wrench.
+        sharing = give @ np.linalg.pinv(give.sum(axis=1), rcond=1e-10, hermitian=True)[:, None]
         model: pin.Model = body.pinocchio
         joints = tuple(model.frames[body.effector_frame(name)].parentJoint for name in names)
         toes = [hanging_segment(body, body.effector(name).segment) for name in names]
@@ -104,8 +97,7 @@ def compliance(contact: Contact) -> FloatArray:
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class ExcessTorque:
+class ExcessTorque(NamedTuple):
     """Shares of the strength beyond the wanted one.
 
     Attributes:
@@ -120,13 +112,8 @@ class ExcessTorque:
 
 
 def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wanted: float) -> ExcessTorque:
-    """Shares of the strength that sampled states take beyond ``wanted``, with forces near those held.
-
-    Args:
-        states: n states.
-        wanted: Share of the strength that costs nothing.
-    """
-    data_of = {key: model.createData() for key, model in {id(each): each for each in held.models}.items()}
+    """Shares of the strength that n states take beyond ``wanted``, with forces near those held."""
+    data_of = {id(model): model.createData() for model in {id(each): each for each in held.models}.values()}
     n, hinges = len(states.q), np.array(held.hinges)
     torque, answer = np.empty((n, body.nv - 6)), np.empty((n, body.nv - 6, 6))
     external: list[pin.StdVec_Force] = []

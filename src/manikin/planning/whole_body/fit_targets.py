@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +65,8 @@ class FitTargets:
         com_acceleration: (n, 3) its acceleration [m/s^2].
         margin: (n,) balance margin of the planned centre of mass [N.m].
         reference: (n, nq) preferred configuration.
-        reference_scale: (nv,), or (n, nv) by sample, deviation of the tangent [m, rad] that costs as
-            much as one unit of every other residual; infinite entries are free.
+        reference_scale: (nv,), or (n, nv) by sample, deviation of the tangent [m, rad] that costs one unit;
+            infinite entries are free.
         ignored: Pairs whose distance does not count, per sample.
         meeting: What is met at speed, per sample, or None without.
         turning: (n, 3) rate of the angular momentum about the centre of mass [N.m]; None for that of a point
@@ -121,11 +122,9 @@ def effector_targets(
                 rows = (time >= start) & (time < end)
                 share = (time[rows] - start) / (end - start)
                 place, turn, leave = (
-                    min(0.25, longest / (end - start))
+                    0.25 if end - start < LONG_FLIGHT else min(0.25, longest / (end - start))
                     for longest in (POSITION_RAMP, ROTATION_RAMP, LEAVING_RAMP)
                 )
-                if end - start < LONG_FLIGHT:
-                    place = turn = leave = 0.25
                 weight[rows] = flight_weight(share, FLIGHT_POSITION_WEIGHT, place, place)
                 rotation_weight[rows] = flight_weight(share, FLIGHT_ROTATION_WEIGHT, leave, turn)
                 if item.method == "reach":
@@ -143,10 +142,10 @@ def _place(item: PlannedSwing, time: FloatArray, target: EffectorTarget) -> None
     start, end = item.interval if item.roll is None else item.roll.instants[[0, 3]].tolist()
     rows = (time >= start) & (time < end)
     state = item.curve.evaluate(time[rows])
-    position, rotation = state.position, state.rotation
+    placed = state.position, state.rotation
     if item.roll is not None:
-        position, rotation = item.roll.pose(position, rotation, time[rows])
-    target.position[rows], target.rotation[rows] = position, rotation
+        placed = item.roll.pose(*placed, time[rows])
+    target.position[rows], target.rotation[rows] = placed
 
 
 def toe_angles(body: BodyModel, rolls: Rolls, time: FloatArray) -> dict[int, FloatArray]:
@@ -186,23 +185,18 @@ def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> 
         if toes is None:
             continue
         held = np.zeros(len(time))
-        for phase, start, end in zip(
-            schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
-        ):
+        for phase, (start, end) in zip(schedule.sequence, pairwise(schedule.instants), strict=True):
             if name in phase.stance and phase.stance[name].part is SolePart.FULL:
                 coming = 1.0 - np.clip((start - time - STRAIGHT) / STRAIGHTENING, 0.0, 1.0)
                 leaving = 1.0 - np.clip((time - end) / STRAIGHT, 0.0, 1.0)
                 held = np.maximum(held, np.minimum(coming, leaving))
-        for hinge in toes.hinges:
-            found[body.joint_index(hinge.name)] = held
+        found |= dict.fromkeys((body.joint_index(hinge.name) for hinge in toes.hinges), held)
     return found
 
 
-STRAIGHT = 0.1
-"""Time before a landing in which toes are straight already, and after a lift-off until they may bend [s]."""
-
-STRAIGHTENING = 0.2
-"""Time before that in which they become straight [s]."""
+STRAIGHT, STRAIGHTENING = 0.1, 0.2
+"""Time before a landing in which toes are straight already, and after a lift-off until they may bend; and
+time before that in which they become straight [s]."""
 
 
 def settled_share(schedule: ContactSchedule, phase: int, contact: Contact, time: FloatArray) -> FloatArray:
@@ -230,28 +224,17 @@ LEAST_SETTLED = 0.01
 ALMOST = 1.0 - 1e-9
 """Weight of what matters fully but is not required exactly."""
 
-
-FLIGHT_POSITION_WEIGHT = 0.1
-"""Importance of an effector's position in the middle of a flight."""
-
-FLIGHT_ROTATION_WEIGHT = 0.05
-"""Importance of its orientation there: a hint, so that the ankle may follow the shank."""
-
+FLIGHT_POSITION_WEIGHT, FLIGHT_ROTATION_WEIGHT = 0.1, 0.05
+"""Importance of an effector's position in the middle of a flight, and of its orientation there: a hint, so
+that the ankle may follow the shank."""
 
 GRASP_ROTATION_WEIGHT = 0.03
 """Importance of a grasping hand's orientation: a hint, for a grasp holds a point."""
 
-LONG_FLIGHT = 1.0
-"""The ends of a shorter flight are a quarter of it each [s]."""
-
-POSITION_RAMP = 0.2
-"""Longest time near the ends of a flight in which the position matters more [s]."""
-
-ROTATION_RAMP = 0.12
-"""Longest time before a landing in which the orientation matters more [s]."""
-
-LEAVING_RAMP = 0.04
-"""Longest such time after the lift-off to a long flight: the foot may roll off at once [s]."""
+POSITION_RAMP, ROTATION_RAMP, LEAVING_RAMP, LONG_FLIGHT = 0.2, 0.12, 0.04, 1.0
+"""Longest time near the ends of a flight in which the position matters more, before a landing in which the
+orientation does, and after a lift-off, where the foot may roll off at once; the ends of a flight shorter than
+the last are a quarter of it each [s]."""
 
 
 def _reach_weight(share: FloatArray, ramp: float) -> FloatArray:
@@ -284,8 +267,7 @@ def ignored_pairs(
             early = 0.35 if hanging else SITTING_DOWN
             landing.append((touch_pairs(body, scene, swing.end), (time >= end - early) & (time < end)))
             continue
-        for contact in (swing.start, swing.end):
-            if contact is not None:
-                for index in range(swing.first_phase, swing.last_phase + 1):
-                    per_phase[index] |= touch_pairs(body, scene, contact)
+        for contact in filter(None, (swing.start, swing.end)):
+            for index in range(swing.first_phase, swing.last_phase + 1):
+                per_phase[index] |= touch_pairs(body, scene, contact)
     return with_pairs([per_phase[index] for index in schedule.phase_at(time)], landing)

@@ -1,11 +1,10 @@
 """Pitch of a foot from the rise of its heel to its next flat landing.
 
-The foot tilts about the hinge of its toes, which stay flat, until it leaves the ground; flies; lands
-on the edge of its heel and tilts down onto its sole. One pitch, twice continuously differentiable,
-covers all of it, so that the foot does not stop at lift-off or landing. Where the foot is follows
-from the point about which it tilts: the hinge before lift-off, the heel's edge after landing, and in
-flight a point that moves from one to the other along the swing's curve. The angles and their
-timing are our own choice.
+The foot tilts about the hinge of its toes, which stay flat, until it leaves the ground; flies; lands on the
+edge of its heel and tilts down onto its sole. One pitch, twice continuously differentiable, covers all of it,
+so that the foot does not stop at lift-off or landing. Where the foot is follows from the point about which it
+tilts: the hinge before lift-off, the heel's edge after landing, and in flight a point that moves from one to
+the other along the swing's curve. The angles and their timing are our own choice.
 """
 
 from collections.abc import Sequence
@@ -21,18 +20,12 @@ from manikin.contact import ContactSchedule, SolePart, Swing
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.swing_path import Pose
 
-PUSH_OFF_PITCH = float(np.deg2rad(24.0))
-"""Pitch at lift-off on the level, heel up [rad]."""
+PUSH_OFF_PITCH, HEEL_STRIKE_PITCH = float(np.deg2rad(24.0)), float(np.deg2rad(10.0))
+"""Pitch at lift-off on the level, heel up, and at landing, toes up [rad]."""
 
-HIGHEST_PITCH = float(np.deg2rad(48.0))
-"""Pitch at lift-off of a foot that is left behind on a step of :data:`HIGH_STEP` [rad]: with the heel down no
-leg bends far enough for the body to be over the lower foot."""
-
-HIGH_STEP = 0.22
-"""Height of such a step over the stature."""
-
-HEEL_STRIKE_PITCH = float(np.deg2rad(10.0))
-"""Pitch at landing, toes up [rad]."""
+HIGHEST_PITCH, HIGH_STEP = float(np.deg2rad(48.0)), 0.22
+"""Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature: with the
+heel down no leg bends far enough for the body to be over the lower foot."""
 
 PIVOT_SHIFT = (0.2, 0.85)
 """Shares of the flight between which the point that the curve describes moves from hinge to heel: while
@@ -79,15 +72,12 @@ class FootRoll:
     def pose(
         self, position: FloatArray, rotation: FloatArray, time: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Place the sole's frame from its pivot.
+        """Positions (n, 3) and rotations (n, 3, 3) of the sole's frame.
 
         Args:
             position: (n, 3) of the pivot in the world [m].
             rotation: (n, 3, 3) of the sole without its pitch.
             time: (n,) [s].
-
-        Returns:
-            Positions (n, 3) and rotations (n, 3, 3) of the sole's frame.
         """
         turn, offset = self.tilt(time)
         return position - np.einsum("nij,nj->ni", rotation, offset), rotation @ turn
@@ -118,7 +108,7 @@ class FootRoll:
         _, off, land, _ = self.instants
         # Share of the flight after which the toes are straight again.
         back = off + 0.6 * (land - off)
-        return BPoly.from_derivatives([off, back], [self._at_lift_off, [0.0, 0.0, 0.0]])
+        return BPoly.from_derivatives([off, back], [self._at_lift_off, [0.0] * 3])
 
     @cached_property
     def _pitch(self) -> BPoly:
@@ -126,9 +116,7 @@ class FootRoll:
         angle = HEEL_STRIKE_PITCH if flat > land else 0.0
         # The pitch rate at landing is the mean until the sole lies flat.
         at_landing = [-angle, angle / max(flat - land, 1e-9), 0.0]
-        rest = [0.0, 0.0, 0.0]
-        knots = {float(up): rest, float(off): self._at_lift_off}
-        knots |= {float(land): at_landing, float(flat): rest}
+        knots = {up: [0.0] * 3, off: self._at_lift_off, land: at_landing, flat: [0.0] * 3}
         return BPoly.from_derivatives(list(knots), list(knots.values()))
 
 

@@ -1,13 +1,10 @@
 """Postures at the key instants of a centre-of-mass plan, and new plans where one fails ([Qiu2012]_ 7.2.3).
 
-Before the whole body is planned, the posture generator looks for a collision-free posture at
-every key instant ``T_0 ... T_n``, on the contacts of both phases that meet there and with the
-planned centre of mass.  Where there is none, it looks for the nearest centre of mass with
-which there is one: that is where a new plan has to pass.
-
-The thesis goes on with a plan when every key posture is found and otherwise modifies some
-constraints by hand.  Here the centre of mass is planned again, and each failed posture gives a constraint: at
-its key instant the centre of mass must be beyond the plane through the nearest one with a posture.
+Before the whole body is planned, the posture generator looks for a collision-free posture at every key
+instant ``T_0 ... T_n``, on the contacts of both phases that meet there and with the planned centre of mass.
+The thesis modifies some constraints by hand where there is none.  Here the centre of mass is planned again,
+and each failed posture gives a constraint: at its key instant the centre of mass must be beyond the plane
+through the nearest one with which there is a posture.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,27 +19,16 @@ from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.kinematics import Placement, PostureProblem, PostureResult, SolverSettings, generate_posture
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyPlane, plan_com
+from manikin.planning.com import CentroidalResult, CentroidalTrajectory, KeyPlane, plan_com
 from manikin.planning.whole_body.certificate import WholeBodyRequirements
 from manikin.planning.whole_body.fit_targets import ignored_pairs, lay_toes_flat, toe_angles
 from manikin.planning.whole_body.foot_roll import FootRoll, Rolls, foot_roll
 from manikin.planning.whole_body.posture_style import READY, Guide, PostureStyle, reference_motion
-from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.planning.whole_body.swing_planner import leaning_pairs
 from manikin.scene import Proximity, Scene
 
 SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)
 """A posture counts when it is as exact as the finished motion has to be, by default."""
-
-NEARNESS = (200.0, 1000.0)
-"""Weights of the planned centre of mass where it is only wished, one search after the other [1/m^2]: far
-above the other wishes, and below the requirements."""
-
-SETTLING = 10.0
-"""Weight of the place [1/m^2] and orientation [1/rad^2] of a contact that has yet to settle there."""
-
-JUST_BEFORE = 1e-6
-"""Time before a key instant at which the phase before it still lasts [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +62,8 @@ class KeyPosture:
         return self.reason is None
 
     def __str__(self) -> str:
-        place = f"T_{self.key} = {self.time:.2f} s, end of phase {self.phase}"
-        if self.key == 0:
-            place = "T_0 = 0 s, start of phase 0"
+        end = f"T_{self.key} = {self.time:.2f} s, end of phase {self.phase}"
+        place = end if self.key else "T_0 = 0 s, start of phase 0"
         return f"no posture at {place}, on {', '.join(self.contacts) or 'no contact'}: {self.reason}"
 
 
@@ -143,14 +128,14 @@ def find_key_postures(
     leaning, proximity = leaning_pairs(body, padded), Proximity(body, scene)
     clearance = (requirements or WholeBodyRequirements()).clearance
     settings = replace(SETTINGS, tolerance=tolerance)
+    # Pairs that may touch at each key instant, or just before it, when the phase before still lasts [s].
+    before, at = (ignored_pairs(body, scene, schedule, when) for when in (np.maximum(time - 1e-6, 0.0), time))
     q, found = references[0], list[KeyPosture]()
-    for key, (reference, ignored) in enumerate(
-        zip(references, _ignored(body, scene, schedule, time), strict=True)
-    ):
+    for key, reference in enumerate(references):
         contacts, placements = requirements_at(schedule, key, rolls)
         problem = PostureProblem(
             body, contacts, placements, com=com[key], proximity=proximity, clearance=clearance,
-            self_clearance=clearance, ignore=ignored | leaning, reference=reference,
+            self_clearance=clearance, ignore=before[key] | at[key] | leaning, reference=reference,
             preferences=manner.preferences, range_margin=range_margin,
         )  # fmt: skip
         result = generate_posture(problem, q if known is None else reference, settings=settings)
@@ -172,10 +157,17 @@ def _explained(
 
     The nearest posture is also where a search that only ended in a poor minimum finds its way.
     """
-    near = _nearest(problem, result.q, settings)
-    if near is None:
+    free = generate_posture(replace(problem, com=None), result.q, settings=settings)
+    if not free.succeeded:
         result = generate_posture(problem, result.q, settings=replace(settings, explain=first))
         return replace(posture, reason=result.failure or "posture not found")
+    near = free.q
+    # Weights of the planned centre of mass where it is only wished [1/m^2]: far above the other wishes, and
+    # below the requirements.
+    for weight in (200.0, 1000.0):
+        wished = replace(problem, com_weight=weight)
+        closer = generate_posture(wished, near, settings=replace(settings, restarts=False))
+        near = closer.q if closer.succeeded else near
     again = generate_posture(problem, near, settings=settings)
     if again.succeeded:
         return replace(posture, q=again.q)
@@ -188,19 +180,6 @@ def _explained(
     return replace(posture, reason=reason, nearest_com=com)
 
 
-def _nearest(problem: PostureProblem, start: FloatArray, settings: SolverSettings) -> FloatArray | None:
-    """(nq,) posture with the nearest centre of mass; None when there is none with any."""
-    free = generate_posture(replace(problem, com=None), start, settings=settings)
-    if not free.succeeded:
-        return None
-    nearest = free.q
-    for weight in NEARNESS:
-        wished = replace(problem, com_weight=weight)
-        found = generate_posture(wished, nearest, settings=replace(settings, restarts=False))
-        nearest = found.q if found.succeeded else nearest
-    return nearest
-
-
 def rolls_of(body: BodyModel, schedule: ContactSchedule) -> tuple[tuple[str, FootRoll], ...]:
     """Rolls of the feet about their flights."""
     found = ((swing.effector, foot_roll(body, schedule, swing)) for swing in schedule.sequence.swings())
@@ -210,42 +189,26 @@ def rolls_of(body: BodyModel, schedule: ContactSchedule) -> tuple[tuple[str, Foo
 def requirements_at(
     schedule: ContactSchedule, key: int, rolls: Rolls = ()
 ) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
-    """Contacts and placements at a key instant: the contacts of both phases that meet there.
+    """Contacts of both phases that meet at a key instant, and placements of the other effectors.
 
-    A sole that lies flat in one of them lies flat; one that only touches with an edge has the
-    pitch of its roll.  A contact that has yet to settle is only wished at its place.
-
-    Args:
-        key: Index of the key instant.
-        rolls: Of :func:`rolls_of`.
-
-    Returns:
-        The contacts, and placements of the other effectors.
+    A sole that lies flat in one of them lies flat; one that only touches with an edge has the pitch of its
+    roll, of :func:`rolls_of`.  A contact that has yet to settle is only wished at its place.
     """
-    time = float(schedule.instants[key])
+    time, held = float(schedule.instants[key]), dict[str, Contact]()
+    for phase in schedule.sequence.phases[max(key - 1, 0) : key + 1]:
+        for contact in phase.stance:
+            if contact.effector not in held or contact.part is SolePart.FULL:
+                held[contact.effector] = contact
     contacts, placements = [], {}
-    for name, contact in _held_at(schedule, key).items():
+    for name, contact in held.items():
         if contact.part is not SolePart.FULL and not contact.rolls:
             placements[name] = _tilted(contact, time, [roll for other, roll in rolls if other == name])
         elif schedule.settling(time, name)[0]:
-            placements[name] = Placement(
-                contact.position, contact.rotation_contact_to_world,
-                rotation_weight=SETTLING, position_weight=SETTLING,
-            )  # fmt: skip
+            # Weights of its orientation [1/rad^2] and place [1/m^2].
+            placements[name] = Placement(contact.position, contact.rotation_contact_to_world, 10.0, 10.0)
         else:
             contacts.append(contact)
     return tuple(contacts), placements
-
-
-def _held_at(schedule: ContactSchedule, key: int) -> dict[str, Contact]:
-    """Contacts of both phases at a key instant; of an edge and a full sole, the full one."""
-    held: dict[str, Contact] = {}
-    for index in (key - 1, key):
-        if 0 <= index < len(schedule.sequence):
-            for contact in schedule.sequence[index].stance:
-                if contact.effector not in held or contact.part is SolePart.FULL:
-                    held[contact.effector] = contact
-    return held
 
 
 def _tilted(contact: Contact, time: float, rolls: Sequence[FootRoll]) -> Placement:
@@ -259,32 +222,12 @@ def _tilted(contact: Contact, time: float, rolls: Sequence[FootRoll]) -> Placeme
     return Placement(contact.position, contact.rotation_contact_to_world)
 
 
-def _ignored(
-    body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
-) -> tuple[Ignored, ...]:
-    """Pairs that may touch just before or at each key instant."""
-    before = ignored_pairs(body, scene, schedule, np.maximum(time - JUST_BEFORE, 0.0))
-    after = ignored_pairs(body, scene, schedule, time)
-    return tuple(one | other for one, other in zip(before, after, strict=True))
-
-
-ROOM = 0.01
-"""Distance that a new plan is kept inside the place where a posture begins to exist [m]."""
-
-Realise = Callable[[CentroidalTrajectory], CentroidalTrajectory | None]
-"""Complete a plan (real supports, a seated part); None ends the search."""
-
-Look = Callable[[CentroidalTrajectory], KeyPostures]
-"""Find the key postures of a completed plan."""
-
-
 @dataclass(frozen=True)
 class IneligiblePlan:
-    """Reason why no plan has all its key postures.
+    """Reason why no plan has all its key postures, and the first one that fails.
 
     Attributes:
         stage: ``"wholebody"``, or ``"centroidal"`` when no plan keeps the tightened constraints.
-        posture: The first key posture that fails.
     """
 
     stage: str
@@ -312,12 +255,15 @@ class Eligibility:
 
 
 def find_eligible_plan(
-    first: CentroidalResult, realise: Realise, look: Look, *, replan: bool = True
-) -> Eligibility:
+    first: CentroidalResult, realise: Callable[[CentroidalTrajectory], CentroidalTrajectory | None],
+    look: Callable[[CentroidalTrajectory], KeyPostures], *, replan: bool = True,
+) -> Eligibility:  # fmt: skip
     """Test a plan at its key instants; plan again, three times at most, with tightened constraints.
 
     Args:
         first: A plan that succeeded.
+        realise: Complete a plan (real supports, a seated part); None ends the search.
+        look: Find the key postures of a completed plan.
         replan: Whether its problem may be solved again; a recorded centre of mass is what it is.
     """
     plan, replans = first, 0
@@ -329,43 +275,27 @@ def find_eligible_plan(
         postures = look(trajectory)
         if not postures.failed:
             return Eligibility(plan, trajectory, postures, replans, None)
-        worst = _most_hopeless(plan.problem, postures.failed)
-        tightened = tighten(plan.problem, postures.failed) if replan else None
-        if tightened is None or replans == 3:
-            failure = IneligiblePlan("wholebody", f"{worst}; {_tried(replans)}", worst)
-            return Eligibility(plan, trajectory, postures, replans, failure)
-        again, replans = plan_com(tightened), replans + 1
-        if again.failure is not None:
-            cause = f"no plan of the centre of mass passes there: {again.failure.reason}"
-            failure = IneligiblePlan("centroidal", f"{worst}; {cause}; {_tried(replans)}", worst)
-            return Eligibility(plan, trajectory, postures, replans, failure)
-        plan = again
-
-
-def tighten(problem: CentroidalProblem, failed: tuple[KeyPosture, ...]) -> CentroidalProblem | None:
-    """The problem with a plane for every failed key posture; None where planning again cannot help.
-
-    It cannot where there is no posture with any centre of mass, nor at the start and the goal,
-    where the centre of mass is given.
-    """
-    planes = []
-    for posture in failed:
-        if not movable(problem, posture) or posture.nearest_com is None:
-            return None
-        planes.append(KeyPlane.towards(posture.key, posture.com, posture.nearest_com, ROOM))
-    return replace(problem, key_planes=(*problem.key_planes, *planes))
-
-
-def movable(problem: CentroidalProblem, posture: KeyPosture) -> bool:
-    """Whether another plan may move the centre of mass so that the posture is found."""
-    return posture.nearest_com is not None and 0 < posture.key < len(problem.sequence)
-
-
-def _most_hopeless(problem: CentroidalProblem, failed: tuple[KeyPosture, ...]) -> KeyPosture:
-    """The first key posture that no plan can help, or else the first."""
-    return next((posture for posture in failed if not movable(problem, posture)), failed[0])
-
-
-def _tried(replans: int) -> str:
-    plans = "plan" if replans == 1 else "plans"
-    return f"{replans} further {plans} of the centre of mass tried"
+        # None helps where there is no posture with any centre of mass, nor at both ends, where it is given.
+        hopeless = [
+            item for item in postures.failed
+            if item.nearest_com is None or not 0 < item.key < len(plan.problem.sequence)
+        ]  # fmt: skip
+        worst = (hopeless or postures.failed)[0]
+        stage, cause = "wholebody", ""
+        if replan and replans < 3 and not hopeless:
+            # A new plan is kept inside the place where a posture begins to exist [m].
+            planes = (
+                KeyPlane.towards(item.key, item.com, item.nearest_com, 0.01)
+                for item in postures.failed if item.nearest_com is not None
+            )  # fmt: skip
+            tightened = replace(plan.problem, key_planes=(*plan.problem.key_planes, *planes))
+            again, replans = plan_com(tightened), replans + 1
+            if again.failure is None:
+                plan = again
+                continue
+            stage = "centroidal"
+            cause = f"no plan of the centre of mass passes there: {again.failure.reason}; "
+        plans = "plan" if replans == 1 else "plans"
+        reason = f"{worst}; {cause}{replans} further {plans} of the centre of mass tried"
+        failure = IneligiblePlan(stage, reason, worst)
+        return Eligibility(plan, trajectory, postures, replans, failure)

@@ -1,14 +1,14 @@
 """Plan the whole-body motion of a centre-of-mass trajectory and its contacts.
 
-Swings are smooth curves where that suffices and Bi-RRT paths where it does not
-([Qiu2012]_ 6.2.3); guide postures show the way; the whole body then follows contacts, swings
-and centre of mass as one spline, and the result is certified at 1 kHz.
+Swings are smooth curves where that suffices and Bi-RRT paths where it does not ([Qiu2012]_ 6.2.3); guide
+postures show the way; the whole body then follows contacts, swings and centre of mass as one spline.
 """
 
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from itertools import product
 from types import MappingProxyType
 
 import numpy as np
@@ -58,31 +58,21 @@ from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import RequirementTable
 from manikin.scene import Proximity, Scene
 
-REPAIRS = 3
-"""Most fits that follow a failed one with other weights."""
-
-FIRST_DECREASE = 0.02
-"""Relative decrease of the objective below which the first repair stops."""
-
-LATER_DECREASE = 0.005
-"""Relative decrease below which a later repair, or a fit that begins again, stops."""
+FIRST_DECREASE, LATER_DECREASE = 0.02, 0.005
+"""Relative decrease of the objective below which the first repair stops, and a later one or a fit that begins
+again."""
 
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
 
-MOMENTUM = frozenset({"max_missing_wrench"})
-"""Requirement that a rate of the momentum nearer to its plan keeps."""
-
-PENALTIES = MappingProxyType(
-    {
-        "max_meeting_error_m": ("position",),
-        "min_clearance_m": ("clearance",),
-        "max_joint_limit_violation_rad": ("joint_limit",),
-        "max_velocity_share": ("joint_velocity",),
-        "max_missing_wrench": ("force", "moment_share"),
-        "max_torque_share": ("torque_share",),
-    }
-)
+PENALTIES = MappingProxyType({
+    "max_meeting_error_m": ("position",),
+    "min_clearance_m": ("clearance",),
+    "max_joint_limit_violation_rad": ("joint_limit",),
+    "max_velocity_share": ("joint_velocity",),
+    "max_missing_wrench": ("force", "moment_share"),
+    "max_torque_share": ("torque_share",),
+})  # fmt: skip
 """Scales that decide each residual of the certificate; contacts and centre of mass are constraints."""
 
 
@@ -209,12 +199,11 @@ class _Goal:
         ignored = ignored_pairs(planner.body, planner.scene, schedule, time)
         if planner.leaning:
             ignored = tuple(pairs | planner.leaning for pairs in ignored)
-        certificate = certify(
+        return motion, certify(
             planner.body, planner.proximity, planner.trajectory, motion, ignored, wrench,
             sliding_touchdown_at(planner.body, planner.scene, schedule, time), planner.polytopes,
             planner.settings.requirements,
         )  # fmt: skip
-        return motion, certificate
 
     def failure(self, certificate: MotionCertificate) -> WholeBodyFailure | None:
         """Reason why a motion to this goal is no success, or None."""
@@ -223,39 +212,31 @@ class _Goal:
             return None
         reason, time = broken.reason, broken.time_s or 0.0
         for item in self.swings:
-            start, end = item.interval
-            if item.failure is not None and start <= time <= end:
-                reason = f"{reason}; swing of {item.swing.effector}: {item.failure}"
+            if item.failure is not None and item.interval[0] <= time <= item.interval[1]:
+                reason += f"; swing of {item.swing.effector}: {item.failure}"
         for when, missed in [item for item in self.guide.failures if abs(item[0] - time) < 0.2][:1]:
-            reason = f"{reason}; posture at {when:.2f} s: {missed}"
+            reason += f"; posture at {when:.2f} s: {missed}"
         return WholeBodyFailure.at(self.schedule, time, reason)
 
     def _targets(self, time: FloatArray) -> FitTargets:
         planner, schedule, trajectory = self.planner, self.schedule, self.planner.trajectory
-        toes = planner.toes(self.swings, time)
-        scale = np.tile(self.manner.scale(planner.body), (len(time), 1))
-        reference = self.guide.at(time)
+        scale, reference = np.tile(self.manner.scale(planner.body), (len(time), 1)), self.guide.at(time)
         straight = flat_share(planner.body, schedule, time) if self.straight_toes else {}
         for joint, flat in straight.items():
             reference[:, 7 + joint] *= 1.0 - flat
             scale[:, 6 + joint] *= (FLAT_TOES / scale[:, 6 + joint]) ** flat
-        lay_toes_flat(toes, reference, scale)
-        held = None if self.forces is None else HeldForces.of(planner.body, schedule, self.forces, time)
+        lay_toes_flat(planner.toes(self.swings, time), reference, scale)
         return FitTargets(
-            time=time,
-            effectors=effector_targets(schedule, self.swings, time),
-            com=trajectory.position(time),
+            time, effector_targets(schedule, self.swings, time), trajectory.position(time),
             # Importance of a centre of mass that only shows the way.
             com_weight=np.where(trajectory.binds(time), 1.0, 0.01),
-            com_acceleration=trajectory.acceleration(time),
-            margin=planner.planned_margins(time),
-            reference=reference,
-            reference_scale=scale,
+            com_acceleration=trajectory.acceleration(time), margin=planner.planned_margins(time),
+            reference=reference, reference_scale=scale,
             ignored=ignored_pairs(planner.body, planner.scene, schedule, time),
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
-            forces=held,
-        )
+            forces=None if self.forces is None else HeldForces.of(planner.body, schedule, self.forces, time),
+        )  # fmt: skip
 
 
 class _Planner:
@@ -308,10 +289,9 @@ class _Planner:
         """Replace a smooth swing whose limb comes too near to something, when there is one."""
         time = best.certificate["min_clearance_m"].time_s or 0.0
         for index, item in enumerate(swings):
-            start, end = item.interval
             smooth = item.method == "smooth" and item.failure is None and item.roll is None
             # A clearance that is missed this close to a flight is put down to it [s].
-            near = start - 0.05 <= time <= end + 0.05
+            near = item.interval[0] - 0.05 <= time <= item.interval[1] + 0.05
             if smooth and near and best.is_too_near(_limb_of(self.body, item.swing.effector)):
                 # Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it.
                 other = self.flights.search(item.swing, item, iterations=600)
@@ -320,12 +300,9 @@ class _Planner:
         return None
 
     def _attempt(
-        self,
-        swings: tuple[PlannedSwing, ...],
-        manner: PostureStyle,
-        progress: Progress,
+        self, swings: tuple[PlannedSwing, ...], manner: PostureStyle, progress: Progress,
         straight_toes: bool = True,
-    ) -> FitAttempt[_Goal]:
+    ) -> FitAttempt[_Goal]:  # fmt: skip
         """Fit a motion to the swings; where it misses a little, fit on with more weight on that.
 
         The first fit is led by the manner, or by the key postures where that one is caught. The fit has the
@@ -333,11 +310,9 @@ class _Planner:
         restarts.
         """
         share = manner.moment_factor * self.settings.fit.moment_share
-        scales = replace(self.settings.fit, moment_share=share)
-
-        first: FitAttempt[_Goal] | None = None
+        scales, first = replace(self.settings.fit, moment_share=share), None
         ways = (self.known,) if self.waypoints is None else (self.known, self.waypoints)
-        for known, restarts in ((way, again) for again in (False, True) for way in ways):
+        for restarts, known in product((False, True), ways):
             if restarts and not self.guide(swings, manner, known, False).misses_many:
                 continue
             goal = _Goal(self, swings, self.guide(swings, manner, known, restarts), manner, straight_toes)
@@ -349,7 +324,7 @@ class _Planner:
                 break
             first = first or attempt
         assert first is not None  # the first way is always tried
-        return self.job.repair(first, self._remedy, REPAIRS)
+        return self.job.repair(first, self._remedy, 3)  # most fits with other weights
 
     def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal] | None:
         """The next fit after one that breaks requirements; None where contacts stay out of reach."""
@@ -359,18 +334,15 @@ class _Planner:
         if last.fine > 0 and broken & INEXACT:
             return None
         inexact, weak = bool(broken & INEXACT), "max_torque_share" in broken
-        if weak and self._settles(last.certificate["max_torque_share"].time_s or 0.0):
-            broken |= MOMENTUM
+        if weak:  # where a contact made at speed still settles, only the momentum decides the torques
+            when, names = last.certificate["max_torque_share"].time_s or 0.0, goal.schedule.sequence.effectors
+            if any(goal.schedule.settling(when, name)[0] for name in names):
+                broken |= {"max_missing_wrench"}
         scales = self.job.updated(last.scales, broken, narrow=number > 0)
         if inexact or weak:
             goal = replace(goal, forces=last.motion) if weak else goal
             return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
-
-    def _settles(self, time: float) -> bool:
-        """Whether a contact made at speed still settles: only the momentum then decides the torques."""
-        schedule, instant = self.trajectory.schedule, np.array([time])
-        return any(schedule.settling(instant, name)[0] for name in schedule.sequence.effectors)
 
     def _guide(
         self, swings: tuple[PlannedSwing, ...], manner: PostureStyle, known: Guide | None, restarts: bool
@@ -414,6 +386,5 @@ class _Planner:
 
 def _limb_of(body: BodyModel, effector: str) -> frozenset[str]:
     """Names of the segments of the limb that ends in an effector, with what hangs on it."""
-    return frozenset(end_segments(body, effector)).union(
-        *(limb.segments for limb in body.limbs if limb.effector == effector)
-    )
+    limbs = (limb.segments for limb in body.limbs if limb.effector == effector)
+    return frozenset(end_segments(body, effector)).union(*limbs)

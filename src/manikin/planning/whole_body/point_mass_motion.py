@@ -38,28 +38,18 @@ def point_mass_motion(
     com, rest = trajectory.position(time), np.zeros((len(time), 3))
     turn = np.tile([0.0, 0.0, 0.0, 1.0], (len(time), 1))
     return Motion(
-        time=time,
-        q=np.hstack([com, turn]),
-        v=np.hstack([trajectory.velocity(time), rest]),
-        a=np.hstack([trajectory.acceleration(time), rest]),
-        tau=np.zeros((len(time), 6)),
-        com=com,
-        angular_momentum=rest,
-        margin=_margins(problem, trajectory, polytopes, time),
-        support=schedule.support(time, names),
-        contact_force=point_mass_forces(trajectory, time),
-        contact_names=names,
-        joint_names=(),
-        margin_unit=problem.margin_unit,
-    )
+        time=time, q=np.hstack([com, turn]), v=np.hstack([trajectory.velocity(time), rest]),
+        a=np.hstack([trajectory.acceleration(time), rest]), tau=np.zeros((len(time), 6)), com=com,
+        angular_momentum=rest, margin=_margins(problem, trajectory, polytopes, time),
+        support=schedule.support(time, names), contact_force=point_mass_forces(trajectory, time),
+        contact_names=names, joint_names=(), margin_unit=problem.margin_unit,
+    )  # fmt: skip
 
 
 def _margins(
-    problem: CentroidalProblem,
-    trajectory: CentroidalTrajectory,
-    polytopes: Sequence[WrenchPolytope],
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope],
     time: FloatArray,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(n,) margin in the phase of each instant; at a key instant the smaller of both phases."""
     schedule = trajectory.schedule
     starts = np.searchsorted(time, schedule.instants - 1e-9)
@@ -74,11 +64,7 @@ def _margins(
 
 
 def point_mass_forces(trajectory: CentroidalTrajectory, time: FloatArray) -> FloatArray:
-    """(n, c, 6) contact forces of a CoM trajectory, with moments about each contact's origin [N, N.m].
-
-    Args:
-        time: (n,) [s].
-    """
+    """(n, c, 6) contact forces at times (n,) [s], with moments about each contact's origin [N, N.m]."""
     schedule, names = trajectory.schedule, trajectory.schedule.sequence.effectors
     forces = np.zeros((len(time), len(names), 6))
     wrench, phases = trajectory.pseudo_wrench(time), schedule.phase_at(time)
@@ -127,6 +113,5 @@ class _Corners:
             magnitude = np.maximum(np.linalg.lstsq(self._wrenches, wrench, rcond=None)[0], 0.0)
         for index, origin in enumerate(self._places):
             total = self._wrenches[:, self._owner == index] @ magnitude[self._owner == index]
-            out[index, :3] = total[:3]
-            out[index, 3:] = total[3:] - skew(origin) @ total[:3]
+            out[index] = [*total[:3], *(total[3:] - skew(origin) @ total[:3])]
         return out

@@ -1,9 +1,8 @@
 """Postures that guide the whole-body fit, and the style that they keep where the task leaves freedom.
 
-At the key instants and every fraction of a second between them the posture generator finds a
-collision-free posture on the contacts, the swings and the centre of mass.  Like the key
-postures of [Qiu2012]_ 7.2.3 they tell, before the motion is fitted, whether it can be done,
-and they are what the fitted motion stays near.
+At the key instants and every fraction of a second between them the posture generator finds a collision-free
+posture on the contacts, the swings and the centre of mass.  Like the key postures of [Qiu2012]_ 7.2.3 they
+tell, before the motion is fitted, whether it can be done, and they are what the fitted motion stays near.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,9 +24,6 @@ from manikin.planning.whole_body.fit_targets import EffectorTarget, settled_shar
 from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.scene import Proximity
 
-MISSED = 0.1
-"""Share of a guide's postures that may be missed without another search with restarts."""
-
 
 @dataclass(frozen=True, eq=False)
 class Guide:
@@ -47,7 +43,7 @@ class Guide:
     @property
     def misses_many(self) -> bool:
         """Whether so many postures could not be found that they may be worth a search with restarts."""
-        return len(self.failures) > MISSED * len(self.time)
+        return len(self.failures) > 0.1 * len(self.time)
 
     def at(self, time: FloatArray) -> FloatArray:
         """(n, nq) linear interpolation; quaternions are normalised."""
@@ -75,19 +71,16 @@ def plan_guide(
         exact: Joints that keep to the reference whatever the posture before.
         restarts: Whether a posture that is not found from the one before is sought from others as well.
     """
-    q = reference[0]
-    found: list[FloatArray] = []
-    failures: list[tuple[float, str]] = []
-    touched: dict[str, FloatArray] = {}
+    q, exactly = reference[0], [7 + joint for joint in exact]
+    found, failures, touched = list[FloatArray](), list[tuple[float, str]](), dict[str, FloatArray]()
     settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False, restarts=restarts)
-    for k, instant in enumerate(time):
-        contacts, placements = _requirements(schedule, float(instant), effectors, k)
-        placements.update(_settling(body, schedule, float(instant), q, touched))
+    for k, instant in enumerate(time.tolist()):
+        contacts, placements = _requirements(body, schedule, instant, effectors, k, q, touched)
         # Half way to the posture before: neighbouring postures must not jump.
         wanted = np.array(reference[k])
         if k > 0:
             wanted[7:] = 0.5 * (reference[k][7:] + q[7:])
-            wanted[[7 + joint for joint in exact]] = reference[k][[7 + joint for joint in exact]]
+            wanted[exactly] = reference[k][exactly]
         problem = PostureProblem(
             body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
             self_clearance=clearance, ignore=ignored[k], reference=wanted,
@@ -96,65 +89,50 @@ def plan_guide(
         result = generate_posture(problem, q, settings=settings)
         flying = [name for name in placements if effectors[name].weight[k] < 1.0]
         if not result.succeeded and flying:
-            # In flight an effector need not pass exactly where its curve does.
-            loose = {
-                # Weight of the place of a flying effector where it cannot be exact [1/m^2].
-                name: replace(item, position_weight=100.0) if name in flying else item
-                for name, item in placements.items()
-            }
+            # In flight an effector need not pass exactly where its curve does: weight of its place [1/m^2].
+            loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
             retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
             result = retry if retry.succeeded else result
         if not result.succeeded:
-            failures.append((float(instant), result.failure or "posture not found"))
+            failures.append((instant, result.failure or "posture not found"))
         q = result.q
         found.append(q)
     return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))
 
 
 def _requirements(
-    schedule: ContactSchedule, time: float, effectors: dict[str, EffectorTarget], k: int
-) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
-    held = {
-        c.effector: c
-        for c in schedule.stance_at(time)
-        if (c.part is SolePart.FULL or c.rolls) and not schedule.settling(time, c.effector)[0]
-    }
-    settling = {name for name in effectors if schedule.settling(time, name)[0]}
-    placements = {}
-    for name, target in effectors.items():
-        # Targets of less importance than this are left to the fit.
-        if name not in held and name not in settling and target.weight[k] >= 0.05:
-            turn = target.rotation[k] if target.rotation_weight[k] > 0.5 else None
-            placements[name] = Placement(target.position[k], turn)
-    return tuple(held.values()), placements
-
-
-def _settling(
-    body: BodyModel, schedule: ContactSchedule, time: float, q: FloatArray, touched: dict[str, FloatArray]
-) -> dict[str, Placement]:
-    """Places of the contacts that are still settling, on their way from where they touched.
+    body: BodyModel, schedule: ContactSchedule, time: float, effectors: dict[str, EffectorTarget], k: int,
+    q: FloatArray, touched: dict[str, FloatArray],
+) -> tuple[tuple[Contact, ...], dict[str, Placement]]:  # fmt: skip
+    """Contacts, and places of flying effectors and of contacts that settle, on their way from their touch.
 
     Args:
-        time: [s].
         q: (nq,) posture before.
-        touched: Where each of them touched, kept from posture to posture [m].
+        touched: Where each of the latter touched, kept from posture to posture [m].
     """
-    placements = {}
-    phase = int(schedule.phase_at(time))
-    for contact in schedule.sequence[phase].stance:
-        if schedule.settling(time, contact.effector)[0]:
-            if contact.effector not in touched:
-                _, here = Configuration(body, q).effector_placement(contact.effector)
-                touched[contact.effector] = here
-            start = touched[contact.effector]
-            share = float(settled_share(schedule, phase, contact, np.array([time]))[0])
-            placements[contact.effector] = Placement(
-                start + share * (contact.position - start),
-                contact.rotation_contact_to_world,
-                # Weight of the orientation of a settling contact [1/rad^2].
-                rotation_weight=10.0,
-            )
-    return placements
+    phase, placements = int(schedule.phase_at(time)), dict[str, Placement]()
+    settling = {name for name in schedule.sequence.effectors if schedule.settling(time, name)[0]}
+    stance = schedule.sequence[phase].stance
+    held = tuple(
+        contact for contact in stance
+        if (contact.part is SolePart.FULL or contact.rolls) and contact.effector not in settling
+    )  # fmt: skip
+    busy = settling.union(contact.effector for contact in held)
+    for name, target in effectors.items():
+        # Targets of less importance than this are left to the fit.
+        if name not in busy and target.weight[k] >= 0.05:
+            turn = target.rotation[k] if target.rotation_weight[k] > 0.5 else None
+            placements[name] = Placement(target.position[k], turn)
+    for contact in stance:
+        name = contact.effector
+        if name in settling:
+            if name not in touched:
+                touched[name] = Configuration(body, q).effector_placement(name)[1]
+            start, share = touched[name], settled_share(schedule, phase, contact, np.array([time]))[0]
+            # Weight of the orientation of a settling contact [1/rad^2].
+            place = start + float(share) * (contact.position - start)
+            placements[name] = Placement(place, contact.rotation_contact_to_world, rotation_weight=10.0)
+    return held, placements
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,8 +182,7 @@ def _degrees(**angles: float) -> Mapping[str, float]:
 
 
 READY = PostureStyle(
-    "ready",
-    _degrees(shoulder_flexion=20.0, shoulder_abduction=25.0, elbow_flexion=60.0),
+    "ready", _degrees(shoulder_flexion=20.0, shoulder_abduction=25.0, elbow_flexion=60.0),
     MappingProxyType({
         "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.35, "thorax": 0.35, "neck": 0.25,
         "shoulder": 0.35, "elbow": 0.35, "wrist": 0.1,
@@ -214,15 +191,12 @@ READY = PostureStyle(
 """Arms of a person who steps over something: slightly raised and bent, clear of the thighs."""
 
 WALKING = PostureStyle(
-    "walking",
-    _degrees(shoulder_flexion=3.0, elbow_flexion=22.0),
+    "walking", _degrees(shoulder_flexion=3.0, elbow_flexion=22.0),
     MappingProxyType({
         "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.12, "thorax": 0.12, "neck": 0.1,
         "shoulder": 0.12, "elbow": 0.15, "wrist": 0.1,
     }),
-    trunk_scale=0.15,
-    arm_swing=0.7,
-    moment_factor=1.6,
+    trunk_scale=0.15, arm_swing=0.7, moment_factor=1.6,
     preferences=Preferences(
         hinges=MappingProxyType({"shoulder": 0.5, **Preferences().hinges}),
         pelvis=2.0, trunk=2.0, head=1.0, arms=0.0,
@@ -231,13 +205,12 @@ WALKING = PostureStyle(
 """An upright trunk and hanging arms that swing against the legs."""
 
 CLOSE = PostureStyle(
-    "close",
-    _degrees(shoulder_flexion=25.0, shoulder_abduction=15.0, elbow_flexion=80.0),
+    "close", _degrees(shoulder_flexion=25.0, shoulder_abduction=15.0, elbow_flexion=80.0),
     MappingProxyType({**READY.scales, "shoulder": 0.15, "elbow": 0.2}),
     preferences=Preferences(
         hinges=MappingProxyType({"shoulder": 0.5, "elbow": 0.3, **Preferences().hinges}), arms=0.3
     ),
-)
+)  # fmt: skip
 """Arms kept close to the body, as in a narrow place."""
 
 CLIMBING = PostureStyle(
@@ -252,11 +225,9 @@ CLIMBING = PostureStyle(
 """Raised arms and bent, spread legs of a person on a wall."""
 
 HANGING = PostureStyle(
-    "hanging",
-    _degrees(shoulder_flexion=5.0, shoulder_abduction=12.0, elbow_flexion=25.0),
-    CLOSE.scales,
+    "hanging", _degrees(shoulder_flexion=5.0, shoulder_abduction=12.0, elbow_flexion=25.0), CLOSE.scales,
     preferences=CLOSE.preferences,
-)
+)  # fmt: skip
 """Arms that hang, as of a person who comes near to something."""
 
 MANNERS: Mapping[str, PostureStyle] = MappingProxyType(
@@ -266,11 +237,7 @@ MANNERS: Mapping[str, PostureStyle] = MappingProxyType(
 
 
 def posture_style_of(name: str) -> PostureStyle:
-    """Return the manner of a name.
-
-    Raises:
-        InputError: If there is none.
-    """
+    """Return the manner of a name; an :class:`~manikin.errors.InputError` where there is none."""
     if name not in MANNERS:
         raise InputError(f"manner is {name!r}; valid: {', '.join(MANNERS)}")
     return MANNERS[name]
@@ -292,54 +259,39 @@ def foot_lead(schedule: ContactSchedule, time: FloatArray) -> FloatArray:
     """(n,) how far the left foot is ahead of the right one along the heading [m]; 0 without both."""
     heading = heading_of(schedule, time)
     forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    places = [_foot_path(schedule, f"{side}_foot", time) for side in ("left", "right")]
-    if places[0] is None or places[1] is None:
+    left, right = (_foot_path(schedule, f"{side}_foot", time) for side in ("left", "right"))
+    if left is None or right is None:
         return np.zeros(len(time))
-    return np.sum(forward * (places[0] - places[1]), axis=1)
+    return np.sum(forward * (left - right), axis=1)
 
 
 def _foot_path(schedule: ContactSchedule, effector: str, time: FloatArray) -> FloatArray | None:
     """(n, 2) where an effector is, seen from above; smoothly from one contact to the next."""
-    known: list[float] = []
-    places: list[FloatArray] = []
-    for index, phase in enumerate(schedule.sequence):
-        if effector in phase.stance:
-            known.extend(schedule.instants[index : index + 2])
-            places.extend([phase.stance[effector].position[:2]] * 2)
-    if not known:
+    held = [index for index, phase in enumerate(schedule.sequence) if effector in phase.stance]
+    if not held:
         return None
+    known = np.concatenate([schedule.instants[index : index + 2] for index in held])
+    places = np.repeat([schedule.sequence[index].stance[effector].position[:2] for index in held], 2, axis=0)
     after = np.clip(np.searchsorted(known, time, side="right"), 1, len(known) - 1)
-    start, end = np.array(known)[after - 1], np.array(known)[after]
+    start, end = known[after - 1], known[after]
     share = np.clip((time - start) / np.maximum(end - start, 1e-9), 0.0, 1.0)[:, None]
     blend = share**2 * (3.0 - 2.0 * share)
-    return (1.0 - blend) * np.array(places)[after - 1] + blend * np.array(places)[after]
+    return (1.0 - blend) * places[after - 1] + blend * places[after]
 
 
 def reference_motion(
     body: BodyModel, trajectory: CentroidalTrajectory, time: FloatArray, manner: PostureStyle = READY
 ) -> FloatArray:
-    """(n, nq) preferred posture carried along the centre of mass, facing as the feet do.
-
-    Args:
-        time: (n,) [s].
-        manner: Preferred posture and swing of the arms.
-    """
-    standing = manner.posture(body)
-    model = body.pinocchio
+    """(n, nq) preferred posture carried along the centre of mass at times (n,) [s], facing as the feet do."""
+    standing, model = manner.posture(body), body.pinocchio
     offset = pin.centerOfMass(model, model.createData(), standing) - standing[:3]
-    com = trajectory.position(time)
-    out = np.tile(standing, (len(time), 1))
+    com, out = trajectory.position(time), np.tile(standing, (len(time), 1))
     for row, yaw, centre in zip(out, heading_of(trajectory.schedule, time), com, strict=True):
         turn = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)))
         row[:3] = centre - turn.matrix() @ offset
         row[3:7] = (turn * pin.Quaternion(*standing[[6, 3, 4, 5]])).coeffs()
-    _swing_arms(body, out, manner.arm_swing * foot_lead(trajectory.schedule, time))
-    return align_quaternions(out)
-
-
-def _swing_arms(body: BodyModel, configurations: FloatArray, angle: FloatArray) -> None:
-    """Add the shoulders' flexion (n,) [rad], the right forward and the left back when positive."""
-    for side, sign in (("left", -1.0), ("right", 1.0)):
-        name = f"{side}_shoulder_flexion"
+    flexion = manner.arm_swing * foot_lead(trajectory.schedule, time)
+    for name, sign in (("left_shoulder_flexion", -1.0), ("right_shoulder_flexion", 1.0)):
         if name in body.joint_names:
-            configurations[:, 7 + body.joint_index(name)] += sign * angle
+            out[:, 7 + body.joint_index(name)] += sign * flexion
+    return align_quaternions(out)

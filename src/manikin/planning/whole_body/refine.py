@@ -2,8 +2,7 @@
 
 The third stage of the thesis hands the contact sequence to a trajectory optimisation (ITOMP) and reports that
 this "is not fully functional"; the optimisation here is our own, with the terms of 7.3.1 and 7.3.2 on the
-whole-body fit: one quintic spline, analytic Gauss-Newton steps, contacts made exact by multipliers.  A fit
-that breaks a requirement is repeated with other weights, knots, contacts or timing.
+whole-body fit.  A fit that breaks a requirement is repeated with other weights, knots, contacts or timing.
 """
 
 import time as clock
@@ -65,29 +64,20 @@ from manikin.scene import Proximity, Scene
 REPAIRS = 5
 """Most fits that follow a failed one with other weights, knots or timing."""
 
-LEAST_SLACK = -1e-6
-"""Slack of the contacts' limits below which no contact forces balance the body: 0 but for rounding."""
-
-SPARSE = 0.03
-"""Spacing of the samples for which the contact variables are chosen [s]."""
-
 _SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})
 """Broken requirements that a slower motion may keep."""
 
 _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
 """Broken requirements that a spline with more knots may keep."""
 
-PENALTIES = MappingProxyType(
-    {
-        "min_clearance_m": ("clearance",),
-        "max_penetration_m": ("clearance", "touching"),
-        "max_joint_limit_violation_rad": ("joint_limit",),
-        "max_velocity_share": ("joint_velocity",),
-        "max_physics_violation": ("missing_wrench", "margin_violation"),
-        "min_margin": ("margin_violation", "missing_wrench"),
-        "max_torque_share": (),
-    }
-)
+PENALTIES = MappingProxyType({
+    "min_clearance_m": ("clearance",),
+    "max_penetration_m": ("clearance", "touching"),
+    "max_joint_limit_violation_rad": ("joint_limit",),
+    "max_velocity_share": ("joint_velocity",),
+    "max_physics_violation": ("missing_wrench", "margin_violation"),
+    "min_margin": ("margin_violation", "missing_wrench"),
+})  # fmt: skip
 """Scales that decide each residual of the certificate; contacts are constraints."""
 
 
@@ -181,8 +171,7 @@ class _RefineGoal:
             job.body, job.scene, self.path, self.schedule, time, scales, job.task, job.padded, job.variables
         )
         if self.forces is not None:
-            held = HeldForces.of(job.body, self.schedule, self.forces, time)
-            targets = replace(targets, forces=held)
+            targets = replace(targets, forces=HeldForces.of(job.body, self.schedule, self.forces, time))
         wanted = job.rooms(self.schedule.sequence, job.settings.friction_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
@@ -199,20 +188,15 @@ class _RefineGoal:
             [room.is_flat for room in rooms], job.settings.requirements,
         )  # fmt: skip
 
-    def at_rest(self) -> VariableSamples:
-        """Samples of the keys at rest, for the choice of the contacts."""
-        time, body = sample_uniformly(self.schedule, SPARSE), self.job.body
-        still, keys = np.zeros((len(time), body.nv)), self.path.q
-        states, at_keys = (self.path.at(time), still, still), (keys, np.zeros((len(keys), body.nv)))
-        return VariableSamples.of(
-            body, self.schedule.sequence.effectors, time, states, (self.path.time, *at_keys)
-        )
-
-    def moving(self, spline: ConfigurationSpline) -> VariableSamples:
-        """Samples of a motion, for the choice of the contacts."""
-        time = sample_uniformly(self.schedule, SPARSE)
-        names = self.schedule.sequence.effectors
-        return VariableSamples.of(self.job.body, names, time, spline.evaluate(time))
+    def samples(self, spline: ConfigurationSpline | None = None) -> VariableSamples:
+        """Samples of a motion, or of the keys at rest, for the choice of the contacts."""
+        body, names = self.job.body, self.schedule.sequence.effectors
+        time = sample_uniformly(self.schedule, 0.03)
+        if spline is not None:
+            return VariableSamples.of(body, names, time, spline.evaluate(time))
+        still, path = np.zeros((len(time), body.nv)), self.path
+        keys = path.time, path.q, np.zeros((len(path.q), body.nv))
+        return VariableSamples.of(body, names, time, (path.at(time), still, still), keys)
 
 
 class Refinement:
@@ -227,13 +211,9 @@ class Refinement:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        settings: RefineSettings,
-        task: Task | None,
+        self, body: BodyModel, scene: Scene, settings: RefineSettings, task: Task | None,
         padded: tuple[str, ...],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.body, self.scene, self.settings, self.task, self.padded = body, scene, settings, task, padded
         self.proximity = Proximity(body, scene)
         self.variables: Variables = ()
@@ -250,19 +230,14 @@ class Refinement:
         )  # fmt: skip
 
     def run(self, path: KeyPath, schedule: ContactSchedule, began: float, progress: Progress) -> RefineResult:
-        """Fit, repair and measure.
-
-        Args:
-            began: Reading of the clock from which the wall time counts [s].
-            progress: Called with the share of the fits that are done.
-        """
+        """Fit, repair and measure; the wall time counts from a reading of the clock [s]."""
         goal = _RefineGoal(self, path, schedule)
         self.variables = tuple(dict.fromkeys(phase.stance.effectors, 1.0) for phase in schedule.sequence)
         if self.settings.retime:
             share = self.settings.scales.velocity_share
             goal = _RefineGoal(self, *stretched_for_speed(self.body, path, schedule, share))
         if self.settings.contact_variables:
-            goal = self._chosen(goal, goal.at_rest())
+            goal = self._chosen(goal, goal.samples())
         first = self._job.attempt(goal, self.settings.scales)
         best = self._job.repair(first, partial(self._remedy, progress), REPAIRS)
         if self.settings.speed_share is not None and not best.broken:
@@ -277,7 +252,7 @@ class Refinement:
         progress((number + 1) / (REPAIRS + 1))
         goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
         if self.settings.contact_variables:
-            chosen = self._chosen(goal, goal.moving(last.result.spline), goal.at_rest())
+            chosen = self._chosen(goal, goal.samples(last.result.spline), goal.samples())
             if chosen is not goal:
                 return job.attempt(chosen, last.scales, last.fine)
         if last.is_caught:
@@ -325,10 +300,10 @@ class Refinement:
 
     def _slower(self, last: FitAttempt[_RefineGoal]) -> _RefineGoal:
         """Give the worst phase more time."""
-        before, path, schedule = last.goal.schedule, last.goal.path, last.goal.schedule
+        path, schedule = last.goal.path, last.goal.schedule
         for name in sorted(last.broken & _SLOWED):
             worst = last.certificate[name].time_s or 0.0
-            when = float(np.interp(worst, before.instants, schedule.instants))
+            when = float(np.interp(worst, last.goal.schedule.instants, schedule.instants))
             # Factor by which a phase gets longer in which balance or speed is missed again.
             path, schedule = stretched_around(path, schedule, when, 1.3)
         return _RefineGoal(self, path, schedule)
@@ -339,10 +314,8 @@ class Refinement:
         """Measures of the input, of a spline through it and of the motion, and the verdict.
 
         Args:
-            found: The best attempt.
             duration: Of the input [s].
             given: Contacts of the input.
-            began: Reading of the clock from which the wall time counts [s].
         """
         schedule, path, spline = found.goal.schedule, found.goal.path, found.result.spline
         time = sample_uniformly(schedule, STEP)
@@ -360,11 +333,12 @@ class Refinement:
         slacks = contact_slack(schedule, time, centroidal_motion(self.body, *spline.evaluate(time)).wrench)
         worst = int(np.argmin(slacks))
         slack, when = float(slacks[worst]), float(time[worst])
-        table = RequirementTable((
-            *found.certificate.required,
-            Requirement("min_contact_slack", "least slack of the contacts' limits", "N, N.m", slack, ">=",
-                        0.0, when, tolerance=-LEAST_SLACK),
-        ))  # fmt: skip
+        # Without contact forces that balance the body it is negative, but for rounding.
+        room = Requirement(
+            "min_contact_slack", "least slack of the contacts' limits", "N, N.m", slack, ">=", 0.0, when,
+            tolerance=1e-6,
+        )  # fmt: skip
+        table = RequirementTable((*found.certificate.required, room))
         broken, failure = table.first_broken, None
         if broken is not None:
             failure = WholeBodyFailure.at(schedule, broken.time_s or 0.0, broken.reason)

@@ -1,21 +1,20 @@
 """Contact variables and the contact-invariant term ([Tonneau2015]_ 7.3.1, after [Mordatch2012]_).
 
-Each effector has a contact variable ``c`` at each time: 1 while the sequence holds its contact, 0 in
-flight, with a smooth ramp on the way.  The term is ``c (|e|^2 + |e'|^2)``: the place of an effector
-relative to its contact, and its speed.  The contacts are known here, so the variables are given and not
-unknowns; where ``c`` is 1 the place is met exactly by multipliers.
+Each effector has a contact variable ``c`` at each time: 1 while the sequence holds its contact, 0 in flight,
+with a smooth ramp on the way.  The term is ``c (|e|^2 + |e'|^2)``: the place of an effector relative to its
+contact, and its speed.  Here the variables are given and not unknowns; where ``c`` is 1 the place is met
+exactly by multipliers.
 
-The EFORT term ([Tonneau2015]_ 7.8-7.9) keeps contacts in postures in which their limb presses well:
-``C = c / alpha`` for each limb in contact, with ``alpha = f_T (v . n)``.  As printed, the cost is
-singular or negative where the surface would have to pull (``alpha <= 0``), and 7.9 drops the contact
-variable and the unit length of the direction; here ``alpha`` is clamped to :data:`LEAST`, ``c`` is kept,
-and directions have length 1.
+The EFORT term ([Tonneau2015]_ 7.8-7.9) keeps contacts in postures in which their limb presses well: ``C = c /
+alpha`` for each limb in contact, with ``alpha = f_T (v . n)``.  As printed, the cost is singular or negative
+where the surface would have to pull (``alpha <= 0``), and 7.9 drops the contact variable and the unit length
+of the direction; here ``alpha`` is clamped to :data:`LEAST`, ``c`` is kept, and directions have length 1.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import limb_slots
@@ -29,9 +28,6 @@ from manikin.planning.whole_body.refine_input import KeyPath
 
 LEAST = 0.1
 """Smallest alpha; below it the cost is constant [N per N.m]."""
-
-STILL = 1.0e-3
-"""A pelvis that moves less than this during a phase has no direction [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,18 +48,15 @@ class LimbDirections:
 def limb_directions(
     body: BodyModel, path: KeyPath, schedule: ContactSchedule, time: FloatArray, task: Task | None
 ) -> dict[str, LimbDirections]:
-    """Directions of every limb of the sequence that has one.
+    """Directions at times (n,) [s] of every limb of the sequence that has one.
 
     Without a task the direction is that of the pelvis' displacement in the phase, as 7.9 wants.
-
-    Args:
-        time: (n,) [s].
-        task: Direction of the task and the limbs that act on an object, or None.
     """
     phases = schedule.phase_at(time)
     moved = np.diff(path.at(schedule.instants)[:, :3], axis=0)
-    length = np.linalg.norm(moved, axis=1, keepdims=True)
-    forward = np.where(length > STILL, moved / np.maximum(length, STILL), 0.0)
+    # A pelvis that moves less than this during a phase has no direction [m].
+    length, still = np.linalg.norm(moved, axis=1, keepdims=True), 1.0e-3
+    forward = np.where(length > still, moved / np.maximum(length, still), 0.0)
     found = {}
     for limb in body.limbs:
         if limb.effector not in schedule.sequence.effectors:
@@ -107,65 +100,53 @@ def efort_with_derivative(
 
 def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, FloatArray]:
     """(n,) contact variable of every effector of the sequence at each time, in [0, 1]."""
-    held = schedule.support(time, schedule.sequence.effectors)
-    found = {
-        name: held[:, column].astype(np.float64) for column, name in enumerate(schedule.sequence.effectors)
-    }
+    names = schedule.sequence.effectors
+    found = dict(zip(names, schedule.support(time, names).T.astype(np.float64, "C"), strict=True))
     for swing in schedule.sequence.swings():
         start, end = schedule.swing_interval(swing)
         rows = (time >= start) & (time < end)
         # Time before and after a contact in which its variable is above 0 [s].
         ramp = min(0.15, 0.25 * (end - start))
+        variable = found[swing.effector]
         for contact, away in ((swing.start, time - start), (swing.end, end - time)):
             if contact is not None:
                 near = np.clip(1.0 - away[rows] / ramp, 0.0, 1.0)
-                rising = near**2 * (3.0 - 2.0 * near)
-                found[swing.effector][rows] = np.maximum(found[swing.effector][rows], rising)
+                variable[rows] = np.maximum(variable[rows], near**2 * (3.0 - 2.0 * near))
     return found
 
 
 def contact_targets(
     schedule: ContactSchedule, time: FloatArray, variables: dict[str, FloatArray], approach: float
 ) -> dict[str, EffectorTarget]:
-    """Targets of every effector by the contact variables.
+    """Targets of every effector at times (n,) [s] by the contact variables.
+
+    In flight it keeps to the contact's normal; the height above the surface is left to the distances.
 
     Args:
-        time: (n,) [s].
         variables: Those of :func:`contact_variables`.
         approach: Weight of the distance to a contact's normal in flight, relative to that of a held
             contact, at a variable of 1.
     """
-    targets = {}
-    for name in schedule.sequence.effectors:
-        target = targets[name] = EffectorTarget.free(len(time))
-        for swing in schedule.sequence.swings():
-            if swing.effector == name:
-                start, end = schedule.swing_interval(swing)
-                for contact, near in (
-                    (swing.start, (time >= start) & (time < 0.5 * (start + end))),
-                    (swing.end, (time >= 0.5 * (start + end)) & (time < end)),
-                ):
-                    if contact is not None:
-                        _approach(target, near, contact, approach * np.sqrt(variables[name][near]))
-        for number, phase in enumerate(schedule.sequence):
-            if name in phase.stance:
-                start, end = schedule.instants[number : number + 2]
-                rows, contact = (time >= start) & (time <= end), phase.stance[name]
+    targets = {name: EffectorTarget.free(len(time)) for name in schedule.sequence.effectors}
+    for swing in schedule.sequence.swings():
+        target, (start, end) = targets[swing.effector], schedule.swing_interval(swing)
+        middle = 0.5 * (start + end)
+        for contact, first, last in ((swing.start, start, middle), (swing.end, middle, end)):
+            if contact is not None:
+                rows = (time >= first) & (time < last)
+                # Weights are of residuals, the contact variable of their squares.
+                weight = approach * np.sqrt(variables[swing.effector][rows])
                 target.put(rows, contact)
-                target.weight[rows], target.rotation_weight[rows] = 1.0, _turn_weight(contact)
-                target.along[rows] = np.eye(3)
+                target.weight[rows] = np.minimum(weight, ALMOST)
+                target.along[rows] = np.eye(3) - np.outer(contact.normal, contact.normal)
+                target.rotation_weight[rows] = weight * _turn_weight(contact)
+    for phase, (start, end) in zip(schedule.sequence, pairwise(schedule.instants), strict=True):
+        for contact in phase.stance:
+            target, rows = targets[contact.effector], (time >= start) & (time <= end)
+            target.put(rows, contact)
+            target.weight[rows], target.rotation_weight[rows] = 1.0, _turn_weight(contact)
+            target.along[rows] = np.eye(3)
     return targets
-
-
-def _approach(target: EffectorTarget, rows: NDArray[np.bool_], contact: Contact, weight: FloatArray) -> None:
-    """Keep to the contact's normal; the height above the surface is left to the distances.
-
-    Weights are of residuals, the contact variable of their squares.
-    """
-    target.put(rows, contact)
-    target.weight[rows] = np.minimum(weight, ALMOST)
-    target.along[rows] = np.eye(3) - np.outer(contact.normal, contact.normal)
-    target.rotation_weight[rows] = weight * _turn_weight(contact)
 
 
 def _turn_weight(contact: Contact) -> float:
@@ -190,8 +171,7 @@ def effector_speed(
     """
     v = motion.states.v[:, chain]
     linear, axes = jacobian[:, :3, chain], jacobian[:, 3:, chain]
-    turned = np.cumsum(axes * v[:, None, :], axis=2)
-    carried = linear * v[:, None, :]
+    turned, carried = np.cumsum(axes * v[:, None, :], axis=2), linear * v[:, None, :]
     value = carried.sum(axis=2)
     beyond = value[:, :, None] - np.cumsum(carried, axis=2)
     by_joint = np.cross(turned, linear, axis=1) + np.cross(axes, beyond, axis=1)

@@ -22,9 +22,6 @@ from manikin.numerics.spatial import FloatArray, frozen_array
 PEAK = 1.6
 """Peak speed of a smooth motion through key configurations, relative to the mean between two of them."""
 
-SAME_TIME = 1e-9
-"""Difference of two times that are one [s]."""
-
 
 @dataclass(frozen=True, eq=False)
 class KeyPath:
@@ -83,10 +80,8 @@ def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> No
         InputError: If the configurations are not the body's or the times differ.
         ContactError: If the body has no such effector or a part of a sole is asked for.
     """
-    if path.q.shape[1] != body.nq:
-        raise InputError(
-            f"key configurations have {path.q.shape[1]} columns; valid: {body.nq} of {body.name!r}"
-        )
+    if (count := path.q.shape[1]) != body.nq:
+        raise InputError(f"key configurations have {count} columns; valid: {body.nq} of {body.name!r}")
     ends, wanted = (path.time[0], path.time[-1]), (schedule.instants[0], schedule.instants[-1])
     if np.abs(np.subtract(ends, wanted)).max() > 1e-6:
         raise InputError(
@@ -95,14 +90,11 @@ def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> No
         )
     for number, phase in enumerate(schedule.sequence):
         for contact in phase.stance:
-            if contact.effector not in body.effectors:
-                raise ContactError(
-                    f"phase {number} holds {contact.effector!r}; valid: {', '.join(body.effectors)}"
-                )
-            if contact.part is not SolePart.FULL:
-                raise ContactError(
-                    f"phase {number} holds the {contact.part} of {contact.effector!r}; valid: full soles"
-                )
+            name, part = contact.effector, contact.part
+            if name not in body.effectors:
+                raise ContactError(f"phase {number} holds {name!r}; valid: {', '.join(body.effectors)}")
+            if part is not SolePart.FULL:
+                raise ContactError(f"phase {number} holds the {part} of {name!r}; valid: full soles")
 
 
 def retime(
@@ -133,7 +125,7 @@ def stretched_for_speed(
         share: Of the velocity limits that may be used.
     """
     nodes = np.union1d(path.time, schedule.instants)
-    nodes = nodes[np.append(True, np.diff(nodes) > SAME_TIME)]
+    nodes = nodes[np.append(True, np.diff(nodes) > 1e-9)]
     moved = np.abs(np.diff(path.at(nodes)[:, 7:], axis=0))
     needed = PEAK * (moved / (share * body.velocity_limit)).max(axis=1, initial=0.0)
     lengths = np.maximum(np.diff(nodes), needed)
@@ -143,25 +135,18 @@ def stretched_for_speed(
 def stretched_around(
     path: KeyPath, schedule: ContactSchedule, time: float, factor: float
 ) -> tuple[KeyPath, ContactSchedule]:
-    """Slow down the phase at a time, and half as much the ones beside it.
-
-    Args:
-        time: [s].
-        factor: By which the phase gets longer.
-    """
+    """Slow down the phase at a time [s] by a factor, and half as much the ones beside it."""
     worst = int(schedule.phase_at(time))
     away = np.abs(np.arange(len(schedule.sequence)) - worst)
     return stretched(path, schedule, np.select([away == 0, away == 1], [factor, 0.5 * (1.0 + factor)], 1.0))
 
 
-SHORTER = 0.88
-"""Least factor by which a phase gets shorter at once; with 0.75 more timings are taken back than kept."""
+SHORTER, SETTLED = 0.88, 0.97
+"""Least factor by which a phase gets shorter at once; with 0.75 more timings are taken back than kept. Factor
+above which a phase counts as short enough."""
 
 SHORTEST = 0.3
 """Duration below which no phase is shortened [s]; our choice."""
-
-SETTLED = 0.97
-"""Factor above which a phase counts as short enough."""
 
 ROUNDS = 6
 """Most timings that are tried."""

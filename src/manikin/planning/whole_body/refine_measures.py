@@ -1,9 +1,8 @@
 """Every term of the refinement, measured on samples of a motion without its spline or solver.
 
-Velocities and accelerations are differences of the sampled configurations, so that the input, whose
-velocity jumps at its keys, and the refined motion are measured in the same way.  An effector may touch what
-it holds, and that alone.  In flight it begins and ends at distance zero from its supports; in between it has
-to keep off them like everything else.
+Velocities and accelerations are differences of the sampled configurations, so that the input, whose velocity
+jumps at its keys, and the refined motion are measured in the same way.  An effector may touch what it holds,
+and that alone; in flight it begins and ends at distance zero from its supports.
 """
 
 import itertools
@@ -38,21 +37,6 @@ GRASPED = -0.05
 """Distance at which a hand that holds on to something begins to be pushed off it [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One end of a flight.
-
-    Attributes:
-        pairs: Segments and the obstacle that they leave or reach.
-        away: (n,) 0 at the contact, 1 far from it; 1 outside the flight.
-        grasped: Whether the hand has its fingers around the obstacle.
-    """
-
-    pairs: Ignored
-    away: FloatArray
-    grasped: bool
-
-
 class RefineObstacles:
     """Pairs that may be near each other, at samples of a motion.
 
@@ -68,26 +52,21 @@ class RefineObstacles:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        schedule: ContactSchedule,
-        time: FloatArray,
+        self, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray,
         padded: Sequence[str] = (),
-    ) -> None:
+    ) -> None:  # fmt: skip
         leaning = leaning_pairs(body, padded)
         held = [
             leaning.union(*(touch_pairs(body, scene, contact) for contact in phase.stance))
             for phase in schedule.sequence
         ]
         self.ignored: tuple[Ignored, ...] = tuple(held[phase] for phase in schedule.phase_at(time))
-        self._obstacles = [obstacle.name for obstacle in scene]
-        self._ends = {name: end_segments(body, name) for name in schedule.sequence.effectors}
-        self._sides = list[_Side]()
-        self._near = {
-            name: np.where(schedule.support(time, (name,))[:, 0], 0.0, 1.0)
-            for name in schedule.sequence.effectors
-        }
+        self._obstacles, names = [obstacle.name for obstacle in scene], schedule.sequence.effectors
+        # Of each end of a flight the segments and the obstacle that they leave or reach; (n,) 0 at the
+        # contact, 1 far from it or outside the flight; and whether a hand has its fingers around it.
+        self._sides = list[tuple[Ignored, FloatArray, bool]]()
+        self._ends = {name: end_segments(body, name) for name in names}
+        self._near = dict(zip(names, np.where(schedule.support(time, names), 0.0, 1.0).T, strict=True))
         for swing in schedule.sequence.swings():
             start, end = schedule.swing_interval(swing)
             rows = (time >= start) & (time < end)
@@ -99,27 +78,22 @@ class RefineObstacles:
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
                     self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
                     grasped = contact.kind is ContactKind.GRASP
-                    self._sides.append(_Side(touch_pairs(body, scene, contact), away, grasped))
+                    self._sides.append((touch_pairs(body, scene, contact), away, grasped))
 
     def touching(self) -> tuple[Ignored, ...]:
         """Pairs that may go into each other at each sample: those in contact, and a hand about a grasp."""
-        grasped = [side for side in self._sides if side.grasped]
-        return with_pairs(self.ignored, [(side.pairs, side.away < 1.0) for side in grasped])
+        near = [(pairs, away < 1.0) for pairs, away, grasped in self._sides if grasped]
+        return with_pairs(self.ignored, near)
 
     def during_flights(self) -> tuple[Ignored, ...]:
         """Pairs that do not count as clearance at each sample: in contact, leaving it or reaching it."""
-        return with_pairs(self.ignored, [(side.pairs, side.away < 1.0) for side in self._sides])
+        return with_pairs(self.ignored, [(pairs, away < 1.0) for pairs, away, _ in self._sides])
 
     def wanted(self, found: ProximitySamples, safe: float, touching: float) -> FloatArray:
-        """(k,) wanted distance of close pairs [m].
+        """(k,) wanted distance of close pairs: far from contacts, and where a flight begins or ends [m].
 
         Where an effector is held its distance to other obstacles is given as well, and less of it is wanted:
         a push that ended with the contact would tear it off.
-
-        Args:
-            found: The pairs.
-            safe: Wanted far from contacts [m].
-            touching: Wanted where a flight begins or ends [m].
         """
         wanted = np.full(len(found.distance), safe)
         named = np.array([(segment_of(shape), segment_of(other)) for shape, other in found.pairs])
@@ -128,12 +102,11 @@ class RefineObstacles:
             # Share of the wanted clearance that an effector in contact has to keep from other obstacles.
             share = np.maximum(self._near[name][found.sample[rows]], 0.4)
             wanted[rows] = np.minimum(wanted[rows], share * safe)
-        for side in self._sides:
+        for pairs, away, grasped in self._sides:
             rows = np.zeros(len(wanted), dtype=bool)
-            for segment, obstacle in side.pairs:
+            for segment, obstacle in pairs:
                 rows |= (named[:, 0] == segment) & (named[:, 1] == obstacle)
-            share = side.away[found.sample[rows]]
-            inside = GRASPED if side.grasped else touching
+            share, inside = away[found.sample[rows]], GRASPED if grasped else touching
             wanted[rows] = np.minimum(wanted[rows], share * safe + (1.0 - share) * inside)
         return wanted
 
@@ -196,17 +169,15 @@ def differences(body: BodyModel, time: FloatArray, q: FloatArray) -> tuple[Float
     Before and after the motion the body rests.
     """
     model, step = body.pinocchio, float(time[1] - time[0])
-    extended = [q[0], *q, q[-1]]
-    rate = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(extended)])
-    rate /= step
+    extended = itertools.pairwise([q[0], *q, q[-1]])
+    rate = np.array([pin.difference(model, a, b) for a, b in extended]) / step
     return 0.5 * (rate[1:] + rate[:-1]), (rate[1:] - rate[:-1]) / step
 
 
 def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray:
     """(n,) distance of wrenches (n, 6) about the mean contact point to the polytope of a stance [N].
 
-    The polytope holds what all admissible contact forces can supply; the nearest point of it is found
-    by a quadratic program for each wrench outside.
+    The nearest point of it is found by a quadratic program for each wrench outside.
     """
     H, h = room.polytope.H, room.polytope.h
     missing = np.zeros(len(stance_wrench))
@@ -232,12 +203,9 @@ def room_of(stance: Stance, friction_share: float = 1.0) -> MarginCost:
 
 
 def balance_of(
-    schedule: ContactSchedule,
-    rooms: tuple[MarginCost, ...],
-    time: FloatArray,
-    wrench: FloatArray,
+    schedule: ContactSchedule, rooms: tuple[MarginCost, ...], time: FloatArray, wrench: FloatArray,
     com: FloatArray,
-) -> tuple[MotionMargin, FloatArray]:
+) -> tuple[MotionMargin, FloatArray]:  # fmt: skip
     """Margins and (n,) physics violation of wrenches (n, 6) about the world origin with CoM (n, 3)."""
     phases, violation = schedule.phase_at(time), np.zeros(len(time))
     for number, (phase, room) in enumerate(zip(schedule.sequence, rooms, strict=True)):
@@ -264,8 +232,7 @@ def measure(
         q: (n, nq) configurations.
         task: As for :func:`~manikin.planning.whole_body.refine.refine_motion`.
     """
-    v, a = differences(body, time, q)
-    step = float(time[1] - time[0])
+    (v, a), step = differences(body, time, q), float(time[1] - time[0])
     found = centroidal_motion(body, q, v, a)
     margin, violation = balance_of(schedule, rooms, time, found.wrench, found.com)
     error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
@@ -276,17 +243,13 @@ def measure(
         duration_s=float(time[-1] - time[0]),
         squared_accelerations=step * float(np.sum(a[:, 6:] ** 2)),
         squared_pelvis_accelerations=step * float(np.sum(a[:, :3] ** 2)),
-        physics_violation=float(violation.mean()),
-        max_physics_violation=float(violation.max()),
-        min_clearance_m=float(clearance.distance),
-        max_penetration_m=max(0.0, -float(flying.distance)),
-        contact_error_m=error,
-        contact_slide_mps=slide,
-        efort_cost=cost,
+        physics_violation=float(violation.mean()), max_physics_violation=float(violation.max()),
+        min_clearance_m=float(clearance.distance), max_penetration_m=max(0.0, -float(flying.distance)),
+        contact_error_m=error, contact_slide_mps=slide, efort_cost=cost,
         max_joint_limit_violation_rad=max(0.0, float(outside)),
         max_velocity_share=float((np.abs(v[:, 6:]) / body.velocity_limit).max(initial=0.0)),
         min_margin=float(margin.margin.min()),
-    )
+    )  # fmt: skip
 
 
 def _contact_terms(
@@ -307,8 +270,7 @@ def _contact_terms(
     variables, limbs = contact_variables(schedule, time), limb_directions(body, path, schedule, time, task)
     moves, phases = moves_by_joint(model), schedule.phase_at(time)
     error = slide = cost = 0.0
-    for column, name in enumerate(names):
-        variable = variables[name]
+    for column, (name, variable) in enumerate(variables.items()):
         for number, phase in enumerate(schedule.sequence):
             if name in phase.stance:
                 away = place[phases == number, column] - phase.stance[name].position

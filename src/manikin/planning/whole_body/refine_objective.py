@@ -8,11 +8,13 @@ here the control points of one spline, and every derivative is analytic.
 """
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from manikin.balance.motion_forces import load_shares
 from manikin.body import BodyModel
@@ -38,12 +40,9 @@ from manikin.planning.whole_body.refine_contacts import (
 )
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.refine_measures import RefineObstacles
-from manikin.planning.whole_body.refine_physics import MarginCost, RefinedForces, WrenchCost, WrenchSamples
+from manikin.planning.whole_body.refine_physics import MarginCost, RefinedForces, WrenchCost, needed_wrench
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint
-
-KNEES = "knee_flexion", "_knee"
-"""End of the names of knee joints."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,28 +79,17 @@ def refine_targets(
             if name in schedule.sequence[number].stance:
                 variables[name][phases == number] *= own[name]
                 load[phases == number, column] *= np.sqrt(own[name])
-    obstacles = RefineObstacles(body, scene, schedule, time, padded)
-    n = len(time)
+    obstacles, n = RefineObstacles(body, scene, schedule, time, padded), len(time)
     reference, guide = path.at(time), np.full(body.nv, scales.guide)
     guide[:3] = np.inf
     for joint in sole_toes(body, schedule):
         reference[:, 7 + joint], guide[6 + joint] = 0.0, scales.toes
     return RefineTargets(
-        time=time,
-        effectors=contact_targets(schedule, time, variables, scales.position / scales.approach),
-        com=np.zeros((n, 3)),
-        com_weight=np.zeros(n),
-        com_acceleration=np.zeros((n, 3)),
-        margin=np.zeros(n),
-        reference=reference,
-        reference_scale=guide,
-        ignored=obstacles.ignored,
-        variables=variables,
-        load=load,
-        limbs=limb_directions(body, path, schedule, time, task),
-        obstacles=obstacles,
-        schedule=schedule,
-    )
+        time, contact_targets(schedule, time, variables, scales.position / scales.approach),
+        com=np.zeros((n, 3)), com_weight=np.zeros(n), com_acceleration=np.zeros((n, 3)), margin=np.zeros(n),
+        reference=reference, reference_scale=guide, ignored=obstacles.ignored, variables=variables, load=load,
+        limbs=limb_directions(body, path, schedule, time, task), obstacles=obstacles, schedule=schedule,
+    )  # fmt: skip
 
 
 def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
@@ -134,12 +122,6 @@ def _relied_on(schedule: ContactSchedule) -> list[tuple[float, float]]:
     return list(zip(early.tolist(), late.tolist(), strict=True))
 
 
-def _centres_of_mass(body: BodyModel, q: FloatArray) -> FloatArray:
-    """(n, 3) of configurations (n, nq) [m]."""
-    data = body.pinocchio.createData()
-    return np.array([pin.centerOfMass(body.pinocchio, data, row).copy() for row in q])
-
-
 class RefineObjective(MotionObjective):
     """Evaluates and linearises the objective of a spline's control points.
 
@@ -150,30 +132,23 @@ class RefineObjective(MotionObjective):
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        proximity: Proximity | None,
-        targets: RefineTargets,
-        basis: SampledBasis,
+        self, body: BodyModel, proximity: Proximity | None, targets: RefineTargets, basis: SampledBasis,
         rooms: tuple[MarginCost, ...],
-    ) -> None:
+    ) -> None:  # fmt: skip
         super().__init__(body, proximity, targets, basis)
-        self._refine = targets
-        schedule, self._names, time = targets.schedule, tuple(targets.effectors), targets.time
-        com = _centres_of_mass(body, targets.reference)
+        self._refine, self._names = targets, tuple(targets.effectors)
+        schedule, time, model = targets.schedule, targets.time, body.pinocchio
+        data = model.createData()
+        com = np.array([pin.centerOfMass(model, data, row).copy() for row in targets.reference])
         # At a key instant the stances on both sides of it have to do.
-        self._stances = [
-            (
-                rows,
-                RefinedForces(phase.stance, self._names),
-                room,
-                cache(partial(room.wanted, com=com[rows].mean(axis=0))),
-            )
-            for phase, room, (start, end) in zip(schedule.sequence, rooms, _relied_on(schedule), strict=True)
-            for rows in (np.flatnonzero((time >= start) & (time <= end)),)
-        ]
-        self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEES)]
-        model = body.pinocchio
+        self._stances = list[tuple[NDArray[np.intp], RefinedForces, MarginCost, Callable[[float], float]]]()
+        for phase, room, (start, end) in zip(schedule.sequence, rooms, _relied_on(schedule), strict=True):
+            rows = np.flatnonzero((time >= start) & (time <= end))
+            wanted = cache(partial(room.wanted, com=com[rows].mean(axis=0)))
+            self._stances.append((rows, RefinedForces(phase.stance, self._names), room, wanted))
+        # The end of the names of knee joints.
+        knees = "knee_flexion", "_knee"
+        self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(knees)]
         moves = moves_by_joint(model)
         self._chains = {
             name: np.flatnonzero(moves[model.frames[body.effector_frame(name)].parentJoint])
@@ -207,11 +182,11 @@ class RefineObjective(MotionObjective):
     def _add_dynamics(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
         """Physics violation and balance, which depend on the wrench that the whole body needs."""
         assert isinstance(scales, RefineScales)
-        wrench = WrenchSamples.of(motion, self._body.mass)
+        wrench, com_jacobian = needed_wrench(motion, self._body.mass)
         cost = self.wrench_cost(wrench.value, motion.com, scales)
         out.sample_cost += cost.value
         # The lengths of the rows change little with the CoM; the gradient alone has it.
-        out.gradient[0] += np.einsum("nc,ncq->nq", cost.by_com, wrench.com_jacobian)
+        out.gradient[0] += np.einsum("nc,ncq->nq", cost.by_com, com_jacobian)
         # With the curvature L L^T, the rows L^T db and the residual L^-1 gradient have its gradient
         # and its Gauss-Newton matrix.
         size = np.abs(cost.curvature).max(axis=(1, 2))

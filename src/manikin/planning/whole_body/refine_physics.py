@@ -7,8 +7,7 @@ form of [Mordatch2012]_):
 
 with the wrench ``b`` that the whole body needs, the edges ``A`` of the friction pyramids and the axes of
 the grasps, and the contact variable ``c_j`` of each: the larger it is, the less its force costs.  Here it
-rises and falls within the time that the contact is held, so that load passes smoothly from one contact to
-the next.  Caps on sums of forces are left to the margin.
+rises and falls within the time that the contact is held.  Caps on sums of forces are left to the margin.
 
 What this program allows may lie on the very edge of what friction and soles admit.  Therefore the distance
 to every facet of the stance's wrench polytope ([Qiu2012]_ 4.36), its caps included and moments about the CoM,
@@ -23,7 +22,6 @@ limits ([Qiu2012]_ 4.2.2),
 where ``s >= 0`` exactly where the margin of ``b`` in the stance's wrench polytope is not negative.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +35,7 @@ from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.balance.friction import contact_limits
 from manikin.balance.margin import wrench_levers
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
-from manikin.motion.dynamics import MotionSamples
+from manikin.motion.dynamics import MomentumRate, MotionSamples
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, skew, wrench_map
 from manikin.planning.whole_body.fit_objective import to_raw
 
@@ -48,33 +46,20 @@ LEAST_VARIABLE = 0.05
 """Contact variables below this do not make a force any costlier."""
 
 
-@dataclass(frozen=True, eq=False)
-class WrenchSamples:
-    """Wrench that the whole body needs at samples of a motion, moments about the world origin.
+def needed_wrench(motion: MotionSamples, mass: float) -> tuple[MomentumRate, FloatArray]:
+    """``[m (c'' - g); c x m (c'' - g) + L']`` (n, 6) [N, N.m] ([Qiu2012]_ 4.51) with its derivatives.
 
-    Attributes:
-        value: (n, 6) force and moment [N, N.m].
-        jacobians: Three (n, 6, nq) derivatives, by the raw coordinates, their rates and second derivatives.
-        com_jacobian: (n, 3, nq) derivative of the CoM by the raw coordinates.
+    The second result is (n, 3, nq), the derivative of the CoM by the raw coordinates.
     """
-
-    value: FloatArray
-    jacobians: tuple[FloatArray, FloatArray, FloatArray]
-    com_jacobian: FloatArray
-
-    @classmethod
-    def of(cls, motion: MotionSamples, mass: float) -> "WrenchSamples":
-        """``[m (c'' - g); c x m (c'' - g) + L']`` ([Qiu2012]_ 4.51) with its derivatives."""
-        rate = motion.momentum
-        force = rate.value[:, :3] - mass * GRAVITY_VECTOR
-        moment = rate.value[:, 3:] + np.cross(motion.com, force)
-        arm = skew(motion.com)
-        jacobians = [
-            np.concatenate([part[:, :3], part[:, 3:] + arm @ part[:, :3]], axis=1) for part in rate.jacobians
-        ]
-        by_com = to_raw(motion.com_jacobian, motion.tangent)
-        jacobians[0][:, 3:] -= skew(force) @ by_com
-        return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]), by_com)
+    rate, arm = motion.momentum, skew(motion.com)
+    force = rate.value[:, :3] - mass * GRAVITY_VECTOR
+    moment = rate.value[:, 3:] + np.cross(motion.com, force)
+    first, second, third = (
+        np.concatenate([part[:, :3], part[:, 3:] + arm @ part[:, :3]], axis=1) for part in rate.jacobians
+    )
+    by_com = to_raw(motion.com_jacobian, motion.tangent)
+    first[:, 3:] -= skew(force) @ by_com
+    return MomentumRate(np.hstack([force, moment]), (first, second, third)), by_com
 
 
 def centre_of(stance: Stance) -> FloatArray:
@@ -98,8 +83,7 @@ class WrenchCost(NamedTuple):
     by_com: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class ForceShare:
+class ForceShare(NamedTuple):
     """Contact forces of many samples of one stance.
 
     Attributes:
@@ -124,22 +108,20 @@ class RefinedForces:
     """
 
     def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
-        self.centre = centre_of(stance)
-        generators = ContactGenerators.of(stance)
+        self.centre, generators = centre_of(stance), ContactGenerators.of(stance)
         columns = [names.index(contact.effector) for contact in stance]
-        scale = np.repeat([1.0, 1.0 / ARM], 3)
-        self._to_local = scale[:, None] * wrench_map(self.centre)
-        self._matrix = scale[:, None] * generators.about(self.centre)
-        self._limit = generators.upper
+        scale = np.repeat([1.0, 1.0 / ARM], 3)[:, None]
+        self._to_local, self._limit = scale * wrench_map(self.centre), generators.upper
+        self._matrix = scale * generators.about(self.centre)
         self.columns = np.array(columns, dtype=np.int64)[generators.contact]
 
     def share(
         self, wrench: FloatArray, variables: FloatArray, *, tolerance: float, force: float
     ) -> ForceShare:
-        """Solve the program for many samples at once.
+        """Solve the program for many samples at once, see :func:`~manikin.balance.contact_forces.share`.
 
-        See :func:`~manikin.balance.contact_forces.share`. The gradient of the least value by ``b`` is the
-        multiplier of the wrench, its second derivative the inverse of Newton's matrix.
+        The gradient of the least value by ``b`` is the multiplier of the wrench, its second derivative the
+        inverse of Newton's matrix.
 
         Args:
             wrench: (n, 6) needed, about the world origin.
@@ -158,13 +140,6 @@ class RefinedForces:
         return ForceShare(magnitude, tolerance**2 * multiplier, cost)
 
 
-FLAT = 1.0
-"""Radius of the largest ball in a polytope below which it is flat: it has no inside to stay in [N.m]."""
-
-SHARE = 0.4
-"""Most of the largest margin of any wrench that is wanted as margin."""
-
-
 class MarginCost:
     """The margin of one stance.
 
@@ -176,23 +151,18 @@ class MarginCost:
     def __init__(self, stance: Stance) -> None:
         self._to_local = wrench_map(centre_of(stance))
         self.polytope = wrench_polytope(stance, reference=centre_of(stance))
-        self.is_flat = self.polytope.inscribed_ball()[1] < FLAT
+        # Radius of the largest ball in it below which it has no inside to stay in [N.m].
+        self.is_flat = self.polytope.inscribed_ball()[1] < 1.0
 
     def wanted(self, margin: float, com: FloatArray) -> float:
-        """A wanted margin, or :data:`SHARE` of the largest one of any wrench when that is less [N.m].
-
-        Args:
-            margin: [N.m].
-            com: (3,) where the CoM is about, about which the moments are [m].
-        """
+        """A wanted margin, or 0.4 of the largest one of any wrench about a CoM (3,) if that is less [N.m]."""
         if self.is_flat:
             return margin
-        return min(margin, SHARE * self.polytope.at_reference(com).inscribed_ball()[1])
+        return min(margin, 0.4 * self.polytope.at_reference(com).inscribed_ball()[1])
 
     def margin(self, wrench: FloatArray, com: FloatArray) -> FloatArray:
         """(n,) margin about the CoM (n, 3) of wrenches (n, 6) about the world origin [N.m]."""
-        found = stability_margins(self.polytope, wrench @ self._to_local.T, com)
-        return found.wrench_about_com
+        return stability_margins(self.polytope, wrench @ self._to_local.T, com).wrench_about_com
 
     def cost(
         self, wrench: FloatArray, com: FloatArray, wanted: float, violation: float, softness: float
@@ -200,8 +170,7 @@ class MarginCost:
         """Softened squares of what the distances to the facets lack, with derivatives by wrench and CoM.
 
         Args:
-            wrench: (n, 6) about the world origin.
-            com: (n, 3) CoM [m].
+            wrench: (n, 6) about the world origin, with CoM (n, 3).
             wanted: Margin, see :meth:`wanted` [N.m].
             violation: Missing margin that costs one unit [N.m].
             softness: Width of the bend of the penalty [N.m].
@@ -209,18 +178,15 @@ class MarginCost:
         n = len(wrench)
         if self.is_flat:
             return WrenchCost(np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6)), np.zeros((n, 3)))
-        H = self.polytope.H
-        arm = com - self.polytope.reference
+        H, arm = self.polytope.H, com - self.polytope.reference
         length = wrench_levers(H, arm)
         distance = self.polytope.distances(wrench @ self._to_local.T) / length
         near = np.flatnonzero(np.any(distance < wanted + 6.0 * softness, axis=0))
         rows, missing = H[near] @ self._to_local, (wanted - distance[:, near]) / softness
-        residual = softness * np.logaddexp(0.0, missing) / violation
-        length = length[:, near]
+        residual, length = softness * np.logaddexp(0.0, missing) / violation, length[:, near]
         slope = expit(missing) / violation / length
         # A row's length l has the derivative (H1 + H2 arm^) x H2 / l by the CoM.
-        moment = H[near, 3:]
-        at_com = H[near, :3] + cross(moment, arm[:, None, :])
+        moment, at_com = H[near, 3:], H[near, :3] + cross(H[near, 3:], arm[:, None, :])
         by_length = residual * slope * distance[:, near] / length
         outer = (rows[:, :, None] * rows[:, None, :]).reshape(len(near), 36)
         return WrenchCost(
@@ -231,44 +197,37 @@ class MarginCost:
         )
 
 
-TOGETHER = 50
-"""Instants that one program holds side by side."""
-
-
 def contact_slack(schedule: ContactSchedule, time: FloatArray, wrench: FloatArray) -> FloatArray:
     """(n,) room that the limits of all contacts have in common, in the units of their rows [N, N.m].
+
+    It is negative where no admissible contact forces supply the wrench; minus infinity without any contact.
 
     Args:
         time: (n,) [s].
         wrench: (n, 6) needed by the whole body, about the world origin.
-
-    Returns:
-        Negative where no admissible contact forces supply the wrench; minus infinity without any contact.
     """
     phases, slack = schedule.phase_at(time), np.full(len(time), -np.inf)
     for number, phase in enumerate(schedule.sequence):
-        rows = np.flatnonzero(phases == number)
         if len(phase.stance) == 0:
             continue
+        rows = np.flatnonzero(phases == number)
         program, to_centre = _slack_program(phase.stance), wrench_map(centre_of(phase.stance)).T
-        for start in range(0, len(rows), TOGETHER):
-            part = rows[start : start + TOGETHER]
+        for start in range(0, len(rows), 50):  # one program holds several instants side by side
+            part = rows[start : start + 50]
             slack[part] = _solve_slack(program, wrench[part] @ to_centre)
     return slack
 
 
 def _slack_program(stance: Stance) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rows of the balance and of the limits, and bounds of these, on the contacts' wrenches and the slack."""
-    maps = [_map(contact, centre_of(stance)) for contact in stance]
-    parts = [_limits(contact, stance.friction_model) for contact in stance]
-    widths = [item.shape[1] for item in maps]
-    blocks = [left[:, :width] for (left, _), width in zip(parts, widths, strict=True)]
+    parts = [_contact_rows(contact, centre_of(stance), stance.friction_model) for contact in stance]
+    maps, blocks, bounds = zip(*parts, strict=True)
     limits = np.asarray(linalg.block_diag(*blocks), dtype=np.float64)
-    bound = np.concatenate([right for _, right in parts])
+    bound = np.concatenate(bounds)
     if stance.normal_force_cap is not None:
         normal = [
-            (contact.kind is not ContactKind.GRASP) * np.eye(width)[2]
-            for contact, width in zip(stance, widths, strict=True)
+            (contact.kind is not ContactKind.GRASP) * np.eye(item.shape[1])[2]
+            for contact, item in zip(stance, maps, strict=True)
         ]
         limits = np.vstack([limits, np.concatenate(normal)])
         bound = np.append(bound, stance.normal_force_cap)
@@ -292,19 +251,18 @@ def _solve_slack(program: tuple[FloatArray, FloatArray, FloatArray], wrench: Flo
     return np.concatenate([_solve_slack(program, row[None]) for row in wrench])
 
 
-def _map(contact: Contact, centre: FloatArray) -> FloatArray:
-    """(6, 3 or 6) from a contact's wrench in the frame of its limits to one about the centre."""
-    grasped = contact.kind is ContactKind.GRASP
+def _contact_rows(
+    contact: Contact, centre: FloatArray, model: FrictionModel
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Map (6, m) of a contact's wrench to one about the centre, rows (k, m) and bounds (k,) of its limits.
+
+    The wrench is in the frame of the limits, without moments, m = 3, where the contact has none.
+    """
+    grasped, limits = contact.kind is ContactKind.GRASP, contact_limits(contact, model)
     rotation = np.eye(3) if grasped else contact.rotation_contact_to_world
     moved = wrench_map(centre - contact.position) @ np.kron(np.eye(2), rotation)
-    forces_only = contact.kind is ContactKind.POINT or (grasped and contact.max_moment == 0.0)
-    return moved[:, :3] if forces_only else moved
-
-
-def _limits(contact: Contact, model: FrictionModel) -> tuple[FloatArray, FloatArray]:
-    """Rows (k, 6) and bounds (k,) of a contact, without those of moments that it does not have."""
-    limits = contact_limits(contact, model)
-    if contact.kind is ContactKind.GRASP and contact.max_moment == 0.0:
+    if grasped and contact.max_moment == 0.0:
         kept = np.any(limits.A[:, :3] != 0.0, axis=1)
-        return limits.A[kept], limits.b[kept]
-    return limits.A, limits.b
+        return moved[:, :3], limits.A[kept][:, :3], limits.b[kept]
+    width = 3 if contact.kind is ContactKind.POINT else 6
+    return moved[:, :width], limits.A[:, :width], limits.b

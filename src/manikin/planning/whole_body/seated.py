@@ -1,9 +1,8 @@
 """Continue a motion on the seat: from the touch of the buttocks to sitting at rest.
 
-Once a body sits it hardly loses its balance, so [Qiu2012]_ 7.2.2 ends the centre-of-mass plan
-at the touch and moves hands and feet to their places without it.  Here the centre of mass of
-that part is planned as well, from the velocity of the touch to rest in a final sitting
-posture, but a whole body need only follow it loosely.
+Once a body sits it hardly loses its balance, so [Qiu2012]_ 7.2.2 ends the centre-of-mass plan at the touch
+and moves hands and feet to their places without it.  Here the centre of mass of that part is planned as well,
+to rest in a final sitting posture, but a whole body need only follow it loosely.
 """
 
 from dataclasses import dataclass, replace
@@ -27,8 +26,7 @@ WEIGHTS = Weights(
 """Weights of the seated part: smooth, and not longer than it has to be."""
 
 CLEARANCES = (0.02, 0.0105)
-"""Distances that the final posture keeps to the scene [m], tried in order; within the body the
-last one."""
+"""Distances that the final posture keeps to the scene [m], tried in order; within the body the last one."""
 
 SITTING = replace(READY, angles=MappingProxyType({**READY.angles, "hip_flexion": 1.4, "knee_flexion": 1.3}))
 """Bent hips and knees, from which the final posture is sought."""
@@ -52,11 +50,7 @@ class SeatedContinuation:
 def continue_seated(
     body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, phases: StanceSequence
 ) -> SeatedContinuation:
-    """Plan the phases in which the body sits and join them to the trajectory that led there.
-
-    Args:
-        trajectory: Centre of mass up to the touch of the seat.
-    """
+    """Plan the phases in which the body sits and join them to the trajectory up to the touch of the seat."""
     contacts, reference = tuple(phases[len(phases) - 1].stance), SITTING.posture(body)
     end = trajectory.duration
     reference[:3] = trajectory.position(end)

@@ -7,6 +7,7 @@ contact's own frame is above the surface, and only the distance of the shapes sa
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +29,6 @@ Samples = NDArray[np.bool_]
 
 SITTING_DOWN = 0.15
 """Time before a seat is touched in which the trunk may come close to it [s]."""
-
-_REACH = 0.1
-"""Distances beyond this are not measured [m]."""
 
 
 def with_pairs(held: Sequence[Ignored], more: Sequence[tuple[Ignored, Samples]]) -> tuple[Ignored, ...]:
@@ -66,21 +64,14 @@ class SlidingTouchdown:
 
     def rows(self, found: ProximitySamples) -> NDArray[np.bool_]:
         """(k,) whether a close pair is one that meets."""
-        known: dict[tuple[str, str], bool] = {}
-        for pair in found.pairs:
-            if pair not in known:
-                known[pair] = not considered([pair], self.pairs)[0]
-        named = np.array([known[pair] for pair in found.pairs], dtype=np.bool_)
-        return named & self.near[found.sample]
+        distinct = list(dict.fromkeys(found.pairs))
+        apart = dict(zip(distinct, considered(distinct, self.pairs), strict=True))
+        return ~np.array([apart[pair] for pair in found.pairs], dtype=np.bool_) & self.near[found.sample]
 
     def importance(self, found: ProximitySamples, rows: NDArray[np.bool_]) -> FloatArray:
-        """(k,) how much it matters that each distance is zero: of what is inside, and of the closest.
+        """(k,) how much it matters that distances of ``rows`` are zero: of what is inside, and the closest.
 
         Where a contact rolls from one shape to the other, the importance passes gradually between them.
-
-        Args:
-            found: Close pairs.
-            rows: (k,) those that meet.
         """
         sample, distance = found.sample[rows], found.distance[rows]
         least = np.full(len(self.near), np.inf)
@@ -98,13 +89,9 @@ class SlidingTouchdown:
 def sliding_touchdown_at(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> SlidingTouchdown | None:
-    """Contacts made at speed, from shortly before the touch until they have settled.
+    """Contacts made at speed at times (n,) [s], from shortly before the touch until they have settled.
 
-    Args:
-        time: (n,) [s].
-
-    Returns:
-        None where every contact is made at rest, and none of the trunk is left.
+    None where every contact is made at rest, and none of the trunk is left.
     """
     pairs: Ignored = frozenset()
     near, sliding = np.zeros(len(time), dtype=np.bool_), np.zeros(len(time), dtype=np.bool_)
@@ -133,14 +120,10 @@ def sliding_touchdown_errors(
     errors = np.zeros(len(motion.time))
     if meeting is None:
         return errors
-    samples = np.flatnonzero(meeting.near)
-    others = frozenset(
-        pair
-        for pair, apart in zip(proximity.pairs, considered(proximity.pairs, meeting.pairs), strict=True)
-        if apart
-    )
-    found = proximity.evaluate_over(motion.q[samples], _REACH, others)
-    least = np.full(len(samples), _REACH)
+    samples, reach = np.flatnonzero(meeting.near), 0.1  # distances beyond are not measured [m]
+    others = frozenset(compress(proximity.pairs, considered(proximity.pairs, meeting.pairs)))
+    found = proximity.evaluate_over(motion.q[samples], reach, others)
+    least = np.full(len(samples), reach)
     np.minimum.at(least, found.sample, found.distance)
     errors[samples] = np.where(meeting.sliding[samples], np.abs(least), np.maximum(-least, 0.0))
     return errors

@@ -1,9 +1,8 @@
 """Find a smooth swing that keeps clear of everything: simple curves first, then a local optimisation.
 
-The first way of [Qiu2012]_ 6.2.3 to move a flying effector, made stronger: a small family of
-curves over one apex is tried from the least to the most effort; where none keeps the wanted
-clearance, the control points of the best one are moved by sequential quadratic programming
-(least squared jerk, linearised distances) until it does.  The Bi-RRT is for what remains.
+The first way of [Qiu2012]_ 6.2.3 to move a flying effector, made stronger: a small family of curves over
+one apex is tried from the least to the most effort; where none keeps the wanted clearance, the best one is
+moved by sequential quadratic programming (least squared jerk, linearised distances) until it does.
 """
 
 import itertools
@@ -32,11 +31,8 @@ Clearance = Callable[[float, Pose], float]
 HEIGHTS = (0.06, 0.10, 0.15, 0.22, 0.30, 0.42, 0.56, 0.70)
 """Apex heights above the higher end that are tried [m]."""
 
-LATERALS = (0.0, 0.10, -0.10, 0.20, -0.20)
-"""Lateral offsets of the apex that are tried [m]."""
-
-APEXES = (0.5, 0.4, 0.6)
-"""Shares of the duration at which the apex is passed that are tried."""
+LATERALS, APEXES = (0.0, 0.10, -0.10, 0.20, -0.20), (0.5, 0.4, 0.6)
+"""Lateral offsets of the apex that are tried [m], and shares of the duration at which it is passed."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +43,8 @@ class SwingLimits:
         clearance: Distance to everything once the effector is away from its two contacts [m].
         speed: Largest linear speed [m/s].
         angular_speed: Largest angular speed [rad/s].
-        departure: Clearance gained per metre moved away from a contact: near its ends the
-            effector may be as close to its surface as the contact itself, and must have
-            gained this share of the distance travelled.
+        departure: Clearance gained per metre moved away from a contact, where the effector may be as close to
+            the surface as the contact itself.
         time_step: Spacing of the instants that are checked [s].
     """
 
@@ -114,33 +109,33 @@ def plan_swing(
         InputError: If the times or normals are not usable.
     """
     limits = limits or SwingLimits()
-    normals = (
-        frozen_array(start_normal, "swing start_normal", (3,)),
-        frozen_array(end_normal, "swing end_normal", (3,)),
-    )
+    leaving = frozen_array(start_normal, "swing start_normal", (3,))
+    reaching = frozen_array(end_normal, "swing end_normal", (3,))
     if end_time <= start_time:
         raise InputError(f"swing ends at {end_time} s; valid: after its start at {start_time} s")
     family = (
         SwingCurve.lift(
             start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
-            start_normal=normals[0], end_normal=normals[1], pitch=pitch,
+            start_normal=leaving, end_normal=reaching, pitch=pitch,
         )
         for height, lateral, apex in sorted(itertools.product(heights, laterals, APEXES), key=_exertion)
     )  # fmt: skip
     best = _first_clear(family, clearance, limits)
-    free = _free_directions(normals, len(best.curve.control_position))
-    return _refine(best, clearance, limits, free, refine)
+    curve, free = best.curve, _free_directions(leaving, reaching, len(best.curve.control_position))
+    for _ in range(refine):
+        step = _best_step(curve, clearance, limits, free)
+        moved = curve.control_position + (free @ step).reshape(-1, 3)
+        curve = SwingCurve(curve.start_time, curve.end_time, moved, curve.control_rotation)
+        plan = check_swing(curve, clearance, limits)
+        best = max(best, plan, key=_rank)
+        if np.abs(step).max() < (SETTLED if plan.succeeded else STATIONARY):
+            break
+    return best
 
 
 def check_swing(curve: SwingCurve, clearance: Clearance, limits: SwingLimits) -> SwingPlan:
-    """Measure a curve against its limits, densely in time.
-
-    Args:
-        clearance: Signed distance of the effector at a time and pose [m].
-    """
-    state = curve.evaluate(_instants(curve, limits))
-    distance = _distances(state, clearance)
-    required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
+    """Measure a curve against its limits, densely in time."""
+    state, distance, required = _measured(curve, clearance, limits)
     slack = (distance - required)[1:-1]  # at the contacts themselves it is zero by definition
     worst = int(np.argmin(slack)) + 1
     in_flight = required >= limits.clearance
@@ -177,12 +172,7 @@ def _first_clear(family: Iterator[SwingCurve], clearance: Clearance, limits: Swi
 
 
 class _Slack:
-    """Smallest slack of curves over the same instants, those first that were the nearest before.
-
-    Args:
-        clearance: Signed distance of the effector at a time and pose [m].
-        count: Of the instants; every ``limits.time_step`` when omitted.
-    """
+    """Smallest slack of curves over the same instants, those first that were the nearest before."""
 
     def __init__(self, clearance: Clearance, limits: SwingLimits, count: int | None = None) -> None:
         self._clearance, self._limits, self._count = clearance, limits, count
@@ -217,9 +207,14 @@ def _instants(curve: SwingCurve, limits: SwingLimits, count: int | None = None) 
     return np.linspace(curve.start_time, curve.end_time, count)
 
 
-def _distances(state: SwingState, clearance: Clearance) -> FloatArray:
+def _measured(
+    curve: SwingCurve, clearance: Clearance, limits: SwingLimits, count: int | None = None
+) -> tuple[SwingState, FloatArray, FloatArray]:
+    """States of a curve at its instants, with their distances and those required there [m]."""
+    state = curve.evaluate(_instants(curve, limits, count))
     poses = zip(state.time, state.position, state.rotation, strict=True)
-    return np.array([clearance(float(t), Pose(p, r)) for t, p, r in poses])
+    distance = np.array([clearance(float(t), Pose(p, r)) for t, p, r in poses])
+    return state, distance, _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
 
 
 def required_clearance(
@@ -247,32 +242,16 @@ def _required(
     return required_clearance((from_start, to_end), at_contact, limits)
 
 
-def _refine(
-    best: SwingPlan, clearance: Clearance, limits: SwingLimits, free: FloatArray, iterations: int
-) -> SwingPlan:
-    """Move the control points until the curve keeps clear, at the least squared jerk."""
-    curve = best.curve
-    for _ in range(iterations):
-        step = _best_step(curve, clearance, limits, free)
-        moved = curve.control_position + (free @ step).reshape(-1, 3)
-        curve = SwingCurve(curve.start_time, curve.end_time, moved, curve.control_rotation)
-        plan = check_swing(curve, clearance, limits)
-        best = max(best, plan, key=_rank)
-        if np.abs(step).max() < (SETTLED if plan.succeeded else STATIONARY):
-            break
-    return best
-
-
 def _rank(plan: SwingPlan) -> tuple[bool, float]:
     """Order of preference: a curve that keeps the limits, then the least effort or the least violation."""
     return plan.succeeded, -plan.curve.effort if plan.succeeded else plan.slack
 
 
-def _free_directions(normals: tuple[FloatArray, FloatArray], n: int) -> FloatArray:
+def _free_directions(start_normal: FloatArray, end_normal: FloatArray, n: int) -> FloatArray:
     """(3n, f) directions in which the control points may move: all inner ones, the lifts along the normal."""
     columns = []
     for index in range(RESTING, n - RESTING):
-        lifts = {RESTING: normals[0], n - RESTING - 1: normals[1]}
+        lifts = {RESTING: start_normal, n - RESTING - 1: end_normal}
         block = lifts[index][:, None] / np.linalg.norm(lifts[index]) if index in lifts else np.eye(3)
         column = np.zeros((n, 3, block.shape[1]))
         column[index] = block
@@ -280,20 +259,13 @@ def _free_directions(normals: tuple[FloatArray, FloatArray], n: int) -> FloatArr
     return np.hstack(columns)
 
 
-TRUST = 0.05
-"""Largest change of a control coordinate in one iteration [m]."""
+TRUST, SETTLED, STATIONARY = 0.05, 0.004, 1e-5
+"""Largest change of a control coordinate in one iteration, and changes below which the optimisation stops:
+where the limits are kept, and where they are not but the next curve would be the same [m]."""
 
-SETTLED = 0.004
-"""Change of the control coordinates below which the optimisation stops [m]."""
-
-STATIONARY = 1e-5
-"""Change below which it stops where no curve keeps the limits: the next would be the same curve [m]."""
-
-TOLERANCE = 1e-5
-"""Accuracy expected of measured distances [m]."""
-
-BUFFER = 0.003
-"""Aimed at beyond the required clearance, for what lies between the samples [m]."""
+TOLERANCE, BUFFER = 1e-5, 0.003
+"""Accuracy expected of measured distances, and what is aimed at beyond the required clearance, for what lies
+between the samples [m]."""
 
 
 def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, free: FloatArray) -> FloatArray:
@@ -303,9 +275,8 @@ def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, fre
     energy = block_rows(jerk_energy(n) / 720.0)
     distance_rows, distance_lower = _distance_rows(curve, clearance, limits)
     speed_rows, speed_lower = _speed_rows(curve, limits)
-    rows = np.vstack([distance_rows, speed_rows]) @ free
+    rows, count = np.vstack([distance_rows, speed_rows]) @ free, free.shape[1]
     lower = np.concatenate([distance_lower, speed_lower])
-    count = free.shape[1]
     # One last unknown: the worst violation, costly but allowed.
     hessian = np.zeros((count + 1, count + 1))
     hessian[:count, :count] = free.T @ energy @ free + 1e-6 * np.eye(count)
@@ -322,10 +293,9 @@ def _distance_rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
     # Spacing of the instants at which the optimisation linearises the distances [s].
-    state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / 0.012))))
-    distance = _distances(state, clearance)
-    required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
-    weights = basis((state.time - curve.start_time) / curve.duration, len(curve.control_position))
+    count, n = max(33, int(curve.duration / 0.012)), len(curve.control_position)
+    state, distance, required = _measured(curve, clearance, limits, count)
+    weights = basis((state.time - curve.start_time) / curve.duration, n)
     rows, lower = [], []
     for index in np.flatnonzero(distance - required < 0.1)[1:-1]:
         pose = Pose(state.position[index], state.rotation[index])
@@ -334,9 +304,7 @@ def _distance_rows(
         # Near its contacts the effector cannot have gained the whole buffer yet.
         buffer = BUFFER * min(1.0, max(0.0, required[index]) / max(limits.clearance, BUFFER))
         lower.append(required[index] + buffer - distance[index])
-    if not rows:
-        return np.zeros((0, 3 * len(curve.control_position))), np.zeros(0)
-    return np.array(rows), np.array(lower)
+    return np.array(rows).reshape(-1, 3 * n), np.array(lower)
 
 
 def _slope(clearance: Clearance, time: float, pose: Pose, distance: float) -> FloatArray:

@@ -1,11 +1,9 @@
 """A smooth flight of an effector between two poses, in closed form.
 
-Positions are a clamped B-spline of degree 5 on uniform knots, rotations the cumulative
-B-spline of the same degree on SO(3) ([Kim1995]_: products of exponentials, so a turn about
-one axis is exactly the shortest rotation, SLERP).  Both are four times continuously
-differentiable.  The first four and the last four control poses are equal, so velocity,
-acceleration and jerk vanish at both ends; the fifth one from either end lies on the
-surface normal, so the curve leaves and meets the surface along its normal.
+Positions are a clamped B-spline of degree 5 on uniform knots, rotations the cumulative B-spline of the same
+degree on SO(3) ([Kim1995]_: products of exponentials, so a turn about one axis is exactly the shortest one).
+The first four and the last four control poses are equal, so velocity, acceleration and jerk vanish at both
+ends; the fifth one from either end lies on the surface normal, along which the curve leaves and arrives.
 """
 
 from dataclasses import dataclass
@@ -24,7 +22,7 @@ DEGREE = 5
 """Degree of the curves: four continuous derivatives."""
 
 RESTING = 4
-"""Equal control poses at each end: velocity, acceleration and jerk are zero there."""
+"""Equal control poses at each end."""
 
 MIN_CONTROLS = 2 * RESTING + 2
 """Fewest control poses: the resting ones and one normal lift at each end."""
@@ -74,12 +72,10 @@ class SwingCurve:
         finite_number(self.end_time, "swing end_time [s]", above=start)
         positions = frozen_array(self.control_position, "swing control_position [m]", (None, 3))
         n = len(positions)
-        if n < MIN_CONTROLS:
-            raise InputError(f"swing has {n} control poses; valid: at least {MIN_CONTROLS}")
+        _check_controls(n)
         object.__setattr__(self, "control_position", positions)
-        object.__setattr__(
-            self, "control_rotation", frozen_array(self.control_rotation, "swing control_rotation", (n, 3, 3))
-        )
+        rotations = frozen_array(self.control_rotation, "swing control_rotation", (n, 3, 3))
+        object.__setattr__(self, "control_rotation", rotations)
 
     @classmethod
     def lift(
@@ -99,39 +95,35 @@ class SwingCurve:
             apex: Share of the duration at which the apex is passed.
             start_normal: (3,) surface normal along which the curve leaves.
             end_normal: (3,) surface normal along which it arrives, reversed.
-            pitch: Extra turn about the effector's own y axis in early flight, toes down when
-                positive [rad], as of a foot whose heel comes up first.
+            pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
         """
         up, left = _flight_axes(start.position, goal.position, np.add(start_normal, end_normal))
         share = 0.5 + 0.6 * (apex - 0.5)  # where along the way: close to the middle even for early apexes
         middle = (1.0 - share) * start.position + share * goal.position
         top = max(float(up @ start.position), float(up @ goal.position)) + height
         point = middle + (top - float(up @ middle)) * up + lateral * left
-        normals = _unit(start_normal), _unit(end_normal)
-        rows, target = _end_conditions(start.position, goal.position, normals, controls)
+        ends = (start.position, _unit(start_normal)), (goal.position, _unit(end_normal))
+        rows, target = _end_conditions(*ends, controls)
         matrix = np.vstack([rows, block_rows(basis(np.array([apex]), controls))])
         gain = _least_jerk(controls, matrix.tobytes())
         positions = (gain @ np.concatenate([target, point])).reshape(controls, 3)
-        rotations = _turning(start.rotation, goal.rotation, pitch, controls)
-        return cls(start_time, end_time, positions, rotations)
+        return cls(start_time, end_time, positions, _turning(start.rotation, goal.rotation, pitch, controls))
 
     @classmethod
     def along(cls, path: EffectorPath, controls: int = 20, sharpening: int = 0) -> "SwingCurve":
         """Curve that follows a polyline of timed poses, rounding its corners.
 
-        The control poses are taken from the path (Schoenberg's variation-diminishing
-        approximation): the curve has no more wiggles than the path, stays in the convex hull
-        of any few neighbouring control points and converges to the path as ``controls`` grows.
+        The control poses are taken from the path (Schoenberg's variation-diminishing approximation): the
+        curve has no more wiggles than the path, stays in the convex hull of any few neighbouring control
+        points and converges to the path as ``controls`` grows.
 
         Args:
             path: Timed poses, as found by the Bi-RRT.
             controls: Number of control poses; fewer are smoother, more are closer.
-            sharpening: How often the remaining offset from the path is added to the control
-                points; the curve then passes ever closer to the corners, swinging around
-                them on the outside rather than cutting them.
+            sharpening: How often the remaining offset from the path is added to the control points; the
+                curve then swings around the corners on the outside rather than cutting them.
         """
-        if controls < MIN_CONTROLS:
-            raise InputError(f"swing has {controls} control poses; valid: at least {MIN_CONTROLS}")
+        _check_controls(controls)
         places = _greville(controls)
         first, last = places[RESTING - 1], places[-RESTING]
         shares = np.clip((places - first) / (last - first), 0.0, 1.0)
@@ -190,11 +182,9 @@ class SwingCurve:
         """Reason why a peak speed is above its limit [m/s, rad/s], or None."""
         if self.peak_speed > speed:
             return f"speed reaches {self.peak_speed:.2f} m/s; limit {speed:.2f} m/s"
-        if self.peak_angular_speed > angular_speed:
-            return (
-                f"angular speed reaches {self.peak_angular_speed:.2f} rad/s; limit {angular_speed:.2f} rad/s"
-            )
-        return None
+        peak = self.peak_angular_speed
+        fast = peak > angular_speed
+        return f"angular speed reaches {peak:.2f} rad/s; limit {angular_speed:.2f} rad/s" if fast else None
 
     @cached_property
     def effort(self) -> float:
@@ -223,11 +213,14 @@ class SwingCurve:
         return rotation, np.einsum("kij,kj->ki", rotation, velocity)
 
 
+def _check_controls(count: int) -> None:
+    if count < MIN_CONTROLS:
+        raise InputError(f"swing has {count} control poses; valid: at least {MIN_CONTROLS}")
+
+
 def basis(share: FloatArray, controls: int, derivative: int = 0) -> FloatArray:
     """(k, controls) B-spline basis on [0, 1], or its derivative by the share of the duration."""
-    if not len(share):
-        return np.zeros((0, controls))
-    return _spline(controls, derivative)(share)
+    return _spline(controls, derivative)(share) if len(share) else np.zeros((0, controls))
 
 
 @lru_cache(maxsize=256)
@@ -261,16 +254,16 @@ def jerk_energy(controls: int) -> FloatArray:
 
 
 def _end_conditions(
-    start: FloatArray, goal: FloatArray, normals: tuple[FloatArray, FloatArray], controls: int
+    start: tuple[FloatArray, FloatArray], goal: tuple[FloatArray, FloatArray], controls: int
 ) -> tuple[FloatArray, FloatArray]:
     """Matrix (8 x 3 + 4, 3 controls) and target that put the end control points where they belong.
 
-    The unknowns are the control points, flattened row by row.
+    Each end is a place and a normal; the unknowns are the control points, flattened row by row.
     """
-    across = [np.ascontiguousarray(axes_of_normal(normal)[:, :2].T) for normal in normals]
-    places = [(index, np.eye(3), start) for index in range(RESTING)]
-    places += [(index, np.eye(3), goal) for index in range(controls - RESTING, controls)]
-    places += [(RESTING, across[0], start), (controls - RESTING - 1, across[1], goal)]
+    across = [np.ascontiguousarray(axes_of_normal(normal)[:, :2].T) for _, normal in (start, goal)]
+    places = [(index, np.eye(3), start[0]) for index in range(RESTING)]
+    places += [(index, np.eye(3), goal[0]) for index in range(controls - RESTING, controls)]
+    places += [(RESTING, across[0], start[0]), (controls - RESTING - 1, across[1], goal[0])]
     rows = [np.kron(np.eye(controls)[[index]], block) for index, block, _ in places]
     target = [block @ point for _, block, point in places]
     return np.asarray(np.vstack(rows), dtype=np.float64), np.concatenate(target)
@@ -301,16 +294,13 @@ def _least_jerk(controls: int, conditions: bytes) -> FloatArray:
     return np.asarray(np.linalg.solve(system, targets)[: 3 * controls], dtype=np.float64)
 
 
-PITCH_DECLINE = 2.0
-"""Time in which the extra pitch fades relative to that in which it grows: it peaks at a third."""
-
-
 def _turning(start: FloatArray, goal: FloatArray, pitch: float, controls: int) -> FloatArray:
     """Control rotations of the shortest turn, timed like a straight flight, and the extra pitch."""
     share = _straight_shares(controls)
     turn = Rotation.from_matrix(start.T @ goal).as_rotvec()
-    peak = 1.0 / (1.0 + PITCH_DECLINE)
-    bell = share * (1.0 - share) ** PITCH_DECLINE / (peak * (1.0 - peak) ** PITCH_DECLINE)
+    decline = 2.0  # time in which the extra pitch fades relative to that in which it grows
+    peak = 1.0 / (1.0 + decline)
+    bell = share * (1.0 - share) ** decline / (peak * (1.0 - peak) ** decline)
     straight = Rotation.from_rotvec(share[:, None] * turn)
     nod = Rotation.from_rotvec(bell[:, None] * np.array([0.0, pitch, 0.0]))
     rotations = start @ (straight * nod).as_matrix()
@@ -321,12 +311,9 @@ def _turning(start: FloatArray, goal: FloatArray, pitch: float, controls: int) -
 @lru_cache(maxsize=64)
 def _straight_shares(controls: int) -> FloatArray:
     """(controls,) control values of the smoothest flight from 0 to 1, with one more resting at each end."""
-    matrix = np.zeros((2 * RESTING + 2, controls))
     resting = RESTING + 1
-    matrix[:resting, :resting] = np.eye(resting)
-    matrix[resting:, controls - resting :] = np.eye(resting)
-    target = np.concatenate([np.zeros(resting), np.ones(resting)])
-    energy = jerk_energy(controls)
+    matrix = np.eye(controls)[[*range(resting), *range(controls - resting, controls)]]
+    target, energy = np.repeat([0.0, 1.0], resting), jerk_energy(controls)
     system = np.block([[energy / np.trace(energy), matrix.T], [matrix, np.zeros((len(target), len(target)))]])
     solution = np.linalg.lstsq(system, np.concatenate([np.zeros(controls), target]), rcond=None)[0]
     shares = np.asarray(np.clip(solution[:controls], 0.0, 1.0), dtype=np.float64)

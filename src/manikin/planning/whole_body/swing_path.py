@@ -47,11 +47,8 @@ class Pose(NamedTuple):
         return cls(np.array(position), np.array(rotation))
 
 
-ROTATION_WEIGHT = 0.09
-"""lambda1 of :func:`metric`, not published: 1 rad is worth 0.3 m [m^2/rad^2]."""
-
-TIME_WEIGHT = 1.0
-"""lambda2, not published: 1 s is worth 1 m [m^2/s^2]."""
+ROTATION_WEIGHT, TIME_WEIGHT = 0.09, 1.0
+"""lambda1 [m^2/rad^2] and lambda2 [m^2/s^2] of :func:`metric`, not published: 1 rad is 0.3 m, 1 s is 1 m."""
 
 
 def metric(translation: ArrayLike, rotation: ArrayLike, time: ArrayLike) -> FloatArray:
@@ -120,9 +117,6 @@ Placed = tuple[Any, Any]
 OwnShape = tuple[Any, FloatArray, FloatArray]
 """A Coal geometry, its rotation and translation in the effector frame."""
 
-_ENDLESS = 1.0e9
-"""Half the extent of what has no end (a floor) [m]."""
-
 
 class EffectorClearance:
     """Callable ``(time, pose) -> signed distance [m]`` for one flying effector.
@@ -141,20 +135,16 @@ class EffectorClearance:
         self._own, frame = end_shapes(body, effector), body.effector(effector)
         self._first_bent = len(body.segment(frame.segment).shapes)
         hanging, to_frame = hanging_segment(body, frame.segment), frame.rotation.T
-        self._hinge: tuple[FloatArray, FloatArray] | None = None
-        if hanging is not None:
-            place = to_frame @ (hanging.origin - frame.translation)
-            self._hinge = place, to_frame @ hanging.hinges[0].axis
+        self._hinge = None if hanging is None else (
+            to_frame @ (hanging.origin - frame.translation), to_frame @ hanging.hinges[0].axis
+        )  # fmt: skip
         self._fixed = [
             (part.geometry, coal.Transform3s(part.rotation, part.translation))
             for obstacle in scene.obstacles
             for part in collision_parts(obstacle)
         ]
         for contact in standing:
-            rotation, position = contact.rotation_contact_to_world, contact.position
-            for geometry, turn, offset in end_shapes(body, contact.effector):
-                placement = coal.Transform3s(rotation @ turn, position + rotation @ offset)
-                self._fixed.append((geometry, placement))
+            self._fixed += _placed(end_shapes(body, contact.effector), Pose.of(contact))
         limbs = (_standing_limb(body, contact) for contact in standing)
         self._limbs = [limb for limb in limbs if limb is not None]
         boxes = [_world_box(geometry, placement) for geometry, placement in self._fixed]
@@ -166,16 +156,12 @@ class EffectorClearance:
         self._radii = np.array([np.linalg.norm(half) for _, half in balls])
         self._com, self._bend = com, bend
         self._placed_limbs, self._bent = cache(self._limbs_at), cache(self._bent_at)
-        self._request = coal.DistanceRequest()
-        self._result = coal.DistanceResult()
+        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
 
     def __call__(self, time: float, pose: Pose) -> float:
         """Return the signed distance at a pose [m]; negative means penetration."""
         local, slack = self._bent(time)
-        own = [
-            (geometry, coal.Transform3s(pose.rotation @ turn, pose.position + pose.rotation @ offset))
-            for geometry, turn, offset in local
-        ]
+        own = _placed(local, pose)
         smallest = min((self._distance(mine, limb) for limb in self._placed_limbs(time) for mine in own),
                        default=np.inf)  # fmt: skip
         # Far obstacles are ruled out by the box around them and the ball around the own shape.
@@ -216,20 +202,25 @@ class EffectorClearance:
         return coal.distance(*mine, *other, self._request, self._result)
 
 
+def _placed(shapes: Sequence[OwnShape], pose: Pose) -> list[Placed]:
+    """An effector's shapes with its frame at a pose."""
+    return [
+        (geometry, coal.Transform3s(pose.rotation @ turn, pose.position + pose.rotation @ offset))
+        for geometry, turn, offset in shapes
+    ]
+
+
 def end_shapes(body: BodyModel, effector: str) -> list[OwnShape]:
     """Shapes of an effector's end segments: its own and the one that hangs on it (toes), at zero angle."""
-    frame = body.effector(effector)
-    offsets = {frame.segment: np.zeros(3)}
-    hanging = hanging_segment(body, frame.segment)
-    if hanging is not None:
-        offsets[hanging.name] = hanging.origin
+    frame, shapes = body.effector(effector), list[OwnShape]()
+    hanging, to_frame = hanging_segment(body, frame.segment), frame.rotation.T
+    ends = [(body.segment(frame.segment), np.zeros(3))]
+    ends += [] if hanging is None else [(hanging, hanging.origin)]
     geometries = {item.name: item.geometry for item in body.geometry.geometryObjects}
-    shapes = []
-    for name, offset in offsets.items():
-        for shape in body.segment(name).shapes:
-            translation = frame.rotation.T @ (offset + shape.translation - frame.translation)
-            geometry = geometries[f"{name}/{shape.name}"]
-            shapes.append((geometry, frame.rotation.T @ shape.rotation, translation))
+    for segment, offset in ends:
+        for shape in segment.shapes:
+            place = to_frame @ (offset + shape.translation - frame.translation)
+            shapes.append((geometries[f"{segment.name}/{shape.name}"], to_frame @ shape.rotation, place))
     return shapes
 
 
@@ -243,7 +234,7 @@ def _local_box(geometry: Any) -> tuple[FloatArray, FloatArray]:
 def _world_box(geometry: Any, placement: Any) -> tuple[FloatArray, FloatArray]:
     """Corners (3,) of an axis-aligned box around a placed geometry [m]; boundless for half-spaces."""
     if isinstance(geometry, (coal.Halfspace, coal.Plane)):
-        return np.full(3, -_ENDLESS), np.full(3, _ENDLESS)
+        return np.full(3, -1.0e9), np.full(3, 1.0e9)
     middle, half = _local_box(geometry)
     rotation = np.array(placement.getRotation())
     centre, half = rotation @ middle + np.array(placement.getTranslation()), np.abs(rotation) @ half

@@ -1,9 +1,8 @@
 """A curve for every flight of a motion: smooth curves first, the Bi-RRT where they fail.
 
-Key postures of a contact plan get further postures along such curves.  They lie at the changes of contact,
-at most with one between; joined by lines they drag an effector through what it leaves, reaches or passes,
-and an optimisation that pushes it out may as well swing the limb aside as bend it, or be caught on the
-wrong side.
+Key postures of a contact plan get further postures along such curves.  Joined by lines they drag an effector
+through what it leaves, reaches or passes, and an optimisation that pushes it out may as well swing the limb
+aside as bend it, or be caught on the wrong side.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,14 +31,8 @@ from manikin.scene import Proximity, Scene
 SHARES = (0.25, 0.5, 0.75)
 """Shares of a flight at which a posture is looked for; our choice."""
 
-SAME_TIME = 0.01
-"""A given posture this near to a new one is replaced by it [s]."""
-
 ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
-
-SETTINGS = SolverSettings(tolerance=1e-3, explain=False)
-"""A flight without such a posture needs no reason, and a guess no exact contacts."""
 
 
 def with_mid_flights(
@@ -59,8 +52,6 @@ def with_mid_flights(
     limits = SwingLimits(clearance=distance, time_step=0.02)
     keys = dict(zip(path.time.tolist(), path.q, strict=True))
     for swing in schedule.sequence.swings():
-        if swing.start is None or swing.end is None or not hangs(body, swing.effector):
-            continue
         curve = _curve(body, scene, schedule, path, swing, limits)
         if curve is None:
             continue
@@ -80,9 +71,11 @@ def with_mid_flights(
                 # Share of the wanted distance that the posture keeps from everything that is not touched.
                 proximity=proximity, clearance=0.75 * distance, ignore=touched, reference=guess,
             )  # fmt: skip
-            found = generate_posture(problem, guess, settings=SETTINGS)
+            # A flight without such a posture needs no reason, and a guess no exact contacts.
+            found = generate_posture(problem, guess, settings=SolverSettings(tolerance=1e-3, explain=False))
             if found.succeeded:
-                keys = {other: q for other, q in keys.items() if abs(other - time) > SAME_TIME}
+                # A given posture this near to a new one is replaced by it [s].
+                keys = {other: q for other, q in keys.items() if abs(other - time) > 0.01}
                 keys[time] = found.q
     times = sorted(keys)
     return KeyPath(times, np.array([keys[time] for time in times]))
@@ -92,11 +85,11 @@ def _curve(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, swing: Swing, limits: SwingLimits
 ) -> SwingCurve | None:
     """A curve of the effector that keeps off everything; None where there is none, or none is needed."""
-    assert swing.start is not None
-    assert swing.end is not None
-    start, end = schedule.swing_interval(swing)
+    if swing.start is None or swing.end is None or not hangs(body, swing.effector):
+        return None
+    interval = schedule.swing_interval(swing)
     # A flight that is clear already at these instants needs no curve.
-    times = np.linspace(start, end, 13)
+    times = np.linspace(*interval, 13)
     given = path.at(times)
     coms = np.array([Configuration(body, q).com for q in given])
 
@@ -106,40 +99,34 @@ def _curve(
     clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
     ends = Pose.of(swing.start), Pose.of(swing.end)
     # Distance that a given path has to gain per metre from a contact to count as clear.
-    is_clear = ClearFlight(clearance, ends, (start, end), replace(limits, departure=0.1))
+    is_clear = ClearFlight(clearance, ends, interval, replace(limits, departure=0.1))
     between = zip(times[1:-1].tolist(), given[1:-1], strict=True)
     if all(is_clear(time, Pose.in_posture(body, q, swing.effector)) for time, q in between):
         return None
     plan = plan_swing(
-        *ends, start, end, clearance, limits=limits,
-        start_normal=swing.start.normal, end_normal=swing.end.normal,
+        *ends, *interval, clearance, limits=limits, start_normal=swing.start.normal,
+        end_normal=swing.end.normal,
     )  # fmt: skip
     if plan.succeeded:
         return plan.curve
 
     def check(extra: float) -> Feasible:
-        is_clear = ClearFlight(clearance, ends, (start, end), limits, extra)
+        is_clear = ClearFlight(clearance, ends, interval, limits, extra)
         return lambda pose, time, _: is_clear(time, pose) or None
 
     # The Bi-RRT asks for a clear effector only; its draws are always the same, and its flights slower.
     rng, slower = np.random.default_rng(0), replace(limits, speed=2.0, angular_speed=5.0)
     return search_swing(
-        *ends, start, end, check(0.0), rng, roomy=check(ROOM), limits=slower, iterations=600
+        *ends, *interval, check(0.0), rng, roomy=check(ROOM), limits=slower, iterations=600
     ).curve
 
 
 REACHING_TIME = 0.7
 """A free hand begins to reach for its grasp this long before [s], and is put away as slowly."""
 
-
-PASSED = 0.1
-"""Flights shorter than this along the level pass by nothing [m]."""
-
-IN_LINE = 0.06
-"""What stands this near to the straight way may be passed on either side [m]."""
-
-LEVEL = 0.6
-"""Standing limbs this much higher or lower than a lift-off are not passed by [m]."""
+PASSED, IN_LINE, LEVEL = 0.1, 0.06, 0.6
+"""Flights shorter than this along the level pass by nothing; what stands this near to the straight way may be
+passed on either side; standing limbs this much higher or lower than a lift-off are not passed by [m]."""
 
 ROLLING_HEIGHTS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, *HEIGHTS[1:])
 """Apex heights of the point about which a rolling foot tilts: the ankle is lifted by the tilt already [m]."""
@@ -212,11 +199,7 @@ class FlightPlanner:
         return smooth if plan.succeeded or roll is not None else self.search(swing, smooth)
 
     def _reach(self, swing: Swing) -> PlannedSwing:
-        """Curve between a contact and where the effector is in the preferred posture.
-
-        Only the end at the contact has to be kept; the rest is a hint, see
-        :func:`~manikin.planning.whole_body.fit_targets.effector_targets`.
-        """
+        """Curve between a contact, where alone it must be kept, and the effector in the preferred posture."""
         start, end = self.schedule.swing_interval(swing)
         if swing.start is None:
             start = max(start, end - REACHING_TIME)
@@ -225,14 +208,12 @@ class FlightPlanner:
         contact = swing.end or swing.start
         assert contact is not None
         first, last = (
-            Pose.in_posture(self._body, self._reference(time), swing.effector)
-            if held is None
-            else Pose.of(held)
+            Pose.of(held) if held else Pose.in_posture(self._body, self._reference(time), swing.effector)
             for held, time in ((swing.start, start), (swing.end, end))
         )
         plan = plan_swing(
-            first, last, start, end, self._clearance(swing), limits=self._limits,
-            start_normal=contact.normal, end_normal=contact.normal, refine=0,
+            first, last, start, end, self._clearance(swing), limits=self._limits, refine=0,
+            start_normal=contact.normal, end_normal=contact.normal,
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "reach")
 
@@ -255,18 +236,17 @@ class FlightPlanner:
         """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""
         assert swing.start is not None
         assert swing.end is not None
-        start, end = self.schedule.swing_interval(swing)
-        ends = Pose.of(swing.start), Pose.of(swing.end)
+        times, ends = self.schedule.swing_interval(swing), (Pose.of(swing.start), Pose.of(swing.end))
         clearance = self._clearance(swing)
 
         def check(extra: float) -> PostureCheck:
-            screen = ClearFlight(clearance, ends, (start, end), self._limits, extra)
+            screen = ClearFlight(clearance, ends, times, self._limits, extra)
             return PostureCheck(swing.effector, partial(self._problem, swing), screen, rotation_weight=0.3)
 
-        limits, rng = self._limits, self._rng
         found = search_swing(
-            *ends, start, end, check(0.0), rng, roomy=check(ROOM), limits=limits, iterations=iterations
-        )
+            *ends, *times, check(0.0), self._rng, roomy=check(ROOM), limits=self._limits,
+            iterations=iterations,
+        )  # fmt: skip
         if found.curve is None:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
             return PlannedSwing(swing, fallback.curve, fallback.method, reason)
@@ -293,8 +273,7 @@ class FlightPlanner:
     def _pitch(self, swing: Swing, lift_off: float) -> float:
         """Turn the toes down where the foot is left far behind: a level foot has no posture there [rad]."""
         assert swing.start is not None
-        yaw = swing.start.yaw
-        away = self._trajectory.position(lift_off) - swing.start.position
+        yaw, away = swing.start.yaw, self._trajectory.position(lift_off) - swing.start.position
         behind = float(np.cos(yaw) * away[0] + np.sin(yaw) * away[1])
         # Toes turn down [rad/m] where the foot is further behind the centre of mass than 0.08 m.
         return float(np.clip(3.0 * (behind - 0.08), 0.0, 0.9))
@@ -306,11 +285,10 @@ class FlightPlanner:
         )  # fmt: skip
 
     def _problem(self, swing: Swing, time: float) -> PostureProblem:
-        stance = self.schedule.stance_at(time)
-        others = [contact for contact in stance if contact.effector != swing.effector]
+        others = tuple(item for item in self.schedule.stance_at(time) if item.effector != swing.effector)
         touching = [*others, *(contact for contact in (swing.start, swing.end) if contact is not None)]
         return PostureProblem(
-            self._body, tuple(others), com=self._trajectory.position(time), proximity=self._proximity,
+            self._body, others, com=self._trajectory.position(time), proximity=self._proximity,
             ignore=frozenset().union(*(self._touching(item) for item in touching)),
             reference=self._reference(time),
         )  # fmt: skip
@@ -318,11 +296,9 @@ class FlightPlanner:
 
 def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, ...]:
     """Every contact held at some time of a flight."""
-    found: dict[tuple[str, bytes], Contact] = {}
-    for index in range(swing.first_phase, swing.last_phase + 1):
-        for contact in schedule.sequence[index].stance:
-            found[(contact.effector, contact.position.tobytes())] = contact
-    return tuple(found.values())
+    phases = (schedule.sequence[index] for index in range(swing.first_phase, swing.last_phase + 1))
+    held = (contact for phase in phases for contact in phase.stance)
+    return tuple({(contact.effector, contact.position.tobytes()): contact for contact in held}.values())
 
 
 def leaning_pairs(body: BodyModel, padded: Sequence[str]) -> frozenset[tuple[str, str]]:

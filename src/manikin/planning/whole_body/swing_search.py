@@ -7,7 +7,7 @@ clear of everything, and does the posture generator find a whole-body posture wi
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,24 +18,12 @@ from manikin.planning.whole_body.swing import Clearance, SwingLimits, required_c
 from manikin.planning.whole_body.swing_curve import SwingCurve
 from manikin.planning.whole_body.swing_path import EffectorPath, Pose
 
-CONTROLS = (12, 14, 17, 20, 24, 29, 35, 42, 50, 64, 80)
-"""Numbers of control poses that are tried, from the smoothest curve to the closest."""
-
-SHARPENINGS = (0, 1, 3)
-"""Corrections towards the corners of the path that are tried for each of them."""
-
-SHORTEST = 1e-6
-"""Shortest segment that a replacement may leave [s]."""
-
-TIME_STEP = 0.02
-"""Largest spacing of the instants at which a curve is checked [s]."""
-
-ATTEMPTS = 3
-"""Paths that are searched when no smooth curve follows one."""
+CONTROLS, SHARPENINGS = (12, 14, 17, 20, 24, 29, 35, 42, 50, 64, 80), (0, 1, 3)
+"""Numbers of control poses that are tried, from the smoothest curve to the closest, and corrections towards
+the corners of the path that are tried for each of them."""
 
 
-@dataclass(frozen=True, eq=False)
-class SmoothCurve:
+class SmoothCurve(NamedTuple):
     """A smooth swing that was found by search, or why there is none."""
 
     curve: SwingCurve | None
@@ -43,19 +31,13 @@ class SmoothCurve:
 
 
 def smooth_path(
-    path: EffectorPath,
-    feasible: Feasible,
-    rng: np.random.Generator,
-    *,
-    limits: SwingLimits,
-    hints: tuple[Any, ...] | None = None,
-    iterations: int = 60,
-) -> EffectorPath:
+    path: EffectorPath, feasible: Feasible, rng: np.random.Generator, *, limits: SwingLimits,
+    hints: tuple[Any, ...] | None = None, iterations: int = 60,
+) -> EffectorPath:  # fmt: skip
     """Replace stretches of a path by straight edges between two random points (Algorithm 6).
 
-    A stretch is replaced only when the new edge passes both checks (the printed algorithm
-    replaces it in any case).  Straight edges are the shortest in the metric, so the path
-    never grows longer.
+    A stretch is replaced only when the new edge passes both checks (the printed algorithm replaces it in any
+    case).  Straight edges are the shortest in the metric, so the path never grows longer.
 
     Args:
         path: Path to shorten; its nodes are taken to be feasible.
@@ -69,15 +51,19 @@ def smooth_path(
         first, second = sorted(rng.choice(len(path.time) - 1, size=2, replace=False).tolist())
         ends = slice(first, second + 1, second - first)
         times = path.time[ends] + rng.uniform(size=2) * np.diff(path.time)[ends]
-        # Hardly beside a node, the new edge would begin or end in a segment without duration.
-        spans = (times[0] - path.time[first], times[1] - times[0], path.time[second + 1] - times[1])
-        if min(spans) < SHORTEST:
+        # Hardly beside a node, the new edge would begin or end in a segment without duration [s].
+        if min(times[0] - path.time[first], times[1] - times[0], path.time[second + 1] - times[1]) < 1e-6:
             continue
         edge = EffectorPath(times, *path.sample(times))
         found = _edge_hints(edge, feasible, limits, known[first])
         if found is not None:
-            path = _spliced(path, edge, first, second)
             known[first + 1 : second + 1] = found
+            path = EffectorPath(*(
+                np.concatenate([whole[: first + 1], part, whole[second + 1 :]])
+                for whole, part in (
+                    (path.time, edge.time), (path.position, edge.position), (path.rotation, edge.rotation),
+                )
+            ))  # fmt: skip
     return path
 
 
@@ -91,23 +77,13 @@ def _edge_hints(edge: EffectorPath, feasible: Feasible, limits: SwingLimits, hin
     return None if end is None else [start, end]
 
 
-def _spliced(path: EffectorPath, edge: EffectorPath, first: int, second: int) -> EffectorPath:
-    """The path with an edge from inside segment ``first`` to inside segment ``second``."""
-    before, after = slice(first + 1), slice(second + 1, None)
-    return EffectorPath(
-        np.concatenate([path.time[before], edge.time, path.time[after]]),
-        np.concatenate([path.position[before], edge.position, path.position[after]]),
-        np.concatenate([path.rotation[before], edge.rotation, path.rotation[after]]),
-    )
-
-
 def smooth_curve(
     path: EffectorPath, feasible: Feasible, *, limits: SwingLimits, hint: Any = None
 ) -> SmoothCurve:
     """Turn a path into a C4 swing from rest to rest that is feasible at dense instants.
 
-    Curves of more and more control poses follow the path more and more closely; the first
-    (smoothest) one that keeps the speed limits and has a posture everywhere is returned.
+    Curves of more and more control poses follow the path more and more closely; the first (smoothest) one
+    that keeps the speed limits and has a posture everywhere is returned.
 
     Args:
         limits: Speed limits; a rest-to-rest curve is faster in the middle than the path's average.
@@ -127,7 +103,8 @@ def _curve_failure(curve: SwingCurve, feasible: Feasible, limits: SwingLimits, h
     haste = curve.haste(limits.speed, limits.angular_speed)
     if haste is not None:
         return haste
-    count = max(2, int(np.ceil(curve.duration / TIME_STEP)))
+    # Instants at most this far apart [s].
+    count = max(2, int(np.ceil(curve.duration / 0.02)))
     state = curve.evaluate(np.linspace(curve.start_time, curve.end_time, count + 1))
     for time, position, rotation in zip(state.time, state.position, state.rotation, strict=True):
         hint = feasible(Pose(position, rotation), float(time), hint)
@@ -136,11 +113,8 @@ def _curve_failure(curve: SwingCurve, feasible: Feasible, limits: SwingLimits, h
     return None
 
 
-QUICK = SolverSettings(iterations=25, restarts=False, explain=False)
-"""Settings for postures that start from a neighbour's; a failure from there is final."""
-
-THOROUGH = SolverSettings(explain=False)
-"""Settings for the first posture of a search, without a neighbour."""
+QUICK, THOROUGH = SolverSettings(iterations=25, restarts=False, explain=False), SolverSettings(explain=False)
+"""Settings for postures that start from a neighbour's, where a failure is final, and for the first one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +137,7 @@ class PostureCheck:
         """(nq,) posture with the effector at ``pose``, or None."""
         if not self.screen(time, pose):
             return None
-        problem = self.problem_at(time)
-        wanted = Placement(pose.position, pose.rotation, self.rotation_weight)
+        problem, wanted = self.problem_at(time), Placement(*pose, self.rotation_weight)
         problem = replace(problem, placements={**problem.placements, self.effector: wanted})
         result = generate_posture(problem, hint, settings=THOROUGH if hint is None else QUICK)
         return result.q if result.succeeded else None
@@ -213,7 +186,7 @@ def search_swing(
     failure = None
     # Speeds left to the path: a flight from rest to rest is faster in its middle.
     slower = replace(limits, speed=0.65 * limits.speed, angular_speed=0.65 * limits.angular_speed)
-    for _ in range(ATTEMPTS):
+    for _ in range(3):  # paths that are searched when no smooth curve follows one
         found = plan_flight(
             start, goal, start_time, end_time, roomy, rng, limits=slower, iterations=iterations
         )
