@@ -30,30 +30,19 @@ from manikin.planning.contacts.seat import FEET
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
 from manikin.scene import Box, Obstacle, Scene
 
-ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")
-"""Order in which limbs go."""
-
-CRAWLING = (0.2, 0.05, 0.45)
-"""Radius, lowest and highest end of what has to be free to crawl, of a body of 1.75 m [m]."""
-
-APART = {"knee": 0.10, "fist": 0.17}
-"""Distance of limbs to the middle of the way, of a body of 1.75 m [m]; our choice, as the next ones."""
-
-WHEELBASE = {"knee": -0.65, "fist": 0.65}
-"""Place of limbs along the way, of a body of 1.75 m, twice [m]."""
+ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")  # order in which limbs go
+CRAWLING = (0.2, 0.05, 0.45)  # radius, lowest and highest end of what is free to crawl, at 1.75 m [m]
+APART = {"knee": 0.10, "fist": 0.17}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
+WHEELBASE = {"knee": -0.65, "fist": 0.65}  # place of limbs along the way, of a body of 1.75 m, twice [m]
 
 RESTING = (0.35, 0.2, 0.5)
 """Places of the centre of mass that are tried, as shares of the way from the knees to the fists: arms are
 weaker than thighs."""
 
-EASE = 0.9
-"""Largest share of the strength for which a posture at rest may ask; the motion asks for more."""
-
-ROOM = 0.72
-"""Height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]."""
-
+EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
+ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
 GAITS = ((0.42, 0.60), (0.42, 0.70), (0.28, 0.52), (0.28, 0.70))
-"""Strides and distances of hands before knees that are tried, of a body of 1.75 m [m]."""
+"""Strides and distances of hands before knees that are tried, at 1.75 m [m]."""
 
 KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
 """Distances of hands before knees, and of knees before the feet, with which the body kneels down and gets up
@@ -66,29 +55,14 @@ BEFORE, BEHIND = 0.85, 0.45
 """Distances of feet before what is low and behind it at which the body kneels and gets up, of a body of
 1.75 m [m]."""
 
-NEAR_END = 0.8
-"""Way to the start or goal up to which the body kneels or gets up there, and does not walk [m]."""
-
-TURNED = math.radians(25.0)
-"""Angle up to which it does so with feet as they are."""
-
-STEEPEST = math.radians(30.0)
-"""Largest slope of a surface for hands and knees."""
-
-INSET = 0.03
-"""Distance of hands and knees to the edges of what they are on [m]."""
-
-LIFT = 0.05
-"""Height of a limb in flight [m]."""
-
-LEVEL = {"knee": 0.3, "fist": 6.0}
-"""Weights with which shanks are level and hands upright [1/rad^2]."""
-
-TILT = 0.19
-"""Sine of the largest angle of a hand on its fist: its edge is not pressed into the ground."""
-
-TURNING = 1.2
-"""Time in which a leg goes from its knee onto its foot or back [s]."""
+NEAR_END = 0.8  # way to the start or goal up to which the body kneels or gets up there, and does not walk [m]
+TURNED = math.radians(25.0)  # angle up to which it does so with feet as they are
+STEEPEST = math.radians(30.0)  # largest slope of a surface for hands and knees
+INSET = 0.03  # distance of hands and knees to the edges of what they are on [m]
+LIFT = 0.05  # height of a limb in flight [m]
+LEVEL = {"knee": 0.3, "fist": 6.0}  # weights with which shanks are level and hands upright [1/rad^2]
+TILT = 0.19  # sine of the largest angle of a hand on its fist: its edge is not pressed into the ground
+TURNING = 1.2  # time in which a leg goes from its knee onto its foot or back [s]
 
 _ON_ALL_FOURS = {
     "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 80.0,
@@ -97,8 +71,7 @@ _ON_ALL_FOURS = {
 _PITCH = math.radians(80.0)
 _PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 
-Walk = Callable[[Stage, Stage], Extension]
-"""Plans a walk between two stages on feet."""
+Walk = Callable[[Stage, Stage], Extension]  # plans a walk between two stages on feet
 
 
 def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:

@@ -24,17 +24,10 @@ from manikin.scene import Scene, Surface
 
 UP = np.array([0.0, 0.0, 1.0])
 
-SEAT_HEIGHTS = (0.12, 0.40)
-"""Lowest and greatest height of a seat above the feet [statures]; our choice."""
-
-FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)
-"""Distances before the middle of the buttocks at which a floor for the feet is looked for [statures]."""
-
-SITTING_TIME = 0.35
-"""Shortest time for which a body sits before it moves [s]."""
-
-CROUCH = 0.6
-"""Height of a crouching body's root relative to a standing one's; our choice."""
+SEAT_HEIGHTS = (0.12, 0.40)  # lowest and greatest height of a seat above the feet [statures]; our choice
+FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)  # places of a floor before the middle of the buttocks [statures]
+SITTING_TIME = 0.35  # shortest time for which a body sits before it moves [s]
+CROUCH = 0.6  # height of a crouching body's root relative to a standing one's; our choice
 
 
 class Habit(StrEnum):
@@ -219,11 +212,8 @@ def _height_at(surface: Surface, at: FloatArray) -> float | None:
     return height if float(surface.outside(point)[0]) <= 1e-9 else None
 
 
-PLACES = 6
-"""Places of each limb among which a start is sought."""
-
-TRIES = 40
-"""Most of their combinations for which a posture is looked for; our choice."""
+PLACES = 6  # places of each limb among which a start is sought
+TRIES = 40  # most of their combinations for which a posture is looked for; our choice
 
 
 def starts_on_limbs(

@@ -21,20 +21,11 @@ from manikin.scene import Scene
 from manikin.scene.collision import collision_parts
 from manikin.scene.footing import WHOLE, FootingTable, Places
 
-SHIFT = 0.08
-"""Longest shift of a candidate along the sole [m]; half of it across; our choice."""
-
-STEEPEST = math.radians(30.0)
-"""Largest slope of a surface to stand on [rad]; our choice."""
-
-FOOT_HEIGHT = 0.10
-"""Height above a sole that has to be free for the foot [m]; our choice."""
-
-FOOT_CLEARANCE = 0.015
-"""Distance of the foot to what stands beside it [m]; our choice."""
-
-ON_PLANE = 0.02
-"""Height up to which a neighbouring surface is no hindrance to a foot [m]; the foot has a test of its own."""
+SHIFT = 0.08  # longest shift of a candidate along the sole [m]; half of it across; our choice
+STEEPEST = math.radians(30.0)  # largest slope of a surface to stand on [rad]; our choice
+FOOT_HEIGHT = 0.10  # height above a sole that has to be free for the foot [m]; our choice
+FOOT_CLEARANCE = 0.015  # distance of the foot to what stands beside it [m]; our choice
+ON_PLANE = 0.02  # height up to which a neighbouring surface does not hinder a foot [m]
 
 _REQUEST = coal.CollisionRequest()
 _CLEAR = coal.CollisionRequest()

@@ -28,50 +28,26 @@ from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import collision_parts, local_box
 
-STEP = 0.7
-"""Time of a short step [s]; our choice, as the next ones."""
-
-EASY = 3.0**0.25
-"""Way at which a step costs twice as much as a short one, over that of the cheapest gait: of a quartic."""
-
-REACH_MARGIN = 0.02
-"""Distance that steps keep to the end of what the body reaches [m]; our choice."""
-
-HIGHEST = 0.48
-"""Largest difference in height of two soles, of a body of 1.75 m [m]."""
-
-HELD_HIGHEST = 0.80
-"""The same of a body that has something to hold on to or lean on [m]."""
-
-HELD_COST = 4.0 * STEP
-"""Cost of a step that is higher than :data:`HIGHEST`: hands come and go [s]."""
-
-NARROWEST = 0.115
-"""Least distance of the middles of two soles across, of a body of 1.75 m [m]."""
+STEP = 0.7  # time of a short step [s]; our choice, as the next ones
+EASY = 3.0**0.25  # way at twice the cost of a short step, over that of the cheapest gait: of a quartic
+REACH_MARGIN = 0.02  # distance that steps keep to the end of what the body reaches [m]; our choice
+HIGHEST = 0.48  # largest difference in height of two soles, of a body of 1.75 m [m]
+HELD_HIGHEST = 0.80  # the same of a body that has something to hold on to or lean on [m]
+HELD_COST = 4.0 * STEP  # cost of a step that is higher than :data:`HIGHEST`: hands come and go [s]
+NARROWEST = 0.115  # least distance of the middles of two soles across, of a body of 1.75 m [m]
 
 ALONG = (-0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
 ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
 TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
 """Steps that are tried from a foot: ahead and to its side [m], and turned outwards [rad]."""
-
-CELL = 0.1
-"""Width of the cells of the ground on which the estimate is computed [m]."""
-
-GAP = 0.7
-"""Longest way over no ground that the estimate takes [m]."""
+CELL = 0.1  # width of the cells of the ground on which the estimate is computed [m]
+GAP = 0.7  # longest way over no ground that the estimate takes [m]
 
 MERGED = 0.06
-MERGED_TURN = math.radians(15.0)
-"""Places [m] and headings [rad] this close together count as one foothold."""
-
-LOW_STEP = 0.05
-"""Distance of places on a way for one who crawls [m]."""
-
-LOW_RISE = 0.2
-"""Largest difference in height of its cells [m]."""
-
-BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])
-"""Shares of such a way at which nothing may stand in it."""
+MERGED_TURN = math.radians(15.0)  # places [m] and headings [rad] this close together count as one foothold
+LOW_STEP = 0.05  # distance of places on a way for one who crawls [m]
+LOW_RISE = 0.2  # largest difference in height of its cells [m]
+BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothing may stand in it
 
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.
@@ -79,23 +55,12 @@ GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 No bound on the cost of a way follows: the estimate counts turns, and may be more than the least cost.
 """
 
-SAME_GREED = 3
-"""Ways after which the search for another one begins with the factor that found the last."""
-
-ALIKE = 0.08
-"""Distance of footholds up to which a step is much like one that was refused [m]; our choice."""
-
-SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1
-"""Differences of the way [m], turn [rad] and slopes up to which a step is as hard as another; our choice."""
-
-TURN_COST = 0.9
-"""Cost of a turn [s/rad]: two steps turn a body by a right angle."""
-
-TURN_WAY = 0.6
-"""Way on which going backwards costs as much as a turn by two radians [m]."""
-
-LOOK = 5
-"""Cells of the way that tell where it leads."""
+SAME_GREED = 3  # ways after which the search for another one begins with the factor that found the last
+ALIKE = 0.08  # distance of footholds up to which a step is much like one that was refused [m]; our choice
+SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1  # up to which steps are as hard [m, rad, 1]; our choice
+TURN_COST = 0.9  # cost of a turn [s/rad]: two steps turn a body by a right angle
+TURN_WAY = 0.6  # way on which going backwards costs as much as a turn by two radians [m]
+LOOK = 5  # cells of the way that tell where it leads
 
 _REQUEST = coal.CollisionRequest()
 

@@ -24,8 +24,7 @@ from manikin.planning.contacts.limb_collisions import DeepSamples, LimbCollision
 from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene
 
-_GROWTH = 0.15
-"""How much longer each step down the order is than the one before."""
+_GROWTH = 0.15  # how much longer each step down the order is than the one before
 _STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
 _FEW, _SOME, _BLOCK = 4, 16, 64  # candidates looked at together: first, later, and where many collide
 _NO_DIRECTION = np.zeros(3)
@@ -33,8 +32,7 @@ _LOOKED_AT = 8  # candidates for each that may be tried
 Alpha = TypeVar("Alpha", float, FloatArray)
 
 _TILTED, _UNNATURAL, _WEAK = ("", "tilted"), ("", "unnatural"), ("", "weak")
-NATURAL_SLACK = 0.1
-"""Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
+NATURAL_SLACK = 0.1  # normalised distance out of the learnt range that the alignment may leave
 
 
 class Hindrance(StrEnum):

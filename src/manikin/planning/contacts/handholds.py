@@ -19,26 +19,13 @@ from manikin.scene import Scene
 
 HANDS = ("left_hand", "right_hand")
 
-HEIGHTS = (0.5, 1.35)
-"""Lowest and greatest height of a hold above the lower foot [m]."""
-
-WANTED = (0.30, 0.30, 0.0)
-"""Where a hand is best: ahead of the root, to its side, and above it [m]."""
-
-SHOULDER, ARM = (0.05, 0.19, 0.45), 0.66
-"""Place of a shoulder from the root, and the reach from there with some lean of the trunk [m]."""
-
-STOOP = 0.45
-"""How far shoulders go down to a hold that is low [m]."""
-
-APART = 0.15
-"""Distance between two places that are offered [m]."""
-
-PALM = 0.05
-"""Half the size of what has to be level below a palm [m]."""
-
-LEVEL = math.radians(20.0)
-"""Largest slope of a surface to lean on [rad]."""
+HEIGHTS = (0.5, 1.35)  # lowest and greatest height of a hold above the lower foot [m]
+WANTED = (0.30, 0.30, 0.0)  # where a hand is best: ahead of the root, to its side, and above it [m]
+SHOULDER, ARM = (0.05, 0.19, 0.45), 0.66  # shoulder from the root, and reach from there with some lean [m]
+STOOP = 0.45  # how far shoulders go down to a hold that is low [m]
+APART = 0.15  # distance between two places that are offered [m]
+PALM = 0.05  # half the size of what has to be level below a palm [m]
+LEVEL = math.radians(20.0)  # largest slope of a surface to lean on [rad]
 
 _GRID = np.array([[i, j] for i in range(-5, 6) for j in range(-5, 6)]) * 0.08
 _CORNERS = PALM * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])

@@ -25,8 +25,7 @@ from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene, segment_of
 from manikin.scene.collision import CollisionPart, collision_parts
 
-TOUCH = 0.002
-"""Depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]."""
+TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]
 YIELD = 0.8
 """Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius.
 
@@ -221,8 +220,7 @@ def yielding(body: BodyModel, limb: Limb) -> tuple[tuple[str, ...], float]:
     return last, YIELD * max(radii, default=0.0)
 
 
-_ALONG = np.array([0.0, 0.5])
-"""Where the balls are on a capsule's axis, from its middle, over its length: not near the joint before."""
+_ALONG = np.array([0.0, 0.5])  # shares of a capsule's axis with a ball, from its middle on
 
 
 class DeepSamples:

@@ -30,50 +30,21 @@ def stature_of(body: BodyModel) -> float:
     return body.stature
 
 
-TOE_ROOM = 0.02
-"""Distance of the toes to the end of the hold that carries them [m]; our choice."""
-
-TURN_OUT = float(np.deg2rad(25.0))
-"""Angle by which a foot may stand turned out [rad]; our choice."""
-
-STEEPEST = float(np.deg2rad(40.0))
-"""Largest slope of a surface on which such a place may be [rad]; our choice."""
-
-FINGERS = (0.005, 0.02)
-"""Distances of a palm from the edge around which its fingers go [m]; our choice."""
-
-BEYOND = 0.03
-"""Room beyond such an edge [m]; our choice."""
-
-INSET = 0.06
-"""Distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice."""
-
-SPACING = 0.1
-"""Distance of neighbouring places of a limb, by its reach, twice that of soles; our choice."""
-
-PALM_DEPTH = 0.1
-"""Depth behind an edge that a palm needs; a hand does not close round a narrow board; our choice [m]."""
-
-FAR_EDGE = 0.7
-"""Cosine of the angle between the heading and the way out over an edge that is left out; our choice."""
-
-RUNG_TURN = float(np.deg2rad(30.0))
-"""Largest angle between the heading of a foot and the way across its rung; our choice [rad]."""
-
-RUNG_SIDE = 0.025
-"""Distance of a sole to the ends of its rung, where the stiles are [m]; our choice."""
-
-RUNG_APART = 0.025
-"""Distance on the sole between two places of a rung below it [m]; our choice."""
-
-PALM_ROOM = 0.01
-"""Distance of a palm's middle from the bar that its fingers close round [m]."""
-
-STEEP_BAR = 0.85
-"""Rise of a bar over its length from which on a hand takes it from the side; our choice."""
-
-RUNG_SPACING = 0.045
-"""Distance of neighbouring places of a foot along a rung [m]; our choice."""
+TOE_ROOM = 0.02  # distance of the toes to the end of the hold that carries them [m]; our choice
+TURN_OUT = float(np.deg2rad(25.0))  # angle by which a foot may stand turned out [rad]; our choice
+STEEPEST = float(np.deg2rad(40.0))  # largest slope of a surface with such a place [rad]; our choice
+FINGERS = (0.005, 0.02)  # distances of a palm from the edge around which its fingers go [m]; our choice
+BEYOND = 0.03  # room beyond such an edge [m]; our choice
+INSET = 0.06  # distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice
+SPACING = 0.1  # distance of neighbouring places of a limb, by its reach, twice that of soles; our choice
+PALM_DEPTH = 0.1  # depth behind an edge that a palm needs: boards are too narrow for a hand; our choice [m]
+FAR_EDGE = 0.7  # cosine of the angle of the heading to the way out over an edge that is left out; our choice
+RUNG_TURN = float(np.deg2rad(30.0))  # largest angle of a heading to the way across its rung; our choice [rad]
+RUNG_SIDE = 0.025  # distance of a sole to the ends of its rung, where the stiles are [m]; our choice
+RUNG_APART = 0.025  # distance on the sole between two places of a rung below it [m]; our choice
+PALM_ROOM = 0.01  # distance of a palm's middle from the bar that its fingers close round [m]
+STEEP_BAR = 0.85  # rise of a bar over its length from which on a hand takes it from the side; our choice
+RUNG_SPACING = 0.045  # distance of neighbouring places of a foot along a rung [m]; our choice
 
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 

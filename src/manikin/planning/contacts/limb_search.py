@@ -33,59 +33,25 @@ from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stag
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.samples import LimbSamples
 
-GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))
-"""Factors on the estimate, tried in turn, each with the states that may be expanded with it; our choice."""
-
-GOAL_REACH = 1.5
-"""Distance from the root at the goal within which limbs have to have places, by their reach."""
-
-STEEPEST_TRUNK = 0.5
-"""Largest pitch of a trunk that follows its contacts [rad]; our choice."""
-
-LEVELLED = 0.8
-"""Share of the slope of its contacts to which a trunk pitches; our choice."""
-
-FARTHEST = 0.5
-"""Distance of a first contact to where its limb should be at most, by the limb's reach; our choice."""
-
-APART = 0.15
-"""Distance between first contacts that are tried for a limb, by its reach; our choice."""
-
-REST = 0.06
-"""Distance to the edges of where it rests at which a trunk is thought, by the reach; our choice."""
-
-SHARES = np.linspace(0.0, 1.0, 9)
-"""Shares of the way of the trunk to the middle of the limbs that stay that are tried."""
-
-WIDE = 0.12
-"""Distance to the edges of where it rests at which a trunk is at ease, by the reach; our choice."""
-
-NARROW = 3.0
-"""Cost of a move over contacts on one line, between whose edges there is no room, in moves; our choice."""
-
-OVERREACH = 30.0
-"""Cost of a limb that is beyond its reach then by as much as that, in moves; our choice."""
-
-PROVEN = 0.8
-"""Discount on a move that has a posture, so that ways with postures are gone on with [moves]; our choice."""
-
-LOOSE = 1.0
-"""Cost of a limb without a contact, in moves; our choice."""
-
+GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))  # on the estimate, states expanded with each; our choice
+GOAL_REACH = 1.5  # distance from the root at the goal within which limbs have to have places, by their reach
+STEEPEST_TRUNK = 0.5  # largest pitch of a trunk that follows its contacts [rad]; our choice
+LEVELLED = 0.8  # share of the slope of its contacts to which a trunk pitches; our choice
+FARTHEST = 0.5  # largest distance of a first contact to the place of its limb, by its reach; our choice
+APART = 0.15  # distance between first contacts that are tried for a limb, by its reach; our choice
+REST = 0.06  # distance to the edges of where it rests at which a trunk is thought, by the reach; our choice
+SHARES = np.linspace(0.0, 1.0, 9)  # of the way of the trunk to the middle of the limbs that stay
+WIDE = 0.12  # distance to the edges of where it rests at which a trunk is at ease, by the reach; our choice
+NARROW = 3.0  # cost of a move over contacts on one line, without room between their edges, in moves
+OVERREACH = 30.0  # cost of a limb that is beyond its reach then by as much as that, in moves; our choice
+PROVEN = 0.8  # discount on a move that has a posture: such ways are gone on with [moves]; our choice
+LOOSE = 1.0  # cost of a limb without a contact, in moves; our choice
 HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
 """Turn of a hand whose fingers hook round an edge, from one that lies flat on it."""
-
-SOLES_APART = 0.02
-"""Least distance of two soles side by side; our choice [m]."""
-
-SOLE_ABOVE = 0.1
-"""Distance of two soles of which one may be above the other; our choice [m]."""
-
-TURN = 0.2
-"""Distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice."""
-
-FREE = -1
-"""Row of a hand that has let go."""
+SOLES_APART = 0.02  # least distance of two soles side by side; our choice [m]
+SOLE_ABOVE = 0.1  # distance of two soles of which one may be above the other; our choice [m]
+TURN = 0.2  # distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice
+FREE = -1  # row of a hand that has let go
 
 State = tuple[int, ...]
 """Place of each limb, by its row among those of the limb; the first is that of the start, if it has one."""

@@ -21,11 +21,8 @@ from manikin.kinematics import (
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Proximity, Scene
 
-ROOT = 7
-"""Numbers of a posture that are the pose of its root."""
-
-LEARNT_MARGIN = 0.01
-"""Angle that such postures keep to the surface of a learnt volume [rad]; our choice."""
+ROOT = 7  # numbers of a posture that are the pose of its root
+LEARNT_MARGIN = 0.01  # angle that such postures keep to the surface of a learnt volume [rad]; our choice
 
 
 @dataclass(frozen=True)

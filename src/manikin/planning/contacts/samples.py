@@ -16,8 +16,7 @@ from manikin.kinematics.limb_kinematics import hull_of, rigid_reach
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.contacts.efort import MOST_RATIO
 
-THRESHOLD = 0.05
-"""Smallest manipulability, as a share of the largest one seen; our choice, the thesis leaves it open."""
+THRESHOLD = 0.05  # least manipulability, as a share of the largest seen; our choice, open in the thesis
 _FEWEST_KEPT = 0.02
 
 
@@ -89,8 +88,7 @@ class LimbSamples:
 
 
 _ROUNDING = 1e-9
-_LEAF = 16
-"""Largest number of samples in a leaf."""
+_LEAF = 16  # largest number of samples in a leaf
 
 
 @dataclass(frozen=True, eq=False)

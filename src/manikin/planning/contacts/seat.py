@@ -29,42 +29,22 @@ from manikin.scene import Scene, Surface
 
 FEET = ("left_foot", "right_foot")
 
-SEATED_ON = frozenset({"buttocks"})
-"""Effectors with which a body sits."""
-
-STRENGTH_SHARE = 0.95
-"""Largest share of the strength of a joint with which a seat is left."""
-
-SEAT_FRICTION = 0.3
-"""Coulomb coefficient of clothes on a seat; our choice."""
-
-SHANK_SLOPE = float(np.deg2rad(12.0))
-"""Slope of the shank that is liked, knee before ankle [rad]; people who rise have 0 to 20 degrees."""
-
-SLOPES = np.deg2rad(np.arange(-25.0, 28.1, 1.0))
-"""Slopes of the shank that are compared [rad]."""
-
-FORWARD = np.arange(0.0, 0.161, 0.01)
-"""Ways of the buttocks towards the seat's edge that are compared [statures]."""
-
-APART = 0.07
-"""Distance of the middle of a sole from the body's middle plane [statures]."""
+SEATED_ON = frozenset({"buttocks"})  # effectors with which a body sits
+STRENGTH_SHARE = 0.95  # largest share of the strength of a joint with which a seat is left
+SEAT_FRICTION = 0.3  # Coulomb coefficient of clothes on a seat; our choice
+SHANK_SLOPE = float(np.deg2rad(12.0))  # slope that is liked, knee before ankle [rad]; people have 0 to 20 deg
+SLOPES = np.deg2rad(np.arange(-25.0, 28.1, 1.0))  # slopes of the shank that are compared [rad]
+FORWARD = np.arange(0.0, 0.161, 0.01)  # ways of the buttocks towards the seat's edge [statures]
+APART = 0.07  # distance of the middle of a sole from the body's middle plane [statures]
 
 LIKED = (0.05, float(np.deg2rad(12.0)), 0.012)
 """Way forward [statures], deviation of the shank's slope [rad] and gap between the farthest lean and the
 heels [statures] that count alike; our choice."""
 
-CALF_ROOM = 0.016
-"""Distance of the calves to the edge of the seat [m]."""
-
-SEAT_THICKNESS = 0.05
-"""Depth below the top of a seat at which calves keep that distance [m]; our choice."""
-
-FEET_SPACING = 0.01
-"""Distance of the places that are tried for the feet [m]."""
-
-TRIED = 6
-"""Sittings that are tried with the whole body."""
+CALF_ROOM = 0.016  # distance of the calves to the edge of the seat [m]
+SEAT_THICKNESS = 0.05  # depth below the top of a seat at which calves keep that distance [m]; our choice
+FEET_SPACING = 0.01  # distance of the places that are tried for the feet [m]
+TRIED = 6  # sittings that are tried with the whole body
 
 LEAN = {
     "hip_flexion": 1.5, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1, "lumbar_flexion": 0.8,
@@ -72,8 +52,7 @@ LEAN = {
 }  # fmt: skip
 """Angles of a body that leans far forward on a seat, its pelvis flat [rad]."""
 
-LEAN_PITCH = 0.5
-"""Pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]."""
+LEAN_PITCH = 0.5  # pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,33 +203,19 @@ def _room_ahead(seat: Surface, at: FloatArray, heading: FloatArray) -> float:
     return float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
 
 
-LEANING = (0.25, 0.5, 0.75, 0.92)
-"""Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
-
-LEANING_TIMES = (1.3, 0.9)
-"""Time of that way, to where the body comes to rest over its feet and to where it goes on in motion [s]."""
+LEANING = (0.25, 0.5, 0.75, 0.92)  # shares of the way of the centre of mass to the feet that have a posture
+LEANING_TIMES = (1.3, 0.9)  # time of that way, to rest over the feet and to where it goes on in motion [s]
 
 SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
 """Distances of the centre of mass to the edge of where it may rest on the feet when a seat is left, tried in
 order [m]; the first is inside the smaller soles on which it is planned."""
 
-BEHIND = (0.0, 0.02, 0.04)
-"""How far behind where it could rest the centre of mass is when a seat is left, tried in order [m]."""
-
-LEAN_WEIGHT = 300.0
-"""Weight of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice."""
-
-RISING_TIME = 0.9
-"""Shortest time from there to standing [s]; the pace of the joints mostly asks for more."""
-
-SETTLING_TIME = 0.8
-"""Shortest time that the body stands then [s]."""
-
-SEATED_ROOM = (0.01, 0.01, 0.006)
-"""How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
-
-SEAT_OFF_ROOM = (0.01, 0.01, 0.002)
-"""The same where the seat is left at rest [m]: there a trunk ends its lean, no higher and no lower."""
+BEHIND = (0.0, 0.02, 0.04)  # ways behind where the centre of mass could rest as a seat is left [m]
+LEAN_WEIGHT = 300.0  # of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice
+RISING_TIME = 0.9  # shortest time from there to standing [s]; the pace of the joints mostly asks for more
+SETTLING_TIME = 0.8  # shortest time that the body stands then [s]
+SEATED_ROOM = (0.01, 0.01, 0.006)  # for the centre of mass [m]: a seated trunk cannot follow any path
+SEAT_OFF_ROOM = (0.01, 0.01, 0.002)  # where the seat is left at rest [m]: a trunk ends its lean there
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,13 +398,9 @@ def _least_jerk(share: FloatArray) -> FloatArray:
 
 
 HAND_AHEAD, HAND_ASIDE, HAND_ABOVE = 0.08, 0.17, 0.13
-"""Where a hand pushes best, before, beside and above the middle of the buttocks [statures]; our choice."""
-
-HAND_ROOM = 0.25
-"""Farthest that it is from there [statures]."""
-
-HAND_INSET = 0.012
-"""Distance of the middle of the palm to the edges of its surface [m]."""
+"""Where a hand pushes best from the middle of the buttocks [statures]; our choice."""
+HAND_ROOM = 0.25  # farthest that it is from there [statures]
+HAND_INSET = 0.012  # distance of the middle of the palm to the edges of its surface [m]
 
 
 def hand_supports(

@@ -36,20 +36,16 @@ from manikin.scene.covering import cover
 from manikin.scene.obstacle import Capsule
 from manikin.scene.scene import FLOOR
 
-CEILINGS = (0.92, 0.84, 0.76, 0.68, 0.61, 0.55)
-"""Heights under which a body is folded [statures]; people duck-walk at about the lowest."""
+CEILINGS = (0.92, 0.84, 0.76, 0.68, 0.61, 0.55)  # over a folded body [statures]; a duck-walk is the last
 
 RECORDED_COM = ((0.55, 0.63, 0.743, 0.83, 1.0), (0.31, 0.371, 0.457, 0.486, 0.56))
 """Ceilings and the heights of the CoM below them [statures] of people who pass beams of 1.10, 1.30 and 1.45 m
 ([Qiu2012]_ 3.2.3, taken for 1.75 m); the lowest is extrapolated."""
 
-SKIN = 0.02
-"""Distance of a posture to the walls and ceilings between which it is found [m]."""
+SKIN = 0.02  # distance of a posture to the walls and ceilings between which it is found [m]
 
 ARMS_CLOSE_COST = 1.05
-TURNED_COST = 1.3
-"""Costs of arms held close and of a trunk turned against the feet; our choice."""
-
+TURNED_COST = 1.3  # costs of arms held close and of a trunk turned against the feet; our choice
 _WALL = 1.0  # thickness of the walls [m]
 _SETTINGS = SolverSettings(tolerance=1e-4, clearance_tolerance=1e-3, restarts=False, explain=False)
 _ARMS_CLOSE = {"shoulder_flexion": 0.35, "shoulder_abduction": 0.1, "elbow_flexion": 1.6,
@@ -249,15 +245,9 @@ def _half_extent(shape: coal.CollisionGeometry, rotation: FloatArray) -> FloatAr
     return np.abs(rotation) @ (0.5 * (high - low))
 
 
-STANDING = 0.1
-"""Way that standing at a place counts as, at least [m]; our choice."""
-
-CHANGING = 0.3
-"""Way that costs as much as a change of posture in which the parts of the body move 1 m; our choice [m]."""
-
-BALLS = 4
-"""Balls that cover each shape in the quick test."""
-
+STANDING = 0.1  # way that standing at a place counts as, at least [m]; our choice
+CHANGING = 0.3  # way at the cost of a change of posture in which body parts move 1 m; our choice [m]
+BALLS = 4  # balls that cover each shape in the quick test
 _TOGETHER = 32  # places that are tested at once: keeps temporary arrays in the cache
 
 

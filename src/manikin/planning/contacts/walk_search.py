@@ -34,8 +34,7 @@ from manikin.planning.contacts.seat import leave_seat
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.scene import Scene
 
-COLUMN = (0.12, 0.5, 0.9)
-"""Radius, lowest and highest end above the ground of what has to be free, of a body of 1.75 m [m]."""
+COLUMN = (0.12, 0.5, 0.9)  # radius, lowest and highest end above the ground of what is free, at 1.75 m [m]
 
 
 STRONG_TRIES = 16
@@ -45,26 +44,13 @@ A motion may need less than its postures at rest, whose knees and trunk are not 
 after that many ways the later stages decide."""
 
 EASIER_MOVES = 8
-EASIER_TURN = 0.2
-"""Moves in which a posture may come to ask for less strength, and the most a joint turns in each [rad]."""
-
-EASY = 0.95
-"""Share of the strength at which they aim."""
-
-NEAR_TRIES = 12
-"""Ways after which a pair without a posture closes all that are much like it."""
-
-HIGH = 0.3
-"""Step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]."""
-
-HIGH_TRIES = 2
-"""Ways after which a high step without a posture closes all that are much like it."""
-
-HAND_TRIES = 4
-"""Ways that feet alone do not make after which hands may join at any step."""
-
-HOLDS = 6
-"""Most places of hands that are tried at a step."""
+EASIER_TURN = 0.2  # moves towards a posture of less strength, and a joint's largest turn in each [rad]
+EASY = 0.95  # share of the strength at which they aim
+NEAR_TRIES = 12  # ways after which a pair without a posture closes all that are much like it
+HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]
+HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
+HAND_TRIES = 4  # ways that feet alone do not make after which hands may join at any step
+HOLDS = 6  # most places of hands that are tried at a step
 
 
 @dataclass(frozen=True)
