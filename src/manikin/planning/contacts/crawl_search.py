@@ -14,9 +14,8 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.criteria import static_torque_share
 from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, Stance, point
+from manikin.contact import Contact, point
 from manikin.kinematics import Placement, Preferences
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Extension
@@ -25,6 +24,7 @@ from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.contacts.limb_search import within_strength
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.seat import FEET
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
@@ -70,8 +70,6 @@ _ON_ALL_FOURS = {
 }  # fmt: skip
 _PITCH = math.radians(80.0)
 _PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
-
-Walk = Callable[[Stage, Stage], Extension]  # plans a walk between two stages on feet
 
 
 def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
@@ -122,7 +120,7 @@ class CrawlSearch:
 
     def __init__(
         self, poser: PostureFinder, endpoints: Endpoints, start: Stage, goal: Stage, friction: float,
-        walk: Walk, settings: WalkSettings | None = None,
+        walk: Callable[[Stage, Stage], Extension], settings: WalkSettings | None = None,
     ) -> None:  # fmt: skip
         """Prepare a search.
 
@@ -132,7 +130,7 @@ class CrawlSearch:
             start: On feet.
             goal: On feet.
             friction: Coulomb coefficient.
-            walk: Plans what is walked before and behind.
+            walk: Plans a walk between two stages on feet.
             settings: Paces.
         """
         self._body, self._scene = poser.body, poser.scene
@@ -149,9 +147,8 @@ class CrawlSearch:
     def run(self) -> Extension:
         """The plan, or why there is none."""
         found = self._fault or self._planned()
-        if isinstance(found, str):
-            return Extension(None, self._poser.searches, 0, found)
-        return Extension(found, self._poser.searches, 0)
+        plan, failure = (None, found) if isinstance(found, str) else (found, None)
+        return Extension(plan, self._poser.searches, 0, failure)
 
     def _planned(self) -> ContactPlan | str:
         start, goal = (
@@ -231,14 +228,14 @@ class CrawlSearch:
             if isinstance(rise, _Rise):
                 return replace(rise, along=at, base=base * self._size)
             reason = reason or rise
-        return f"cannot kneel down at {np.round(middle, 2).tolist()} m: {reason}"
+        return f"cannot kneel down at {_text(middle)}: {reason}"
 
     def _got_up(
         self, held: dict[str, Contact], feet: Mapping[str, Contact], lead: str, standing: FloatArray
     ) -> "_Rise | str":
         """From four contacts onto two feet, the leading one first."""
         other = "left" if lead == "right" else "right"
-        posed = self._posed(held, held, self._guide(held))
+        posed = self._posed(held, held, self._guide(held), guided=True)
         stages: list[Stage] = []
         changes = [
             (f"{lead}_knee", None), (None, f"{lead}_foot"), (f"{other}_knee", None), (None, f"{other}_foot"),
@@ -252,7 +249,7 @@ class CrawlSearch:
             both = {**contacts, **after}
             staying = {name: contact for name, contact in after.items() if name in contacts}
             if posed.q is not None:
-                posed = self._posed(both, staying, None, posed.q)
+                posed = self._posed(both, staying, posed.q)
             if posed.q is None:
                 return f"{leaving or landing} cannot {'be put down' if landing else 'leave'}: {posed.reason}"
             contacts = after
@@ -273,7 +270,7 @@ class CrawlSearch:
         stages = [down.kneeling]
         begin = {"knee": down.along, "fist": down.along + base}
         end = {"knee": up.along, "fist": up.along + up.base}
-        reached = {name: self._along(name, down) for name in ORDER}
+        reached = {name: down.along + down.base * name.endswith("fist") for name in ORDER}
         for number in range(4 * (2 + math.ceil(total / (0.5 * stride)))):
             name = ORDER[number % 4]
             part = name.partition("_")[2]
@@ -283,43 +280,36 @@ class CrawlSearch:
                 step = self._stepped(way, name, (reached[name], min(ahead, end[part])), target, contacts, q)
                 if isinstance(step, str):
                     return step
-                stages += step.stages
-                reached[name], q = step.along, step.stages[-1].q
-                contacts = dict(step.stages[-1].contacts)
+                reached[name], *made = step
+                stages += made
+                q, contacts = made[-1].q, dict(made[-1].contacts)
             if all(contacts[each] is up.kneeling.contacts[each] for each in ORDER):
                 return stages
         return "does not arrive on hands and knees"
 
-    def _along(self, name: str, end: "_Rise") -> float:
-        return end.along + (end.base if name.endswith("fist") else 0.0)
-
     def _stepped(
         self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None,
         contacts: Mapping[str, Contact], q: FloatArray,
-    ) -> "_Step | str":  # fmt: skip
-        """One limb goes on: to a contact, or to where the way has it, or near there."""
+    ) -> tuple[float, Stage, Stage] | str:  # fmt: skip
+        """New place and stages of a limb that goes to a contact, where the way has it, or near there."""
         staying = {other: contact for other, contact in contacts.items() if other != name}
-        lifted = self._posed(contacts, staying, self._guide(contacts), q)
+        lifted = self._posed(contacts, staying, q, guided=True)
         if lifted.q is None:
-            return f"{name} cannot leave {_spot(contacts[name])}: {lifted.reason}"
-        reason = f"there is nothing to put {name} on beyond {_spot(contacts[name])}"
+            return f"{name} cannot leave {_text(contacts[name].position)}: {lifted.reason}"
+        reason = f"there is nothing to put {name} on beyond {_text(contacts[name].position)}"
         for along, contact in self._offers(way, name, ends, target):
             landed = {**staying, name: contact}
-            landing = self._posed(landed, staying, self._guide(landed), lifted.q)
+            landing = self._posed(landed, staying, lifted.q, guided=True)
             if landing.q is None:
-                reason = f"{name} cannot be put down at {_spot(contact)}: {landing.reason}"
+                reason = f"{name} cannot be put down at {_text(contact.position)}: {landing.reason}"
                 continue
             via = self._between(staying, name, (contacts[name], contact), (lifted.q, landing.q))
             if via is None:
-                reason = f"{name} finds no way to {_spot(contact)}"
+                reason = f"{name} finds no way to {_text(contact.position)}"
                 continue
-            settings = self._settings
-            way_there = float(np.linalg.norm(contact.position - contacts[name].position))
-            flight = max(settings.swing_duration, way_there / settings.swing_speed)
-            return _Step(along, (
-                Stage.of(self._body, staying, lifted.q, flight, via=via),
-                Stage.of(self._body, landed, landing.q, settings.shift_duration),
-            ))  # fmt: skip
+            flight = self._settings.flight(contacts[name], contact)
+            flying = Stage.of(self._body, staying, lifted.q, flight, via=via)
+            return along, flying, Stage.of(self._body, landed, landing.q, self._settings.shift_duration)
         return reason
 
     def _offers(
@@ -343,7 +333,7 @@ class CrawlSearch:
         start = 0.5 * (postures[0] + postures[1])
         start[3:7] = postures[1][3:7]
         wish = {name: Placement(middle, None, None, 0.5 / LIFT**2)}
-        return self._posed(staying, staying, None, start, wish).q
+        return self._posed(staying, staying, start, wish).q
 
     # --- contacts and postures --------------------------------------------------------------------
 
@@ -353,7 +343,7 @@ class CrawlSearch:
         for name in ORDER:
             contact = self._contact(way, name, ends[name.endswith("fist")])
             if contact is None:
-                return f"there is nothing for {name} at {np.round(way.at(ends[0])[0], 2).tolist()} m"
+                return f"there is nothing for {name} at {_text(way.at(ends[0])[0])}"
             found[name] = contact
         return found
 
@@ -377,10 +367,7 @@ class CrawlSearch:
 
     def _guide(self, contacts: Mapping[str, Contact]) -> FloatArray:
         """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
-        knees, hands = (
-            np.mean([contacts[f"{side}_{part}"].position for side in ("left", "right")], axis=0)
-            for part in ("knee", "fist")
-        )
+        knees, hands = _middles(contacts)
         ahead, q = hands - knees, np.array(self._reference)
         yaw = math.atan2(ahead[1], ahead[0])
         pitch = -math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
@@ -390,18 +377,24 @@ class CrawlSearch:
         return q
 
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], guide: FloatArray | None,
-        start: FloatArray | None = None, wishes: Mapping[str, Placement] | None = None,
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
+        wishes: Mapping[str, Placement] | None = None, *, guided: bool = False,
     ) -> Posed:  # fmt: skip
-        """A posture that the strength can hold, palms flat and shanks level as far as they can be."""
-        begin = guide if start is None else start
-        assert begin is not None
+        """A posture that the strength can hold, palms flat and shanks level as far as they can be.
+
+        A guided one is like that on all fours, its weight between the knees and the fists.
+        """
         first: Posed | None = None
-        for share in RESTING if guide is not None else (None,):
-            place = None if share is None else self._place(held, carrying, share)
+        for share in RESTING if guided else (None,):
+            place = None
+            if share is not None:
+                knees, fists = (middle[:2] for middle in _middles(held))
+                near = knees + share * (fists - knees)
+                place = self._poser.resting_place(carrying, near, self._poser.settings.inset)
             posed = self._poser.pose(
-                held, carrying, begin, guide, place=place, placements={**_level(held), **(wishes or {})},
-                preferences=_PREFERENCES, restarts=guide is None and not wishes,
+                held, carrying, start, self._guide(held) if guided else None, place=place,
+                placements={**_level(held), **(wishes or {})}, preferences=_PREFERENCES,
+                restarts=not guided and not wishes,
             )  # fmt: skip
             posed = self._held_easily(posed, held, carrying)
             if posed.q is not None:
@@ -409,34 +402,26 @@ class CrawlSearch:
             first = first or posed
         return first or Posed(None)
 
-    def _place(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], share: float
-    ) -> FloatArray | None:
-        """(2,) where the centre of mass rests, a share of the way from the knees to the fists [m]."""
-        knees, fists = (
-            np.mean([contact.position[:2] for name, contact in held.items() if name.endswith(part)], axis=0)
-            for part in ("knee", "fist")
-        )
-        return self._poser.resting_place(
-            carrying, knees + share * (fists - knees), self._poser.settings.inset
-        )
-
     def _held_easily(
         self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact]
     ) -> Posed:
         """The posture, or that a hand is not upright in it, or that it asks for too much of the strength."""
-        if posed.q is None:
-            return posed
-        state = Configuration(self._body, posed.q)
-        for name, contact in held.items():
-            if name.endswith("fist"):
+        if posed.q is not None:
+            state = Configuration(self._body, posed.q)
+            for name, contact in held.items():
                 up = state.effector_placement(name)[0][:, 2]
-                if np.linalg.norm(np.cross(up, contact.normal)) > TILT:
+                if name.endswith("fist") and np.linalg.norm(np.cross(up, contact.normal)) > TILT:
                     return Posed(None, f"{name} is not upright")
-        share = static_torque_share(self._body, posed.q, Stance(list(carrying.values())))
-        if share <= EASE:
-            return posed
-        return Posed(None, f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength")
+        return within_strength(self._body, posed, carrying, EASE)
+
+
+def _middles(contacts: Mapping[str, Contact]) -> tuple[FloatArray, FloatArray]:
+    """(3,) middles of the knees and of the fists [m]."""
+    knees, fists = (
+        np.mean([contact.position for name, contact in contacts.items() if name.endswith(part)], axis=0)
+        for part in ("knee", "fist")
+    )
+    return knees, fists
 
 
 def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
@@ -466,14 +451,6 @@ class _Rise:
     base: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Stages of one limb's step, and where it is along the way then [m]."""
-
-    along: float
-    stages: tuple[Stage, ...]
-
-
 def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
     """Kneeling down: the stages of getting up in the other order of time."""
     stages = [rise.kneeling, *rise.stages]
@@ -484,5 +461,5 @@ def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
     ]
 
 
-def _spot(contact: Contact) -> str:
-    return f"{np.round(contact.position, 2).tolist()} m"
+def _text(place: FloatArray) -> str:
+    return f"{np.round(place, 2).tolist()} m"

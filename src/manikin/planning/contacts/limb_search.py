@@ -29,7 +29,7 @@ from manikin.kinematics import Placement
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
-from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.samples import LimbSamples
 
@@ -58,7 +58,7 @@ State = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class LimbSettings:
+class LimbSettings(Paces):
     """How limbs are moved, of a body whose limbs reach 1 m; the values are our choice.
 
     Attributes:
@@ -69,10 +69,6 @@ class LimbSettings:
         sway: Distance of the root from the polygon of the contacts that stay at most, by that reach.
         searches: Most postures that are looked for.
         lift: How far a limb in flight keeps from the line between its contacts [m].
-        swing_duration: Shortest flight of a limb [s].
-        swing_speed: Its mean speed on longer ways [m/s].
-        shift_duration: Shortest time between two flights [s].
-        hinge_pace: Mean speed of the hinge that turns most [rad/s].
         goal_distance: Distance of the root from its goal at which it is reached [m].
         goal_turn: Angle between the root's heading and the goal's at which it is reached [rad].
         turns: Whether the root's heading follows the contacts; it goes from that of the start to the goal's
@@ -89,10 +85,6 @@ class LimbSettings:
     sway: float = 0.12
     searches: int = 900
     lift: float = 0.08
-    swing_duration: float = 0.7
-    swing_speed: float = 0.7
-    shift_duration: float = 0.35
-    hinge_pace: float = HINGE_PACE
     goal_distance: float = 0.08
     goal_turn: float = math.radians(12.0)
     turns: bool = True
@@ -162,12 +154,14 @@ class LimbHolds:
         return self.samples.reach.residual((places - at) @ turn)
 
 
-def within_strength(body: BodyModel, posed: Posed, carrying: Mapping[str, Contact]) -> Posed:
-    """The posture, or that resting on some contacts in it asks for more than the strength."""
+def within_strength(
+    body: BodyModel, posed: Posed, carrying: Mapping[str, Contact], most: float = 1.0
+) -> Posed:
+    """The posture, or that resting on some contacts in it asks for more than a share of the strength."""
     if posed.q is None:
         return posed
     share = static_torque_share(body, posed.q, Stance(list(carrying.values())))
-    if share <= 1.0:
+    if share <= most:
         return posed
     return Posed(None, f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength")
 
@@ -542,8 +536,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 via = self._between(staying, lifted.q, landing.q, (old, landed[name]), (before, after))
                 if via is None:
                     return self._refused(before, after, f"{name} finds no way around")
-                distance = float(np.linalg.norm(landed[name].position - old.position))
-                flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
+                flight = self.settings.flight(old, landed[name])
                 stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
                 self._moves.append((before, after))
             stages.append(Stage.of(body, landed, landing.q, self.settings.shift_duration))

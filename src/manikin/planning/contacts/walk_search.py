@@ -23,7 +23,7 @@ from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
-from manikin.planning.contacts.contact_plan import ContactPlan, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
 from manikin.planning.contacts.endpoint import FEET
 from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
@@ -54,27 +54,20 @@ HOLDS = 6  # most places of hands that are tried at a step
 
 
 @dataclass(frozen=True)
-class WalkSettings:
+class WalkSettings(Paces):
     """How a body goes on its feet; the values are our choice.
 
     Attributes:
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
         searches: Most postures that are looked for.
-        swing_duration: Shortest flight of a foot [s].
-        swing_speed: Its mean speed on longer ways [m/s].
-        shift_duration: Shortest time between two flights [s].
         reach_duration: Shortest time between a hand's change and the next one [s].
-        hinge_pace: Mean speed of the hinge that turns most [rad/s].
         grasp_force: Largest force of a grasp along each axis [N].
     """
 
+    hinge_pace: float = 2.0
     stride: float = 0.4
     searches: int = 400
-    swing_duration: float = 0.7
-    swing_speed: float = 0.7
-    shift_duration: float = 0.35
     reach_duration: float = 0.5
-    hinge_pace: float = 2.0
     grasp_force: float = 400.0
 
 
@@ -219,8 +212,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if step.lifted is None or step.landed is None:
                 first = k if step.lifted is None else k + 1
                 return self._refuse(way[first], way[first + 1], step.reason, too_hard=step.too_hard)
-            distance = float(np.linalg.norm(landing.position - leaving.position))
-            flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
+            flight = self.settings.flight(leaving, landing)
             lifted = Stage.of(body, {standing.effector: standing, **held}, step.lifted, flight)
             both = {standing.effector: standing, landing.effector: landing, **held}
             stages += [*changes, lifted, Stage.of(body, both, step.landed, self.settings.shift_duration)]
