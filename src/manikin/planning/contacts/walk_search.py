@@ -192,7 +192,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     def _contact(self, foot: str, number: int) -> Contact:
         key = foot, number
         if key not in self._contacts:
-            self._contacts[key] = self._footholds.contact(foot, self.search.hold(number), self.friction)
+            self._contacts[key] = self._footholds.contact(foot, self.search.holds[number], self.friction)
         return self._contacts[key]
 
     def _planned(self, way: list[int]) -> ContactPlan | None:
@@ -234,7 +234,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _refuse(self, stand: int, step: int, reason: str, *, too_hard: bool = False) -> None:
         self.reasons[reason] += 1
-        rise = abs(float(self.search.hold(stand).position[2] - self.search.hold(step).position[2]))
+        rise = abs(float(self.search.holds[stand].position[2] - self.search.holds[step].position[2]))
         if too_hard:
             self.search.refuse_everywhere(stand, step)
         elif self.replanned < (NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES):
@@ -244,7 +244,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _pair(self, first: str, numbers: Sequence[int]) -> tuple[Foothold, Foothold]:
         """Left and right of two footholds, the first of which is one foot's."""
-        one, other = (self.search.hold(number) for number in numbers)
+        one, other = (self.search.holds[number] for number in numbers)
         return (one, other) if first == FEET[0] else (other, one)
 
     def _pair_cost(self, left: Foothold, right: Foothold) -> float:
