@@ -21,12 +21,12 @@ from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw,
 from manikin.planning.contacts.best_first import Extension
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
 from manikin.planning.contacts.endpoint import Endpoints, Habit
-from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.limb_search import within_strength
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.seat import FEET
+from manikin.planning.contacts.seat import of_both_sides
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
 from manikin.scene import Box, Obstacle, Scene
 
@@ -74,10 +74,9 @@ _PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 
 def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
     """Posture on fists and knees on a level floor, the middle between them at the origin."""
-    q = np.array(body.standing_posture())
-    names = (name.removeprefix("left_").removeprefix("right_") for name in body.joint_names)
-    q[7:] = [math.radians(_ON_ALL_FOURS.get(name, 0.0)) for name in names]
-    q[:3], q[3:7] = 0.0, quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
+    angles = {name: math.radians(value) for name, value in _ON_ALL_FOURS.items()}
+    q = body.posture(of_both_sides(body, angles))
+    q[3:7] = quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
     q[2] = -Configuration(body, q).effector_placement(ORDER[0])[1][2]
     size = stature_of(body) / 1.75
     held = {}
@@ -93,12 +92,7 @@ def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """Way over the ground.
-
-    Attributes:
-        places: (n, 3) [m].
-        along: (n,) length of the way up to each [m].
-    """
+    """Way over the ground: places (n, 3) and its length (n,) up to each [m]."""
 
     places: FloatArray
     along: FloatArray
@@ -127,11 +121,9 @@ class CrawlSearch:
         Args:
             poser: Of the body in its scene; postures on all fours are found with its settings.
             endpoints: Finds where the body stands before and behind what is low.
-            start: On feet.
-            goal: On feet.
+            start: On feet, as the goal.
             friction: Coulomb coefficient.
             walk: Plans a walk between two stages on feet.
-            settings: Paces.
         """
         self._body, self._scene = poser.body, poser.scene
         crawling = on_all_fours(poser.body, poser.settings)
@@ -151,16 +143,13 @@ class CrawlSearch:
         return Extension(plan, self._poser.searches, 0, failure)
 
     def _planned(self) -> ContactPlan | str:
-        start, goal = (
-            (Foothold.of(stage.contacts[FEET[0]]), Foothold.of(stage.contacts[FEET[1]]))
-            for stage in (self._start, self._goal)
-        )
+        ends = feet_of(self._start.contacts), feet_of(self._goal.contacts)
         footholds = Footholds(self._body, self._scene, steepest=STEEPEST)
         low, high = (
             (self._size * radius, self._size * bottom, self._size * top)
             for radius, bottom, top in (CRAWLING, COLUMN)
         )
-        found = low_way(self._scene, footholds, (start, goal), low, high)
+        found = low_way(self._scene, footholds, ends, low, high)
         if found is None:
             return "no way over the ground has room for the body on hands and knees"
         way, under = _Way.of(found[0]), np.flatnonzero(~found[1])
@@ -434,14 +423,9 @@ def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
 
 @dataclass(frozen=True, eq=False)
 class _Rise:
-    """Getting up.
+    """Getting up: on hands and knees, then up to two feet, with the posture (nq,) at the end.
 
-    Attributes:
-        kneeling: On hands and knees.
-        stages: After that, up to that on two feet.
-        q: (nq,) standing posture at the end.
-        along: Where the knees are along the way [m].
-        base: Distance of the hands before them [m].
+    The knees are at ``along`` on the way, the hands ``base`` before them [m].
     """
 
     kneeling: Stage

@@ -6,7 +6,7 @@ where more of it lies.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import coal
@@ -20,6 +20,8 @@ from manikin.numerics.spatial import FloatArray
 from manikin.scene import Scene
 from manikin.scene.collision import collision_parts
 from manikin.scene.footing import WHOLE, FootingTable, Places
+
+FEET = ("left_foot", "right_foot")
 
 SHIFT = 0.08  # longest shift of a candidate along the sole [m]; half of it across; our choice
 STEEPEST = math.radians(30.0)  # largest slope of a surface to stand on [rad]; our choice
@@ -57,10 +59,12 @@ class Foothold:
     share: float = 1.0
     surface: int = -1
 
-    @classmethod
-    def of(cls, contact: Contact) -> "Foothold":
-        """Foothold of a contact that is given."""
-        return cls(contact.position, contact.yaw, contact.rotation_contact_to_world)
+
+def feet_of(contacts: Mapping[str, Contact]) -> tuple[Foothold, Foothold]:
+    """Left and right foothold of contacts that are given."""
+    left, right = (contacts[foot] for foot in FEET)
+    turns = left.rotation_contact_to_world, right.rotation_contact_to_world
+    return Foothold(left.position, left.yaw, turns[0]), Foothold(right.position, right.yaw, turns[1])
 
 
 @dataclass(frozen=True, eq=False)

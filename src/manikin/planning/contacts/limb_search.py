@@ -30,7 +30,7 @@ from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
 from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 from manikin.planning.contacts.samples import LimbSamples
 
 GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))  # on the estimate, states expanded with each; our choice
@@ -614,15 +614,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             guesses: Poses (7,) of the root to be near, each with a posture (nq,) to begin with.
         """
         if key not in self._postures:
-            upright = {
-                name: Placement(None, contact.rotation_contact_to_world, 0.05)
-                for name, contact in held.items() if contact.kind is ContactKind.POINT
-            }  # fmt: skip
-            posed = Posed(None)
+            posed, placements = Posed(None), {**upright_points(held), **(wishes or {})}
             for guide, start in guesses:
-                posed = self.poser.pose(
-                    held, carrying, start, guide, placements={**upright, **(wishes or {})}
-                )
+                posed = self.poser.pose(held, carrying, start, guide, placements=placements)
                 if posed.q is not None:
                     break
             self._postures[key] = within_strength(self.poser.body, posed, carrying)

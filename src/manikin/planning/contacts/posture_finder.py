@@ -79,6 +79,14 @@ class Posed:
     too_hard: bool = False
 
 
+def upright_points(held: Mapping[str, Contact]) -> dict[str, Placement]:
+    """Wishes for what touches at a point to stand upright on its surface, by effector."""
+    return {
+        name: Placement(None, contact.rotation_contact_to_world, 0.05)
+        for name, contact in held.items() if contact.kind is ContactKind.POINT
+    }  # fmt: skip
+
+
 class PostureFinder:
     """Finds postures of a body in a scene, and counts them.
 

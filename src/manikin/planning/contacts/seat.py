@@ -21,13 +21,11 @@ from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
-from manikin.planning.contacts.footholds import Footholds
+from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.transition import Momentum, momentum_to_rest
 from manikin.scene import Scene, Surface
-
-FEET = ("left_foot", "right_foot")
 
 SEATED_ON = frozenset({"buttocks"})  # effectors with which a body sits
 STRENGTH_SHARE = 0.95  # largest share of the strength of a joint with which a seat is left
@@ -55,19 +53,8 @@ LEAN = {
 LEAN_PITCH = 0.5  # pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]
 
 
-@dataclass(frozen=True, eq=False)
-class Sitting:
-    """A way to sit that is to be tried.
-
-    Attributes:
-        contacts: Of buttocks and feet.
-        guess: (nq,) posture near one that holds them.
-        cost: By which sittings are compared.
-    """
-
-    contacts: dict[str, Contact]
-    guess: FloatArray
-    cost: float
+Sitting = tuple[dict[str, Contact], FloatArray]
+"""Contacts of buttocks and feet, and a posture (nq,) near one that holds them."""
 
 
 class Sitter:
@@ -99,9 +86,8 @@ class Sitter:
     def _farthest_lean(self) -> float:
         """Way of the centre of mass before the middle of the buttocks' place where the body leans far [m]."""
         pitch = LEAN_PITCH * self._rolls
-        q = self._body.posture(
-            _of_both_sides(self._body, {**LEAN, "hip_flexion": LEAN["hip_flexion"] + pitch})
-        )
+        angles = {**LEAN, "hip_flexion": LEAN["hip_flexion"] + pitch}
+        q = self._body.posture(of_both_sides(self._body, angles))
         q[3:7] = [0.0, np.sin(0.5 * pitch), 0.0, np.cos(0.5 * pitch)]
         state = Configuration(self._body, q)
         turn, place = state.effector_placement("buttocks")
@@ -120,7 +106,7 @@ class Sitter:
         room = _room_ahead(seat, at, turn[:, 0])
         tried: list[tuple[float, float]] = []
         feet: dict[int, dict[str, Contact]] = {}
-        for cost, forward, ahead in self._compared(float(at[2]) - floor, room):
+        for forward, ahead in self._compared(float(at[2]) - floor, room):
             if len(tried) == TRIED:
                 return
             if any(abs(forward - other) < 0.02 and abs(ahead - foot) < 0.02 for other, foot in tried):
@@ -137,7 +123,7 @@ class Sitter:
                 if self._rolls:
                     buttocks = rolling_front(buttocks, BUTTOCK_RADIUS * size)
                 tried.append((forward, ahead))
-                yield Sitting({"buttocks": buttocks, **feet[row]}, self._guess(buttocks, heading), cost)
+                yield {"buttocks": buttocks, **feet[row]}, self._guess(buttocks, heading)
 
     def _feet(self, middle: FloatArray, heading: float) -> dict[str, Contact]:
         """Footholds beside a place (3,) between the feet, as far as there are any close enough."""
@@ -149,8 +135,8 @@ class Sitter:
                 found[foot] = contact
         return found
 
-    def _compared(self, height: float, room: float) -> list[tuple[float, float, float]]:
-        """Cost, way of the buttocks forward and place of the soles before them [m], the cheapest first.
+    def _compared(self, height: float, room: float) -> list[tuple[float, float]]:
+        """Way of the buttocks forward and place of the soles before them [m], the cheapest first.
 
         Args:
             height: Of the seat above the floor [m].
@@ -177,12 +163,10 @@ class Sitter:
             (np.abs(drop) < self._thigh) & (over >= 0.0) & (calf >= CALF_ROOM) & (room - forward >= half)
         )
         order = np.argsort(cost, kind="stable")
-        return [
-            (float(cost[k]), float(forward[k]), float(ahead[k] + toes)) for k in order.tolist() if possible[k]
-        ]
+        return [(float(forward[k]), float(ahead[k] + toes)) for k in order.tolist() if possible[k]]
 
     def _guess(self, buttocks: Contact, heading: float) -> FloatArray:
-        q = self._body.posture({**self._body.standing_angles, **_of_both_sides(self._body, _SITTING)})
+        q = self._body.posture({**self._body.standing_angles, **of_both_sides(self._body, _SITTING)})
         q[3:7] = [0.0, 0.0, np.sin(0.5 * heading), np.cos(0.5 * heading)]
         q[:3] += buttocks.position - Configuration(self._body, q).effector_placement("buttocks")[1]
         return q
@@ -191,8 +175,8 @@ class Sitter:
 _SITTING = {"hip_flexion": 1.4, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1}
 
 
-def _of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
-    """Angles by the full names of a body's hinges."""
+def of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
+    """Angles by the full names of a body's hinges, of both sides where a name has none."""
     return {name: value for name in body.joint_names for key, value in angles.items() if name.endswith(key)}
 
 

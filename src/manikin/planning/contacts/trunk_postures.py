@@ -14,7 +14,7 @@ expended while walking in stooping postures", Brit. J. Industr. Med. 12, 1955); 
 Arms close and a turned trunk are our choice.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -30,6 +30,7 @@ from manikin.errors import BodyError
 from manikin.kinematics import PostureProblem, SolverSettings, com_target, generate_posture, touching_pairs
 from manikin.kinematics.fold import FEET_APART
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw, turned_root
+from manikin.planning.contacts.seat import of_both_sides
 from manikin.scene import Box, Obstacle, Proximity, Scene
 from manikin.scene.collision import CollisionPart, Meter, collision_parts, local_box, part_meter, shape_of
 from manikin.scene.covering import cover
@@ -199,13 +200,11 @@ def _feet(body: BodyModel) -> Iterator[Contact]:
         yield sole(effector, (0.0, y, 0.0), 0.0, length=body.sole_length, width=body.sole_width, friction=0.7)
 
 
-def _with(body: BodyModel, q: FloatArray, angles: Mapping[str, float]) -> FloatArray:
+def _with(body: BodyModel, q: FloatArray, angles: dict[str, float]) -> FloatArray:
     """A posture with hinges at angles [rad], of both sides where the name has none."""
     out = np.array(q)
-    for number, name in enumerate(body.joint_names):
-        plain = name.removeprefix("left_").removeprefix("right_")
-        if name in angles or plain in angles:
-            out[7 + number] = angles.get(name, angles.get(plain, 0.0))
+    for name, angle in of_both_sides(body, angles).items():
+        out[7 + body.joint_index(name)] = angle
     return out
 
 

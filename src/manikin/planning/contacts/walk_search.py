@@ -24,12 +24,11 @@ from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
-from manikin.planning.contacts.endpoint import FEET
-from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.planning.contacts.footholds import FEET, Foothold, Footholds, feet_of
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.limb_places import stature_of
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 from manikin.planning.contacts.seat import leave_seat
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.scene import Scene
@@ -71,21 +70,13 @@ class WalkSettings(Paces):
     grasp_force: float = 400.0
 
 
-@dataclass
 class BodyRoom:
-    """Room for the trunk of a body between its feet, in one of a few postures.
+    """Room for the trunk of a body between its feet, in one of a few postures."""
 
-    Attributes:
-        body: The body.
-        scene: What is around it.
-    """
-
-    body: BodyModel
-    scene: Scene
-
-    def __post_init__(self) -> None:
-        self._postures = TrunkPostures.of(self.body)
-        self._clearance = TrunkClearance(self._postures, self.scene)
+    def __init__(self, body: BodyModel, scene: Scene) -> None:
+        """Prepare a scene."""
+        self._postures = TrunkPostures.of(body)
+        self._clearance = TrunkClearance(self._postures, scene)
         self._costs = self._postures.costs - 1.0
 
     def cost(self, left: Foothold, right: Foothold) -> float:
@@ -152,10 +143,10 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         self._kept: list[Contact] = []
         self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
+        ends = feet_of(start.contacts), feet_of(goal.contacts)
         self.search = FootstepSearch(
-            scene, self._footholds, self._holds(start), self._holds(goal), scale, StepReach.of(body),
-            self._pair_cost, (radius, low, high), self.settings.stride,
-            HELD_HIGHEST if self._handholds.exist else HIGHEST,
+            scene, self._footholds, *ends, scale, StepReach.of(body), self._pair_cost, (radius, low, high),
+            self.settings.stride, HELD_HIGHEST if self._handholds.exist else HIGHEST,
         )  # fmt: skip
         for number, (stage, foot) in enumerate((s, f) for s in (start, goal) for f in FEET):
             self._contacts[foot, number] = stage.contacts[foot]
@@ -163,7 +154,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _best(self) -> list[int] | str:
         if not self._risen:
-            upright = self._room.guide(0, *self._holds(self.start))
+            upright = self._room.guide(0, *feet_of(self.start.contacts))
             leaving = leave_seat(self.poser, self.start, frozenset(FEET), upright)
             if leaving.failure is not None:
                 self.reasons[leaving.failure] += 1
@@ -184,10 +175,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             return ""
         place = self.search.farthest()[1].position
         return f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
-
-    def _holds(self, stage: Stage) -> tuple[Foothold, Foothold]:
-        left, right = (stage.contacts[foot] for foot in FEET)
-        return Foothold.of(left), Foothold.of(right)
 
     def _contact(self, foot: str, number: int) -> Contact:
         key = foot, number
@@ -294,9 +281,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             return
         start = bare[-1].q if bare else q
         holds = self._holds_near(before, after)
-        pairs = [
-            pair for pair in combinations(holds[: HOLDS // 2], 2) if pair[0].effector != pair[1].effector
-        ]
+        pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector != b.effector]
         for contacts in [*((hold,) for hold in holds), *pairs[:2]]:
             stages, held, at = list(bare), dict[str, Contact](), start
             for contact in contacts:
@@ -307,9 +292,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
                     self.reasons[f"{contact.effector} cannot be put down: {posed.reason}"] += 1
                     break
                 at = posed.q
-                stages.append(
-                    Stage.of(self.poser.body, {**standing, **held}, at, self.settings.reach_duration)
-                )
+                stages.append(self._reached({**standing, **held}, at))
             else:
                 yield stages, held, at
 
@@ -355,10 +338,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if key in self._postures:
             return self._postures[key]
         guide, feet_alone = self._guide(place), set(held) <= set(FEET)
-        flat = {
-            name: Placement(None, contact.rotation_contact_to_world, 0.05)
-            for name, contact in held.items() if contact.kind is ContactKind.POINT
-        }  # fmt: skip
+        flat = upright_points(held)
         posed = self.poser.pose(held, carrying, q, guide, placements=flat)
         if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
@@ -380,10 +360,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         """
         assert posed.q is not None
         body, stance, q = self.poser.body, Stance(list(carrying.values())), posed.q
-        lower, upper = (
-            body.lower + self.poser.settings.range_margin,
-            body.upper - self.poser.settings.range_margin,
-        )
+        margin = self.poser.settings.range_margin
+        lower, upper = body.lower + margin, body.upper - margin
         share, slope = torque_share_gradient(body, q, stance)
         size = 1.0
         for _ in range(EASIER_MOVES):
@@ -411,11 +389,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             else:
                 size *= 0.4
         if share > 1.0 and self.replanned < STRONG_TRIES:
-            return Posed(
-                None,
-                f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength",
-                too_hard=True,
-            )
+            why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
+            return Posed(None, why, too_hard=True)
         return Posed(q)
 
 
