@@ -9,7 +9,7 @@ A pair without a posture is closed, and the search goes on with the next best wa
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -70,6 +70,25 @@ class WalkSettings(Paces):
     grasp_force: float = 400.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Two footholds, and the number of the trunk's posture between them."""
+
+    left: Foothold
+    right: Foothold
+    trunk: int = 0
+
+    @property
+    def between(self) -> FloatArray:
+        """(4,) x, y and height of the ground [m] and heading [rad] between the feet."""
+        left, right = self.left, self.right
+        yaw = math.atan2(math.sin(left.yaw) + math.sin(right.yaw), math.cos(left.yaw) + math.cos(right.yaw))
+        middle = 0.5 * (left.position + right.position)
+        low = min(float(left.position[2]), float(right.position[2]))
+        # A foot that stands high folds its leg; the body is as high as the other one lets it.
+        return np.array([middle[0], middle[1], low + 0.4 * (float(middle[2]) - low), yaw])
+
+
 class BodyRoom:
     """Room for the trunk of a body between its feet, in one of a few postures."""
 
@@ -79,37 +98,28 @@ class BodyRoom:
         self._clearance = TrunkClearance(self._postures, scene)
         self._costs = self._postures.costs - 1.0
 
-    def cost(self, left: Foothold, right: Foothold) -> float:
+    def cost(self, place: _Place) -> float:
         """Cost of a step in the cheapest posture that is free, beyond upright [s]; infinite without one."""
-        place = self._place(left, right)
-        number = int(self._clearance.cheapest(place[None])[0])
+        number = int(self._clearance.cheapest(place.between[None])[0])
         return STEP * float(self._costs[number]) if number >= 0 else math.inf
 
-    def postures(self, pairs: Sequence[tuple[Foothold, Foothold]]) -> NDArray[np.int64]:
-        """(k,) postures to take one after the other between pairs of footholds, left and right.
+    def postures(self, places: Sequence[_Place]) -> NDArray[np.int64]:
+        """(k,) postures to take one after the other at places.
 
-        Where no sequence of them passes, the cheapest that is free at each pair, upright where none is.
+        Where no sequence of them passes, the cheapest that is free at each place, upright where none is.
         """
-        places = np.array([self._place(*pair) for pair in pairs])
-        along = self._clearance.along(places)
-        return np.maximum(self._clearance.cheapest(places), 0) if along is None else along
+        between = np.array([place.between for place in places])
+        along = self._clearance.along(between)
+        return np.maximum(self._clearance.cheapest(between), 0) if along is None else along
 
-    def guide(self, number: int, left: Foothold, right: Foothold) -> FloatArray:
+    def guide(self, place: _Place) -> FloatArray:
         """Guide of a posture there, on level ground: (7,) pose of the root upright, else the (nq,) whole.
 
         Upright arms hang as the manner wants; otherwise they have to be where the posture has room for them.
         """
-        posture = self._postures[number]
-        q = posture.at(self._place(left, right))
+        posture = self._postures[place.trunk]
+        q = posture.at(place.between)
         return q[:7] if posture.cost <= 1.0 else q
-
-    def _place(self, left: Foothold, right: Foothold) -> FloatArray:
-        """(4,) x, y and height of the ground [m] and heading [rad] between two feet."""
-        yaw = math.atan2(math.sin(left.yaw) + math.sin(right.yaw), math.cos(left.yaw) + math.cos(right.yaw))
-        middle = 0.5 * (left.position + right.position)
-        low = min(float(left.position[2]), float(right.position[2]))
-        # A foot that stands high folds its leg; the body is as high as the other one lets it.
-        return np.array([middle[0], middle[1], low + 0.4 * (float(middle[2]) - low), yaw])
 
 
 class WalkSearch(PosedSearch[int, tuple[int, int]]):
@@ -154,7 +164,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _best(self) -> list[int] | str:
         if not self._risen:
-            upright = self._room.guide(0, *feet_of(self.start.contacts))
+            upright = self._room.guide(_Place(*feet_of(self.start.contacts)))
             leaving = leave_seat(self.poser, self.start, frozenset(FEET), upright)
             if leaving.failure is not None:
                 self.reasons[leaving.failure] += 1
@@ -164,8 +174,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if way is not None:
             return way
         why = self.search.walled_off()
-        walled = f"the goal is walled off from the start: {why}"
-        return "no footsteps lead to the goal" if why is None else walled
+        return f"the goal is walled off from the start: {why}" if why else "no footsteps lead to the goal"
 
     def _close(self, move: tuple[int, int]) -> None:
         self.search.refuse(*move)
@@ -177,18 +186,22 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
 
     def _contact(self, foot: str, number: int) -> Contact:
-        key = foot, number
-        if key not in self._contacts:
-            self._contacts[key] = self._footholds.contact(foot, self.search.holds[number], self.friction)
-        return self._contacts[key]
+        if (foot, number) not in self._contacts:
+            hold = self.search.holds[number]
+            self._contacts[foot, number] = self._footholds.contact(foot, hold, self.friction)
+        return self._contacts[foot, number]
 
     def _planned(self, way: list[int]) -> ContactPlan | None:
         stages = list(self._risen)
         self._moves = [None] * len(stages)
         feet = FEET if way[0] == 0 else (FEET[1], FEET[0])
         names = [feet[k % 2] for k in range(len(way))]
-        places = [_Place(*self._pair(names[k], way[k : k + 2]), 0) for k in range(len(way) - 1)]
-        trunks = self._room.postures([(place.left, place.right) for place in places]).tolist()
+        holds = [self.search.holds[number] for number in way]
+        places = [
+            _Place(one, other) if name == FEET[0] else _Place(other, one)
+            for name, (one, other) in zip(names[:-1], pairwise(holds), strict=True)
+        ]
+        trunks = self._room.postures(places).tolist()
         q, hands, body = stages[-1].q, dict[str, Contact](), self.poser.body
         for k in range(len(way) - 2):
             leaving, standing, landing = (self._contact(names[k + j], way[k + j]) for j in range(3))
@@ -217,7 +230,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             self.reasons[f"at the goal: {posed.reason}"] += 1
             self.search.close(way[-2], way[-1])
             return None
-        return ContactPlan.of(self.poser.body, stages, posed.q, self.settings.hinge_pace)
+        return ContactPlan.of(body, stages, posed.q, self.settings.hinge_pace)
 
     def _refuse(self, stand: int, step: int, reason: str, *, too_hard: bool = False) -> None:
         self.reasons[reason] += 1
@@ -229,31 +242,26 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         else:
             self.search.refuse(stand, step)
 
-    def _pair(self, first: str, numbers: Sequence[int]) -> tuple[Foothold, Foothold]:
-        """Left and right of two footholds, the first of which is one foot's."""
-        one, other = (self.search.holds[number] for number in numbers)
-        return (one, other) if first == FEET[0] else (other, one)
-
     def _pair_cost(self, left: Foothold, right: Foothold) -> float:
         """Cost of the trunk's room, and of hands where feet alone do not make the step."""
-        cost = self._room.cost(left, right)
+        place = _Place(left, right)
+        cost = self._room.cost(place)
         rise = abs(float(left.position[2] - right.position[2]))
         if rise <= HIGHEST * self._scale or not math.isfinite(cost):
             return cost
-        place = _Place(left, right, 0)
         return cost + HELD_COST if self._holds_near(place, place) else math.inf
 
-    def _holds_near(self, before: "_Place", after: "_Place") -> list[Contact]:
+    def _holds_near(self, before: _Place, after: _Place) -> list[Contact]:
         holds = before.left, before.right, after.left, after.right
         key = *map(id, holds), before.trunk, after.trunk
         if key not in self._near:
-            roots = [self._guide(place)[:7] for place in (before, after)]
+            roots = [self._room.guide(place)[:7] for place in (before, after)]
             ground = min(float(hold.position[2]) for hold in holds)
             self._near[key] = self._handholds.near(roots, ground, HOLDS)
         return self._near[key]
 
     def _moved(
-        self, feet: Sequence[Contact], before: "_Place", after: "_Place", hands: dict[str, Contact],
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
         q: FloatArray,
     ) -> "tuple[list[Stage], dict[str, Contact], _Step]":  # fmt: skip
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
@@ -266,7 +274,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return [], hands, first or _Step(None, None, f"{' and '.join(hands)} cannot be left")
 
     def _hands_before(
-        self, feet: Sequence[Contact], before: "_Place", after: "_Place", hands: dict[str, Contact],
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
         q: FloatArray,
     ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:  # fmt: skip
         """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
@@ -297,7 +305,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
                 yield stages, held, at
 
     def _left(
-        self, contacts: Mapping[str, Contact], place: "_Place", hands: Mapping[str, Contact], q: FloatArray
+        self, contacts: Mapping[str, Contact], place: _Place, hands: Mapping[str, Contact], q: FloatArray
     ) -> list[Stage] | None:
         """Stages in which hands leave one after the other; None where they cannot."""
         held, stages = dict(contacts), list[Stage]()
@@ -314,7 +322,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return Stage.of(self.poser.body, contacts, q, self.settings.reach_duration)
 
     def _step(
-        self, feet: Sequence[Contact], before: "_Place", after: "_Place", q: FloatArray,
+        self, feet: Sequence[Contact], before: _Place, after: _Place, q: FloatArray,
         hands: Mapping[str, Contact],
     ) -> "_Step":  # fmt: skip
         """Postures in which a foot leaves one place and lands on another, the other one stands."""
@@ -327,17 +335,14 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         why = f"{landing.effector} cannot be put down: {landed.reason}"
         return _Step(lifted.q, landed.q, why if landed.q is None else "", landed.too_hard)
 
-    def _guide(self, place: "_Place") -> FloatArray:
-        return self._room.guide(place.trunk, place.left, place.right)
-
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: "_Place", q: FloatArray
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: _Place, q: FloatArray
     ) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
         key = frozenset(map(id, held.values())), frozenset(carrying), place.trunk
         if key in self._postures:
             return self._postures[key]
-        guide, feet_alone = self._guide(place), set(held) <= set(FEET)
+        guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
         flat = upright_points(held)
         posed = self.poser.pose(held, carrying, q, guide, placements=flat)
         if posed.q is None and (feet_alone or len(held) > 2):
@@ -392,15 +397,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
             return Posed(None, why, too_hard=True)
         return Posed(q)
-
-
-@dataclass(frozen=True, eq=False)
-class _Place:
-    """Two footholds, and the number of the trunk's posture between them."""
-
-    left: Foothold
-    right: Foothold
-    trunk: int
 
 
 @dataclass(frozen=True, eq=False)
