@@ -80,13 +80,9 @@ def footprint(
 
 
 def make_contact(
-    body: BodyModel,
-    limb: Limb,
-    kind: ContactKind,
-    position: FloatArray,
-    rotation: FloatArray,
+    body: BodyModel, limb: Limb, kind: ContactKind, position: FloatArray, rotation: FloatArray,
     rules: ContactRules,
-) -> Contact:
+) -> Contact:  # fmt: skip
     """Contact of a limb's effector.
 
     Args:

@@ -23,7 +23,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.candidates import IntArray, Situation
 from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene, segment_of
-from manikin.scene.collision import CollisionPart, collision_parts
+from manikin.scene.collision import CollisionPart, collision_parts, local_box
 
 TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]
 YIELD = 0.8
@@ -44,6 +44,7 @@ class LimbCollisions:
     Attributes:
         shapes: All geometries, those of the body first.
         pairs: (p, 2) numbers of the limb's shape and of the other one of each pair.
+        names: What the shapes of each pair are called: that of the body, and the obstacle or other shape.
         active: (p,) which pairs may touch in the situation that was begun.
         soft: Segments that give way in what the limb touches.
     """
@@ -52,7 +53,11 @@ class LimbCollisions:
         self._model = body.pinocchio
         self._data = self._model.createData()
         parts = [part for obstacle in scene for part in collision_parts(obstacle)]
-        self._shapes = _with_scene(body, parts)
+        self._shapes: Any = body.geometry.copy()
+        for number, part in enumerate(parts):
+            place = pin.SE3(np.array(part.rotation), np.array(part.translation))
+            name = f"{part.obstacle}#{number}"
+            self._shapes.addGeometryObject(pin.GeometryObject(name, 0, 0, place, part.geometry))
         moving = moving_segments(body, limb)
         count = len(body.geometry.geometryObjects)
         names = [item.name for item in self._shapes.geometryObjects]
@@ -66,21 +71,21 @@ class LimbCollisions:
             self._shapes.addCollisionPair(pin.CollisionPair(*pair))
         self._placed = pin.GeometryData(self._shapes)
         self._results = list(self._placed.collisionResults)  # references: making one takes longer
-        self._names = [(names[a], names[b].rsplit("#", 1)[0]) for a, b in outer]
+        self.names = [(names[a], names[b].rsplit("#", 1)[0]) for a, b in outer]
         self.soft, self._depth = yielding(body, limb)
         self._yielding: dict[str, list[int]] = {}
-        for number, (shape, obstacle) in enumerate(self._names):
+        for number, (shape, obstacle) in enumerate(self.names):
             self._placed.collisionRequests[number].security_margin = -TOUCH
             if segment_of(shape) in self.soft:
                 self._yielding.setdefault(obstacle, []).append(number)
-        self._names += [(names[a], names[b]) for a, b in inner]
+        self.names += [(names[a], names[b]) for a, b in inner]
         self._touched: tuple[str, ...] = ()
         self._far = FarPairs(body, limb, parts, self._shapes, self._placed, outer + inner)
-        self.active: NDArray[np.bool_] = np.ones(len(self._names), dtype=bool)
+        self.active: NDArray[np.bool_] = np.ones(len(self.names), dtype=bool)
         self.pairs = np.array(outer + inner, dtype=np.int64).reshape(-1, 2)
         self.shapes = list(self._shapes.geometryObjects)
         self._places = list(self._placed.oMg)
-        self._tested = list(zip(self._names, self._results, strict=True))
+        self._tested = list(zip(self.names, self._results, strict=True))
 
     def begin(self, situation: Situation) -> None:
         """Leave out what the limb cannot reach wherever its joints are, until the next call."""
@@ -93,17 +98,13 @@ class LimbCollisions:
         for number in np.flatnonzero(self.active & ~near).tolist():
             self._placed.deactivateCollisionPair(number)
         self.active = near
-        self._tested = [(self._names[number], self._results[number]) for number in np.flatnonzero(near)]
+        self._tested = [(self.names[number], self._results[number]) for number in np.flatnonzero(near)]
 
     def placements(self, numbers: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
         """Axes (n, 3, 3) and origins (n, 3) of some shapes in the world, as the situation began [m]."""
         frames = [self._places[number] for number in numbers.tolist()]
         turns = np.array([item.rotation for item in frames]).reshape(-1, 3, 3)
         return turns, np.array([item.translation for item in frames]).reshape(-1, 3)
-
-    def names(self, number: int) -> tuple[str, str]:
-        """What the shapes of a pair are called: that of the body, and the obstacle or other shape."""
-        return self._names[number]
 
     def first(self, q: FloatArray, touched: tuple[str, ...] = ()) -> tuple[str, str] | None:
         """Shape of the body, and obstacle or other shape, of the first pair that collides, or None.
@@ -168,16 +169,6 @@ class FarPairs:
         return self._gaps[self._others] <= self._reach
 
 
-def _with_scene(body: BodyModel, parts: Sequence[CollisionPart]) -> Any:
-    """Copy of the body's geometry with the obstacles fixed to the world."""
-    shapes = body.geometry.copy()
-    for number, part in enumerate(parts):
-        place = pin.SE3(np.array(part.rotation), np.array(part.translation))
-        name = f"{part.obstacle}#{number}"
-        shapes.addGeometryObject(pin.GeometryObject(name, 0, 0, place, part.geometry))
-    return shapes
-
-
 def _reaches(body: BodyModel, limb: Limb) -> dict[str, float]:
     """Largest distance of each of the limb's shapes from the limb's origin, by the shape's name [m]."""
     along = {limb.segments[0]: 0.0}
@@ -200,9 +191,8 @@ def _extent(shape: Shape) -> float:
 
 def _radius(item: pin.GeometryObject) -> float:
     """Radius of a ball around the origin of a geometry [m]."""
-    item.geometry.computeLocalAABB()
-    box = item.geometry.aabb_local
-    return float(np.linalg.norm(np.maximum(np.abs(box.min_), np.abs(box.max_))))
+    low, high = local_box(item.geometry)
+    return float(np.linalg.norm(np.maximum(np.abs(low), np.abs(high))))
 
 
 def yielding(body: BodyModel, limb: Limb) -> tuple[tuple[str, ...], float]:

@@ -371,17 +371,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         costs = self._frame_costs(states) if states else np.zeros(0)
         moves = [
             (after, step + cost)
-            for after, step, cost in zip(states, steps, costs.tolist(), strict=True)
-            if math.isfinite(cost)
-        ]
+            for after, step, cost in zip(states, steps, costs.tolist(), strict=True) if math.isfinite(cost)
+        ]  # fmt: skip
         # A limb that is still free comes first ([Tonneau2015]_ 7.2), as long as it finds a place.
         whole = all(self._held(k, row) for k, row in enumerate(state))
-        fills = [not whole and self._fills(state, after) for after, _ in moves]
-        first = [item for item, fill in zip(moves, fills, strict=True) if fill]
-        self._later[state] = (
-            [item for item, fill in zip(moves, fills, strict=True) if not fill] if first else []
-        )
-        self._next[state] = first or moves
+        fills = {after for after, _ in moves if not whole and self._fills(state, after)}
+        self._later[state] = [item for item in moves if item[0] not in fills] if fills else []
+        self._next[state] = [item for item in moves if item[0] in fills] or moves
         return self._next[state]
 
     def _tested(self, before: State, after: State) -> float:
@@ -513,34 +509,30 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             k = self._moved(before, after)
             name, held, landed = self.holds[k].effector, self._contacts_of(before), self._contacts_of(after)
             staying = {other: contact for other, contact in held.items() if other != name}
-            lifted = self._posed(
-                held, staying, self._guesses(self._guide(before), stages[-1].q), (before, k, False)
-            )
+            guesses = self._guesses(self._guide(before), stages[-1].q)
+            lifted = self._posed(held, staying, guesses, (before, k, False))
             if lifted.q is None:
                 self._stuck.add((before, k))
                 return self._refused(before, after, f"{name} cannot leave its contact: {lifted.reason}")
-            if after[k] == FREE:
-                stages.append(Stage.of(body, staying, lifted.q, self.settings.shift_duration))
-                self._moves.append((before, after))
-                continue
-            guesses = self._guesses(self._guide(after), lifted.q, (self.holds[k], landed[name]))
-            landing = self._posed(landed, staying, guesses, (after, k, True))
-            if landing.q is None:
-                return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
-            old = held.get(name)
-            if old is None:
-                # The limb is free already: it reaches its contact while the phase before lasts.
-                longest = max(stages[-1].min_duration, self.settings.swing_duration)
-                stages[-1] = replace(stages[-1], min_duration=longest)
-            else:
-                via = self._between(staying, lifted.q, landing.q, (old, landed[name]), (before, after))
-                if via is None:
-                    return self._refused(before, after, f"{name} finds no way around")
-                flight = self.settings.flight(old, landed[name])
-                stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
-                self._moves.append((before, after))
-            stages.append(Stage.of(body, landed, landing.q, self.settings.shift_duration))
-            self._moves.append((before, after))
+            old, new, q = held.get(name), landed.get(name), lifted.q
+            if new is not None:
+                guesses = self._guesses(self._guide(after), q, (self.holds[k], new))
+                landing = self._posed(landed, staying, guesses, (after, k, True))
+                if landing.q is None:
+                    return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
+                q = landing.q
+                if old is None:
+                    # The limb is free already: it reaches its contact while the phase before lasts.
+                    longest = max(stages[-1].min_duration, self.settings.swing_duration)
+                    stages[-1] = replace(stages[-1], min_duration=longest)
+                else:
+                    via = self._between(staying, lifted.q, q, (old, new), (before, after))
+                    if via is None:
+                        return self._refused(before, after, f"{name} finds no way around")
+                    flight = self.settings.flight(old, new)
+                    stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
+            stages.append(Stage.of(body, landed, q, self.settings.shift_duration))
+            self._moves += [(before, after)] * (len(stages) - len(self._moves))
         contacts = stages[-1].contacts
         end = self.poser.pose(contacts, contacts, stages[-1].q, self.goal)
         end = within_strength(body, end, contacts)
@@ -565,10 +557,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         back, roots = pin.XYZQUATToSE3(guide).rotation[:, 0], [guide]
         if self.settings.retreats:
             roots.append(q[:7])
-        roots += [
-            np.concatenate([guide[:3] - away * self.size * back, guide[3:7]])
-            for away in self.settings.retreats
-        ]
+        for away in self.settings.retreats:
+            roots.append(np.concatenate([guide[:3] - away * self.size * back, guide[3:7]]))
         for root in roots:
             yield root, q if landing is None else landing[0].stretched(q, root, landing[1], self._state)
 

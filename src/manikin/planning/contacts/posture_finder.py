@@ -95,12 +95,9 @@ class PostureFinder:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        reference: FloatArray | None = None,
+        self, body: BodyModel, scene: Scene, reference: FloatArray | None = None,
         settings: PostureFinderSettings | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Prepare a scene.
 
         Args:

@@ -151,14 +151,9 @@ def manipulability(products: FloatArray) -> FloatArray:
 
 
 def sample_limb(
-    body: BodyModel,
-    limb: Limb,
-    rng: np.random.Generator,
-    count: int = 10_000,
-    threshold: float = THRESHOLD,
-    *,
-    natural: bool = False,
-) -> LimbSamples:
+    body: BodyModel, limb: Limb, rng: np.random.Generator, count: int = 10_000,
+    threshold: float = THRESHOLD, *, natural: bool = False,
+) -> LimbSamples:  # fmt: skip
     """Draw configurations of a limb within its range of motion and keep those far from singular.
 
     The ratio that EFORT builds on grows without bound towards singular configurations, so those with
@@ -224,13 +219,9 @@ def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
 
 
 def sample_limbs(
-    body: BodyModel,
-    rng: np.random.Generator,
-    count: int = 10_000,
-    threshold: float = THRESHOLD,
-    *,
+    body: BodyModel, rng: np.random.Generator, count: int = 10_000, threshold: float = THRESHOLD, *,
     natural: bool = False,
-) -> dict[str, LimbSamples]:
+) -> dict[str, LimbSamples]:  # fmt: skip
     """Samples of every limb by its name; mirrored limbs share one set, reflected.
 
     The arguments are those of :func:`sample_limb`.
