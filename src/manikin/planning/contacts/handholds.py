@@ -61,10 +61,9 @@ class Handholds:
         size, offers = self._size, list[tuple[float, Contact]]()
         for hand, side in zip(HANDS, (1.0, -1.0), strict=True):
             frames = [(root[:3], rotation_from_yaw(heading_of(root))) for root in roots]
+            mirror = np.array([1.0, side, 1.0])
             wanted, shoulders = (
-                np.array(
-                    [place + size * turn @ (np.array(away) * [1.0, side, 1.0]) for place, turn in frames]
-                )
+                np.array([place + size * turn @ (np.array(away) * mirror) for place, turn in frames])
                 for away in (WANTED, SHOULDER)
             )
             for contact in self._around(hand, wanted.mean(axis=0), frames[0], ground):
@@ -88,11 +87,9 @@ class Handholds:
         self, hand: str, wanted: FloatArray, frame: tuple[FloatArray, FloatArray], ground: float
     ) -> list[Contact]:
         """Contacts of a hand around a place (3,) of a body whose root has a place and heading."""
-        root, turn = frame
-        found: list[Contact] = []
+        (root, turn), found = frame, list[Contact]()
         for bar in self._bars:
-            along = bar.end - bar.start
-            along = along / max(float(np.linalg.norm(along)), 1e-9)
+            along = (bar.end - bar.start) / max(bar.length, 1e-9)
             for step in (0.0, APART, -APART):
                 middle = bar.nearest(wanted + step * self._size * along)
                 # From above, or from the body's side where the bar is upright.

@@ -69,8 +69,7 @@ class Sitter:
         Raises:
             BodyError: If its legs are not a human's.
         """
-        self._body, self._footholds, self._friction = body, footholds, friction
-        self._rolls = rolls
+        self._body, self._footholds, self._friction, self._rolls = body, footholds, friction, rolls
         self.stature = stature_of(body)
         legs = LegKinematics(body)
         self._thigh, self._shank = legs.thigh, legs.shank
@@ -159,9 +158,8 @@ class Sitter:
         scales = LIKED[0] * size, LIKED[1], LIKED[2] * size
         cost = (forward / scales[0]) ** 2 + ((slope - SHANK_SLOPE) / scales[1]) ** 2 + (gap / scales[2]) ** 2
         half = 0.5 * SEAT_LENGTH * size
-        possible = (
-            (np.abs(drop) < self._thigh) & (over >= 0.0) & (calf >= CALF_ROOM) & (room - forward >= half)
-        )
+        possible = (np.abs(drop) < self._thigh) & (over >= 0.0) & (calf >= CALF_ROOM)
+        possible &= room - forward >= half
         order = np.argsort(cost, kind="stable")
         return [(float(forward[k]), float(ahead[k] + toes)) for k in order.tolist() if possible[k]]
 
@@ -204,11 +202,7 @@ SEAT_OFF_ROOM = (0.01, 0.01, 0.002)  # where the seat is left at rest [m]: a tru
 
 @dataclass(frozen=True, eq=False)
 class Leaving:
-    """The stages from a seat to standing on feet, or why there are none.
-
-    Attributes:
-        stages: From the start on; only that where the body does not sit.
-    """
+    """The stages from a seat to standing on feet, from the start on, or why there are none but that."""
 
     stages: tuple[Stage, ...]
     failure: str | None = None
@@ -236,36 +230,24 @@ def leave_seat(
         return _pushed_up(poser, start, pushing, held, risen.q)
     failure = None
     for lean in _leans(poser, start, held, risen.q):
-        if lean.q is not None and lean.failure is None:
-            return _rising(poser, start, [(held, lean.q, lean.momentum)], risen.q)
-        failure = lean.failure
+        if not isinstance(lean, str):
+            return _rising(poser, start, [(held, *lean)], risen.q)
+        failure = lean
     return Leaving((start,), failure)
 
 
-@dataclass(frozen=True, eq=False)
-class _Lean:
-    """A posture in which a seat is left for the feet, or why not there.
-
-    Attributes:
-        q: (nq,) or None.
-        momentum: Its motion; None at rest.
-        failure: None, or the reason in one line.
-    """
-
-    q: FloatArray | None
-    momentum: Momentum | None = None
-    failure: str | None = None
+_Lean = tuple[FloatArray, Momentum | None] | str
+"""Posture (nq,) in which a seat is left for the feet, with its motion, None at rest; or why not there."""
 
 
 def _leans(
     poser: PostureFinder, start: Stage, held: Mapping[str, Contact], risen: FloatArray
 ) -> Iterator[_Lean]:
     """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
-    body = poser.body
-    rest = Configuration(body, risen).com
+    rest = Configuration(poser.body, risen).com
     over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSETS[-1])
     if over is None:
-        yield _Lean(None, failure=f"{', '.join(held)} cannot carry the body at rest")
+        yield f"{', '.join(held)} cannot carry the body at rest"
         return
     for inset in SEAT_OFF_INSETS[:-1]:
         farther = poser.resting_place(held, start.com[:2], inset)
@@ -285,10 +267,10 @@ def _leans(
     # The farthest lean, wherever that is.
     posed = poser.pose(start.contacts, held, q, place=over, com_weight=LEAN_WEIGHT)
     if posed.q is None:
-        yield _Lean(None, failure=reason or posed.reason)
+        yield reason or posed.reason
         return
     lean = _lean(poser, posed.q, held, rest, moving=True)
-    yield lean if lean.failure is None else replace(lean, failure=f"{lean.failure}; at rest: {reason}")
+    yield f"{lean}; at rest: {reason}" if isinstance(lean, str) else lean
 
 
 def _lean(
@@ -301,11 +283,9 @@ def _lean(
         momentum = momentum_to_rest(Stance(list(held.values()), model=poser.model), body.mass, com, rest)
         if momentum is None:
             behind = float(np.linalg.norm(com[:2] - rest[:2]))
-            return _Lean(q, failure=(
-                f"a lean leaves the centre of mass {behind:.3f} m behind the middle of the feet, from where "
-                "no speed carries it over them"
-            ))  # fmt: skip
-    return _Lean(q, momentum, _too_weak(poser, q, held, momentum))
+            where = f"{behind:.3f} m behind the middle of the feet"
+            return f"a lean leaves the centre of mass {where}, from where no speed carries it over them"
+    return _too_weak(poser, q, held, momentum) or (q, momentum)
 
 
 def _pushed_up(
@@ -409,9 +389,8 @@ def hand_supports(
             away = np.inf if place is None else float(np.linalg.norm(place - wanted))
             if place is not None and away < best:
                 best = away
-                result[hand] = point(
-                    hand, place, friction=friction, rotation=onto_normal(turn, surface.normal)
-                )
+                frame = onto_normal(turn, surface.normal)
+                result[hand] = point(hand, place, friction=friction, rotation=frame)
     return result
 
 
@@ -453,9 +432,6 @@ def take_seat(poser: PostureFinder, way: ContactPlan, sat: Stage) -> ContactPlan
         return f"cannot sit down: {rising.failure}"
     risen, touch = rising.stages[-1], rising.stages[-2]
     momentum = None if touch.momentum is None else touch.momentum.backwards
-    stages = (
-        *way.stages,
-        Stage.of(body, feet, risen.q, RISING_TIME),
-        Stage.of(body, contacts, touch.q, SETTLING_TIME, SEATED_ROOM, momentum=momentum),
-    )
-    return ContactPlan.of(body, stages, seated.q)
+    up = Stage.of(body, feet, risen.q, RISING_TIME)
+    down = Stage.of(body, contacts, touch.q, SETTLING_TIME, SEATED_ROOM, momentum=momentum)
+    return ContactPlan.of(body, [*way.stages, up, down], seated.q)

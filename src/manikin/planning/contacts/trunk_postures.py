@@ -32,9 +32,8 @@ from manikin.kinematics.fold import FEET_APART
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw, turned_root
 from manikin.planning.contacts.seat import of_both_sides
 from manikin.scene import Box, Obstacle, Proximity, Scene
-from manikin.scene.collision import CollisionPart, Meter, collision_parts, local_box, part_meter, shape_of
+from manikin.scene.collision import Meter, collision_parts, local_box, part_meter, shape_of
 from manikin.scene.covering import cover
-from manikin.scene.obstacle import Capsule
 from manikin.scene.scene import FLOOR
 
 CEILINGS = (0.92, 0.84, 0.76, 0.68, 0.61, 0.55)  # over a folded body [statures]; a duck-walk is the last
@@ -138,7 +137,8 @@ def _postures_of(body: BodyModel) -> TrunkPostures:
 def _narrow(body: BodyModel) -> Iterator[TrunkPosture]:
     """Arms close, and the trunk turned to either side as well."""
     close = _with(body, body.standing_posture(), _ARMS_CLOSE)
-    width = _breadth_of_shoulders(body) + 2.0 * SKIN + 0.01
+    arm = body.segment("left_upper_arm")
+    width = 2.0 * float(arm.origin[1] + max(shape.size[0] for shape in arm.shapes)) + 2.0 * SKIN + 0.01
     found = _between(body, close, width=width)
     if found is None:
         return
@@ -208,12 +208,6 @@ def _with(body: BodyModel, q: FloatArray, angles: dict[str, float]) -> FloatArra
     return out
 
 
-def _breadth_of_shoulders(body: BodyModel) -> float:
-    """Distance between the outer sides of upper arms that hang straight down [m]."""
-    arm = body.segment("left_upper_arm")
-    return 2.0 * float(arm.origin[1] + max(shape.size[0] for shape in arm.shapes))
-
-
 _LEG_PARTS = ("thigh", "leg", "foot", "toes")
 
 
@@ -224,10 +218,9 @@ def _shapes_of_trunk(
     data, geometry = body.pinocchio.createData(), pin.GeometryData(body.geometry)
     pin.updateGeometryPlacements(body.pinocchio, data, body.geometry, geometry, np.asarray(q))
     rows = [
-        row
-        for row, item in enumerate(body.geometry.geometryObjects)
+        row for row, item in enumerate(body.geometry.geometryObjects)
         if not item.name.split("/")[0].endswith(_LEG_PARTS)
-    ]
+    ]  # fmt: skip
     shapes = tuple(body.geometry.geometryObjects[row].geometry for row in rows)
     placed = [geometry.oMg[row] for row in rows]
     return shapes, np.array([m.rotation for m in placed]), np.array([m.translation for m in placed])
@@ -235,12 +228,11 @@ def _shapes_of_trunk(
 
 def _half_extent(shape: coal.CollisionGeometry, rotation: FloatArray) -> FloatArray:
     """(3,) half size of the axis-aligned box around a turned shape [m]."""
-    solid, _ = shape_of(shape)
-    if isinstance(solid, Capsule):
-        return solid.radius + 0.5 * solid.length * np.abs(rotation[:, 2])
-    low, high = local_box(shape)
+    if isinstance(shape, coal.Capsule):
+        return float(shape.radius) + float(shape.halfLength) * np.abs(rotation[:, 2])
     if isinstance(shape, coal.Sphere):
         return np.full(3, float(shape.radius))
+    low, high = local_box(shape)
     return np.abs(rotation) @ (0.5 * (high - low))
 
 
@@ -270,7 +262,8 @@ class TrunkClearance:
         self._origins = np.array([part.rotation.T @ part.translation for part in self._parts]).reshape(-1, 3)
         self._low = np.array([part.low for part in self._parts]).reshape(-1, 3) + self._origins
         self._high = np.array([part.high for part in self._parts]).reshape(-1, 3) + self._origins
-        self._solid = np.array([_fills_its_box(part) for part in self._parts], dtype=bool)
+        fills = [isinstance(part.geometry, (coal.Box, coal.Halfspace)) for part in self._parts]
+        self._solid = np.array(fills, dtype=bool)  # which are all of the box around them
         shapes = [(row, n) for row, item in enumerate(postures) for n in range(len(item.shapes))]
         self._shapes = np.array(shapes, dtype=np.int64)
         self._meters: dict[tuple[int, int], Meter] = {}
@@ -409,11 +402,6 @@ def _turns(headings: FloatArray) -> FloatArray:
     out[:, 0, 0], out[:, 0, 1], out[:, 1, 0], out[:, 1, 1] = cosine, -sine, sine, cosine
     out[:, 2, 2] = 1.0
     return out
-
-
-def _fills_its_box(part: CollisionPart) -> bool:
-    """Whether a part is all of the box around it: a box, or a half-space."""
-    return isinstance(part.geometry, (coal.Box, coal.Halfspace))
 
 
 def _balls(posture: TrunkPosture, number: int) -> tuple[FloatArray, float, float]:
