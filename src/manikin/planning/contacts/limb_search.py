@@ -176,12 +176,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """Prepare a search.
 
         Args:
-            poser: Finds postures.
             holds: Places of each limb that makes contacts.
             start: Contacts and posture at the start; limbs without a contact make one where they can.
             goal: (7,) pose of the root at the goal.
             size: Mean distance that the limbs reach [m].
-            settings: Paces and bounds.
             lead: Finds places (n, 3) of the root on a guide to the goal, None where the straight way is free
                 [m]; asked when a chain of places leads there. The straight way when omitted.
         """
@@ -210,9 +208,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._ahead: dict[State, float] = {}
         self._stuck: set[tuple[State, int]] = set()
         self._dearer: dict[int, FloatArray] = {}  # (n, 2, 3) places of a limb and the root, by limb
-        self._roots: dict[State, FloatArray] = {}
-        self._turns: dict[State, FloatArray] = {}
-        self._onward: dict[State, FloatArray] = {}
+        # Place and rotation of the root, and the place a stride on.
+        self._trunks: dict[State, tuple[FloatArray, FloatArray, FloatArray]] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
         self._beyond: dict[tuple[State, State], float] = {}
         self._resting: dict[tuple[State, int], tuple[tuple[FloatArray, FloatArray] | None, float]] = {}
@@ -243,17 +240,15 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             return f"the goal is walled off from the start: none of {names} has a place within reach of it"
         tree, left = cKDTree(places), np.linalg.norm(places - there, axis=1)
         known = np.arange(len(places)) < len(self.holds)
-        open_ = list(zip(left[known].tolist(), np.flatnonzero(known).tolist(), strict=True))
-        heapq.heapify(open_)
+        open_ = sorted((left[row], row) for row in range(len(self.holds)))
         while open_:
             near, row = heapq.heappop(open_)
             if near <= enough:
                 return ""
             around = np.array(tree.query_ball_point(places[row], self.size))
-            around = around[~known[around]]
-            known[around] = True
-            for item in zip(left[around].tolist(), around.tolist(), strict=True):
-                heapq.heappush(open_, item)
+            for other in around[~known[around]].tolist():
+                known[other] = True
+                heapq.heappush(open_, (left[other], other))
         return f"the goal is walled off from the start: a gap is wider than {self.size:.2f} m"
 
     def _farthest(self) -> str:
@@ -318,9 +313,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         for k, item in enumerate(self.holds if self.settings.retreats else ()):
             near &= ~held[:, k] | (-item.room(there[:, k]) <= self.settings.beyond * self.size)
         ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
-        self._roots.update(zip(states, roots, strict=True))
-        self._turns.update(zip(states, turn, strict=True))
-        self._onward.update(zip(states, onward, strict=True))
+        self._trunks.update(zip(states, zip(roots, turn, onward, strict=True), strict=True))
         for state, left in zip(states, np.where(near, 0.0, ahead + 1e-6).tolist(), strict=True):
             self._ahead.setdefault(state, left)
         return cost
@@ -346,8 +339,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """States after one move, with what it costs."""
         if state in self._next:
             return self._next[state]
-        root, turn, stride = self._roots[state], self._turns[state], self.settings.stride
-        away = self._onward[state] - root
+        (root, turn, onward), stride = self._trunks[state], self.settings.stride
+        away = onward - root
         onward = min(1.0, 0.5 * stride / max(float(np.linalg.norm(away)), 1e-9)) * away
         states: list[State] = []
         steps: list[float] = []
@@ -394,7 +387,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         dearer = self._dearer.get(k)
         if dearer is None or math.isinf(cost):
             return cost
-        place = np.concatenate([self._places[k][after[k]], self._roots[after]]).reshape(2, 3)
+        place = np.concatenate([self._places[k][after[k]], self._trunks[after][0]]).reshape(2, 3)
         away = np.linalg.norm(dearer - place, axis=2)
         return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
 
@@ -429,13 +422,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
         On its way over the limbs that stay the trunk takes the others there.
         """
-        root = self._roots[state]
+        root, turn, _ = self._trunks[state]
         ways = root[:2] + SHARES[:, None] * (middle - root[:2])
         rooms = signed_distance(ways, hull)
         if rooms[0] < -self.settings.sway * self.size:
             return math.inf
         shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
-        local = (self._at(state) - shifted) @ self._turns[state]
+        local = (self._at(state) - shifted) @ turn
         beyond = [-float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])]
         return OVERREACH * max(0.0, *beyond) / self.size
 
@@ -479,7 +472,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         left = [item for item in self._next.get(before, []) if item[0] != after]
         self._next[before] = left or self._later.pop(before, [])
-        place = np.array([[self._at(after)[k], self._roots[after]]])
+        place = np.array([[self._at(after)[k], self._trunks[after][0]]])
         self._dearer[k] = np.vstack([self._dearer.get(k, np.zeros((0, 2, 3))), place])
 
     # --- whole postures -------------------------------------------------------------------------

@@ -70,8 +70,6 @@ class TrunkPosture:
         q: (nq,) posture on feet about the origin of a level floor at z = 0, toes along x.
         cost: Cost of a metre of way in it, relative to upright walking.
         height: Height of its highest point above the ground [m].
-        breadth: Extent of what counts of it across the heading of the feet [m].
-        depth: Extent of it along that heading [m].
         shapes: Shapes that count, of Coal.
         rotations: (n, 3, 3) shape to floor.
         translations: (n, 3) centres of the shapes [m].
@@ -81,8 +79,6 @@ class TrunkPosture:
     q: FloatArray
     cost: float
     height: float
-    breadth: float
-    depth: float
     shapes: tuple[coal.CollisionGeometry, ...]
     rotations: FloatArray
     translations: FloatArray
@@ -98,12 +94,9 @@ class TrunkPosture:
         """Take the shapes of a body in a posture."""
         shapes, rotations, translations = _shapes_of_trunk(body, q)
         reach = [_half_extent(shape, turn) for shape, turn in zip(shapes, rotations, strict=True)]
-        low, high = (translations - reach).min(axis=0), (translations + reach).max(axis=0)
-        return cls(
-            name, frozen_array(q, "trunk posture"), cost, float(high[2]), float(high[1] - low[1]),
-            float(high[0] - low[0]), shapes, frozen_array(rotations, "rotations"),
-            frozen_array(translations, "translations [m]"),
-        )  # fmt: skip
+        top = float((translations + reach).max(axis=0)[2])
+        placed = frozen_array(rotations, "rotations"), frozen_array(translations, "translations [m]")
+        return cls(name, frozen_array(q, "trunk posture"), cost, top, shapes, *placed)
 
 
 class TrunkPostures(tuple[TrunkPosture, ...]):
@@ -256,13 +249,13 @@ class TrunkClearance:
     def __init__(self, postures: TrunkPostures, scene: Scene, margin: float = 0.015) -> None:
         """Prepare a scene."""
         self.postures, self.margin = postures, margin
-        self._parts = tuple(part for item in scene for part in collision_parts(item))
-        self._placed = [coal.Transform3s(part.rotation, part.translation) for part in self._parts]
-        self._axes = np.array([part.rotation for part in self._parts]).reshape(-1, 3, 3)
-        self._origins = np.array([part.rotation.T @ part.translation for part in self._parts]).reshape(-1, 3)
-        self._low = np.array([part.low for part in self._parts]).reshape(-1, 3) + self._origins
-        self._high = np.array([part.high for part in self._parts]).reshape(-1, 3) + self._origins
-        fills = [isinstance(part.geometry, (coal.Box, coal.Halfspace)) for part in self._parts]
+        self._parts = parts = tuple(part for item in scene for part in collision_parts(item))
+        self._placed = [coal.Transform3s(part.rotation, part.translation) for part in parts]
+        self._axes = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
+        origins = np.array([part.rotation.T @ part.translation for part in parts]).reshape(-1, 3)
+        self._low = np.array([part.low for part in parts]).reshape(-1, 3) + origins
+        self._high = np.array([part.high for part in parts]).reshape(-1, 3) + origins
+        fills = [isinstance(part.geometry, (coal.Box, coal.Halfspace)) for part in parts]
         self._solid = np.array(fills, dtype=bool)  # which are all of the box around them
         shapes = [(row, n) for row, item in enumerate(postures) for n in range(len(item.shapes))]
         self._shapes = np.array(shapes, dtype=np.int64)

@@ -136,7 +136,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             start: Contacts and posture at the start; those of no feet are left first.
             goal: Contacts and posture at the goal, on feet.
             friction: Coulomb coefficient of soles and palms.
-            settings: Paces and bounds.
         """
         self.start, self.goal, self.friction = start, goal, friction
         self.settings = settings or WalkSettings()
