@@ -495,7 +495,7 @@ def test_a_sample_is_deep_where_a_ball_along_its_limb_is(person, person_samples)
     collisions.begin(situation)
     rows = np.arange(150)
     found = deep.pairs(deep.around(situation), rows, depth)
-    others = {collisions.names(pair)[1] for pair in found[found >= 0].tolist()}
+    others = {collisions.names[pair][1] for pair in found[found >= 0].tolist()}
     assert others >= {"seat", "ball", "post"}
     assert any("/" in name for name in others)
     shapes = {shape.name: shape for shape in collisions.shapes}
@@ -503,7 +503,7 @@ def test_a_sample_is_deep_where_a_ball_along_its_limb_is(person, person_samples)
     for row, pair in zip(rows.tolist(), found.tolist(), strict=True):
         q[slots] = samples.angles[row]
         state, depths = Configuration(person, q), []
-        for name, other in (collisions.names(number) for number in np.flatnonzero(collisions.active)):
+        for name, other in (collisions.names[number] for number in np.flatnonzero(collisions.active)):
             if name not in deep.shapes or other in (*deep.shapes, "floor"):
                 continue
             capsule = next(s for s in person.segment(name.split("/")[0]).shapes if name.endswith(s.name))
@@ -527,7 +527,7 @@ def test_a_sample_is_deep_where_a_ball_along_its_limb_is(person, person_samples)
             assert (pair >= 0) == (max(depths) > depth)
         if pair >= 0:
             exact = proximity.evaluate(q, activation=0.0)
-            same = [set(names) == set(collisions.names(pair)) for names in exact.pairs]
+            same = [set(names) == set(collisions.names[pair]) for names in exact.pairs]
             assert exact.distance[same].min() < -depth + 1e-6
 
 

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -46,9 +47,7 @@ class Graph(Generic[Node]):
     ) -> tuple[list[Node] | None, list[int]]:
         """Nodes of the best way to a goal, or None, and how many were expanded with each factor.
 
-        Args:
-            starts: Where ways begin.
-            greeds: Factors on the estimate, tried in turn, each with the nodes that may be expanded with it.
+        Each factor on the estimate goes with the nodes that may be expanded with it; they are tried in turn.
         """
         expanded: list[int] = []
         for greed, most in greeds:
@@ -60,11 +59,16 @@ class Graph(Generic[Node]):
 
     def _search(self, starts: Sequence[Node], greed: float, most: int) -> tuple[list[Node] | None, int]:
         """A way with one factor on the estimate, and how many nodes were expanded; fewer than most: all."""
-        open_: list[tuple[float, int, float, Node, Node | None, bool]]
-        open_ = [(greed * self.ahead(node), k, 0.0, node, None, True) for k, node in enumerate(starts)]
-        heapq.heapify(open_)
+        open_: list[tuple[float, int, float, Node, Node | None, bool]] = []
         parents: dict[Node, Node | None] = {}
-        count, expanded = len(open_), 0
+        numbers, expanded = count(), 0
+
+        def push(total: float, node: Node, parent: Node | None, tested: bool) -> None:
+            entry = (total + greed * self.ahead(node), next(numbers), total, node, parent, tested)
+            heapq.heappush(open_, entry)
+
+        for node in starts:
+            push(0.0, node, None, True)
         while open_:
             _, _, cost, node, parent, tested = heapq.heappop(open_)
             if node in parents:
@@ -72,10 +76,7 @@ class Graph(Generic[Node]):
             if not tested and parent is not None:
                 total = cost + self.tested(parent, node)
                 if math.isfinite(total):
-                    count += 1
-                    heapq.heappush(
-                        open_, (total + greed * self.ahead(node), count, total, node, parent, True)
-                    )
+                    push(total, node, parent, True)
                 continue
             parents[node] = parent
             if self.ended(node):
@@ -88,11 +89,7 @@ class Graph(Generic[Node]):
             expanded += 1
             for after, step in self.followers(node):
                 if after not in parents:
-                    count += 1
-                    total = cost + step
-                    heapq.heappush(
-                        open_, (total + greed * self.ahead(after), count, total, after, node, False)
-                    )
+                    push(cost + step, after, node, False)
         return None, min(expanded, most - 1)
 
 
@@ -109,11 +106,6 @@ class Extension:
     searches: int
     backtracks: int
     failure: str | None = None
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether there is a plan."""
-        return self.plan is not None
 
 
 class PosedSearch(ABC, Generic[Node, Move]):
@@ -157,9 +149,8 @@ class PosedSearch(ABC, Generic[Node, Move]):
         return self.poser.searches - self._before
 
     def _failed(self, what: str) -> Extension:
-        most = self.reasons.most_common(1)
-        why = f"; most often: {most[0][0]}" if most else ""
-        return Extension(None, self._searches, self.replanned, f"{what}{self._farthest()}{why}")
+        often = "".join(f"; most often: {reason}" for reason, _ in self.reasons.most_common(1))
+        return Extension(None, self._searches, self.replanned, f"{what}{self._farthest()}{often}")
 
     @abstractmethod
     def _best(self) -> list[Node] | str:
@@ -180,5 +171,5 @@ class PosedSearch(ABC, Generic[Node, Move]):
 
 def heading_of(pose: FloatArray) -> float:
     """Heading of a (7,) pose: direction of its x axis seen from above [rad]."""
-    forward = Rotation.from_quat(pose[3:]).as_matrix()[:, 0]
-    return float(np.arctan2(forward[1], forward[0]))
+    ahead, aside, _ = Rotation.from_quat(pose[3:]).as_matrix()[:, 0]
+    return float(np.arctan2(aside, ahead))

@@ -177,10 +177,7 @@ def find_candidates(
     """Select the samples in contact (step 2, [Tonneau2015]_ 4.3): near the plane and over the polygon.
 
     Args:
-        table: Surfaces of the scene.
-        numbers: Indices of those within reach.
-        situation: Where the limb is.
-        samples: Samples of the limb.
+        numbers: Indices of the surfaces of the table that are within reach.
         tolerance: Largest distance of an effector to the plane, on either side [m].
         max_tilt: Largest angle between the effector's z axis and the normal [rad]; what is
             tilted more cannot be aligned by small moves of the joints.
@@ -213,10 +210,9 @@ def _near_planes(
     table: SurfaceTable, numbers: IntArray, situation: Situation, samples: LimbSamples, tolerance: float,
     max_tilt: float,
 ) -> tuple[IntArray, IntArray, FloatArray]:  # fmt: skip
-    """Samples upright over planes, within the bounds of their polygons; whole leaves of samples first.
+    """Rows of samples upright over planes, within the bounds of their polygons; whole leaves first.
 
-    Returns:
-        Rows of the samples, positions of their surfaces in ``numbers``, heights over the planes [m].
+    With them go the positions of their surfaces in ``numbers``, and the heights over the planes [m].
     """
     leaves, frames = samples.leaves, table.frames[table.group[numbers]]
     shift = frames @ situation.origin

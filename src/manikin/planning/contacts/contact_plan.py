@@ -74,20 +74,15 @@ def footprint(
     if body.sole_length is None or body.sole_width is None:
         raise ContactError(f"body {body.name!r} has no soles; valid: a contact of kind point or grasp")
     if rules is not None and rules.patch is not None:
-        start, end, width = rules.patch
-        side = 0.5 * width
+        start, end, side = *rules.patch[:2], 0.5 * rules.patch[2]
         return np.array([[end, side, 0.0], [end, -side, 0.0], [start, -side, 0.0], [start, side, 0.0]])
     return _RECTANGLE * 0.5 * np.array([body.sole_length, body.sole_width, 0.0])
 
 
 def make_contact(
-    body: BodyModel,
-    limb: Limb,
-    kind: ContactKind,
-    position: FloatArray,
-    rotation: FloatArray,
+    body: BodyModel, limb: Limb, kind: ContactKind, position: FloatArray, rotation: FloatArray,
     rules: ContactRules,
-) -> Contact:
+) -> Contact:  # fmt: skip
     """Contact of a limb's effector.
 
     Args:
@@ -122,15 +117,33 @@ def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
     return turned
 
 
-COM_ROOM = (0.06, 0.06, 0.03)
-"""How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
+COM_ROOM = (0.06, 0.06, 0.03)  # way of the centre of mass off its posture when a phase begins [m]; our choice
 
 
-HINGE_PACE = 1.3
-"""Mean speed of the hinge that turns most between two postures [rad/s]; our choice."""
+HINGE_PACE = 1.3  # mean speed of the hinge that turns most between two postures [rad/s]; our choice
+COM_PACE = 0.4  # mean speed of the centre of mass between two postures [m/s]; our choice
 
-COM_PACE = 0.4
-"""Mean speed of the centre of mass between two postures [m/s]; our choice."""
+
+@dataclass(frozen=True)
+class Paces:
+    """How fast contacts follow one another; the values are our choice.
+
+    Attributes:
+        swing_duration: Shortest flight of a limb [s].
+        swing_speed: Its mean speed on longer ways [m/s].
+        shift_duration: Shortest time between two flights [s].
+        hinge_pace: Mean speed of the hinge that turns most [rad/s].
+    """
+
+    swing_duration: float = 0.7
+    swing_speed: float = 0.7
+    shift_duration: float = 0.35
+    hinge_pace: float = HINGE_PACE
+
+    def flight(self, before: Contact, after: Contact) -> float:
+        """Duration of a limb's flight from one contact to another [s]."""
+        way = float(np.linalg.norm(after.position - before.position))
+        return max(self.swing_duration, way / self.swing_speed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,10 +218,10 @@ class ContactPlan:
 
     def sequence(self, model: ContactModel | None = None) -> StanceSequence:
         """The stances in order, with a contact model; the default one without a cap when omitted."""
-        stances = [Stance(list(stage.contacts.values()), model=model) for stage in self.stages]
-        return StanceSequence(
-            [Phase(stance, stage.min_duration) for stance, stage in zip(stances, self.stages, strict=True)]
-        )
+        return StanceSequence([
+            Phase(Stance(list(stage.contacts.values()), model=model), stage.min_duration)
+            for stage in self.stages
+        ])  # fmt: skip
 
     def schedule(self, model: ContactModel) -> ContactSchedule:
         """The stances with a contact model in time, each as short as it may be, from zero on."""
@@ -218,12 +231,12 @@ class ContactPlan:
     def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Key times (k,) [s] and configurations (k, nq): at (n + 1,) changes and, if any, in between."""
         times, keys = [float(instants[0])], [self.stages[0].q]
-        ends = [*(stage.q for stage in self.stages[1:]), self.goal]
-        for number, (stage, end) in enumerate(zip(self.stages, ends, strict=True)):
+        spans = pairwise(instants.tolist())
+        for stage, end, (begin, stop) in zip(self.stages, self.postures[1:], spans, strict=True):
             if stage.via is not None:
-                times.append(0.5 * float(instants[number] + instants[number + 1]))
+                times.append(0.5 * (begin + stop))
                 keys.append(stage.via)
-            times.append(float(instants[number + 1]))
+            times.append(stop)
             keys.append(end)
         return np.array(times), np.array(keys)
 
@@ -261,10 +274,9 @@ class PlanCertificate(RequirementTable):
     """Worst values of the postures of a plan beside their limits; ``where`` names the posture.
 
     ``min_room_m`` is the least room of the centre of mass on the contacts that stay, see
-    :func:`~manikin.balance.static_room`, ``max_torque_share`` the largest share of a torque limit with
-    which the postures can be held at rest, ``min_clearance_m`` the least distance of what does not touch.
-    A posture that cannot rest is measured in its motion, and the point to which its velocity would carry the
-    centre of mass must have room as well.
+    :func:`~manikin.balance.static_room`; ``max_torque_share`` is that of holding the postures at rest;
+    ``min_clearance_m`` is of what does not touch.  A posture that cannot rest is measured in its motion, and
+    the point to which its velocity would carry the centre of mass must have room as well.
 
     Attributes:
         postures: Number of postures: at every change, in the middle of flights, at the goal.
@@ -296,20 +308,21 @@ def certify_plan(
     """
     model = model or ContactModel.of_body(body.mass)
     postures, proximity = _postures(plan), Proximity(body, scene)
-    measured = [_measured(body, scene, proximity, item, model) for item in postures]
+    measured, pairs = zip(
+        *(_measured(body, scene, proximity, item, model) for item in postures), strict=True
+    )  # fmt: skip
     rows = []
-    for key, name, unit, sense, limit in _QUANTITIES:
-        values = [item[key][0] for item in measured]
+    for (key, name, unit, sense, limit), values in zip(_QUANTITIES, zip(*measured, strict=True), strict=True):
         worst = int(np.argmax(values) if sense == "<=" else np.argmin(values))
-        where = f"posture {worst}{measured[worst][key][1]}"
+        where = f"posture {worst}{pairs[worst] if key == 'min_clearance_m' else ''}"
         rows.append(Requirement(key, name, unit, values[worst], sense, limit, where=where))
     return PlanCertificate(tuple(rows), len(postures), _changes(plan))
 
 
 def _measured(
     body: BodyModel, scene: Scene, proximity: Proximity, item: "_Held", model: ContactModel
-) -> dict[str, tuple[float, str]]:
-    """Value of each quantity in one posture, and the rest of where."""
+) -> tuple[tuple[float, ...], str]:
+    """Value of each quantity in one posture, and the nearest pair in words."""
     state, angles = Configuration(body, item.q), item.q[7:]
     error = turn = 0.0
     for contact in item.held:
@@ -332,34 +345,26 @@ def _measured(
     if moving is not None:
         after = Stance(item.after, model=model)
         room = min(room, static_room(after, body.mass, moving.extrapolated(state.com, stance)))
-    return {
-        "max_contact_error_m": (error, ""),
-        "max_sole_turn_rad": (turn, ""),
-        "min_clearance_m": (float(near.distance.min(initial=np.inf)), pair),
-        "max_range_violation_rad": (float(beyond), ""),
-        "min_room_m": (float(room), ""),
-        "max_torque_share": (static_torque_share(body, item.q, stance, acceleration), ""),
-    }
+    clearance = float(near.distance.min(initial=np.inf))
+    share = static_torque_share(body, item.q, stance, acceleration)
+    return (error, turn, clearance, float(beyond), float(room), share), pair
 
 
 def _postures(plan: ContactPlan) -> list[_Held]:
     """At a change the contacts of both sides are held, and those that are in both carry."""
-    first = tuple(plan.stages[0].contacts.values())
-    found = [_Held(plan.stages[0].q, first, first)]
+    own = tuple(plan.stages[0].contacts.values())
+    found = [_Held(plan.stages[0].q, own, own)]
     for before, after in pairwise(plan.stages):
+        own = tuple(after.contacts.values())
         both = tuple(c for name, c in after.contacts.items() if before.contacts.get(name) is c)
-        every = tuple({id(c): c for c in (*before.contacts.values(), *after.contacts.values())}.values())
-        found.append(_Held(after.q, every, both, after.momentum, tuple(after.contacts.values())))
+        every = tuple({id(c): c for c in (*before.contacts.values(), *own)}.values())
+        found.append(_Held(after.q, every, both, after.momentum, own))
         if after.via is not None:
-            own = tuple(after.contacts.values())
             found.append(_Held(after.via, own, own))
-    last = tuple(plan.stages[-1].contacts.values())
-    return [*found, _Held(plan.goal, last, last)]
+    return [*found, _Held(plan.goal, own, own)]
 
 
 def _changes(plan: ContactPlan) -> int:
-    most = 0
-    for before, after in pairwise(plan.stages):
-        changed = {name for name, c in after.contacts.items() if before.contacts.get(name) is not c}
-        most = max(most, len(changed | (set(before.contacts) - set(after.contacts))))
-    return most
+    pairs = ((before.contacts, after.contacts) for before, after in pairwise(plan.stages))
+    changed = ([a.get(name) is not b.get(name) for name in {*a, *b}] for a, b in pairs)
+    return max(map(sum, changed), default=0)

@@ -14,46 +14,35 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.criteria import static_torque_share
 from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, Stance, point
+from manikin.contact import Contact, point
 from manikin.kinematics import Placement, Preferences
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Extension
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
 from manikin.planning.contacts.endpoint import Endpoints, Habit
-from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.contacts.limb_search import within_strength
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.seat import FEET
+from manikin.planning.contacts.seat import of_both_sides
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
 from manikin.scene import Box, Obstacle, Scene
 
-ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")
-"""Order in which limbs go."""
-
-CRAWLING = (0.2, 0.05, 0.45)
-"""Radius, lowest and highest end of what has to be free to crawl, of a body of 1.75 m [m]."""
-
-APART = {"knee": 0.10, "fist": 0.17}
-"""Distance of limbs to the middle of the way, of a body of 1.75 m [m]; our choice, as the next ones."""
-
-WHEELBASE = {"knee": -0.65, "fist": 0.65}
-"""Place of limbs along the way, of a body of 1.75 m, twice [m]."""
+ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")  # order in which limbs go
+CRAWLING = (0.2, 0.05, 0.45)  # radius, lowest and highest end of what is free to crawl, at 1.75 m [m]
+APART = {"knee": 0.10, "fist": 0.17}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
+WHEELBASE = {"knee": -0.65, "fist": 0.65}  # place of limbs along the way, of a body of 1.75 m, twice [m]
 
 RESTING = (0.35, 0.2, 0.5)
 """Places of the centre of mass that are tried, as shares of the way from the knees to the fists: arms are
 weaker than thighs."""
 
-EASE = 0.9
-"""Largest share of the strength for which a posture at rest may ask; the motion asks for more."""
-
-ROOM = 0.72
-"""Height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]."""
-
+EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
+ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
 GAITS = ((0.42, 0.60), (0.42, 0.70), (0.28, 0.52), (0.28, 0.70))
-"""Strides and distances of hands before knees that are tried, of a body of 1.75 m [m]."""
+"""Strides and distances of hands before knees that are tried, at 1.75 m [m]."""
 
 KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
 """Distances of hands before knees, and of knees before the feet, with which the body kneels down and gets up
@@ -66,29 +55,14 @@ BEFORE, BEHIND = 0.85, 0.45
 """Distances of feet before what is low and behind it at which the body kneels and gets up, of a body of
 1.75 m [m]."""
 
-NEAR_END = 0.8
-"""Way to the start or goal up to which the body kneels or gets up there, and does not walk [m]."""
-
-TURNED = math.radians(25.0)
-"""Angle up to which it does so with feet as they are."""
-
-STEEPEST = math.radians(30.0)
-"""Largest slope of a surface for hands and knees."""
-
-INSET = 0.03
-"""Distance of hands and knees to the edges of what they are on [m]."""
-
-LIFT = 0.05
-"""Height of a limb in flight [m]."""
-
-LEVEL = {"knee": 0.3, "fist": 6.0}
-"""Weights with which shanks are level and hands upright [1/rad^2]."""
-
-TILT = 0.19
-"""Sine of the largest angle of a hand on its fist: its edge is not pressed into the ground."""
-
-TURNING = 1.2
-"""Time in which a leg goes from its knee onto its foot or back [s]."""
+NEAR_END = 0.8  # way to the start or goal up to which the body kneels or gets up there, and does not walk [m]
+TURNED = math.radians(25.0)  # angle up to which it does so with feet as they are
+STEEPEST = math.radians(30.0)  # largest slope of a surface for hands and knees
+INSET = 0.03  # distance of hands and knees to the edges of what they are on [m]
+LIFT = 0.05  # height of a limb in flight [m]
+LEVEL = {"knee": 0.3, "fist": 6.0}  # weights with which shanks are level and hands upright [1/rad^2]
+TILT = 0.19  # sine of the largest angle of a hand on its fist: its edge is not pressed into the ground
+TURNING = 1.2  # time in which a leg goes from its knee onto its foot or back [s]
 
 _ON_ALL_FOURS = {
     "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 80.0,
@@ -97,16 +71,12 @@ _ON_ALL_FOURS = {
 _PITCH = math.radians(80.0)
 _PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 
-Walk = Callable[[Stage, Stage], Extension]
-"""Plans a walk between two stages on feet."""
-
 
 def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
     """Posture on fists and knees on a level floor, the middle between them at the origin."""
-    q = np.array(body.standing_posture())
-    names = (name.removeprefix("left_").removeprefix("right_") for name in body.joint_names)
-    q[7:] = [math.radians(_ON_ALL_FOURS.get(name, 0.0)) for name in names]
-    q[:3], q[3:7] = 0.0, quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
+    angles = {name: math.radians(value) for name, value in _ON_ALL_FOURS.items()}
+    q = body.posture(of_both_sides(body, angles))
+    q[3:7] = quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
     q[2] = -Configuration(body, q).effector_placement(ORDER[0])[1][2]
     size = stature_of(body) / 1.75
     held = {}
@@ -122,12 +92,7 @@ def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """Way over the ground.
-
-    Attributes:
-        places: (n, 3) [m].
-        along: (n,) length of the way up to each [m].
-    """
+    """Way over the ground: places (n, 3) and its length (n,) up to each [m]."""
 
     places: FloatArray
     along: FloatArray
@@ -149,18 +114,16 @@ class CrawlSearch:
 
     def __init__(
         self, poser: PostureFinder, endpoints: Endpoints, start: Stage, goal: Stage, friction: float,
-        walk: Walk, settings: WalkSettings | None = None,
+        walk: Callable[[Stage, Stage], Extension], settings: WalkSettings | None = None,
     ) -> None:  # fmt: skip
         """Prepare a search.
 
         Args:
             poser: Of the body in its scene; postures on all fours are found with its settings.
             endpoints: Finds where the body stands before and behind what is low.
-            start: On feet.
-            goal: On feet.
+            start: On feet, as the goal.
             friction: Coulomb coefficient.
-            walk: Plans what is walked before and behind.
-            settings: Paces.
+            walk: Plans a walk between two stages on feet.
         """
         self._body, self._scene = poser.body, poser.scene
         crawling = on_all_fours(poser.body, poser.settings)
@@ -176,21 +139,17 @@ class CrawlSearch:
     def run(self) -> Extension:
         """The plan, or why there is none."""
         found = self._fault or self._planned()
-        if isinstance(found, str):
-            return Extension(None, self._poser.searches, 0, found)
-        return Extension(found, self._poser.searches, 0)
+        plan, failure = (None, found) if isinstance(found, str) else (found, None)
+        return Extension(plan, self._poser.searches, 0, failure)
 
     def _planned(self) -> ContactPlan | str:
-        start, goal = (
-            (Foothold.of(stage.contacts[FEET[0]]), Foothold.of(stage.contacts[FEET[1]]))
-            for stage in (self._start, self._goal)
-        )
+        ends = feet_of(self._start.contacts), feet_of(self._goal.contacts)
         footholds = Footholds(self._body, self._scene, steepest=STEEPEST)
         low, high = (
             (self._size * radius, self._size * bottom, self._size * top)
             for radius, bottom, top in (CRAWLING, COLUMN)
         )
-        found = low_way(self._scene, footholds, (start, goal), low, high)
+        found = low_way(self._scene, footholds, ends, low, high)
         if found is None:
             return "no way over the ground has room for the body on hands and knees"
         way, under = _Way.of(found[0]), np.flatnonzero(~found[1])
@@ -258,14 +217,14 @@ class CrawlSearch:
             if isinstance(rise, _Rise):
                 return replace(rise, along=at, base=base * self._size)
             reason = reason or rise
-        return f"cannot kneel down at {np.round(middle, 2).tolist()} m: {reason}"
+        return f"cannot kneel down at {_text(middle)}: {reason}"
 
     def _got_up(
         self, held: dict[str, Contact], feet: Mapping[str, Contact], lead: str, standing: FloatArray
     ) -> "_Rise | str":
         """From four contacts onto two feet, the leading one first."""
         other = "left" if lead == "right" else "right"
-        posed = self._posed(held, held, self._guide(held))
+        posed = self._posed(held, held, self._guide(held), guided=True)
         stages: list[Stage] = []
         changes = [
             (f"{lead}_knee", None), (None, f"{lead}_foot"), (f"{other}_knee", None), (None, f"{other}_foot"),
@@ -279,7 +238,7 @@ class CrawlSearch:
             both = {**contacts, **after}
             staying = {name: contact for name, contact in after.items() if name in contacts}
             if posed.q is not None:
-                posed = self._posed(both, staying, None, posed.q)
+                posed = self._posed(both, staying, posed.q)
             if posed.q is None:
                 return f"{leaving or landing} cannot {'be put down' if landing else 'leave'}: {posed.reason}"
             contacts = after
@@ -300,7 +259,7 @@ class CrawlSearch:
         stages = [down.kneeling]
         begin = {"knee": down.along, "fist": down.along + base}
         end = {"knee": up.along, "fist": up.along + up.base}
-        reached = {name: self._along(name, down) for name in ORDER}
+        reached = {name: down.along + down.base * name.endswith("fist") for name in ORDER}
         for number in range(4 * (2 + math.ceil(total / (0.5 * stride)))):
             name = ORDER[number % 4]
             part = name.partition("_")[2]
@@ -310,43 +269,36 @@ class CrawlSearch:
                 step = self._stepped(way, name, (reached[name], min(ahead, end[part])), target, contacts, q)
                 if isinstance(step, str):
                     return step
-                stages += step.stages
-                reached[name], q = step.along, step.stages[-1].q
-                contacts = dict(step.stages[-1].contacts)
+                reached[name], *made = step
+                stages += made
+                q, contacts = made[-1].q, dict(made[-1].contacts)
             if all(contacts[each] is up.kneeling.contacts[each] for each in ORDER):
                 return stages
         return "does not arrive on hands and knees"
 
-    def _along(self, name: str, end: "_Rise") -> float:
-        return end.along + (end.base if name.endswith("fist") else 0.0)
-
     def _stepped(
         self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None,
         contacts: Mapping[str, Contact], q: FloatArray,
-    ) -> "_Step | str":  # fmt: skip
-        """One limb goes on: to a contact, or to where the way has it, or near there."""
+    ) -> tuple[float, Stage, Stage] | str:  # fmt: skip
+        """New place and stages of a limb that goes to a contact, where the way has it, or near there."""
         staying = {other: contact for other, contact in contacts.items() if other != name}
-        lifted = self._posed(contacts, staying, self._guide(contacts), q)
+        lifted = self._posed(contacts, staying, q, guided=True)
         if lifted.q is None:
-            return f"{name} cannot leave {_spot(contacts[name])}: {lifted.reason}"
-        reason = f"there is nothing to put {name} on beyond {_spot(contacts[name])}"
+            return f"{name} cannot leave {_text(contacts[name].position)}: {lifted.reason}"
+        reason = f"there is nothing to put {name} on beyond {_text(contacts[name].position)}"
         for along, contact in self._offers(way, name, ends, target):
             landed = {**staying, name: contact}
-            landing = self._posed(landed, staying, self._guide(landed), lifted.q)
+            landing = self._posed(landed, staying, lifted.q, guided=True)
             if landing.q is None:
-                reason = f"{name} cannot be put down at {_spot(contact)}: {landing.reason}"
+                reason = f"{name} cannot be put down at {_text(contact.position)}: {landing.reason}"
                 continue
             via = self._between(staying, name, (contacts[name], contact), (lifted.q, landing.q))
             if via is None:
-                reason = f"{name} finds no way to {_spot(contact)}"
+                reason = f"{name} finds no way to {_text(contact.position)}"
                 continue
-            settings = self._settings
-            way_there = float(np.linalg.norm(contact.position - contacts[name].position))
-            flight = max(settings.swing_duration, way_there / settings.swing_speed)
-            return _Step(along, (
-                Stage.of(self._body, staying, lifted.q, flight, via=via),
-                Stage.of(self._body, landed, landing.q, settings.shift_duration),
-            ))  # fmt: skip
+            flight = self._settings.flight(contacts[name], contact)
+            flying = Stage.of(self._body, staying, lifted.q, flight, via=via)
+            return along, flying, Stage.of(self._body, landed, landing.q, self._settings.shift_duration)
         return reason
 
     def _offers(
@@ -370,7 +322,7 @@ class CrawlSearch:
         start = 0.5 * (postures[0] + postures[1])
         start[3:7] = postures[1][3:7]
         wish = {name: Placement(middle, None, None, 0.5 / LIFT**2)}
-        return self._posed(staying, staying, None, start, wish).q
+        return self._posed(staying, staying, start, wish).q
 
     # --- contacts and postures --------------------------------------------------------------------
 
@@ -380,7 +332,7 @@ class CrawlSearch:
         for name in ORDER:
             contact = self._contact(way, name, ends[name.endswith("fist")])
             if contact is None:
-                return f"there is nothing for {name} at {np.round(way.at(ends[0])[0], 2).tolist()} m"
+                return f"there is nothing for {name} at {_text(way.at(ends[0])[0])}"
             found[name] = contact
         return found
 
@@ -404,10 +356,7 @@ class CrawlSearch:
 
     def _guide(self, contacts: Mapping[str, Contact]) -> FloatArray:
         """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
-        knees, hands = (
-            np.mean([contacts[f"{side}_{part}"].position for side in ("left", "right")], axis=0)
-            for part in ("knee", "fist")
-        )
+        knees, hands = _middles(contacts)
         ahead, q = hands - knees, np.array(self._reference)
         yaw = math.atan2(ahead[1], ahead[0])
         pitch = -math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
@@ -417,18 +366,24 @@ class CrawlSearch:
         return q
 
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], guide: FloatArray | None,
-        start: FloatArray | None = None, wishes: Mapping[str, Placement] | None = None,
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
+        wishes: Mapping[str, Placement] | None = None, *, guided: bool = False,
     ) -> Posed:  # fmt: skip
-        """A posture that the strength can hold, palms flat and shanks level as far as they can be."""
-        begin = guide if start is None else start
-        assert begin is not None
+        """A posture that the strength can hold, palms flat and shanks level as far as they can be.
+
+        A guided one is like that on all fours, its weight between the knees and the fists.
+        """
         first: Posed | None = None
-        for share in RESTING if guide is not None else (None,):
-            place = None if share is None else self._place(held, carrying, share)
+        for share in RESTING if guided else (None,):
+            place = None
+            if share is not None:
+                knees, fists = (middle[:2] for middle in _middles(held))
+                near = knees + share * (fists - knees)
+                place = self._poser.resting_place(carrying, near, self._poser.settings.inset)
             posed = self._poser.pose(
-                held, carrying, begin, guide, place=place, placements={**_level(held), **(wishes or {})},
-                preferences=_PREFERENCES, restarts=guide is None and not wishes,
+                held, carrying, start, self._guide(held) if guided else None, place=place,
+                placements={**_level(held), **(wishes or {})}, preferences=_PREFERENCES,
+                restarts=not guided and not wishes,
             )  # fmt: skip
             posed = self._held_easily(posed, held, carrying)
             if posed.q is not None:
@@ -436,34 +391,26 @@ class CrawlSearch:
             first = first or posed
         return first or Posed(None)
 
-    def _place(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], share: float
-    ) -> FloatArray | None:
-        """(2,) where the centre of mass rests, a share of the way from the knees to the fists [m]."""
-        knees, fists = (
-            np.mean([contact.position[:2] for name, contact in held.items() if name.endswith(part)], axis=0)
-            for part in ("knee", "fist")
-        )
-        return self._poser.resting_place(
-            carrying, knees + share * (fists - knees), self._poser.settings.inset
-        )
-
     def _held_easily(
         self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact]
     ) -> Posed:
         """The posture, or that a hand is not upright in it, or that it asks for too much of the strength."""
-        if posed.q is None:
-            return posed
-        state = Configuration(self._body, posed.q)
-        for name, contact in held.items():
-            if name.endswith("fist"):
+        if posed.q is not None:
+            state = Configuration(self._body, posed.q)
+            for name, contact in held.items():
                 up = state.effector_placement(name)[0][:, 2]
-                if np.linalg.norm(np.cross(up, contact.normal)) > TILT:
+                if name.endswith("fist") and np.linalg.norm(np.cross(up, contact.normal)) > TILT:
                     return Posed(None, f"{name} is not upright")
-        share = static_torque_share(self._body, posed.q, Stance(list(carrying.values())))
-        if share <= EASE:
-            return posed
-        return Posed(None, f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength")
+        return within_strength(self._body, posed, carrying, EASE)
+
+
+def _middles(contacts: Mapping[str, Contact]) -> tuple[FloatArray, FloatArray]:
+    """(3,) middles of the knees and of the fists [m]."""
+    knees, fists = (
+        np.mean([contact.position for name, contact in contacts.items() if name.endswith(part)], axis=0)
+        for part in ("knee", "fist")
+    )
+    return knees, fists
 
 
 def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
@@ -476,14 +423,9 @@ def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
 
 @dataclass(frozen=True, eq=False)
 class _Rise:
-    """Getting up.
+    """Getting up: on hands and knees, then up to two feet, with the posture (nq,) at the end.
 
-    Attributes:
-        kneeling: On hands and knees.
-        stages: After that, up to that on two feet.
-        q: (nq,) standing posture at the end.
-        along: Where the knees are along the way [m].
-        base: Distance of the hands before them [m].
+    The knees are at ``along`` on the way, the hands ``base`` before them [m].
     """
 
     kneeling: Stage
@@ -491,14 +433,6 @@ class _Rise:
     q: FloatArray
     along: float = 0.0
     base: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Stages of one limb's step, and where it is along the way then [m]."""
-
-    along: float
-    stages: tuple[Stage, ...]
 
 
 def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
@@ -511,5 +445,5 @@ def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
     ]
 
 
-def _spot(contact: Contact) -> str:
-    return f"{np.round(contact.position, 2).tolist()} m"
+def _text(place: FloatArray) -> str:
+    return f"{np.round(place, 2).tolist()} m"

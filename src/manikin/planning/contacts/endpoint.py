@@ -15,26 +15,17 @@ from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, FrictionModel
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
-from manikin.planning.contacts.footholds import Footholds
+from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.limb_search import LimbHolds, within_strength
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.seat import FEET, Sitter, Sitting, hand_supports, leave_seat
+from manikin.planning.contacts.seat import Sitter, Sitting, hand_supports, leave_seat
 from manikin.scene import Scene, Surface
 
-UP = np.array([0.0, 0.0, 1.0])
-
-SEAT_HEIGHTS = (0.12, 0.40)
-"""Lowest and greatest height of a seat above the feet [statures]; our choice."""
-
-FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)
-"""Distances before the middle of the buttocks at which a floor for the feet is looked for [statures]."""
-
-SITTING_TIME = 0.35
-"""Shortest time for which a body sits before it moves [s]."""
-
-CROUCH = 0.6
-"""Height of a crouching body's root relative to a standing one's; our choice."""
+SEAT_HEIGHTS = (0.12, 0.40)  # lowest and greatest height of a seat above the feet [statures]; our choice
+FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)  # places of a floor before the middle of the buttocks [statures]
+SITTING_TIME = 0.35  # shortest time for which a body sits before it moves [s]
+CROUCH = 0.6  # height of a crouching body's root relative to a standing one's; our choice
 
 
 class Habit(StrEnum):
@@ -113,16 +104,18 @@ class Endpoints:
         self, at: FloatArray, heading: float, habit: Habit, height: float | None
     ) -> Iterator[tuple[dict[str, Contact], FloatArray]]:
         q = np.array(self._body.standing_posture())
-        turn = rotation_from_yaw(heading)
-        state = Configuration(self._body, q)
+        turn, state = rotation_from_yaw(heading), Configuration(self._body, q)
         for level in self._levels(at, height):
-            wanted = {
-                foot: np.array([*at, level]) + turn @ state.effector_placement(foot)[1] for foot in FEET
-            }
-            contacts = self._feet(wanted, heading, level, 0.1)
+            contacts: dict[str, Contact] = {}
+            for foot in FEET:
+                wanted = np.array([*at, level]) + turn @ state.effector_placement(foot)[1]
+                for contact in self._footholds.near(foot, wanted, heading, self._friction):
+                    if abs(contact.position[2] - level) < 0.1:
+                        contacts[foot] = contact
+                        break
             if len(contacts) == 2:
                 guess = q.copy()
-                guess[:2], guess[3:7] = at, _level_turn(heading)
+                guess[:2], guess[3:7] = at, [0.0, 0.0, np.sin(0.5 * heading), np.cos(0.5 * heading)]
                 guess[2] = level + q[2] * (CROUCH if habit is Habit.CROUCHED else 1.0)
                 yield contacts, guess
 
@@ -138,11 +131,11 @@ class Endpoints:
         forward = self._stature * rotation_from_yaw(heading)[:2, 0]
         ahead = [at + distance * forward for distance in FEET_BEFORE_SEAT]
         for floor in sorted({level for place in ahead for level in self._levels(place, None)}):
-            for seat in self._surfaces(at, height):
-                place = np.array([*at, _height_at(seat, at)])
-                if not low <= place[2] - floor <= high:
+            for level, seat in self._surfaces(at, height):
+                if not low <= level - floor <= high:
                     continue
-                for contacts, guess in self._with_hands(list(sitter.sittings(place, heading, seat, floor))):
+                sittings = list(sitter.sittings(np.array([*at, level]), heading, seat, floor))
+                for contacts, guess in self._with_hands(sittings):
                     result = self._sat(contacts, guess)
                     if result.stage is not None:
                         return result
@@ -151,16 +144,15 @@ class Endpoints:
         why = "; ".join(dict.fromkeys([reasons[0], reasons[-1]])) if reasons else nothing
         return Endpoint(None, f"no posture seated at {np.round(at, 3).tolist()} m: {why}")
 
-    def _with_hands(self, sittings: list[Sitting]) -> Iterator[tuple[dict[str, Contact], FloatArray]]:
-        """Contacts and guess of each way to sit; then of each with hands that push, where they can."""
-        yield from ((item.contacts, item.guess) for item in sittings)
-        for item in sittings:
+    def _with_hands(self, sittings: list[Sitting]) -> Iterator[Sitting]:
+        """Each way to sit, then each with hands that push, where they can."""
+        yield from sittings
+        for contacts, guess in sittings:
             hands = hand_supports(
-                self._scene, item.contacts["buttocks"], self._stature, self._friction,
-                self._footholds.steepest,
-            )  # fmt: skip
+                self._scene, contacts["buttocks"], self._stature, self._friction, self._footholds.steepest
+            )
             if hands:
-                yield {**item.contacts, **hands}, item.guess
+                yield {**contacts, **hands}, guess
 
     def _sat(self, contacts: dict[str, Contact], guess: FloatArray) -> Endpoint:
         """A way to sit with its posture, where the body can rise from it."""
@@ -173,42 +165,18 @@ class Endpoints:
         leaving = leave_seat(self._poser, start, frozenset(FEET))
         return Endpoint(None, leaving.failure) if leaving.failure is not None else Endpoint(start)
 
-    def _feet(
-        self,
-        wanted: Mapping[str, FloatArray],
-        heading: float,
-        level: float,
-        step: float,
-        away: float = np.inf,
-    ) -> dict[str, Contact]:
-        """Footholds nearest to where feet should be, up to a step in height and a distance off [m]."""
-        contacts: dict[str, Contact] = {}
-        for foot, place in wanted.items():
-            for contact in self._footholds.near(foot, place, heading, self._friction):
-                off = float(np.linalg.norm(contact.position - place))
-                if abs(contact.position[2] - level) < step and off < away:
-                    contacts[foot] = contact
-                    break
-        return contacts
-
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""
-        levels = (_height_at(surface, at) for surface in self._surfaces(at, height))
-        return sorted({round(level, 6) for level in levels if level is not None})
+        return sorted({round(level, 6) for level, _ in self._surfaces(at, height)})
 
-    def _surfaces(self, at: FloatArray, height: float | None) -> list[Surface]:
-        """Surfaces below and above a place, the lowest first; those near a height, where one is given."""
+    def _surfaces(self, at: FloatArray, height: float | None) -> list[tuple[float, Surface]]:
+        """Surfaces below and above a place with their heights, the lowest first; those near one given."""
         found: list[tuple[float, Surface]] = []
         for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
             level = _height_at(surface, at)
             if level is not None and (height is None or abs(level - height) < 0.05):
                 found.append((level, surface))
-        return [surface for _, surface in sorted(found, key=lambda item: item[0])]
-
-
-def _level_turn(yaw: float) -> FloatArray:
-    """(4,) quaternion xyzw of a turn about the vertical."""
-    return np.array([0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw)])
+        return sorted(found, key=lambda item: item[0])
 
 
 def _height_at(surface: Surface, at: FloatArray) -> float | None:
@@ -219,11 +187,8 @@ def _height_at(surface: Surface, at: FloatArray) -> float | None:
     return height if float(surface.outside(point)[0]) <= 1e-9 else None
 
 
-PLACES = 6
-"""Places of each limb among which a start is sought."""
-
-TRIES = 40
-"""Most of their combinations for which a posture is looked for; our choice."""
+PLACES = 6  # places of each limb among which a start is sought
+TRIES = 40  # most of their combinations for which a posture is looked for; our choice
 
 
 def starts_on_limbs(

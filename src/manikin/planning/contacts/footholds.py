@@ -6,14 +6,14 @@ where more of it lies.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from manikin.body import BodyModel, Configuration
+from manikin.body import BodyModel
 from manikin.contact import Contact, sole
 from manikin.errors import ContactError
 from manikin.numerics.spatial import FloatArray
@@ -21,20 +21,13 @@ from manikin.scene import Scene
 from manikin.scene.collision import collision_parts
 from manikin.scene.footing import WHOLE, FootingTable, Places
 
-SHIFT = 0.08
-"""Longest shift of a candidate along the sole [m]; half of it across; our choice."""
+FEET = ("left_foot", "right_foot")
 
-STEEPEST = math.radians(30.0)
-"""Largest slope of a surface to stand on [rad]; our choice."""
-
-FOOT_HEIGHT = 0.10
-"""Height above a sole that has to be free for the foot [m]; our choice."""
-
-FOOT_CLEARANCE = 0.015
-"""Distance of the foot to what stands beside it [m]; our choice."""
-
-ON_PLANE = 0.02
-"""Height up to which a neighbouring surface is no hindrance to a foot [m]; the foot has a test of its own."""
+SHIFT = 0.08  # longest shift of a candidate along the sole [m]; half of it across; our choice
+STEEPEST = math.radians(30.0)  # largest slope of a surface to stand on [rad]; our choice
+FOOT_HEIGHT = 0.10  # height above a sole that has to be free for the foot [m]; our choice
+FOOT_CLEARANCE = 0.015  # distance of the foot to what stands beside it [m]; our choice
+ON_PLANE = 0.02  # height up to which a neighbouring surface does not hinder a foot [m]
 
 _REQUEST = coal.CollisionRequest()
 _CLEAR = coal.CollisionRequest()
@@ -43,6 +36,7 @@ _SHIFTS = np.array(
     [[x, 0.0] for x in (0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0)]
     + [[x, y] for y in (-0.5, 0.5) for x in (0.0, 0.5, -0.5)]
 )
+_CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
 _NEAR = np.arange(-12, 13) * 0.02, np.arange(-3, 4) * 0.02  # around a wanted place, along and across [m]
 _HEIGHT_WEIGHT = 0.7  # what a difference in height counts beside one along the ground
 
@@ -65,10 +59,12 @@ class Foothold:
     share: float = 1.0
     surface: int = -1
 
-    @classmethod
-    def of(cls, contact: Contact) -> "Foothold":
-        """Foothold of a contact that is given."""
-        return cls(contact.position, contact.yaw, contact.rotation_contact_to_world)
+
+def feet_of(contacts: Mapping[str, Contact]) -> tuple[Foothold, Foothold]:
+    """Left and right foothold of contacts that are given."""
+    left, right = (contacts[foot] for foot in FEET)
+    turns = left.rotation_contact_to_world, right.rotation_contact_to_world
+    return Foothold(left.position, left.yaw, turns[0]), Foothold(right.position, right.yaw, turns[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +84,6 @@ class Footholds:
     Attributes:
         size: Length and width of the sole [m].
         steepest: Largest slope of a surface to stand on [rad].
-        below_root: (3,) place of each foot's sole relative to the root, level, in the standing posture [m].
     """
 
     def __init__(
@@ -107,28 +102,16 @@ class Footholds:
         if body.sole_length is None or body.sole_width is None:
             raise ContactError(f"body {body.name!r} has no soles; valid: a body that stands on feet")
         self.size, self.steepest = size or (body.sole_length, body.sole_width), steepest
-        half = 0.5 * np.array(self.size)
-        self._table = FootingTable(
-            scene.surfaces_facing((0.0, 0.0, 1.0), steepest), half * [[1, 1], [1, -1], [-1, -1], [-1, 1]]
-        )
+        surfaces = scene.surfaces_facing((0.0, 0.0, 1.0), steepest)
+        self._table = FootingTable(surfaces, 0.5 * np.array(self.size) * _CORNERS)
         self._parts = [
             (part.obstacle, part.geometry, coal.Transform3s(part.rotation, part.translation))
-            for item in scene
-            for part in collision_parts(item)
-        ]
+            for item in scene for part in collision_parts(item)
+        ]  # fmt: skip
         gap = 2.0 * FOOT_CLEARANCE
         self._foot = coal.Box(*self.size, FOOT_HEIGHT)
         self._wide_foot = coal.Box(self.size[0] + gap, self.size[1] + gap, FOOT_HEIGHT)
-        self._point = FootingTable(
-            self._table.surfaces, 1e-6 * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-        )
-        q = np.array(body.standing_posture())
-        state = Configuration(body, q)
-        self.below_root = {
-            limb.effector: state.effector_placement(limb.effector)[1] - q[:3]
-            for limb in body.limbs
-            if limb.effector.endswith("foot")
-        }
+        self._point = FootingTable(self._table.surfaces, 1e-6 * _CORNERS)
 
     def levels(self, places: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
         """Rows (m,) of places (k, 2) [m] that have a surface below or above, and its height there [m]."""
@@ -145,7 +128,8 @@ class Footholds:
             level: Height from which the foot comes [m].
             rise: Largest difference in height to there [m].
         """
-        put = self._put(places, yaws, level, rise)
+        put = self._table.under(places, yaws)
+        put = put[np.abs(put.positions[:, 2] - level) <= rise]
         value = self._lies(put)
         partly = np.flatnonzero(value < WHOLE)
         if len(partly):
@@ -157,9 +141,9 @@ class Footholds:
             lies = self._lies(moved).reshape(len(partly), -1)
             # A shift has to gain something.
             pick = np.argmax(lies - 0.2 * SHIFT * np.linalg.norm(_SHIFTS, axis=1), axis=1)
-            rows = np.arange(len(partly)) * len(_SHIFTS) + pick
-            put.positions[partly] = moved.positions[rows]
-            value[partly] = lies[np.arange(len(partly)), pick]
+            each = np.arange(len(partly))
+            put.positions[partly] = moved.positions[each * len(_SHIFTS) + pick]
+            value[partly] = lies[each, pick]
         chosen = np.flatnonzero(value > 0.0)
         return Laid(
             put.positions[chosen], yaws[put.rows[chosen]], put.rotations[chosen], value[chosen],
@@ -180,9 +164,8 @@ class Footholds:
         """
         touched = self._table.surfaces[hold.surface].obstacles if hold.surface >= 0 else ()
         for name, geometry, place in self._parts:
-            foot, request, lift = (
-                (self._wide_foot, _REQUEST, 2e-3) if name in touched else (self._foot, _CLEAR, 0.0)
-            )
+            on = name in touched
+            foot, request, lift = (self._wide_foot, _REQUEST, 2e-3) if on else (self._foot, _CLEAR, 0.0)
             above = (0.5 * FOOT_HEIGHT + lift) * hold.rotation[:, 2]
             pose, result = coal.Transform3s(hold.rotation, hold.position + above), coal.CollisionResult()
             coal.collide(foot, pose, geometry, place, request, result)
@@ -210,17 +193,12 @@ class Footholds:
         """Contact of a foot on a foothold, with a Coulomb coefficient."""
         (length, width), polygon = self.size, None
         if hold.share < WHOLE:
-            laid = self._table.place([hold.surface], hold.position[None], hold.rotation[None])
-            polygon = laid.polygon(0)
+            place = hold.position[None], hold.rotation[None]
+            polygon = self._table.place([hold.surface], *place).polygon(0)
         return sole(
             foot, hold.position, length=length, width=width, friction=friction, rotation=hold.rotation,
             polygon=polygon,
         )  # fmt: skip
-
-    def _put(self, places: FloatArray, yaws: FloatArray, level: float, rise: float) -> Places:
-        """Candidates on the surfaces within a rise."""
-        put = self._table.under(places, yaws)
-        return put[np.abs(put.positions[:, 2] - level) <= rise]
 
     def _lies(self, put: Places) -> FloatArray:
         """(k,) share of each sole on its surface; 0 where it cannot stand or something is in its way."""

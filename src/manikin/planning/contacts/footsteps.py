@@ -13,7 +13,7 @@ best way is found.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 
 import coal
 import numpy as np
@@ -28,50 +28,26 @@ from manikin.planning.contacts.footholds import Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import collision_parts, local_box
 
-STEP = 0.7
-"""Time of a short step [s]; our choice, as the next ones."""
-
-EASY = 3.0**0.25
-"""Way at which a step costs twice as much as a short one, over that of the cheapest gait: of a quartic."""
-
-REACH_MARGIN = 0.02
-"""Distance that steps keep to the end of what the body reaches [m]; our choice."""
-
-HIGHEST = 0.48
-"""Largest difference in height of two soles, of a body of 1.75 m [m]."""
-
-HELD_HIGHEST = 0.80
-"""The same of a body that has something to hold on to or lean on [m]."""
-
-HELD_COST = 4.0 * STEP
-"""Cost of a step that is higher than :data:`HIGHEST`: hands come and go [s]."""
-
-NARROWEST = 0.115
-"""Least distance of the middles of two soles across, of a body of 1.75 m [m]."""
+STEP = 0.7  # time of a short step [s]; our choice, as the next ones
+EASY = 3.0**0.25  # way at twice the cost of a short step, over that of the cheapest gait: of a quartic
+REACH_MARGIN = 0.02  # distance that steps keep to the end of what the body reaches [m]; our choice
+HIGHEST = 0.48  # largest difference in height of two soles, of a body of 1.75 m [m]
+HELD_HIGHEST = 0.80  # the same of a body that has something to hold on to or lean on [m]
+HELD_COST = 4.0 * STEP  # cost of a step that is higher than :data:`HIGHEST`: hands come and go [s]
+NARROWEST = 0.115  # least distance of the middles of two soles across, of a body of 1.75 m [m]
 
 ALONG = (-0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
 ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
 TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
 """Steps that are tried from a foot: ahead and to its side [m], and turned outwards [rad]."""
-
-CELL = 0.1
-"""Width of the cells of the ground on which the estimate is computed [m]."""
-
-GAP = 0.7
-"""Longest way over no ground that the estimate takes [m]."""
+CELL = 0.1  # width of the cells of the ground on which the estimate is computed [m]
+GAP = 0.7  # longest way over no ground that the estimate takes [m]
 
 MERGED = 0.06
-MERGED_TURN = math.radians(15.0)
-"""Places [m] and headings [rad] this close together count as one foothold."""
-
-LOW_STEP = 0.05
-"""Distance of places on a way for one who crawls [m]."""
-
-LOW_RISE = 0.2
-"""Largest difference in height of its cells [m]."""
-
-BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])
-"""Shares of such a way at which nothing may stand in it."""
+MERGED_TURN = math.radians(15.0)  # places [m] and headings [rad] this close together count as one foothold
+LOW_STEP = 0.05  # distance of places on a way for one who crawls [m]
+LOW_RISE = 0.2  # largest difference in height of its cells [m]
+BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothing may stand in it
 
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.
@@ -79,23 +55,12 @@ GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 No bound on the cost of a way follows: the estimate counts turns, and may be more than the least cost.
 """
 
-SAME_GREED = 3
-"""Ways after which the search for another one begins with the factor that found the last."""
-
-ALIKE = 0.08
-"""Distance of footholds up to which a step is much like one that was refused [m]; our choice."""
-
-SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1
-"""Differences of the way [m], turn [rad] and slopes up to which a step is as hard as another; our choice."""
-
-TURN_COST = 0.9
-"""Cost of a turn [s/rad]: two steps turn a body by a right angle."""
-
-TURN_WAY = 0.6
-"""Way on which going backwards costs as much as a turn by two radians [m]."""
-
-LOOK = 5
-"""Cells of the way that tell where it leads."""
+SAME_GREED = 3  # ways after which the search for another one begins with the factor that found the last
+ALIKE = 0.08  # distance of footholds up to which a step is much like one that was refused [m]; our choice
+SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1  # up to which steps are as hard [m, rad, 1]; our choice
+TURN_COST = 0.9  # cost of a turn [s/rad]: two steps turn a body by a right angle
+TURN_WAY = 0.6  # way on which going backwards costs as much as a turn by two radians [m]
+LOOK = 5  # cells of the way that tell where it leads
 
 _REQUEST = coal.CollisionRequest()
 
@@ -122,6 +87,7 @@ class FootstepSearch:
         footholds: Finds footholds.
         start: Left and right foothold at the start.
         goal: At the goal.
+        holds: All footholds, by their numbers; the first four are those of start and goal.
         scale: Size of the body relative to one of 1.75 m.
         reach: Places of one foot relative to the other that the body reaches.
         pair_cost: Cost of the body between two footholds.
@@ -143,7 +109,7 @@ class FootstepSearch:
     expanded: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
-        self._holds = [*self.start, *self.goal]
+        self.holds = [*self.start, *self.goal]
         self._keys: dict[tuple[int, ...], int] = {}
         self._free: dict[int, bool] = dict.fromkeys(range(4), True)
         self._pairs: dict[tuple[int, int], float] = {}
@@ -157,10 +123,9 @@ class FootstepSearch:
             self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale,
             (HIGHEST * self.scale, self.highest * self.scale),
         )  # fmt: skip
-        places = np.array([hold.position for hold in self._holds])
-        self._ahead: list[float] = self._field.costs(
-            places, np.array([hold.yaw for hold in self._holds])
-        ).tolist()
+        places = np.array([hold.position for hold in self.holds])
+        yaws = np.array([hold.yaw for hold in self.holds])
+        self._ahead: list[float] = self._field.costs(places, yaws).tolist()
 
     def close(self, stand: int, step: int) -> None:
         """Close a pair of footholds, which has no posture."""
@@ -168,20 +133,18 @@ class FootstepSearch:
 
     def refuse(self, stand: int, step: int) -> None:
         """Close all steps that are much like one, with which a later stage failed."""
-        self._refused.append((self._holds[stand].position, self._holds[step].position))
-        self._pairs = {pair: cost for pair, cost in self._pairs.items() if not self._is_refused(*pair)}
+        self._refused.append((self.holds[stand].position, self.holds[step].position))
 
     def refuse_everywhere(self, stand: int, step: int) -> None:
         """Close all steps like one for which the joints are too weak, and longer ones, wherever they are."""
         self._too_hard.append(self._shape(stand, step))
-        self._pairs = {pair: cost for pair, cost in self._pairs.items() if not self._is_refused(*pair)}
 
     def _shape(self, stand: int, step: int) -> FloatArray:
         """(8,) way, turn and normals of a step in the heading frame of the foot that stands, of a right foot.
 
         Each is in units up to which steps are alike.
         """
-        first, last = self._holds[stand], self._holds[step]
+        first, last = self.holds[stand], self.holds[step]
         frame = rotation_from_yaw(first.yaw)
         way, normals = (last.position - first.position) @ frame, [first.rotation[:, 2], last.rotation[:, 2]]
         turn = math.remainder(last.yaw - first.yaw, 2.0 * math.pi)
@@ -197,18 +160,15 @@ class FootstepSearch:
         beyond[:, :3] = np.where(way == 0.0, beyond[:, :3], np.minimum(way * beyond[:, :3], 0.0))
         return bool((np.abs(beyond) <= 1.0).all(axis=1).any())
 
-    def hold(self, number: int) -> Foothold:
-        """Foothold of a number."""
-        return self._holds[number]
-
     def best(self) -> list[int] | None:
         """Numbers of the footholds of the best way, from both of the start to both of the goal; None without.
 
         Consecutive ones are of different feet; the first two and the last two are those of start and goal.
         """
         graph = Graph(
-            self._left, self._followers, self._tested, lambda node: node.ends and self._at_goal(node)
-        )
+            lambda node: self._ahead[node.hold], self._followers, self._tested,
+            lambda node: node.ends and self._at_goal(node),
+        )  # fmt: skip
         way, counts = graph.best([_Node(0, 1), _Node(1, -1)], GREED[self._first_greed :])
         self.expanded += sum(counts)
         self._ways += 1
@@ -216,9 +176,6 @@ class FootstepSearch:
             self._first_greed += len(counts) - 1
         # The foot that is not the first to stand is where it is at the start.
         return None if way is None else [1 - way[0].hold, *(node.hold for node in way)]
-
-    def _left(self, node: _Node) -> float:
-        return self._ahead[node.hold]
 
     def _followers(self, node: _Node) -> Iterator[tuple[_Node, float]]:
         ends = self._at_goal(node)
@@ -228,13 +185,12 @@ class FootstepSearch:
 
     def farthest(self) -> tuple[float, Foothold]:
         """Least cost that was left at a foothold which was reached [s], and that foothold."""
-        return min(((self._ahead[n], self._holds[n]) for n, _ in self._next), key=lambda item: item[0])
+        return min(((self._ahead[n], self.holds[n]) for n, _ in self._next), key=lambda item: item[0])
 
     def walled_off(self) -> str | None:
         """Why no way over the ground leads from the start to the goal; None where one does."""
-        return (
-            None if math.isfinite(min(self._ahead[:2])) else self._field.walled_off(self._holds[0].position)
-        )
+        free = math.isfinite(min(self._ahead[:2]))
+        return None if free else self._field.walled_off(self.holds[0].position)
 
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
@@ -245,20 +201,17 @@ class FootstepSearch:
         if pair in self._closed or self._is_refused(*pair):
             return math.inf
         if pair not in self._pairs:
+            both = [self.holds[number] for number in pair]
             if node.hold not in self._free:
-                self._free[node.hold] = self.footholds.is_free(self._holds[node.hold])
-            if not self._free[node.hold]:
-                self._pairs[pair] = math.inf
-            else:
-                stand, step = self._holds[parent.hold], self._holds[node.hold]
-                left, right = (stand, step) if parent.side > 0 else (step, stand)
-                self._pairs[pair] = self.pair_cost(left, right)
+                self._free[node.hold] = self.footholds.is_free(both[1])
+            left, right = both if parent.side > 0 else both[::-1]
+            self._pairs[pair] = self.pair_cost(left, right) if self._free[node.hold] else math.inf
         return self._pairs[pair]
 
     def _is_refused(self, stand: int, step: int) -> bool:
         if self._too_hard and self._harder(self._shape(stand, step)):
             return True
-        first, last = self._holds[stand].position, self._holds[step].position
+        first, last = self.holds[stand].position, self.holds[step].position
         return any(
             np.linalg.norm(first - a) < ALIKE and np.linalg.norm(last - b) < ALIKE for a, b in self._refused
         )
@@ -268,7 +221,7 @@ class FootstepSearch:
         key = node.hold, node.side
         if key in self._next:
             return self._next[key]
-        stand = self._holds[node.hold]
+        stand = self.holds[node.hold]
         out = -node.side  # the other foot is to the right of a left one
         ahead, across, turns = self._offsets
         turn = np.array([math.cos(stand.yaw), math.sin(stand.yaw)])
@@ -277,7 +230,7 @@ class FootstepSearch:
         yaws = stand.yaw + out * turns
         goal = 3 if node.side > 0 else 2
         found = self.footholds.lay(places, yaws, float(stand.position[2]), self.highest * self.scale)
-        ends = self._holds[goal]
+        ends = self.holds[goal]
         costs = self._step_costs(
             stand, out,
             np.vstack([ends.position, found.positions]), np.append(ends.yaw, found.yaws),
@@ -295,9 +248,9 @@ class FootstepSearch:
         ]).astype(np.int64)  # fmt: skip
         fresh: list[int] = []
         for row, label in zip(rows.tolist(), map(tuple, keys.tolist()), strict=True):
-            number = self._keys.setdefault(label, len(self._holds))
-            if number == len(self._holds):
-                self._holds.append(self.footholds.hold(found, row))
+            number = self._keys.setdefault(label, len(self.holds))
+            if number == len(self.holds):
+                self.holds.append(self.footholds.hold(found, row))
                 fresh.append(row)
             # A place close by stands for the one that was asked for.
             steps[number] = min(steps.get(number, math.inf), float(costs[1 + row]))
@@ -320,12 +273,8 @@ class FootstepSearch:
         made &= (rise <= self.highest * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
         cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
-        cost += (
-            1.2 * rise
-            + 8.0 * np.maximum(0.0, rise - 0.2 * size)
-            + 0.25 * np.abs(turned)
-            + 3.0 * (1.0 - shares)
-        )
+        steep = 8.0 * np.maximum(0.0, rise - 0.2 * size)
+        cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + 3.0 * (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
         cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
         return np.where(made, cost, np.inf)
@@ -335,9 +284,7 @@ def _offsets(scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(k,) ways ahead and across [m] and turns [rad] of steps; the farther one goes, the less one turns."""
     rows = [
         (ahead, across, turn)
-        for ahead in ALONG
-        for across in ACROSS
-        for turn in TURNS
+        for ahead, across, turn in product(ALONG, ACROSS, TURNS)
         if (abs(turn) < 0.3 or ahead <= 0.3)
         and (across < 0.3 or (abs(ahead) <= 0.15 and abs(turn) < 0.3))
         and (across > 0.16 or turn >= 0.0)
@@ -351,16 +298,10 @@ class _Field:
     """Cost to the goal over cells of the ground, for a thin column in place of the body."""
 
     def __init__(
-        self,
-        scene: Scene,
-        footholds: Footholds,
-        start: tuple[Foothold, Foothold],
-        goal: tuple[Foothold, Foothold],
-        column: tuple[float, float, float],
-        stride: float,
-        highest: tuple[float, float],
-        gap: float = GAP,
-    ) -> None:
+        self, scene: Scene, footholds: Footholds, start: tuple[Foothold, Foothold],
+        goal: tuple[Foothold, Foothold], column: tuple[float, float, float], stride: float,
+        highest: tuple[float, float], gap: float = GAP,
+    ) -> None:  # fmt: skip
         easy, self._highest = highest
         ends = np.array([hold.position for hold in (*start, *goal)])
         room = 1.5 + 0.25 * float(np.linalg.norm(ends[0] - ends[2]))
@@ -373,50 +314,40 @@ class _Field:
         order = np.lexsort((height, rows))
         rows, height = rows[order], height[order]
         covered = np.zeros(len(rows), dtype=bool)
-        same = rows[1:] == rows[:-1]
-        covered[:-1] = same & (height[1:] - height[:-1] < 0.45)
-        keep = ~covered
-        rows, height = rows[keep], height[keep]
-        self._points = np.column_stack([grid[rows], height])
-        radius, low_end, high_end = column
-        self._points = self._points[_column_is_free(scene, self._points, column)]
-        slow = np.ones(len(self._points))
+        covered[:-1] = (rows[1:] == rows[:-1]) & (np.diff(height) < 0.45)
+        points = np.column_stack([grid[rows], height])[~covered]
+        self._points = points = points[_column_is_free(scene, points, column)]
+        slow, size = np.ones(len(points)), len(points)
         for share, more in ((1.35, 0.8), (1.8, 0.5)):
-            taller = radius, low_end, share * high_end
-            slow[~_column_is_free(scene, self._points, taller)] += more
-        self._tree = cKDTree(self._points)
-        flat = cKDTree(self._points[:, :2])
-        near = flat.query_pairs(1.6 * CELL, output_type="ndarray")
+            slow[~_column_is_free(scene, points, (*column[:2], share * column[2]))] += more
+        self._tree = cKDTree(points)
+        near = cKDTree(points[:, :2]).query_pairs(1.6 * CELL, output_type="ndarray")
         # Over gaps: cells at the edge of the ground reach farther.
-        degree = np.bincount(near.ravel(), minlength=len(self._points))
-        edge = np.flatnonzero(degree < 8)
+        edge = np.flatnonzero(np.bincount(near.ravel(), minlength=size) < 8)
         if len(edge) and gap:
-            far = edge[cKDTree(self._points[edge, :2]).query_pairs(gap, output_type="ndarray")]
+            far = edge[cKDTree(points[edge, :2]).query_pairs(gap, output_type="ndarray")]
             near = np.vstack([near, far[self._is_open(scene, far, column)]])
-        away = self._points[near[:, 0]] - self._points[near[:, 1]]
-        rise = np.abs(away[:, 2])
-        pace = STEP * (1.0 + 1.0 / 3.0) / stride
+        self._near, away = near, points[near[:, 0]] - points[near[:, 1]]
+        self._rise = rise = np.abs(away[:, 2])
+        self._pace = pace = STEP * (1.0 + 1.0 / 3.0) / stride
         slower = 0.5 * (slow[near[:, 0]] + slow[near[:, 1]])
         length = pace * slower * np.linalg.norm(away[:, :2], axis=1) + 1.2 * rise
-        size = len(self._points)
         length += np.where(rise > easy, 8.0 * (rise - 0.2) + HELD_COST, 0.0)
-        self._near, self._rise = near, rise
         passable = rise <= self._highest
         near, length = near[passable], length[passable]
         graph = csr_array((length + 1e-9, (near[:, 0], near[:, 1])), shape=(size, size))
         middle = 0.5 * (goal[0].position + goal[1].position)
         self._root = int(self._tree.query(middle)[1])
         self._cost, before = dijkstra(graph, directed=False, indices=self._root, return_predecessors=True)
-        self._before = before
-        self._pace = pace
-        self._yaw = _middle_yaw(goal[0].yaw, goal[1].yaw)
+        self._before, (first, last) = before, (hold.yaw for hold in goal)
+        self._yaw = math.atan2(math.sin(first) + math.sin(last), math.cos(first) + math.cos(last))
         # Where the way leads from each cell, and how far it is.
         ahead = np.arange(size)
         for _ in range(LOOK):
             ahead = np.where(before[ahead] >= 0, before[ahead], ahead)
-        way = self._points[ahead, :2] - self._points[:, :2]
+        way = points[ahead, :2] - points[:, :2]
         self._heading = np.arctan2(way[:, 1], way[:, 0])
-        self._way = np.linalg.norm(self._points[:, :2] - middle[:2], axis=1)
+        self._way = np.linalg.norm(points[:, :2] - middle[:2], axis=1)
 
     def _is_open(self, scene: Scene, pairs: np.ndarray, column: tuple[float, float, float]) -> np.ndarray:
         """(k,) whether the column passes between pairs (k, 2) of cells over what has no ground."""
@@ -459,13 +390,13 @@ class _Field:
             return np.zeros(0)
         gap, rows = self._tree.query(places, k=4)
         costs = self._cost[rows] + self._pace * gap
-        pick = np.argmin(costs, axis=1)
-        row = rows[np.arange(len(places)), pick]
+        pick = np.arange(len(places)), np.argmin(costs, axis=1)
+        row = rows[pick]
         there, here = self._heading[row], np.asarray(yaws)
         # To turn to where the way leads and back, or to go as one stands: aside or backwards is slower.
         straight = _angle(here - there) + _angle(there - self._yaw)
         across = _angle(here - self._yaw) + self._way[row] / TURN_WAY * (1.0 - np.cos(here - there))
-        return costs[np.arange(len(places)), pick] + TURN_COST * np.minimum(straight, across)
+        return costs[pick] + TURN_COST * np.minimum(straight, across)
 
 
 def low_way(
@@ -509,43 +440,30 @@ def _angle(difference: FloatArray) -> FloatArray:
     return np.abs(np.mod(difference + math.pi, 2.0 * math.pi) - math.pi)
 
 
-def _middle_yaw(first: float, second: float) -> float:
-    """Heading between two [rad]."""
-    return math.atan2(math.sin(first) + math.sin(second), math.cos(first) + math.cos(second))
-
-
 def _column_is_free(scene: Scene, places: FloatArray, column: tuple[float, float, float]) -> np.ndarray:
     """(k,) whether a vertical capsule above each place meets nothing."""
-    radius, low, high = column
-    shape = coal.Capsule(radius, max(high - low - 2.0 * radius, 1e-3))
+    radius, bottom, top = column
+    shape = coal.Capsule(radius, max(top - bottom - 2.0 * radius, 1e-3))
     free = np.ones(len(places), dtype=bool)
-    turn = np.eye(3)
-    lift = np.array([0.0, 0.0, 0.5 * (low + high)])
-    for item in scene:
-        for part in collision_parts(item):
-            there = coal.Transform3s(part.rotation, part.translation)
-            box = _bounds(part.geometry, there)
-            near = np.ones(len(places), dtype=bool)
-            if box is not None:
-                near = (places[:, :2] >= box[0][:2] - radius).all(axis=1)
-                near &= (places[:, :2] <= box[1][:2] + radius).all(axis=1)
-                near &= (places[:, 2] + low <= box[1][2]) & (places[:, 2] + high >= box[0][2])
-            for row in np.flatnonzero(near & free):
-                result = coal.CollisionResult()
-                coal.collide(
-                    shape, coal.Transform3s(turn, places[row] + lift), part.geometry, there, _REQUEST, result
-                )
-                free[row] = not result.isCollision()
+    lift = np.array([0.0, 0.0, 0.5 * (bottom + top)])
+    for part in (part for item in scene for part in collision_parts(item)):
+        there = coal.Transform3s(part.rotation, part.translation)
+        low, high = _bounds(part.geometry, there)
+        near = (places[:, :2] >= low[:2] - radius).all(axis=1)
+        near &= (places[:, :2] <= high[:2] + radius).all(axis=1)
+        near &= (places[:, 2] + bottom <= high[2]) & (places[:, 2] + top >= low[2])
+        for row in np.flatnonzero(near & free):
+            here, result = coal.Transform3s(np.eye(3), places[row] + lift), coal.CollisionResult()
+            coal.collide(shape, here, part.geometry, there, _REQUEST, result)
+            free[row] = not result.isCollision()
     return free
 
 
-def _bounds(
-    geometry: coal.CollisionGeometry, place: coal.Transform3s
-) -> tuple[FloatArray, FloatArray] | None:
-    """Corners of the box about a placed geometry along the axes; None where it is endless."""
+def _bounds(geometry: coal.CollisionGeometry, place: coal.Transform3s) -> tuple[FloatArray, FloatArray]:
+    """Corners of the box about a placed geometry along the axes; infinite where it is endless."""
     low, high = (np.asarray(corner) for corner in local_box(geometry))
     if not (np.isfinite(low).all() and np.isfinite(high).all()) or np.abs([low, high]).max() > 1e6:
-        return None
+        return np.full(3, -np.inf), np.full(3, np.inf)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     turned = corners @ place.getRotation().T + place.getTranslation()
     return turned.min(axis=0), turned.max(axis=0)

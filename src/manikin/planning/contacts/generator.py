@@ -24,8 +24,7 @@ from manikin.planning.contacts.limb_collisions import DeepSamples, LimbCollision
 from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene
 
-_GROWTH = 0.15
-"""How much longer each step down the order is than the one before."""
+_GROWTH = 0.15  # how much longer each step down the order is than the one before
 _STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
 _FEW, _SOME, _BLOCK = 4, 16, 64  # candidates looked at together: first, later, and where many collide
 _NO_DIRECTION = np.zeros(3)
@@ -33,8 +32,7 @@ _LOOKED_AT = 8  # candidates for each that may be tried
 Alpha = TypeVar("Alpha", float, FloatArray)
 
 _TILTED, _UNNATURAL, _WEAK = ("", "tilted"), ("", "unnatural"), ("", "weak")
-NATURAL_SLACK = 0.1
-"""Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
+NATURAL_SLACK = 0.1  # normalised distance out of the learnt range that the alignment may leave
 
 
 class Hindrance(StrEnum):
@@ -136,13 +134,9 @@ class ContactGenerator:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        samples: Mapping[str, LimbSamples],
-        settings: GeneratorSettings | None = None,
-        rules: ContactRules | None = None,
-    ) -> None:
+        self, body: BodyModel, scene: Scene, samples: Mapping[str, LimbSamples],
+        settings: GeneratorSettings | None = None, rules: ContactRules | None = None,
+    ) -> None:  # fmt: skip
         """Prepare a scene.
 
         Args:
@@ -151,12 +145,9 @@ class ContactGenerator:
         Raises:
             BodyError: If samples belong to no limb of the body.
         """
-        self.body = body
-        self.settings = settings or GeneratorSettings()
-        self.rules = rules or ContactRules()
-        self._state = Configuration(body)
-        self._table = SurfaceTable(scene.holds)
-        self._scene, self._faces = scene, len(scene.surfaces)
+        self.body, self._state, self._scene = body, Configuration(body), scene
+        self.settings, self.rules = settings or GeneratorSettings(), rules or ContactRules()
+        self._table, self._faces = SurfaceTable(scene.holds), len(scene.surfaces)
         self._tools = {
             name: _LimbTools(body, limb_named(body, name), scene, item) for name, item in samples.items()
         }
@@ -261,10 +252,8 @@ class ContactGenerator:
         limb, near = reached.tools.limb.name, reached.surfaces
         candidates = self._samples_in_contact(reached, near)
         if usable is None or not len(candidates):
-            message = (
-                f"no sample of {limb} lies flat on a surface of {self._names(near)}, though these are near"
-            )
-            return _failure(limb, Hindrance.SURFACE, message)
+            where = f"flat on a surface of {self._names(near)}, though these are near"
+            return _failure(limb, Hindrance.SURFACE, f"no sample of {limb} lies {where}")
         best = float(Efort(usable.pulling).score(situation, candidates).max())
         does = "holds" if usable.pulling else "pushes"
         message = (
@@ -275,8 +264,8 @@ class ContactGenerator:
 
     def _names(self, surfaces: NDArray[np.int64]) -> str:
         """Names of the obstacles of some surfaces."""
-        near = (self._table.surfaces[number] for number in np.unique(surfaces))
-        return ", ".join(sorted({name for surface in near for name in surface.obstacles}))
+        near = (self._table.surfaces[number].obstacles for number in np.unique(surfaces))
+        return ", ".join(sorted(set[str]().union(*near)))
 
     def _choose(
         self, reached: "_WithinReach", situation: Situation, candidates: Candidates, scores: FloatArray,
@@ -285,18 +274,15 @@ class ContactGenerator:
         """Steps 3 and 4: of some rows best first, the first that can be aligned, are usable and free."""
         tools, kind = reached.tools, reached.kind
         faults: Counter[tuple[str, str]] = Counter()
-        flat = kind is ContactKind.SOLE
+        tried, flat = 0, kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
         tools.collisions.begin(situation)
-        q = np.array(situation.state.q)
-        direction = situation.reaction @ situation.rotation
-        tried = 0
+        q, direction = np.array(situation.state.q), situation.reaction @ situation.rotation
         order = rows[_order(scores[rows])[: _LOOKED_AT * self.settings.tries]]
         for row, goal in self._worth_trying(tools, situation, candidates, order, faults):
             if tried == self.settings.tries:
                 break
-            point = candidates.points[row]
-            tried += 1
+            tried, point = tried + 1, candidates.points[row]
             aligned = tools.aligner.align(*goal, allowed)
             if not aligned.lies(allowed, gap):
                 faults[_TILTED] += 1
@@ -329,13 +315,9 @@ class ContactGenerator:
         return _none_fits(tools.limb.name, faults, len(candidates), usable)
 
     def _worth_trying(
-        self,
-        tools: "_LimbTools",
-        situation: Situation,
-        candidates: Candidates,
-        order: NDArray[np.int64],
+        self, tools: "_LimbTools", situation: Situation, candidates: Candidates, order: NDArray[np.int64],
         faults: Counter[tuple[str, str]],
-    ) -> Iterator[tuple[int, tuple[FloatArray, FloatArray, FloatArray]]]:
+    ) -> Iterator[tuple[int, tuple[FloatArray, FloatArray, FloatArray]]]:  # fmt: skip
         """Rows in order with what to align there.
 
         As soon as the limb itself, not its end, has collided a few times, candidates that are deep in
@@ -348,7 +330,7 @@ class ContactGenerator:
             if sum(count for hit, count in faults.items() if hit[0] in tools.deep.shapes) >= _FEW // 2:
                 around = around or tools.deep.around(situation)
                 deep = tools.deep.pairs(around, candidates.samples[rows], self.settings.tolerance)
-                faults.update(tools.collisions.names(pair) for pair in deep[deep >= 0].tolist())
+                faults.update(tools.collisions.names[pair] for pair in deep[deep >= 0].tolist())
                 rows, size = rows[deep < 0], _BLOCK
             goals = tools.goals(situation, candidates, rows)
             yield from zip(rows.tolist(), zip(*goals, strict=True), strict=True)
@@ -370,19 +352,13 @@ class _LimbTools:
     """What one limb needs for its requests."""
 
     def __init__(self, body: BodyModel, limb: Limb, scene: Scene, samples: LimbSamples) -> None:
-        self.limb = limb
-        self.samples = samples
-        self.chain = LimbKinematics(body, limb)
+        self.limb, self.samples, self.chain = limb, samples, LimbKinematics(body, limb)
         self.aligner = Aligner(self.chain)
         self.collisions = LimbCollisions(body, limb, scene)
         self.deep = DeepSamples(body, self.chain, samples, self.collisions)
         self._range = NaturalRange(body, limb) if samples.natural else None
-        _ = (
-            samples.leaves,
-            samples.manipulability,
-            samples.hull,
-            samples.largest_ratio,
-        )  # made now, not during a request
+        # Made now, not during a request.
+        _ = samples.leaves, samples.manipulability, samples.hull, samples.largest_ratio
 
     def allowed(self, settings: GeneratorSettings, *, flat: bool) -> tuple[float, float]:
         """Distance [m] and tilt [rad] that the alignment may leave; what no joint moves is taken as it is."""

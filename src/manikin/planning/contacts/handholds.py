@@ -19,26 +19,13 @@ from manikin.scene import Scene
 
 HANDS = ("left_hand", "right_hand")
 
-HEIGHTS = (0.5, 1.35)
-"""Lowest and greatest height of a hold above the lower foot [m]."""
-
-WANTED = (0.30, 0.30, 0.0)
-"""Where a hand is best: ahead of the root, to its side, and above it [m]."""
-
-SHOULDER, ARM = (0.05, 0.19, 0.45), 0.66
-"""Place of a shoulder from the root, and the reach from there with some lean of the trunk [m]."""
-
-STOOP = 0.45
-"""How far shoulders go down to a hold that is low [m]."""
-
-APART = 0.15
-"""Distance between two places that are offered [m]."""
-
-PALM = 0.05
-"""Half the size of what has to be level below a palm [m]."""
-
-LEVEL = math.radians(20.0)
-"""Largest slope of a surface to lean on [rad]."""
+HEIGHTS = (0.5, 1.35)  # lowest and greatest height of a hold above the lower foot [m]
+WANTED = (0.30, 0.30, 0.0)  # where a hand is best: ahead of the root, to its side, and above it [m]
+SHOULDER, ARM = (0.05, 0.19, 0.45), 0.66  # shoulder from the root, and reach from there with some lean [m]
+STOOP = 0.45  # how far shoulders go down to a hold that is low [m]
+APART = 0.15  # distance between two places that are offered [m]
+PALM = 0.05  # half the size of what has to be level below a palm [m]
+LEVEL = math.radians(20.0)  # largest slope of a surface to lean on [rad]
 
 _GRID = np.array([[i, j] for i in range(-5, 6) for j in range(-5, 6)]) * 0.08
 _CORNERS = PALM * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
@@ -74,10 +61,9 @@ class Handholds:
         size, offers = self._size, list[tuple[float, Contact]]()
         for hand, side in zip(HANDS, (1.0, -1.0), strict=True):
             frames = [(root[:3], rotation_from_yaw(heading_of(root))) for root in roots]
+            mirror = np.array([1.0, side, 1.0])
             wanted, shoulders = (
-                np.array(
-                    [place + size * turn @ (np.array(away) * [1.0, side, 1.0]) for place, turn in frames]
-                )
+                np.array([place + size * turn @ (np.array(away) * mirror) for place, turn in frames])
                 for away in (WANTED, SHOULDER)
             )
             for contact in self._around(hand, wanted.mean(axis=0), frames[0], ground):
@@ -101,11 +87,9 @@ class Handholds:
         self, hand: str, wanted: FloatArray, frame: tuple[FloatArray, FloatArray], ground: float
     ) -> list[Contact]:
         """Contacts of a hand around a place (3,) of a body whose root has a place and heading."""
-        root, turn = frame
-        found: list[Contact] = []
+        (root, turn), found = frame, list[Contact]()
         for bar in self._bars:
-            along = bar.end - bar.start
-            along = along / max(float(np.linalg.norm(along)), 1e-9)
+            along = (bar.end - bar.start) / max(bar.length, 1e-9)
             for step in (0.0, APART, -APART):
                 middle = bar.nearest(wanted + step * self._size * along)
                 # From above, or from the body's side where the bar is upright.

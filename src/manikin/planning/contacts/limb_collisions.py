@@ -6,7 +6,6 @@ widened by a radius ``r``, whose distance from a point ``p`` in its frame is, wi
 ``|max(e, 0)| + min(max_i e_i, 0) - r``. Other shapes are left to the exact test.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,10 +22,9 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.candidates import IntArray, Situation
 from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene, segment_of
-from manikin.scene.collision import CollisionPart, collision_parts
+from manikin.scene.collision import collision_parts, local_box
 
-TOUCH = 0.002
-"""Depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]."""
+TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]
 YIELD = 0.8
 """Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius.
 
@@ -45,66 +43,75 @@ class LimbCollisions:
     Attributes:
         shapes: All geometries, those of the body first.
         pairs: (p, 2) numbers of the limb's shape and of the other one of each pair.
+        names: What the shapes of each pair are called: that of the body, and the obstacle or other shape.
         active: (p,) which pairs may touch in the situation that was begun.
         soft: Segments that give way in what the limb touches.
     """
 
     def __init__(self, body: BodyModel, limb: Limb, scene: Scene) -> None:
-        self._model = body.pinocchio
-        self._data = self._model.createData()
+        self._model, self._data = body.pinocchio, body.pinocchio.createData()
         parts = [part for obstacle in scene for part in collision_parts(obstacle)]
-        self._shapes = _with_scene(body, parts)
+        self._shapes: Any = body.geometry.copy()
+        for number, part in enumerate(parts):
+            place = pin.SE3(np.array(part.rotation), np.array(part.translation))
+            name = f"{part.obstacle}#{number}"
+            self._shapes.addGeometryObject(pin.GeometryObject(name, 0, 0, place, part.geometry))
+        self.shapes = list(self._shapes.geometryObjects)
+        names = [item.name for item in self.shapes]
+        self._count = count = len(names) - len(parts)
         moving = moving_segments(body, limb)
-        count = len(body.geometry.geometryObjects)
-        names = [item.name for item in self._shapes.geometryObjects]
         own = [number for number, name in enumerate(names[:count]) if segment_of(name) in moving]
-        self._shapes.removeAllCollisionPairs()
         outer = [(shape, part) for shape in own for part in range(count, len(names))]
         inner = [(names.index(a), names.index(b)) for a, b in body.collision_pairs]
         inner = [pair for pair in inner if (pair[0] in own) != (pair[1] in own) or set(pair) <= set(own)]
-        inner = [(a, b) if a in own else (b, a) for a, b in inner]
-        for pair in outer + inner:
+        pairs = outer + [(a, b) if a in own else (b, a) for a, b in inner]
+        self.pairs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        self.names = [(names[a], names[b].rsplit("#", 1)[0] if b >= count else names[b]) for a, b in pairs]
+        self._shapes.removeAllCollisionPairs()
+        for pair in pairs:
             self._shapes.addCollisionPair(pin.CollisionPair(*pair))
         self._placed = pin.GeometryData(self._shapes)
-        self._results = list(self._placed.collisionResults)  # references: making one takes longer
-        self._names = [(names[a], names[b].rsplit("#", 1)[0]) for a, b in outer]
+        # References: making one takes longer.
+        self._results, self._frames = list(self._placed.collisionResults), list(self._placed.oMg)
+        self._tested = list(zip(self.names, self._results, strict=True))
+        self.active: NDArray[np.bool_] = np.ones(len(pairs), dtype=bool)
         self.soft, self._depth = yielding(body, limb)
+        self._touched: tuple[str, ...] = ()
         self._yielding: dict[str, list[int]] = {}
-        for number, (shape, obstacle) in enumerate(self._names):
+        for number, (shape, obstacle) in enumerate(self.names[: len(outer)]):
             self._placed.collisionRequests[number].security_margin = -TOUCH
             if segment_of(shape) in self.soft:
                 self._yielding.setdefault(obstacle, []).append(number)
-        self._names += [(names[a], names[b]) for a, b in inner]
-        self._touched: tuple[str, ...] = ()
-        self._far = FarPairs(body, limb, parts, self._shapes, self._placed, outer + inner)
-        self.active: NDArray[np.bool_] = np.ones(len(self._names), dtype=bool)
-        self.pairs = np.array(outer + inner, dtype=np.int64).reshape(-1, 2)
-        self.shapes = list(self._shapes.geometryObjects)
-        self._places = list(self._placed.oMg)
-        self._tested = list(zip(self._names, self._results, strict=True))
+        # A shape of the limb is within a ball around the limb's origin whatever the joints do.
+        reaches, firsts = _reaches(body, limb), {first for first, _ in pairs}
+        self._reach = np.array([reaches[names[first]] for first, _ in pairs])
+        self._fixed = [number for number in range(count) if number not in firsts]
+        self._radii = np.array([_radius(self.shapes[number]) for number in self._fixed])
+        self._rotations = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
+        self._places, self._low, self._high = (
+            np.array([getattr(part, name) for part in parts]).reshape(-1, 3)
+            for name in ("translation", "low", "high")
+        )
+        self._gaps = np.full(len(names), -np.inf)  # what belongs to the limb is always near
 
     def begin(self, situation: Situation) -> None:
         """Leave out what the limb cannot reach wherever its joints are, until the next call."""
         pin.updateGeometryPlacements(
             self._model, self._data, self._shapes, self._placed, np.asarray(situation.state.q)
         )
-        near = self._far.near(situation.origin)
+        near = self._near(situation.origin)
         for number in np.flatnonzero(near & ~self.active).tolist():
             self._placed.activateCollisionPair(number)
         for number in np.flatnonzero(self.active & ~near).tolist():
             self._placed.deactivateCollisionPair(number)
         self.active = near
-        self._tested = [(self._names[number], self._results[number]) for number in np.flatnonzero(near)]
+        self._tested = [(self.names[number], self._results[number]) for number in np.flatnonzero(near)]
 
     def placements(self, numbers: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
         """Axes (n, 3, 3) and origins (n, 3) of some shapes in the world, as the situation began [m]."""
-        frames = [self._places[number] for number in numbers.tolist()]
+        frames = [self._frames[number] for number in numbers.tolist()]
         turns = np.array([item.rotation for item in frames]).reshape(-1, 3, 3)
         return turns, np.array([item.translation for item in frames]).reshape(-1, 3)
-
-    def names(self, number: int) -> tuple[str, str]:
-        """What the shapes of a pair are called: that of the body, and the obstacle or other shape."""
-        return self._names[number]
 
     def first(self, q: FloatArray, touched: tuple[str, ...] = ()) -> tuple[str, str] | None:
         """Shape of the body, and obstacle or other shape, of the first pair that collides, or None.
@@ -114,69 +121,23 @@ class LimbCollisions:
             touched: Names of the obstacles on which the limb has its contact.
         """
         if touched != self._touched:
-            self._set_margin(self._touched, TOUCH)
-            self._set_margin(touched, max(self._depth, TOUCH))
+            for obstacles, depth in ((self._touched, TOUCH), (touched, max(self._depth, TOUCH))):
+                for number in (pair for name in obstacles for pair in self._yielding.get(name, ())):
+                    self._placed.collisionRequests[number].security_margin = -depth
             self._touched = touched
         if not pin.computeCollisions(self._model, self._data, self._shapes, self._placed, q, True):
             return None
         return next(names for names, result in self._tested if result.isCollision())
 
-    def _set_margin(self, obstacles: tuple[str, ...], depth: float) -> None:
-        for number in (pair for name in obstacles for pair in self._yielding.get(name, ())):
-            self._placed.collisionRequests[number].security_margin = -depth
-
-
-class FarPairs:
-    """Tells which pairs of a limb's shape and something else can never touch while the rest stays.
-
-    A shape of the limb is within a ball around the limb's origin whatever the joints do.
-    """
-
-    def __init__(
-        self, body: BodyModel, limb: Limb, parts: Sequence[CollisionPart], shapes: pin.GeometryModel,
-        placed: pin.GeometryData, pairs: Sequence[tuple[int, int]],
-    ) -> None:  # fmt: skip
-        """Prepare pairs of a shape of the limb with a part of the scene or another shape of the body.
-
-        Args:
-            shapes: Shapes of the body, then the parts.
-            placed: Where they are, updated by the caller.
-            pairs: Numbers of the shapes of each pair.
-        """
-        reaches = _reaches(body, limb)
-        names = [item.name for item in shapes.geometryObjects]
-        count = len(names) - len(parts)
-        self._reach = np.array([reaches[names[first]] for first, _ in pairs])
-        self._others = np.array([second for _, second in pairs], dtype=np.int64)
-        own = {first for first, _ in pairs}
-        self._fixed = [number for number in range(count) if number not in own]
-        self._frames = [placed.oMg[number] for number in self._fixed]  # references: making one takes longer
-        self._radii = np.array([_radius(shapes.geometryObjects[number]) for number in self._fixed])
-        self._rotations = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
-        self._places = np.array([part.translation for part in parts]).reshape(-1, 3)
-        self._low = np.array([part.low for part in parts]).reshape(-1, 3)
-        self._high = np.array([part.high for part in parts]).reshape(-1, 3)
-        self._gaps = np.full(len(names), -np.inf)  # what belongs to the limb is always near
-        self._count = count
-
-    def near(self, origin: FloatArray) -> NDArray[np.bool_]:
-        """(pairs,) whether a pair may touch when the origin of the limb's frame is at (3,) [m]."""
-        away = np.array([frame.translation for frame in self._frames]).reshape(-1, 3) - origin
+    def _near(self, origin: FloatArray) -> NDArray[np.bool_]:
+        """(p,) whether a pair may touch when the origin of the limb's frame is at (3,) and the rest stays."""
+        frames = [self._frames[number] for number in self._fixed]
+        away = np.array([item.translation for item in frames]).reshape(-1, 3) - origin
         self._gaps[self._fixed] = np.sqrt(np.einsum("ni,ni->n", away, away)) - self._radii
         local = np.einsum("nji,nj->ni", self._rotations, origin - self._places)
         outside = np.maximum(np.maximum(self._low - local, local - self._high), 0.0)
         self._gaps[self._count :] = np.sqrt(np.einsum("ni,ni->n", outside, outside))
-        return self._gaps[self._others] <= self._reach
-
-
-def _with_scene(body: BodyModel, parts: Sequence[CollisionPart]) -> Any:
-    """Copy of the body's geometry with the obstacles fixed to the world."""
-    shapes = body.geometry.copy()
-    for number, part in enumerate(parts):
-        place = pin.SE3(np.array(part.rotation), np.array(part.translation))
-        name = f"{part.obstacle}#{number}"
-        shapes.addGeometryObject(pin.GeometryObject(name, 0, 0, place, part.geometry))
-    return shapes
+        return self._gaps[self.pairs[:, 1]] <= self._reach
 
 
 def _reaches(body: BodyModel, limb: Limb) -> dict[str, float]:
@@ -187,9 +148,8 @@ def _reaches(body: BodyModel, limb: Limb) -> dict[str, float]:
             along[segment.name] = along[segment.parent] + float(np.linalg.norm(segment.origin))
     return {
         f"{name}/{shape.name}": length + float(np.linalg.norm(shape.translation)) + _extent(shape)
-        for name, length in along.items()
-        for shape in body.segment(name).shapes
-    }
+        for name, length in along.items() for shape in body.segment(name).shapes
+    }  # fmt: skip
 
 
 def _extent(shape: Shape) -> float:
@@ -201,9 +161,8 @@ def _extent(shape: Shape) -> float:
 
 def _radius(item: pin.GeometryObject) -> float:
     """Radius of a ball around the origin of a geometry [m]."""
-    item.geometry.computeLocalAABB()
-    box = item.geometry.aabb_local
-    return float(np.linalg.norm(np.maximum(np.abs(box.min_), np.abs(box.max_))))
+    low, high = local_box(item.geometry)
+    return float(np.linalg.norm(np.maximum(np.abs(low), np.abs(high))))
 
 
 def yielding(body: BodyModel, limb: Limb) -> tuple[tuple[str, ...], float]:
@@ -221,8 +180,7 @@ def yielding(body: BodyModel, limb: Limb) -> tuple[tuple[str, ...], float]:
     return last, YIELD * max(radii, default=0.0)
 
 
-_ALONG = np.array([0.0, 0.5])
-"""Where the balls are on a capsule's axis, from its middle, over its length: not near the joint before."""
+_ALONG = np.array([0.0, 0.5])  # shares of a capsule's axis with a ball, from its middle on
 
 
 class DeepSamples:
@@ -253,17 +211,15 @@ class DeepSamples:
         numbers = [names.index(name) for name in shapes]
         mine = np.flatnonzero(np.isin(first, numbers) & known[second] & ~np.isin(second, numbers))
         self._others, column = np.unique(second[mine], return_inverse=True)
-        self._half = np.array([np.zeros(3) if item is None else item[0] for item in round_boxes])[
-            self._others
-        ]
-        both = np.array([0.0 if item is None else item[1] for item in round_boxes])
+        solid = [item or (np.zeros(3), 0.0) for item in round_boxes]
+        self._half = np.array([half for half, _ in solid])[self._others]
         # Number of the pair of each ball with each other shape, and the sum of their radii.
         self._pair = np.full((len(self._others), len(numbers)), -1, dtype=np.int64)
         self._reach = np.full(self._pair.shape, -np.inf)
         for pair, row in zip(mine.tolist(), column.tolist(), strict=True):
             own = np.array(numbers) == first[pair]
             self._pair[row, own] = pair
-            self._reach[row, own] = both[second[pair]] + radii[own]
+            self._reach[row, own] = solid[second[pair]][1] + radii[own]
 
     def around(self, situation: Situation) -> "Surroundings":
         """What the balls may be in, in the limb's frame; the collision test was begun with the situation."""

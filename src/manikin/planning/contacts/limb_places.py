@@ -30,50 +30,21 @@ def stature_of(body: BodyModel) -> float:
     return body.stature
 
 
-TOE_ROOM = 0.02
-"""Distance of the toes to the end of the hold that carries them [m]; our choice."""
-
-TURN_OUT = float(np.deg2rad(25.0))
-"""Angle by which a foot may stand turned out [rad]; our choice."""
-
-STEEPEST = float(np.deg2rad(40.0))
-"""Largest slope of a surface on which such a place may be [rad]; our choice."""
-
-FINGERS = (0.005, 0.02)
-"""Distances of a palm from the edge around which its fingers go [m]; our choice."""
-
-BEYOND = 0.03
-"""Room beyond such an edge [m]; our choice."""
-
-INSET = 0.06
-"""Distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice."""
-
-SPACING = 0.1
-"""Distance of neighbouring places of a limb, by its reach, twice that of soles; our choice."""
-
-PALM_DEPTH = 0.1
-"""Depth behind an edge that a palm needs; a hand does not close round a narrow board; our choice [m]."""
-
-FAR_EDGE = 0.7
-"""Cosine of the angle between the heading and the way out over an edge that is left out; our choice."""
-
-RUNG_TURN = float(np.deg2rad(30.0))
-"""Largest angle between the heading of a foot and the way across its rung; our choice [rad]."""
-
-RUNG_SIDE = 0.025
-"""Distance of a sole to the ends of its rung, where the stiles are [m]; our choice."""
-
-RUNG_APART = 0.025
-"""Distance on the sole between two places of a rung below it [m]; our choice."""
-
-PALM_ROOM = 0.01
-"""Distance of a palm's middle from the bar that its fingers close round [m]."""
-
-STEEP_BAR = 0.85
-"""Rise of a bar over its length from which on a hand takes it from the side; our choice."""
-
-RUNG_SPACING = 0.045
-"""Distance of neighbouring places of a foot along a rung [m]; our choice."""
+TOE_ROOM = 0.02  # distance of the toes to the end of the hold that carries them [m]; our choice
+TURN_OUT = float(np.deg2rad(25.0))  # angle by which a foot may stand turned out [rad]; our choice
+STEEPEST = float(np.deg2rad(40.0))  # largest slope of a surface with such a place [rad]; our choice
+FINGERS = (0.005, 0.02)  # distances of a palm from the edge around which its fingers go [m]; our choice
+BEYOND = 0.03  # room beyond such an edge [m]; our choice
+INSET = 0.06  # distance of tips to the edges of what they stand on, by their reach: shanks lean; our choice
+SPACING = 0.1  # distance of neighbouring places of a limb, by its reach, twice that of soles; our choice
+PALM_DEPTH = 0.1  # depth behind an edge that a palm needs: boards are too narrow for a hand; our choice [m]
+FAR_EDGE = 0.7  # cosine of the angle of the heading to the way out over an edge that is left out; our choice
+RUNG_TURN = float(np.deg2rad(30.0))  # largest angle of a heading to the way across its rung; our choice [rad]
+RUNG_SIDE = 0.025  # distance of a sole to the ends of its rung, where the stiles are [m]; our choice
+RUNG_APART = 0.025  # distance on the sole between two places of a rung below it [m]; our choice
+PALM_ROOM = 0.01  # distance of a palm's middle from the bar that its fingers close round [m]
+STEEP_BAR = 0.85  # rise of a bar over its length from which on a hand takes it from the side; our choice
+RUNG_SPACING = 0.045  # distance of neighbouring places of a foot along a rung [m]; our choice
 
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
@@ -94,10 +65,9 @@ def limb_holds(
     state, root = Configuration(body, reference), pin.XYZQUATToSE3(reference[:7])
     low, high = ends[:, :3].min(axis=0) - 2.0 * size, ends[:, :3].max(axis=0) + 2.0 * size
     surfaces = [
-        item
-        for item in scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
+        item for item in scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
         if (item.polygon.min(axis=0) <= high).all() and (item.polygon.max(axis=0) >= low).all()
-    ]
+    ]  # fmt: skip
     grid = _Grid(scene, surfaces, (low, high), SPACING * size)
     heading = heading_of(ends[1])
     known: dict[tuple[object, ...], list[_Place]] = {}
@@ -170,8 +140,7 @@ class _Grid:
     ) -> list[_Place]:
         """Places of contacts of one shape: of hands along edges and bars, of feet on rungs as well.
 
-        Args:
-            stiff: Place on the sole's x axis up to which a foot may stand on a rung [m]; None for on none.
+        A foot may stand on a rung up to ``stiff`` on its x axis [m]; on none where that is None.
         """
         if kind is ContactKind.GRASP:
             along = [place for surface in self._surfaces for place in self._along(surface, turns[0][:, 0])]
@@ -190,8 +159,7 @@ class _Grid:
 
     def _around(self, bar: GraspLine, turn: FloatArray) -> Iterator[_Place]:
         """Places of a hand along a bar: on top of it, or on the body's side of one that is steep."""
-        axis = bar.end - bar.start
-        axis = axis / max(float(np.linalg.norm(axis)), 1e-9)
+        axis = (bar.end - bar.start) / max(bar.length, 1e-9)
         steep = abs(float(axis[2])) >= STEEP_BAR
         out = -turn[:, 0] if steep else turn[:, 2]
         out = out - (out @ axis) * axis
@@ -208,9 +176,7 @@ class _Grid:
     ) -> Iterator[_Place]:
         """Places of a foot across a rung, which all of the sole's width and no bending part of it is on.
 
-        Args:
-            points: (c, 3) corners of the sole [m].
-            turn: (3, 3) rotation of a foot that goes straight on.
+        The sole has corners (c, 3) [m]; the rotation (3, 3) is of a foot that goes straight on.
         """
         ring = surface.polygon
         if len(ring) != 4:
@@ -239,11 +205,7 @@ class _Grid:
         return np.asarray(((places >= low) & (places <= high)).all(axis=1), dtype=np.bool_)
 
     def _along(self, surface: Surface, ahead: FloatArray) -> Iterator[_Place]:
-        """Places along the edges of a surface beyond which there is room, fingers pointing inward.
-
-        Args:
-            ahead: (3,) heading of the body, to which no fingers point back.
-        """
+        """Places along edges beyond which there is room, fingers inward, none back to the heading (3,)."""
         for start, end in zip(*surface.edges, strict=True):
             length = float(np.linalg.norm(end - start))
             along = (end - start) / max(length, 1e-9)
@@ -273,5 +235,4 @@ class _Grid:
         places = middle + grid @ axes.T - points.mean(axis=0)
         places = places[self._inside(places)]
         outside = surface.outside((places[:, None] + points).reshape(-1, 3)).reshape(len(places), len(points))
-        on = (outside <= 0.0).all(axis=1)
-        return places[on]
+        return places[(outside <= 0.0).all(axis=1)]

@@ -29,70 +29,36 @@ from manikin.kinematics import Placement
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
-from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder
+from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 from manikin.planning.contacts.samples import LimbSamples
 
-GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))
-"""Factors on the estimate, tried in turn, each with the states that may be expanded with it; our choice."""
-
-GOAL_REACH = 1.5
-"""Distance from the root at the goal within which limbs have to have places, by their reach."""
-
-STEEPEST_TRUNK = 0.5
-"""Largest pitch of a trunk that follows its contacts [rad]; our choice."""
-
-LEVELLED = 0.8
-"""Share of the slope of its contacts to which a trunk pitches; our choice."""
-
-FARTHEST = 0.5
-"""Distance of a first contact to where its limb should be at most, by the limb's reach; our choice."""
-
-APART = 0.15
-"""Distance between first contacts that are tried for a limb, by its reach; our choice."""
-
-REST = 0.06
-"""Distance to the edges of where it rests at which a trunk is thought, by the reach; our choice."""
-
-SHARES = np.linspace(0.0, 1.0, 9)
-"""Shares of the way of the trunk to the middle of the limbs that stay that are tried."""
-
-WIDE = 0.12
-"""Distance to the edges of where it rests at which a trunk is at ease, by the reach; our choice."""
-
-NARROW = 3.0
-"""Cost of a move over contacts on one line, between whose edges there is no room, in moves; our choice."""
-
-OVERREACH = 30.0
-"""Cost of a limb that is beyond its reach then by as much as that, in moves; our choice."""
-
-PROVEN = 0.8
-"""Discount on a move that has a posture, so that ways with postures are gone on with [moves]; our choice."""
-
-LOOSE = 1.0
-"""Cost of a limb without a contact, in moves; our choice."""
-
+GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))  # on the estimate, states expanded with each; our choice
+GOAL_REACH = 1.5  # distance from the root at the goal within which limbs have to have places, by their reach
+STEEPEST_TRUNK = 0.5  # largest pitch of a trunk that follows its contacts [rad]; our choice
+LEVELLED = 0.8  # share of the slope of its contacts to which a trunk pitches; our choice
+FARTHEST = 0.5  # largest distance of a first contact to the place of its limb, by its reach; our choice
+APART = 0.15  # distance between first contacts that are tried for a limb, by its reach; our choice
+REST = 0.06  # distance to the edges of where it rests at which a trunk is thought, by the reach; our choice
+SHARES = np.linspace(0.0, 1.0, 9)  # of the way of the trunk to the middle of the limbs that stay
+WIDE = 0.12  # distance to the edges of where it rests at which a trunk is at ease, by the reach; our choice
+NARROW = 3.0  # cost of a move over contacts on one line, without room between their edges, in moves
+OVERREACH = 30.0  # cost of a limb that is beyond its reach then by as much as that, in moves; our choice
+PROVEN = 0.8  # discount on a move that has a posture: such ways are gone on with [moves]; our choice
+LOOSE = 1.0  # cost of a limb without a contact, in moves; our choice
 HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
 """Turn of a hand whose fingers hook round an edge, from one that lies flat on it."""
-
-SOLES_APART = 0.02
-"""Least distance of two soles side by side; our choice [m]."""
-
-SOLE_ABOVE = 0.1
-"""Distance of two soles of which one may be above the other; our choice [m]."""
-
-TURN = 0.2
-"""Distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice."""
-
-FREE = -1
-"""Row of a hand that has let go."""
+SOLES_APART = 0.02  # least distance of two soles side by side; our choice [m]
+SOLE_ABOVE = 0.1  # distance of two soles of which one may be above the other; our choice [m]
+TURN = 0.2  # distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice
+FREE = -1  # row of a hand that has let go
 
 State = tuple[int, ...]
 """Place of each limb, by its row among those of the limb; the first is that of the start, if it has one."""
 
 
 @dataclass(frozen=True)
-class LimbSettings:
+class LimbSettings(Paces):
     """How limbs are moved, of a body whose limbs reach 1 m; the values are our choice.
 
     Attributes:
@@ -103,10 +69,6 @@ class LimbSettings:
         sway: Distance of the root from the polygon of the contacts that stay at most, by that reach.
         searches: Most postures that are looked for.
         lift: How far a limb in flight keeps from the line between its contacts [m].
-        swing_duration: Shortest flight of a limb [s].
-        swing_speed: Its mean speed on longer ways [m/s].
-        shift_duration: Shortest time between two flights [s].
-        hinge_pace: Mean speed of the hinge that turns most [rad/s].
         goal_distance: Distance of the root from its goal at which it is reached [m].
         goal_turn: Angle between the root's heading and the goal's at which it is reached [rad].
         turns: Whether the root's heading follows the contacts; it goes from that of the start to the goal's
@@ -123,10 +85,6 @@ class LimbSettings:
     sway: float = 0.12
     searches: int = 900
     lift: float = 0.08
-    swing_duration: float = 0.7
-    swing_speed: float = 0.7
-    shift_duration: float = 0.35
-    hinge_pace: float = HINGE_PACE
     goal_distance: float = 0.08
     goal_turn: float = math.radians(12.0)
     turns: bool = True
@@ -196,12 +154,14 @@ class LimbHolds:
         return self.samples.reach.residual((places - at) @ turn)
 
 
-def within_strength(body: BodyModel, posed: Posed, carrying: Mapping[str, Contact]) -> Posed:
-    """The posture, or that resting on some contacts in it asks for more than the strength."""
+def within_strength(
+    body: BodyModel, posed: Posed, carrying: Mapping[str, Contact], most: float = 1.0
+) -> Posed:
+    """The posture, or that resting on some contacts in it asks for more than a share of the strength."""
     if posed.q is None:
         return posed
     share = static_torque_share(body, posed.q, Stance(list(carrying.values())))
-    if share <= 1.0:
+    if share <= most:
         return posed
     return Posed(None, f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength")
 
@@ -216,12 +176,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """Prepare a search.
 
         Args:
-            poser: Finds postures.
             holds: Places of each limb that makes contacts.
             start: Contacts and posture at the start; limbs without a contact make one where they can.
             goal: (7,) pose of the root at the goal.
             size: Mean distance that the limbs reach [m].
-            settings: Paces and bounds.
             lead: Finds places (n, 3) of the root on a guide to the goal, None where the straight way is free
                 [m]; asked when a chain of places leads there. The straight way when omitted.
         """
@@ -250,9 +208,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._ahead: dict[State, float] = {}
         self._stuck: set[tuple[State, int]] = set()
         self._dearer: dict[int, FloatArray] = {}  # (n, 2, 3) places of a limb and the root, by limb
-        self._roots: dict[State, FloatArray] = {}
-        self._turns: dict[State, FloatArray] = {}
-        self._onward: dict[State, FloatArray] = {}
+        # Place and rotation of the root, and the place a stride on.
+        self._trunks: dict[State, tuple[FloatArray, FloatArray, FloatArray]] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
         self._beyond: dict[tuple[State, State], float] = {}
         self._resting: dict[tuple[State, int], tuple[tuple[FloatArray, FloatArray] | None, float]] = {}
@@ -283,17 +240,15 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             return f"the goal is walled off from the start: none of {names} has a place within reach of it"
         tree, left = cKDTree(places), np.linalg.norm(places - there, axis=1)
         known = np.arange(len(places)) < len(self.holds)
-        open_ = list(zip(left[known].tolist(), np.flatnonzero(known).tolist(), strict=True))
-        heapq.heapify(open_)
+        open_ = sorted((left[row], row) for row in range(len(self.holds)))
         while open_:
             near, row = heapq.heappop(open_)
             if near <= enough:
                 return ""
             around = np.array(tree.query_ball_point(places[row], self.size))
-            around = around[~known[around]]
-            known[around] = True
-            for item in zip(left[around].tolist(), around.tolist(), strict=True):
-                heapq.heappush(open_, item)
+            for other in around[~known[around]].tolist():
+                known[other] = True
+                heapq.heappush(open_, (left[other], other))
         return f"the goal is walled off from the start: a gap is wider than {self.size:.2f} m"
 
     def _farthest(self) -> str:
@@ -358,9 +313,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         for k, item in enumerate(self.holds if self.settings.retreats else ()):
             near &= ~held[:, k] | (-item.room(there[:, k]) <= self.settings.beyond * self.size)
         ahead = n * (off_way + 0.6 * self.size * off_heading) / stride
-        self._roots.update(zip(states, roots, strict=True))
-        self._turns.update(zip(states, turn, strict=True))
-        self._onward.update(zip(states, onward, strict=True))
+        self._trunks.update(zip(states, zip(roots, turn, onward, strict=True), strict=True))
         for state, left in zip(states, np.where(near, 0.0, ahead + 1e-6).tolist(), strict=True):
             self._ahead.setdefault(state, left)
         return cost
@@ -386,8 +339,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """States after one move, with what it costs."""
         if state in self._next:
             return self._next[state]
-        root, turn, stride = self._roots[state], self._turns[state], self.settings.stride
-        away = self._onward[state] - root
+        (root, turn, onward), stride = self._trunks[state], self.settings.stride
+        away = onward - root
         onward = min(1.0, 0.5 * stride / max(float(np.linalg.norm(away)), 1e-9)) * away
         states: list[State] = []
         steps: list[float] = []
@@ -411,17 +364,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         costs = self._frame_costs(states) if states else np.zeros(0)
         moves = [
             (after, step + cost)
-            for after, step, cost in zip(states, steps, costs.tolist(), strict=True)
-            if math.isfinite(cost)
-        ]
+            for after, step, cost in zip(states, steps, costs.tolist(), strict=True) if math.isfinite(cost)
+        ]  # fmt: skip
         # A limb that is still free comes first ([Tonneau2015]_ 7.2), as long as it finds a place.
         whole = all(self._held(k, row) for k, row in enumerate(state))
-        fills = [not whole and self._fills(state, after) for after, _ in moves]
-        first = [item for item, fill in zip(moves, fills, strict=True) if fill]
-        self._later[state] = (
-            [item for item, fill in zip(moves, fills, strict=True) if not fill] if first else []
-        )
-        self._next[state] = first or moves
+        fills = {after for after, _ in moves if not whole and self._fills(state, after)}
+        self._later[state] = [item for item in moves if item[0] not in fills] if fills else []
+        self._next[state] = [item for item in moves if item[0] in fills] or moves
         return self._next[state]
 
     def _tested(self, before: State, after: State) -> float:
@@ -438,7 +387,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         dearer = self._dearer.get(k)
         if dearer is None or math.isinf(cost):
             return cost
-        place = np.concatenate([self._places[k][after[k]], self._roots[after]]).reshape(2, 3)
+        place = np.concatenate([self._places[k][after[k]], self._trunks[after][0]]).reshape(2, 3)
         away = np.linalg.norm(dearer - place, axis=2)
         return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
 
@@ -473,13 +422,13 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
         On its way over the limbs that stay the trunk takes the others there.
         """
-        root = self._roots[state]
+        root, turn, _ = self._trunks[state]
         ways = root[:2] + SHARES[:, None] * (middle - root[:2])
         rooms = signed_distance(ways, hull)
         if rooms[0] < -self.settings.sway * self.size:
             return math.inf
         shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
-        local = (self._at(state) - shifted) @ self._turns[state]
+        local = (self._at(state) - shifted) @ turn
         beyond = [-float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])]
         return OVERREACH * max(0.0, *beyond) / self.size
 
@@ -523,7 +472,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         left = [item for item in self._next.get(before, []) if item[0] != after]
         self._next[before] = left or self._later.pop(before, [])
-        place = np.array([[self._at(after)[k], self._roots[after]]])
+        place = np.array([[self._at(after)[k], self._trunks[after][0]]])
         self._dearer[k] = np.vstack([self._dearer.get(k, np.zeros((0, 2, 3))), place])
 
     # --- whole postures -------------------------------------------------------------------------
@@ -553,35 +502,30 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             k = self._moved(before, after)
             name, held, landed = self.holds[k].effector, self._contacts_of(before), self._contacts_of(after)
             staying = {other: contact for other, contact in held.items() if other != name}
-            lifted = self._posed(
-                held, staying, self._guesses(self._guide(before), stages[-1].q), (before, k, False)
-            )
+            guesses = self._guesses(self._guide(before), stages[-1].q)
+            lifted = self._posed(held, staying, guesses, (before, k, False))
             if lifted.q is None:
                 self._stuck.add((before, k))
                 return self._refused(before, after, f"{name} cannot leave its contact: {lifted.reason}")
-            if after[k] == FREE:
-                stages.append(Stage.of(body, staying, lifted.q, self.settings.shift_duration))
-                self._moves.append((before, after))
-                continue
-            guesses = self._guesses(self._guide(after), lifted.q, (self.holds[k], landed[name]))
-            landing = self._posed(landed, staying, guesses, (after, k, True))
-            if landing.q is None:
-                return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
-            old = held.get(name)
-            if old is None:
-                # The limb is free already: it reaches its contact while the phase before lasts.
-                longest = max(stages[-1].min_duration, self.settings.swing_duration)
-                stages[-1] = replace(stages[-1], min_duration=longest)
-            else:
-                via = self._between(staying, lifted.q, landing.q, (old, landed[name]), (before, after))
-                if via is None:
-                    return self._refused(before, after, f"{name} finds no way around")
-                distance = float(np.linalg.norm(landed[name].position - old.position))
-                flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
-                stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
-                self._moves.append((before, after))
-            stages.append(Stage.of(body, landed, landing.q, self.settings.shift_duration))
-            self._moves.append((before, after))
+            old, new, q = held.get(name), landed.get(name), lifted.q
+            if new is not None:
+                guesses = self._guesses(self._guide(after), q, (self.holds[k], new))
+                landing = self._posed(landed, staying, guesses, (after, k, True))
+                if landing.q is None:
+                    return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
+                q = landing.q
+                if old is None:
+                    # The limb is free already: it reaches its contact while the phase before lasts.
+                    longest = max(stages[-1].min_duration, self.settings.swing_duration)
+                    stages[-1] = replace(stages[-1], min_duration=longest)
+                else:
+                    via = self._between(staying, lifted.q, q, (old, new), (before, after))
+                    if via is None:
+                        return self._refused(before, after, f"{name} finds no way around")
+                    flight = self.settings.flight(old, new)
+                    stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
+            stages.append(Stage.of(body, landed, q, self.settings.shift_duration))
+            self._moves += [(before, after)] * (len(stages) - len(self._moves))
         contacts = stages[-1].contacts
         end = self.poser.pose(contacts, contacts, stages[-1].q, self.goal)
         end = within_strength(body, end, contacts)
@@ -606,10 +550,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         back, roots = pin.XYZQUATToSE3(guide).rotation[:, 0], [guide]
         if self.settings.retreats:
             roots.append(q[:7])
-        roots += [
-            np.concatenate([guide[:3] - away * self.size * back, guide[3:7]])
-            for away in self.settings.retreats
-        ]
+        for away in self.settings.retreats:
+            roots.append(np.concatenate([guide[:3] - away * self.size * back, guide[3:7]]))
         for root in roots:
             yield root, q if landing is None else landing[0].stretched(q, root, landing[1], self._state)
 
@@ -655,15 +597,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             guesses: Poses (7,) of the root to be near, each with a posture (nq,) to begin with.
         """
         if key not in self._postures:
-            upright = {
-                name: Placement(None, contact.rotation_contact_to_world, 0.05)
-                for name, contact in held.items() if contact.kind is ContactKind.POINT
-            }  # fmt: skip
-            posed = Posed(None)
+            posed, placements = Posed(None), {**upright_points(held), **(wishes or {})}
             for guide, start in guesses:
-                posed = self.poser.pose(
-                    held, carrying, start, guide, placements={**upright, **(wishes or {})}
-                )
+                posed = self.poser.pose(held, carrying, start, guide, placements=placements)
                 if posed.q is not None:
                     break
             self._postures[key] = within_strength(self.poser.body, posed, carrying)

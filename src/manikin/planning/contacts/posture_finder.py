@@ -21,11 +21,8 @@ from manikin.kinematics import (
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Proximity, Scene
 
-ROOT = 7
-"""Numbers of a posture that are the pose of its root."""
-
-LEARNT_MARGIN = 0.01
-"""Angle that such postures keep to the surface of a learnt volume [rad]; our choice."""
+ROOT = 7  # numbers of a posture that are the pose of its root
+LEARNT_MARGIN = 0.01  # angle that such postures keep to the surface of a learnt volume [rad]; our choice
 
 
 @dataclass(frozen=True)
@@ -54,11 +51,6 @@ class PostureFinderSettings:
     iterations: int = 40
     friction_model: FrictionModel = "outer"
 
-    @property
-    def learnt_margin(self) -> float | None:
-        """Angle to the learnt ranges [rad]; None where they do not count."""
-        return LEARNT_MARGIN if self.natural else None
-
     def scaled(self, factor: float) -> "PostureFinderSettings":
         """Settings for a body of another size: lengths times a factor."""
         return replace(
@@ -82,6 +74,14 @@ class Posed:
     too_hard: bool = False
 
 
+def upright_points(held: Mapping[str, Contact]) -> dict[str, Placement]:
+    """Wishes for what touches at a point to stand upright on its surface, by effector."""
+    return {
+        name: Placement(None, contact.rotation_contact_to_world, 0.05)
+        for name, contact in held.items() if contact.kind is ContactKind.POINT
+    }  # fmt: skip
+
+
 class PostureFinder:
     """Finds postures of a body in a scene, and counts them.
 
@@ -90,12 +90,9 @@ class PostureFinder:
     """
 
     def __init__(
-        self,
-        body: BodyModel,
-        scene: Scene,
-        reference: FloatArray | None = None,
+        self, body: BodyModel, scene: Scene, reference: FloatArray | None = None,
         settings: PostureFinderSettings | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Prepare a scene.
 
         Args:
@@ -147,8 +144,8 @@ class PostureFinder:
             self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
             self_clearance=settings.clearance, ignore=touching_pairs(self.body, self._touched_by(held)),
-            beside=self._beside(held),
-            range_margin=settings.range_margin, learnt_margin=settings.learnt_margin,
+            beside=self._beside(held), range_margin=settings.range_margin,
+            learnt_margin=LEARNT_MARGIN if settings.natural else None,
             reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
         once = SolverSettings(
@@ -168,11 +165,13 @@ class PostureFinder:
     ) -> FloatArray | None:
         """(2,) place nearest to another where the centre of mass can rest on contacts; None without any.
 
-        Args:
-            near: (2,) [m].
-            inset: Distance to the edges of where it may rest [m].
+        It keeps a distance ``inset`` to the edges of where it may rest [m].
         """
-        return self._region(carrying).nearest(near, inset)
+        key = frozenset(carrying.values())
+        if key not in self._regions:
+            stance = Stance(tuple(carrying.values()), model=self.model)
+            self._regions[key] = StaticRegion.of(stance, self.body.mass)
+        return self._regions[key].nearest(near, inset)
 
     def led(self, guide: FloatArray) -> dict[str, Placement]:
         """Wish for the root to be near a (7,) pose, by the root's effector."""
@@ -195,11 +194,3 @@ class PostureFinder:
             for obstacle in self._touched[item]
         }  # fmt: skip
         return pairs_beside(self.body, self._touched_by(held)) | wrists
-
-    def _region(self, carrying: Mapping[str, Contact]) -> StaticRegion:
-        """Where the body may rest; asked again and again for the same contacts."""
-        key = frozenset(carrying.values())
-        if key not in self._regions:
-            stance = Stance(tuple(carrying.values()), model=self.model)
-            self._regions[key] = StaticRegion.of(stance, self.body.mass)
-        return self._regions[key]

@@ -16,8 +16,7 @@ from manikin.kinematics.limb_kinematics import hull_of, rigid_reach
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.contacts.efort import MOST_RATIO
 
-THRESHOLD = 0.05
-"""Smallest manipulability, as a share of the largest one seen; our choice, the thesis leaves it open."""
+THRESHOLD = 0.05  # least manipulability, as a share of the largest seen; our choice, open in the thesis
 _FEWEST_KEPT = 0.02
 
 
@@ -89,8 +88,7 @@ class LimbSamples:
 
 
 _ROUNDING = 1e-9
-_LEAF = 16
-"""Largest number of samples in a leaf."""
+_LEAF = 16  # largest number of samples in a leaf
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,14 +151,9 @@ def manipulability(products: FloatArray) -> FloatArray:
 
 
 def sample_limb(
-    body: BodyModel,
-    limb: Limb,
-    rng: np.random.Generator,
-    count: int = 10_000,
-    threshold: float = THRESHOLD,
-    *,
-    natural: bool = False,
-) -> LimbSamples:
+    body: BodyModel, limb: Limb, rng: np.random.Generator, count: int = 10_000,
+    threshold: float = THRESHOLD, *, natural: bool = False,
+) -> LimbSamples:  # fmt: skip
     """Draw configurations of a limb within its range of motion and keep those far from singular.
 
     The ratio that EFORT builds on grows without bound towards singular configurations, so those with
@@ -226,13 +219,9 @@ def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
 
 
 def sample_limbs(
-    body: BodyModel,
-    rng: np.random.Generator,
-    count: int = 10_000,
-    threshold: float = THRESHOLD,
-    *,
+    body: BodyModel, rng: np.random.Generator, count: int = 10_000, threshold: float = THRESHOLD, *,
     natural: bool = False,
-) -> dict[str, LimbSamples]:
+) -> dict[str, LimbSamples]:  # fmt: skip
     """Samples of every limb by its name; mirrored limbs share one set, reflected.
 
     The arguments are those of :func:`sample_limb`.

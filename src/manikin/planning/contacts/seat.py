@@ -21,50 +21,28 @@ from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
-from manikin.planning.contacts.footholds import Footholds
+from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.transition import Momentum, momentum_to_rest
 from manikin.scene import Scene, Surface
 
-FEET = ("left_foot", "right_foot")
-
-SEATED_ON = frozenset({"buttocks"})
-"""Effectors with which a body sits."""
-
-STRENGTH_SHARE = 0.95
-"""Largest share of the strength of a joint with which a seat is left."""
-
-SEAT_FRICTION = 0.3
-"""Coulomb coefficient of clothes on a seat; our choice."""
-
-SHANK_SLOPE = float(np.deg2rad(12.0))
-"""Slope of the shank that is liked, knee before ankle [rad]; people who rise have 0 to 20 degrees."""
-
-SLOPES = np.deg2rad(np.arange(-25.0, 28.1, 1.0))
-"""Slopes of the shank that are compared [rad]."""
-
-FORWARD = np.arange(0.0, 0.161, 0.01)
-"""Ways of the buttocks towards the seat's edge that are compared [statures]."""
-
-APART = 0.07
-"""Distance of the middle of a sole from the body's middle plane [statures]."""
+SEATED_ON = frozenset({"buttocks"})  # effectors with which a body sits
+STRENGTH_SHARE = 0.95  # largest share of the strength of a joint with which a seat is left
+SEAT_FRICTION = 0.3  # Coulomb coefficient of clothes on a seat; our choice
+SHANK_SLOPE = float(np.deg2rad(12.0))  # slope that is liked, knee before ankle [rad]; people have 0 to 20 deg
+SLOPES = np.deg2rad(np.arange(-25.0, 28.1, 1.0))  # slopes of the shank that are compared [rad]
+FORWARD = np.arange(0.0, 0.161, 0.01)  # ways of the buttocks towards the seat's edge [statures]
+APART = 0.07  # distance of the middle of a sole from the body's middle plane [statures]
 
 LIKED = (0.05, float(np.deg2rad(12.0)), 0.012)
 """Way forward [statures], deviation of the shank's slope [rad] and gap between the farthest lean and the
 heels [statures] that count alike; our choice."""
 
-CALF_ROOM = 0.016
-"""Distance of the calves to the edge of the seat [m]."""
-
-SEAT_THICKNESS = 0.05
-"""Depth below the top of a seat at which calves keep that distance [m]; our choice."""
-
-FEET_SPACING = 0.01
-"""Distance of the places that are tried for the feet [m]."""
-
-TRIED = 6
-"""Sittings that are tried with the whole body."""
+CALF_ROOM = 0.016  # distance of the calves to the edge of the seat [m]
+SEAT_THICKNESS = 0.05  # depth below the top of a seat at which calves keep that distance [m]; our choice
+FEET_SPACING = 0.01  # distance of the places that are tried for the feet [m]
+TRIED = 6  # sittings that are tried with the whole body
 
 LEAN = {
     "hip_flexion": 1.5, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1, "lumbar_flexion": 0.8,
@@ -72,23 +50,11 @@ LEAN = {
 }  # fmt: skip
 """Angles of a body that leans far forward on a seat, its pelvis flat [rad]."""
 
-LEAN_PITCH = 0.5
-"""Pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]."""
+LEAN_PITCH = 0.5  # pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]
 
 
-@dataclass(frozen=True, eq=False)
-class Sitting:
-    """A way to sit that is to be tried.
-
-    Attributes:
-        contacts: Of buttocks and feet.
-        guess: (nq,) posture near one that holds them.
-        cost: By which sittings are compared.
-    """
-
-    contacts: dict[str, Contact]
-    guess: FloatArray
-    cost: float
+Sitting = tuple[dict[str, Contact], FloatArray]
+"""Contacts of buttocks and feet, and a posture (nq,) near one that holds them."""
 
 
 class Sitter:
@@ -103,8 +69,7 @@ class Sitter:
         Raises:
             BodyError: If its legs are not a human's.
         """
-        self._body, self._footholds, self._friction = body, footholds, friction
-        self._rolls = rolls
+        self._body, self._footholds, self._friction, self._rolls = body, footholds, friction, rolls
         self.stature = stature_of(body)
         legs = LegKinematics(body)
         self._thigh, self._shank = legs.thigh, legs.shank
@@ -120,9 +85,8 @@ class Sitter:
     def _farthest_lean(self) -> float:
         """Way of the centre of mass before the middle of the buttocks' place where the body leans far [m]."""
         pitch = LEAN_PITCH * self._rolls
-        q = self._body.posture(
-            _of_both_sides(self._body, {**LEAN, "hip_flexion": LEAN["hip_flexion"] + pitch})
-        )
+        angles = {**LEAN, "hip_flexion": LEAN["hip_flexion"] + pitch}
+        q = self._body.posture(of_both_sides(self._body, angles))
         q[3:7] = [0.0, np.sin(0.5 * pitch), 0.0, np.cos(0.5 * pitch)]
         state = Configuration(self._body, q)
         turn, place = state.effector_placement("buttocks")
@@ -141,7 +105,7 @@ class Sitter:
         room = _room_ahead(seat, at, turn[:, 0])
         tried: list[tuple[float, float]] = []
         feet: dict[int, dict[str, Contact]] = {}
-        for cost, forward, ahead in self._compared(float(at[2]) - floor, room):
+        for forward, ahead in self._compared(float(at[2]) - floor, room):
             if len(tried) == TRIED:
                 return
             if any(abs(forward - other) < 0.02 and abs(ahead - foot) < 0.02 for other, foot in tried):
@@ -158,7 +122,7 @@ class Sitter:
                 if self._rolls:
                     buttocks = rolling_front(buttocks, BUTTOCK_RADIUS * size)
                 tried.append((forward, ahead))
-                yield Sitting({"buttocks": buttocks, **feet[row]}, self._guess(buttocks, heading), cost)
+                yield {"buttocks": buttocks, **feet[row]}, self._guess(buttocks, heading)
 
     def _feet(self, middle: FloatArray, heading: float) -> dict[str, Contact]:
         """Footholds beside a place (3,) between the feet, as far as there are any close enough."""
@@ -170,8 +134,8 @@ class Sitter:
                 found[foot] = contact
         return found
 
-    def _compared(self, height: float, room: float) -> list[tuple[float, float, float]]:
-        """Cost, way of the buttocks forward and place of the soles before them [m], the cheapest first.
+    def _compared(self, height: float, room: float) -> list[tuple[float, float]]:
+        """Way of the buttocks forward and place of the soles before them [m], the cheapest first.
 
         Args:
             height: Of the seat above the floor [m].
@@ -194,16 +158,13 @@ class Sitter:
         scales = LIKED[0] * size, LIKED[1], LIKED[2] * size
         cost = (forward / scales[0]) ** 2 + ((slope - SHANK_SLOPE) / scales[1]) ** 2 + (gap / scales[2]) ** 2
         half = 0.5 * SEAT_LENGTH * size
-        possible = (
-            (np.abs(drop) < self._thigh) & (over >= 0.0) & (calf >= CALF_ROOM) & (room - forward >= half)
-        )
+        possible = (np.abs(drop) < self._thigh) & (over >= 0.0) & (calf >= CALF_ROOM)
+        possible &= room - forward >= half
         order = np.argsort(cost, kind="stable")
-        return [
-            (float(cost[k]), float(forward[k]), float(ahead[k] + toes)) for k in order.tolist() if possible[k]
-        ]
+        return [(float(forward[k]), float(ahead[k] + toes)) for k in order.tolist() if possible[k]]
 
     def _guess(self, buttocks: Contact, heading: float) -> FloatArray:
-        q = self._body.posture({**self._body.standing_angles, **_of_both_sides(self._body, _SITTING)})
+        q = self._body.posture({**self._body.standing_angles, **of_both_sides(self._body, _SITTING)})
         q[3:7] = [0.0, 0.0, np.sin(0.5 * heading), np.cos(0.5 * heading)]
         q[:3] += buttocks.position - Configuration(self._body, q).effector_placement("buttocks")[1]
         return q
@@ -212,8 +173,8 @@ class Sitter:
 _SITTING = {"hip_flexion": 1.4, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1}
 
 
-def _of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
-    """Angles by the full names of a body's hinges."""
+def of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
+    """Angles by the full names of a body's hinges, of both sides where a name has none."""
     return {name: value for name in body.joint_names for key, value in angles.items() if name.endswith(key)}
 
 
@@ -224,42 +185,24 @@ def _room_ahead(seat: Surface, at: FloatArray, heading: FloatArray) -> float:
     return float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
 
 
-LEANING = (0.25, 0.5, 0.75, 0.92)
-"""Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
-
-LEANING_TIMES = (1.3, 0.9)
-"""Time of that way, to where the body comes to rest over its feet and to where it goes on in motion [s]."""
+LEANING = (0.25, 0.5, 0.75, 0.92)  # shares of the way of the centre of mass to the feet that have a posture
+LEANING_TIMES = (1.3, 0.9)  # time of that way, to rest over the feet and to where it goes on in motion [s]
 
 SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
 """Distances of the centre of mass to the edge of where it may rest on the feet when a seat is left, tried in
 order [m]; the first is inside the smaller soles on which it is planned."""
 
-BEHIND = (0.0, 0.02, 0.04)
-"""How far behind where it could rest the centre of mass is when a seat is left, tried in order [m]."""
-
-LEAN_WEIGHT = 300.0
-"""Weight of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice."""
-
-RISING_TIME = 0.9
-"""Shortest time from there to standing [s]; the pace of the joints mostly asks for more."""
-
-SETTLING_TIME = 0.8
-"""Shortest time that the body stands then [s]."""
-
-SEATED_ROOM = (0.01, 0.01, 0.006)
-"""How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
-
-SEAT_OFF_ROOM = (0.01, 0.01, 0.002)
-"""The same where the seat is left at rest [m]: there a trunk ends its lean, no higher and no lower."""
+BEHIND = (0.0, 0.02, 0.04)  # ways behind where the centre of mass could rest as a seat is left [m]
+LEAN_WEIGHT = 300.0  # of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice
+RISING_TIME = 0.9  # shortest time from there to standing [s]; the pace of the joints mostly asks for more
+SETTLING_TIME = 0.8  # shortest time that the body stands then [s]
+SEATED_ROOM = (0.01, 0.01, 0.006)  # for the centre of mass [m]: a seated trunk cannot follow any path
+SEAT_OFF_ROOM = (0.01, 0.01, 0.002)  # where the seat is left at rest [m]: a trunk ends its lean there
 
 
 @dataclass(frozen=True, eq=False)
 class Leaving:
-    """The stages from a seat to standing on feet, or why there are none.
-
-    Attributes:
-        stages: From the start on; only that where the body does not sit.
-    """
+    """The stages from a seat to standing on feet, from the start on, or why there are none but that."""
 
     stages: tuple[Stage, ...]
     failure: str | None = None
@@ -287,36 +230,24 @@ def leave_seat(
         return _pushed_up(poser, start, pushing, held, risen.q)
     failure = None
     for lean in _leans(poser, start, held, risen.q):
-        if lean.q is not None and lean.failure is None:
-            return _rising(poser, start, [(held, lean.q, lean.momentum)], risen.q)
-        failure = lean.failure
+        if not isinstance(lean, str):
+            return _rising(poser, start, [(held, *lean)], risen.q)
+        failure = lean
     return Leaving((start,), failure)
 
 
-@dataclass(frozen=True, eq=False)
-class _Lean:
-    """A posture in which a seat is left for the feet, or why not there.
-
-    Attributes:
-        q: (nq,) or None.
-        momentum: Its motion; None at rest.
-        failure: None, or the reason in one line.
-    """
-
-    q: FloatArray | None
-    momentum: Momentum | None = None
-    failure: str | None = None
+_Lean = tuple[FloatArray, Momentum | None] | str
+"""Posture (nq,) in which a seat is left for the feet, with its motion, None at rest; or why not there."""
 
 
 def _leans(
     poser: PostureFinder, start: Stage, held: Mapping[str, Contact], risen: FloatArray
 ) -> Iterator[_Lean]:
     """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
-    body = poser.body
-    rest = Configuration(body, risen).com
+    rest = Configuration(poser.body, risen).com
     over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSETS[-1])
     if over is None:
-        yield _Lean(None, failure=f"{', '.join(held)} cannot carry the body at rest")
+        yield f"{', '.join(held)} cannot carry the body at rest"
         return
     for inset in SEAT_OFF_INSETS[:-1]:
         farther = poser.resting_place(held, start.com[:2], inset)
@@ -336,10 +267,10 @@ def _leans(
     # The farthest lean, wherever that is.
     posed = poser.pose(start.contacts, held, q, place=over, com_weight=LEAN_WEIGHT)
     if posed.q is None:
-        yield _Lean(None, failure=reason or posed.reason)
+        yield reason or posed.reason
         return
     lean = _lean(poser, posed.q, held, rest, moving=True)
-    yield lean if lean.failure is None else replace(lean, failure=f"{lean.failure}; at rest: {reason}")
+    yield f"{lean}; at rest: {reason}" if isinstance(lean, str) else lean
 
 
 def _lean(
@@ -352,11 +283,9 @@ def _lean(
         momentum = momentum_to_rest(Stance(list(held.values()), model=poser.model), body.mass, com, rest)
         if momentum is None:
             behind = float(np.linalg.norm(com[:2] - rest[:2]))
-            return _Lean(q, failure=(
-                f"a lean leaves the centre of mass {behind:.3f} m behind the middle of the feet, from where "
-                "no speed carries it over them"
-            ))  # fmt: skip
-    return _Lean(q, momentum, _too_weak(poser, q, held, momentum))
+            where = f"{behind:.3f} m behind the middle of the feet"
+            return f"a lean leaves the centre of mass {where}, from where no speed carries it over them"
+    return _too_weak(poser, q, held, momentum) or (q, momentum)
 
 
 def _pushed_up(
@@ -433,13 +362,9 @@ def _least_jerk(share: FloatArray) -> FloatArray:
 
 
 HAND_AHEAD, HAND_ASIDE, HAND_ABOVE = 0.08, 0.17, 0.13
-"""Where a hand pushes best, before, beside and above the middle of the buttocks [statures]; our choice."""
-
-HAND_ROOM = 0.25
-"""Farthest that it is from there [statures]."""
-
-HAND_INSET = 0.012
-"""Distance of the middle of the palm to the edges of its surface [m]."""
+"""Where a hand pushes best from the middle of the buttocks [statures]; our choice."""
+HAND_ROOM = 0.25  # farthest that it is from there [statures]
+HAND_INSET = 0.012  # distance of the middle of the palm to the edges of its surface [m]
 
 
 def hand_supports(
@@ -464,9 +389,8 @@ def hand_supports(
             away = np.inf if place is None else float(np.linalg.norm(place - wanted))
             if place is not None and away < best:
                 best = away
-                result[hand] = point(
-                    hand, place, friction=friction, rotation=onto_normal(turn, surface.normal)
-                )
+                frame = onto_normal(turn, surface.normal)
+                result[hand] = point(hand, place, friction=friction, rotation=frame)
     return result
 
 
@@ -508,9 +432,6 @@ def take_seat(poser: PostureFinder, way: ContactPlan, sat: Stage) -> ContactPlan
         return f"cannot sit down: {rising.failure}"
     risen, touch = rising.stages[-1], rising.stages[-2]
     momentum = None if touch.momentum is None else touch.momentum.backwards
-    stages = (
-        *way.stages,
-        Stage.of(body, feet, risen.q, RISING_TIME),
-        Stage.of(body, contacts, touch.q, SETTLING_TIME, SEATED_ROOM, momentum=momentum),
-    )
-    return ContactPlan.of(body, stages, seated.q)
+    up = Stage.of(body, feet, risen.q, RISING_TIME)
+    down = Stage.of(body, contacts, touch.q, SETTLING_TIME, SEATED_ROOM, momentum=momentum)
+    return ContactPlan.of(body, [*way.stages, up, down], seated.q)

@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from manikin.errors import BodyError, InputError
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts.contact_plan import ContactRules
 from manikin.planning.contacts.efort import Task, unit_direction, usable_efort
-from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact, Hindrance, UsableEfort
+from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact, UsableEfort
 from manikin.planning.contacts.heuristics import Heuristic, heuristic_named
 from manikin.planning.contacts.samples import sample_limb, sample_limbs
 from manikin.scene import Scene
@@ -37,14 +38,7 @@ class Role(StrEnum):
         return "to move the body" if self is Role.BODY else "to act on an object"
 
 
-_FARTHEST = (
-    Hindrance.REACH,
-    Hindrance.SURFACE,
-    Hindrance.DIRECTION,
-    Hindrance.ALIGNMENT,
-    Hindrance.COLLISION,
-)
-"""How far a request came before it failed."""
+_FARTHEST = ("reach", "surface", "direction", "alignment", "collision")  # how far a request that failed came
 
 
 @dataclass(frozen=True)
@@ -114,25 +108,16 @@ class ContactAnswer:
             "found": result.found,
             "position": None if contact is None else contact.position,
             "normal": None if contact is None else contact.normal,
-            "obstacle": result.obstacle,
-            "efort": self.efort,
-            "usable_efort": self.usable,
-            "candidates": result.candidates,
-            "wall_ms": 1e3 * self.wall_s,
+            "obstacle": result.obstacle, "efort": self.efort, "usable_efort": self.usable,
+            "candidates": result.candidates, "wall_ms": 1e3 * self.wall_s,
             "failure": None if result.found else result.message,
             "hindrance": None if result.failure is None else str(result.failure),
-            "limb": result.limb,
-            "kind": None if contact is None else str(contact.kind),
-            "role": str(self.role),
-            "heuristic": self.question.heuristic,
-            "score": result.score if result.found else None,
-            "gap_m": result.gap if result.found else None,
-            "tried": result.tried,
-            "samples": self.question.samples,
-            "seed": self.question.seed,
-            "prepare_wall_ms": 1e3 * self.prepare_wall_s,
-            "q": result.q,
-        }
+            "limb": result.limb, "kind": None if contact is None else str(contact.kind),
+            "role": str(self.role), "heuristic": self.question.heuristic,
+            "score": result.score if result.found else None, "gap_m": result.gap if result.found else None,
+            "tried": result.tried, "samples": self.question.samples, "seed": self.question.seed,
+            "prepare_wall_ms": 1e3 * self.prepare_wall_s, "q": result.q,
+        }  # fmt: skip
 
 
 def find_contact(
@@ -156,10 +141,10 @@ def find_contact(
     samples = sample_limb(body, limb, np.random.default_rng(question.seed), question.samples)
     generator = ContactGenerator(body, scene, {limb.name: samples}, rules=rules)
     usable = UsableEfort(usable_efort(body, limb), question.pulling)
-    asked = _Asked(limb, question.task, question.role, heuristic, kind, usable)
-    asked.of(generator, q)  # as in a dialogue, where caches are filled
+    ask = partial(_ask, generator, q, limb, question.task, question.role, heuristic, kind, usable)
+    ask()  # as in a dialogue, where caches are filled
     prepared = time.perf_counter()
-    role, result, value = asked.of(generator, q)
+    role, result, value = ask()
     wall = time.perf_counter() - prepared
     return ContactAnswer(question, np.array(q), result, role, value, usable.least, prepared - started, wall)
 
@@ -170,40 +155,26 @@ def check_limbs(body: BodyModel) -> None:
         raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
 
 
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """What one limb is asked for."""
+def _ask(
+    generator: ContactGenerator, q: FloatArray, limb: Limb, direction: ArrayLike, role: Role,
+    heuristic: Heuristic, kind: ContactKind | None, usable: UsableEfort,
+) -> tuple[Role, GeneratedContact, float | None]:  # fmt: skip
+    """First role with a usable contact, the answer, and its EFORT with the sign of the role [N per N.m].
 
-    limb: Limb
-    direction: ArrayLike
-    role: Role
-    heuristic: Heuristic
-    kind: ContactKind | None
-    usable: UsableEfort
-
-    def of(self, generator: ContactGenerator, q: FloatArray) -> tuple[Role, GeneratedContact, float | None]:
-        """First role with a usable contact, the answer, and its EFORT with the sign of the role [N per N.m].
-
-        A failure in both roles says both causes; the hindrance is that of the role that came farthest.
-        """
-        both = self.role is Role.AUTO and self.limb.kind is not ContactKind.SOLE
-        one = Role.BODY if self.role is Role.AUTO else self.role
-        roles = (Role.BODY, Role.OBJECT) if both else (one,)
-        name = self.limb.name
-        tasks = [Task(self.direction, {name} if role is Role.OBJECT else ()) for role in roles]
-        answers = generator.request_first(q, name, tasks, self.heuristic, kind=self.kind, usable=self.usable)
-        result = answers[-1]
-        if result.efort is not None:
-            return roles[len(answers) - 1], result, self.usable.signed(result.efort)
-        farthest = max(range(len(answers)), key=lambda row: _progress(answers[row]))
-        causes = [f"{role.infinitive}, {item.message}" for role, item in zip(roles, answers, strict=False)]
-        same = len({item.message for item in answers}) == 1
-        message = result.message if same else "; ".join(causes)
-        return roles[farthest], replace(answers[farthest], message=message), None
-
-
-def _progress(failed: GeneratedContact) -> int:
-    return _FARTHEST.index(failed.failure or Hindrance.COLLISION)
+    A failure in both roles says both causes; the hindrance is that of the role that came farthest.
+    """
+    both = role is Role.AUTO and limb.kind is not ContactKind.SOLE
+    roles = (Role.BODY, Role.OBJECT) if both else (Role.BODY if role is Role.AUTO else role,)
+    tasks = [Task(direction, {limb.name} if each is Role.OBJECT else ()) for each in roles]
+    answers = generator.request_first(q, limb.name, tasks, heuristic, kind=kind, usable=usable)
+    result = answers[-1]
+    if result.efort is not None:
+        return roles[len(answers) - 1], result, usable.signed(result.efort)
+    farthest = max(range(len(answers)), key=lambda row: _FARTHEST.index(answers[row].failure or "collision"))
+    causes = [f"{each.infinitive}, {item.message}" for each, item in zip(roles, answers, strict=False)]
+    same = len({item.message for item in answers}) == 1
+    message = result.message if same else "; ".join(causes)
+    return roles[farthest], replace(answers[farthest], message=message), None
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,8 +257,9 @@ class LiveContacts:
         for name in self.limbs:
             limb = limb_named(self.body, name)
             usable = UsableEfort(usable_efort(self.body, limb), self.pulling)
-            asked = _Asked(limb, self.direction, self.role, heuristic, kind, usable)
-            _, answers[name], value = asked.of(self._generator, q)
+            _, answers[name], value = _ask(
+                self._generator, q, limb, self.direction, self.role, heuristic, kind, usable
+            )
             efforts |= {} if value is None else {name: value}
             reached = answers[name].q
             q = q if reached is None else np.array(reached)

@@ -21,26 +21,13 @@ from manikin.contact import Stance
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
 
-FORWARD_SPEEDS = (0.0, 0.15, 0.3, 0.45, 0.6)
-"""Level speeds at the start that are tried, up to what people have who rise from a chair [m/s]."""
-
-UPWARD_SPEEDS = (0.0, 0.15, 0.3)
-"""Upward speeds at the start that are tried [m/s]."""
-
-DURATIONS = (1.6, 1.2, 0.9)
-"""Durations of the way that are tried; people rise within 0.7 to 1.6 s from there [s]."""
-
-MARGIN = 3.0
-"""Least margin of the way, about the centre of mass, of a body of 75 kg and 1.75 m [N.m]; our choice."""
-
-STEEPEST_LIFT = 4.0
-"""Largest upward or downward acceleration on the way [m/s^2]; people who rise reach 3; our choice."""
-
-CARRIED_ROOM = 0.03
-"""How far outside of where it could rest the velocity may seem to carry the centre of mass [m]."""
-
-SAMPLES = 12
-"""Instants of the way at which balance is imposed."""
+FORWARD_SPEEDS = (0.0, 0.15, 0.3, 0.45, 0.6)  # level, at the start, up to that of people who rise [m/s]
+UPWARD_SPEEDS = (0.0, 0.15, 0.3)  # upward speeds at the start that are tried [m/s]
+DURATIONS = (1.6, 1.2, 0.9)  # of the way that are tried; people rise within 0.7 to 1.6 s from there [s]
+MARGIN = 3.0  # least one of the way about the centre of mass, at 75 kg and 1.75 m [N.m]; our choice
+STEEPEST_LIFT = 4.0  # largest vertical acceleration on the way [m/s^2]; people who rise reach 3; our choice
+CARRIED_ROOM = 0.03  # how far outside of where it could rest the velocity may seem to carry the body [m]
+SAMPLES = 12  # instants of the way at which balance is imposed
 
 _DEGREE = 5
 _BINOMIAL = (1.0, 5.0, 10.0, 10.0, 5.0, 1.0)

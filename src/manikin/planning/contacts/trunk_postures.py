@@ -14,7 +14,7 @@ expended while walking in stooping postures", Brit. J. Industr. Med. 12, 1955); 
 Arms close and a turned trunk are our choice.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -30,26 +30,22 @@ from manikin.errors import BodyError
 from manikin.kinematics import PostureProblem, SolverSettings, com_target, generate_posture, touching_pairs
 from manikin.kinematics.fold import FEET_APART
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw, turned_root
+from manikin.planning.contacts.seat import of_both_sides
 from manikin.scene import Box, Obstacle, Proximity, Scene
-from manikin.scene.collision import CollisionPart, Meter, collision_parts, local_box, part_meter, shape_of
+from manikin.scene.collision import Meter, collision_parts, local_box, part_meter, shape_of
 from manikin.scene.covering import cover
-from manikin.scene.obstacle import Capsule
 from manikin.scene.scene import FLOOR
 
-CEILINGS = (0.92, 0.84, 0.76, 0.68, 0.61, 0.55)
-"""Heights under which a body is folded [statures]; people duck-walk at about the lowest."""
+CEILINGS = (0.92, 0.84, 0.76, 0.68, 0.61, 0.55)  # over a folded body [statures]; a duck-walk is the last
 
 RECORDED_COM = ((0.55, 0.63, 0.743, 0.83, 1.0), (0.31, 0.371, 0.457, 0.486, 0.56))
 """Ceilings and the heights of the CoM below them [statures] of people who pass beams of 1.10, 1.30 and 1.45 m
 ([Qiu2012]_ 3.2.3, taken for 1.75 m); the lowest is extrapolated."""
 
-SKIN = 0.02
-"""Distance of a posture to the walls and ceilings between which it is found [m]."""
+SKIN = 0.02  # distance of a posture to the walls and ceilings between which it is found [m]
 
 ARMS_CLOSE_COST = 1.05
-TURNED_COST = 1.3
-"""Costs of arms held close and of a trunk turned against the feet; our choice."""
-
+TURNED_COST = 1.3  # costs of arms held close and of a trunk turned against the feet; our choice
 _WALL = 1.0  # thickness of the walls [m]
 _SETTINGS = SolverSettings(tolerance=1e-4, clearance_tolerance=1e-3, restarts=False, explain=False)
 _ARMS_CLOSE = {"shoulder_flexion": 0.35, "shoulder_abduction": 0.1, "elbow_flexion": 1.6,
@@ -74,8 +70,6 @@ class TrunkPosture:
         q: (nq,) posture on feet about the origin of a level floor at z = 0, toes along x.
         cost: Cost of a metre of way in it, relative to upright walking.
         height: Height of its highest point above the ground [m].
-        breadth: Extent of what counts of it across the heading of the feet [m].
-        depth: Extent of it along that heading [m].
         shapes: Shapes that count, of Coal.
         rotations: (n, 3, 3) shape to floor.
         translations: (n, 3) centres of the shapes [m].
@@ -85,8 +79,6 @@ class TrunkPosture:
     q: FloatArray
     cost: float
     height: float
-    breadth: float
-    depth: float
     shapes: tuple[coal.CollisionGeometry, ...]
     rotations: FloatArray
     translations: FloatArray
@@ -102,12 +94,9 @@ class TrunkPosture:
         """Take the shapes of a body in a posture."""
         shapes, rotations, translations = _shapes_of_trunk(body, q)
         reach = [_half_extent(shape, turn) for shape, turn in zip(shapes, rotations, strict=True)]
-        low, high = (translations - reach).min(axis=0), (translations + reach).max(axis=0)
-        return cls(
-            name, frozen_array(q, "trunk posture"), cost, float(high[2]), float(high[1] - low[1]),
-            float(high[0] - low[0]), shapes, frozen_array(rotations, "rotations"),
-            frozen_array(translations, "translations [m]"),
-        )  # fmt: skip
+        top = float((translations + reach).max(axis=0)[2])
+        placed = frozen_array(rotations, "rotations"), frozen_array(translations, "translations [m]")
+        return cls(name, frozen_array(q, "trunk posture"), cost, top, shapes, *placed)
 
 
 class TrunkPostures(tuple[TrunkPosture, ...]):
@@ -141,7 +130,8 @@ def _postures_of(body: BodyModel) -> TrunkPostures:
 def _narrow(body: BodyModel) -> Iterator[TrunkPosture]:
     """Arms close, and the trunk turned to either side as well."""
     close = _with(body, body.standing_posture(), _ARMS_CLOSE)
-    width = _breadth_of_shoulders(body) + 2.0 * SKIN + 0.01
+    arm = body.segment("left_upper_arm")
+    width = 2.0 * float(arm.origin[1] + max(shape.size[0] for shape in arm.shapes)) + 2.0 * SKIN + 0.01
     found = _between(body, close, width=width)
     if found is None:
         return
@@ -203,20 +193,12 @@ def _feet(body: BodyModel) -> Iterator[Contact]:
         yield sole(effector, (0.0, y, 0.0), 0.0, length=body.sole_length, width=body.sole_width, friction=0.7)
 
 
-def _with(body: BodyModel, q: FloatArray, angles: Mapping[str, float]) -> FloatArray:
+def _with(body: BodyModel, q: FloatArray, angles: dict[str, float]) -> FloatArray:
     """A posture with hinges at angles [rad], of both sides where the name has none."""
     out = np.array(q)
-    for number, name in enumerate(body.joint_names):
-        plain = name.removeprefix("left_").removeprefix("right_")
-        if name in angles or plain in angles:
-            out[7 + number] = angles.get(name, angles.get(plain, 0.0))
+    for name, angle in of_both_sides(body, angles).items():
+        out[7 + body.joint_index(name)] = angle
     return out
-
-
-def _breadth_of_shoulders(body: BodyModel) -> float:
-    """Distance between the outer sides of upper arms that hang straight down [m]."""
-    arm = body.segment("left_upper_arm")
-    return 2.0 * float(arm.origin[1] + max(shape.size[0] for shape in arm.shapes))
 
 
 _LEG_PARTS = ("thigh", "leg", "foot", "toes")
@@ -229,10 +211,9 @@ def _shapes_of_trunk(
     data, geometry = body.pinocchio.createData(), pin.GeometryData(body.geometry)
     pin.updateGeometryPlacements(body.pinocchio, data, body.geometry, geometry, np.asarray(q))
     rows = [
-        row
-        for row, item in enumerate(body.geometry.geometryObjects)
+        row for row, item in enumerate(body.geometry.geometryObjects)
         if not item.name.split("/")[0].endswith(_LEG_PARTS)
-    ]
+    ]  # fmt: skip
     shapes = tuple(body.geometry.geometryObjects[row].geometry for row in rows)
     placed = [geometry.oMg[row] for row in rows]
     return shapes, np.array([m.rotation for m in placed]), np.array([m.translation for m in placed])
@@ -240,24 +221,17 @@ def _shapes_of_trunk(
 
 def _half_extent(shape: coal.CollisionGeometry, rotation: FloatArray) -> FloatArray:
     """(3,) half size of the axis-aligned box around a turned shape [m]."""
-    solid, _ = shape_of(shape)
-    if isinstance(solid, Capsule):
-        return solid.radius + 0.5 * solid.length * np.abs(rotation[:, 2])
-    low, high = local_box(shape)
+    if isinstance(shape, coal.Capsule):
+        return float(shape.radius) + float(shape.halfLength) * np.abs(rotation[:, 2])
     if isinstance(shape, coal.Sphere):
         return np.full(3, float(shape.radius))
+    low, high = local_box(shape)
     return np.abs(rotation) @ (0.5 * (high - low))
 
 
-STANDING = 0.1
-"""Way that standing at a place counts as, at least [m]; our choice."""
-
-CHANGING = 0.3
-"""Way that costs as much as a change of posture in which the parts of the body move 1 m; our choice [m]."""
-
-BALLS = 4
-"""Balls that cover each shape in the quick test."""
-
+STANDING = 0.1  # way that standing at a place counts as, at least [m]; our choice
+CHANGING = 0.3  # way at the cost of a change of posture in which body parts move 1 m; our choice [m]
+BALLS = 4  # balls that cover each shape in the quick test
 _TOGETHER = 32  # places that are tested at once: keeps temporary arrays in the cache
 
 
@@ -275,13 +249,14 @@ class TrunkClearance:
     def __init__(self, postures: TrunkPostures, scene: Scene, margin: float = 0.015) -> None:
         """Prepare a scene."""
         self.postures, self.margin = postures, margin
-        self._parts = tuple(part for item in scene for part in collision_parts(item))
-        self._placed = [coal.Transform3s(part.rotation, part.translation) for part in self._parts]
-        self._axes = np.array([part.rotation for part in self._parts]).reshape(-1, 3, 3)
-        self._origins = np.array([part.rotation.T @ part.translation for part in self._parts]).reshape(-1, 3)
-        self._low = np.array([part.low for part in self._parts]).reshape(-1, 3) + self._origins
-        self._high = np.array([part.high for part in self._parts]).reshape(-1, 3) + self._origins
-        self._solid = np.array([_fills_its_box(part) for part in self._parts], dtype=bool)
+        self._parts = parts = tuple(part for item in scene for part in collision_parts(item))
+        self._placed = [coal.Transform3s(part.rotation, part.translation) for part in parts]
+        self._axes = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
+        origins = np.array([part.rotation.T @ part.translation for part in parts]).reshape(-1, 3)
+        self._low = np.array([part.low for part in parts]).reshape(-1, 3) + origins
+        self._high = np.array([part.high for part in parts]).reshape(-1, 3) + origins
+        fills = [isinstance(part.geometry, (coal.Box, coal.Halfspace)) for part in parts]
+        self._solid = np.array(fills, dtype=bool)  # which are all of the box around them
         shapes = [(row, n) for row, item in enumerate(postures) for n in range(len(item.shapes))]
         self._shapes = np.array(shapes, dtype=np.int64)
         self._meters: dict[tuple[int, int], Meter] = {}
@@ -420,11 +395,6 @@ def _turns(headings: FloatArray) -> FloatArray:
     out[:, 0, 0], out[:, 0, 1], out[:, 1, 0], out[:, 1, 1] = cosine, -sine, sine, cosine
     out[:, 2, 2] = 1.0
     return out
-
-
-def _fills_its_box(part: CollisionPart) -> bool:
-    """Whether a part is all of the box around it: a box, or a half-space."""
-    return isinstance(part.geometry, (coal.Box, coal.Halfspace))
 
 
 def _balls(posture: TrunkPosture, number: int) -> tuple[FloatArray, float, float]:

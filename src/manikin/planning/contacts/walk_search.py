@@ -9,7 +9,7 @@ A pair without a posture is closed, and the search goes on with the next best wa
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -23,19 +23,17 @@ from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
-from manikin.planning.contacts.contact_plan import ContactPlan, Stage
-from manikin.planning.contacts.endpoint import FEET
-from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
+from manikin.planning.contacts.footholds import FEET, Foothold, Footholds, feet_of
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.limb_places import stature_of
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 from manikin.planning.contacts.seat import leave_seat
 from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.scene import Scene
 
-COLUMN = (0.12, 0.5, 0.9)
-"""Radius, lowest and highest end above the ground of what has to be free, of a body of 1.75 m [m]."""
+COLUMN = (0.12, 0.5, 0.9)  # radius, lowest and highest end above the ground of what is free, at 1.75 m [m]
 
 
 STRONG_TRIES = 16
@@ -45,101 +43,83 @@ A motion may need less than its postures at rest, whose knees and trunk are not 
 after that many ways the later stages decide."""
 
 EASIER_MOVES = 8
-EASIER_TURN = 0.2
-"""Moves in which a posture may come to ask for less strength, and the most a joint turns in each [rad]."""
-
-EASY = 0.95
-"""Share of the strength at which they aim."""
-
-NEAR_TRIES = 12
-"""Ways after which a pair without a posture closes all that are much like it."""
-
-HIGH = 0.3
-"""Step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]."""
-
-HIGH_TRIES = 2
-"""Ways after which a high step without a posture closes all that are much like it."""
-
-HAND_TRIES = 4
-"""Ways that feet alone do not make after which hands may join at any step."""
-
-HOLDS = 6
-"""Most places of hands that are tried at a step."""
+EASIER_TURN = 0.2  # moves towards a posture of less strength, and a joint's largest turn in each [rad]
+EASY = 0.95  # share of the strength at which they aim
+NEAR_TRIES = 12  # ways after which a pair without a posture closes all that are much like it
+HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]
+HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
+HAND_TRIES = 4  # ways that feet alone do not make after which hands may join at any step
+HOLDS = 6  # most places of hands that are tried at a step
 
 
 @dataclass(frozen=True)
-class WalkSettings:
+class WalkSettings(Paces):
     """How a body goes on its feet; the values are our choice.
 
     Attributes:
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
         searches: Most postures that are looked for.
-        swing_duration: Shortest flight of a foot [s].
-        swing_speed: Its mean speed on longer ways [m/s].
-        shift_duration: Shortest time between two flights [s].
         reach_duration: Shortest time between a hand's change and the next one [s].
-        hinge_pace: Mean speed of the hinge that turns most [rad/s].
         grasp_force: Largest force of a grasp along each axis [N].
     """
 
+    hinge_pace: float = 2.0
     stride: float = 0.4
     searches: int = 400
-    swing_duration: float = 0.7
-    swing_speed: float = 0.7
-    shift_duration: float = 0.35
     reach_duration: float = 0.5
-    hinge_pace: float = 2.0
     grasp_force: float = 400.0
 
 
-@dataclass
-class BodyRoom:
-    """Room for the trunk of a body between its feet, in one of a few postures.
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Two footholds, and the number of the trunk's posture between them."""
 
-    Attributes:
-        body: The body.
-        scene: What is around it.
-    """
+    left: Foothold
+    right: Foothold
+    trunk: int = 0
 
-    body: BodyModel
-    scene: Scene
-
-    def __post_init__(self) -> None:
-        self._postures = TrunkPostures.of(self.body)
-        self._clearance = TrunkClearance(self._postures, self.scene)
-        self._costs = self._postures.costs - 1.0
-
-    def cost(self, left: Foothold, right: Foothold) -> float:
-        """Cost of a step in the cheapest posture that is free, beyond upright [s]; infinite without one."""
-        place = self._place(left, right)
-        number = int(self._clearance.cheapest(place[None])[0])
-        return STEP * float(self._costs[number]) if number >= 0 else math.inf
-
-    def postures(self, pairs: Sequence[tuple[Foothold, Foothold]]) -> NDArray[np.int64]:
-        """(k,) postures to take one after the other between pairs of footholds, left and right.
-
-        Where no sequence of them passes, the cheapest that is free at each pair, upright where none is.
-        """
-        places = np.array([self._place(*pair) for pair in pairs])
-        along = self._clearance.along(places)
-        return np.maximum(self._clearance.cheapest(places), 0) if along is None else along
-
-    def guide(self, number: int, left: Foothold, right: Foothold) -> FloatArray:
-        """Guide of a posture there, on level ground: (7,) pose of the root upright, else the (nq,) whole.
-
-        Upright arms hang as the manner wants; otherwise they have to be where the posture has room for them.
-        """
-        posture = self._postures[number]
-        q = posture.at(self._place(left, right))
-        return q[:7] if posture.cost <= 1.0 else q
-
-    def _place(self, left: Foothold, right: Foothold) -> FloatArray:
-        """(4,) x, y and height of the ground [m] and heading [rad] between two feet."""
+    @property
+    def between(self) -> FloatArray:
+        """(4,) x, y and height of the ground [m] and heading [rad] between the feet."""
+        left, right = self.left, self.right
         yaw = math.atan2(math.sin(left.yaw) + math.sin(right.yaw), math.cos(left.yaw) + math.cos(right.yaw))
         middle = 0.5 * (left.position + right.position)
         low = min(float(left.position[2]), float(right.position[2]))
         # A foot that stands high folds its leg; the body is as high as the other one lets it.
         return np.array([middle[0], middle[1], low + 0.4 * (float(middle[2]) - low), yaw])
+
+
+class BodyRoom:
+    """Room for the trunk of a body between its feet, in one of a few postures."""
+
+    def __init__(self, body: BodyModel, scene: Scene) -> None:
+        """Prepare a scene."""
+        self._postures = TrunkPostures.of(body)
+        self._clearance = TrunkClearance(self._postures, scene)
+        self._costs = self._postures.costs - 1.0
+
+    def cost(self, place: _Place) -> float:
+        """Cost of a step in the cheapest posture that is free, beyond upright [s]; infinite without one."""
+        number = int(self._clearance.cheapest(place.between[None])[0])
+        return STEP * float(self._costs[number]) if number >= 0 else math.inf
+
+    def postures(self, places: Sequence[_Place]) -> NDArray[np.int64]:
+        """(k,) postures to take one after the other at places.
+
+        Where no sequence of them passes, the cheapest that is free at each place, upright where none is.
+        """
+        between = np.array([place.between for place in places])
+        along = self._clearance.along(between)
+        return np.maximum(self._clearance.cheapest(between), 0) if along is None else along
+
+    def guide(self, place: _Place) -> FloatArray:
+        """Guide of a posture there, on level ground: (7,) pose of the root upright, else the (nq,) whole.
+
+        Upright arms hang as the manner wants; otherwise they have to be where the posture has room for them.
+        """
+        posture = self._postures[place.trunk]
+        q = posture.at(place.between)
+        return q[:7] if posture.cost <= 1.0 else q
 
 
 class WalkSearch(PosedSearch[int, tuple[int, int]]):
@@ -156,7 +136,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             start: Contacts and posture at the start; those of no feet are left first.
             goal: Contacts and posture at the goal, on feet.
             friction: Coulomb coefficient of soles and palms.
-            settings: Paces and bounds.
         """
         self.start, self.goal, self.friction = start, goal, friction
         self.settings = settings or WalkSettings()
@@ -173,10 +152,10 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         self._kept: list[Contact] = []
         self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
+        ends = feet_of(start.contacts), feet_of(goal.contacts)
         self.search = FootstepSearch(
-            scene, self._footholds, self._holds(start), self._holds(goal), scale, StepReach.of(body),
-            self._pair_cost, (radius, low, high), self.settings.stride,
-            HELD_HIGHEST if self._handholds.exist else HIGHEST,
+            scene, self._footholds, *ends, scale, StepReach.of(body), self._pair_cost, (radius, low, high),
+            self.settings.stride, HELD_HIGHEST if self._handholds.exist else HIGHEST,
         )  # fmt: skip
         for number, (stage, foot) in enumerate((s, f) for s in (start, goal) for f in FEET):
             self._contacts[foot, number] = stage.contacts[foot]
@@ -184,7 +163,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _best(self) -> list[int] | str:
         if not self._risen:
-            upright = self._room.guide(0, *self._holds(self.start))
+            upright = self._room.guide(_Place(*feet_of(self.start.contacts)))
             leaving = leave_seat(self.poser, self.start, frozenset(FEET), upright)
             if leaving.failure is not None:
                 self.reasons[leaving.failure] += 1
@@ -194,8 +173,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if way is not None:
             return way
         why = self.search.walled_off()
-        walled = f"the goal is walled off from the start: {why}"
-        return "no footsteps lead to the goal" if why is None else walled
+        return f"the goal is walled off from the start: {why}" if why else "no footsteps lead to the goal"
 
     def _close(self, move: tuple[int, int]) -> None:
         self.search.refuse(*move)
@@ -206,23 +184,23 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         place = self.search.farthest()[1].position
         return f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
 
-    def _holds(self, stage: Stage) -> tuple[Foothold, Foothold]:
-        left, right = (stage.contacts[foot] for foot in FEET)
-        return Foothold.of(left), Foothold.of(right)
-
     def _contact(self, foot: str, number: int) -> Contact:
-        key = foot, number
-        if key not in self._contacts:
-            self._contacts[key] = self._footholds.contact(foot, self.search.hold(number), self.friction)
-        return self._contacts[key]
+        if (foot, number) not in self._contacts:
+            hold = self.search.holds[number]
+            self._contacts[foot, number] = self._footholds.contact(foot, hold, self.friction)
+        return self._contacts[foot, number]
 
     def _planned(self, way: list[int]) -> ContactPlan | None:
         stages = list(self._risen)
         self._moves = [None] * len(stages)
         feet = FEET if way[0] == 0 else (FEET[1], FEET[0])
         names = [feet[k % 2] for k in range(len(way))]
-        places = [_Place(*self._pair(names[k], way[k : k + 2]), 0) for k in range(len(way) - 1)]
-        trunks = self._room.postures([(place.left, place.right) for place in places]).tolist()
+        holds = [self.search.holds[number] for number in way]
+        places = [
+            _Place(one, other) if name == FEET[0] else _Place(other, one)
+            for name, (one, other) in zip(names[:-1], pairwise(holds), strict=True)
+        ]
+        trunks = self._room.postures(places).tolist()
         q, hands, body = stages[-1].q, dict[str, Contact](), self.poser.body
         for k in range(len(way) - 2):
             leaving, standing, landing = (self._contact(names[k + j], way[k + j]) for j in range(3))
@@ -233,8 +211,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if step.lifted is None or step.landed is None:
                 first = k if step.lifted is None else k + 1
                 return self._refuse(way[first], way[first + 1], step.reason, too_hard=step.too_hard)
-            distance = float(np.linalg.norm(landing.position - leaving.position))
-            flight = max(self.settings.swing_duration, distance / self.settings.swing_speed)
+            flight = self.settings.flight(leaving, landing)
             lifted = Stage.of(body, {standing.effector: standing, **held}, step.lifted, flight)
             both = {standing.effector: standing, landing.effector: landing, **held}
             stages += [*changes, lifted, Stage.of(body, both, step.landed, self.settings.shift_duration)]
@@ -252,11 +229,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             self.reasons[f"at the goal: {posed.reason}"] += 1
             self.search.close(way[-2], way[-1])
             return None
-        return ContactPlan.of(self.poser.body, stages, posed.q, self.settings.hinge_pace)
+        return ContactPlan.of(body, stages, posed.q, self.settings.hinge_pace)
 
     def _refuse(self, stand: int, step: int, reason: str, *, too_hard: bool = False) -> None:
         self.reasons[reason] += 1
-        rise = abs(float(self.search.hold(stand).position[2] - self.search.hold(step).position[2]))
+        rise = abs(float(self.search.holds[stand].position[2] - self.search.holds[step].position[2]))
         if too_hard:
             self.search.refuse_everywhere(stand, step)
         elif self.replanned < (NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES):
@@ -264,31 +241,26 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         else:
             self.search.refuse(stand, step)
 
-    def _pair(self, first: str, numbers: Sequence[int]) -> tuple[Foothold, Foothold]:
-        """Left and right of two footholds, the first of which is one foot's."""
-        one, other = (self.search.hold(number) for number in numbers)
-        return (one, other) if first == FEET[0] else (other, one)
-
     def _pair_cost(self, left: Foothold, right: Foothold) -> float:
         """Cost of the trunk's room, and of hands where feet alone do not make the step."""
-        cost = self._room.cost(left, right)
+        place = _Place(left, right)
+        cost = self._room.cost(place)
         rise = abs(float(left.position[2] - right.position[2]))
         if rise <= HIGHEST * self._scale or not math.isfinite(cost):
             return cost
-        place = _Place(left, right, 0)
         return cost + HELD_COST if self._holds_near(place, place) else math.inf
 
-    def _holds_near(self, before: "_Place", after: "_Place") -> list[Contact]:
+    def _holds_near(self, before: _Place, after: _Place) -> list[Contact]:
         holds = before.left, before.right, after.left, after.right
         key = *map(id, holds), before.trunk, after.trunk
         if key not in self._near:
-            roots = [self._guide(place)[:7] for place in (before, after)]
+            roots = [self._room.guide(place)[:7] for place in (before, after)]
             ground = min(float(hold.position[2]) for hold in holds)
             self._near[key] = self._handholds.near(roots, ground, HOLDS)
         return self._near[key]
 
     def _moved(
-        self, feet: Sequence[Contact], before: "_Place", after: "_Place", hands: dict[str, Contact],
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
         q: FloatArray,
     ) -> "tuple[list[Stage], dict[str, Contact], _Step]":  # fmt: skip
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
@@ -301,7 +273,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return [], hands, first or _Step(None, None, f"{' and '.join(hands)} cannot be left")
 
     def _hands_before(
-        self, feet: Sequence[Contact], before: "_Place", after: "_Place", hands: dict[str, Contact],
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
         q: FloatArray,
     ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:  # fmt: skip
         """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
@@ -316,9 +288,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             return
         start = bare[-1].q if bare else q
         holds = self._holds_near(before, after)
-        pairs = [
-            pair for pair in combinations(holds[: HOLDS // 2], 2) if pair[0].effector != pair[1].effector
-        ]
+        pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector != b.effector]
         for contacts in [*((hold,) for hold in holds), *pairs[:2]]:
             stages, held, at = list(bare), dict[str, Contact](), start
             for contact in contacts:
@@ -329,14 +299,12 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
                     self.reasons[f"{contact.effector} cannot be put down: {posed.reason}"] += 1
                     break
                 at = posed.q
-                stages.append(
-                    Stage.of(self.poser.body, {**standing, **held}, at, self.settings.reach_duration)
-                )
+                stages.append(self._reached({**standing, **held}, at))
             else:
                 yield stages, held, at
 
     def _left(
-        self, contacts: Mapping[str, Contact], place: "_Place", hands: Mapping[str, Contact], q: FloatArray
+        self, contacts: Mapping[str, Contact], place: _Place, hands: Mapping[str, Contact], q: FloatArray
     ) -> list[Stage] | None:
         """Stages in which hands leave one after the other; None where they cannot."""
         held, stages = dict(contacts), list[Stage]()
@@ -353,7 +321,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return Stage.of(self.poser.body, contacts, q, self.settings.reach_duration)
 
     def _step(
-        self, feet: Sequence[Contact], before: "_Place", after: "_Place", q: FloatArray,
+        self, feet: Sequence[Contact], before: _Place, after: _Place, q: FloatArray,
         hands: Mapping[str, Contact],
     ) -> "_Step":  # fmt: skip
         """Postures in which a foot leaves one place and lands on another, the other one stands."""
@@ -366,21 +334,15 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         why = f"{landing.effector} cannot be put down: {landed.reason}"
         return _Step(lifted.q, landed.q, why if landed.q is None else "", landed.too_hard)
 
-    def _guide(self, place: "_Place") -> FloatArray:
-        return self._room.guide(place.trunk, place.left, place.right)
-
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: "_Place", q: FloatArray
+        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: _Place, q: FloatArray
     ) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
         key = frozenset(map(id, held.values())), frozenset(carrying), place.trunk
         if key in self._postures:
             return self._postures[key]
-        guide, feet_alone = self._guide(place), set(held) <= set(FEET)
-        flat = {
-            name: Placement(None, contact.rotation_contact_to_world, 0.05)
-            for name, contact in held.items() if contact.kind is ContactKind.POINT
-        }  # fmt: skip
+        guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
+        flat = upright_points(held)
         posed = self.poser.pose(held, carrying, q, guide, placements=flat)
         if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
@@ -402,10 +364,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         """
         assert posed.q is not None
         body, stance, q = self.poser.body, Stance(list(carrying.values())), posed.q
-        lower, upper = (
-            body.lower + self.poser.settings.range_margin,
-            body.upper - self.poser.settings.range_margin,
-        )
+        margin = self.poser.settings.range_margin
+        lower, upper = body.lower + margin, body.upper - margin
         share, slope = torque_share_gradient(body, q, stance)
         size = 1.0
         for _ in range(EASIER_MOVES):
@@ -433,21 +393,9 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             else:
                 size *= 0.4
         if share > 1.0 and self.replanned < STRONG_TRIES:
-            return Posed(
-                None,
-                f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength",
-                too_hard=True,
-            )
+            why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
+            return Posed(None, why, too_hard=True)
         return Posed(q)
-
-
-@dataclass(frozen=True, eq=False)
-class _Place:
-    """Two footholds, and the number of the trunk's posture between them."""
-
-    left: Foothold
-    right: Foothold
-    trunk: int
 
 
 @dataclass(frozen=True, eq=False)
