@@ -37,13 +37,8 @@ def facet_distances(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> list[FloatArray]:
     """Least distance of the pseudo-wrench from every facet of each phase [N.m] or [N]."""
-    return [
-        np.min(
-            [block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times, phase)],
-            axis=0,
-        )
-        for phase, (polytope, times) in enumerate(zip(polytopes, phase_times(trajectory), strict=True))
-    ]
+    blocks = facet_margins(problem, trajectory, polytopes)
+    return [np.min([block.min(axis=0) for block in phase], axis=0) for phase in blocks]
 
 
 def nearest_facets(distances: Sequence[FloatArray], count: int = FIRST_COUNT) -> FacetIndices:
