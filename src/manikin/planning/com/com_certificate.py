@@ -73,10 +73,10 @@ class Residuals:
     min_zmp_distance: float | None = None
 
     def __getitem__(self, requirement: str) -> Residual:
-        named = {item.requirement: item for item in reversed(self.items)}
-        if requirement not in named:
-            raise KeyError(f"no residual {requirement!r}; valid: {[item.requirement for item in self.items]}")
-        return named[requirement]
+        for item in self.items:
+            if item.requirement == requirement:
+                return item
+        raise KeyError(f"no residual {requirement!r}; valid: {[item.requirement for item in self.items]}")
 
     @property
     def largest(self) -> Residual:
