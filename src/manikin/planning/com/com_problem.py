@@ -233,6 +233,10 @@ class Weights:
             object.__setattr__(self, name, tuple(float(value) for value in diagonal))
 
 
+END_CONDITIONS = ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration")
+"""Attributes of a :class:`CentroidalProblem` that are None where its ends are free."""
+
+
 @dataclass(frozen=True, eq=False)
 class CentroidalProblem:
     """A CoM trajectory to find through a sequence of stances ([Qiu2012]_ 5.18-5.28).

@@ -14,7 +14,7 @@ from manikin.balance import WrenchPolytope
 from manikin.contact import ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com.com_certificate import TOLERANCE, Residuals, facet_margins, measure, phase_times
-from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
+from manikin.planning.com.com_problem import END_CONDITIONS, CentroidalProblem, CentroidalTrajectory
 from manikin.planning.com.feasibility import row_slopes
 from manikin.planning.com.transcription import (
     MARGIN_SCALE,
@@ -205,7 +205,7 @@ def _parameters(
         "weights": (weights.margin, weights.smoothness, weights.duration, SHORTFALL_WEIGHT),
         "velocity": weights.velocity, "acceleration": weights.acceleration, "jerk": weights.jerk,
     }  # fmt: skip
-    for name in ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration"):
+    for name in END_CONDITIONS:
         value = getattr(problem, name)
         values[name] = np.zeros(3) if value is None else value
     for index, (phase, polytope, rows) in enumerate(zip(problem.sequence, polytopes, facets, strict=True)):
@@ -254,13 +254,11 @@ def _row_bounds(
         "total_duration": (0.0, 0.0),
         "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
     }
-    ends = iter(
-        (problem.start_velocity, problem.start_acceleration, problem.goal_velocity, problem.goal_acceleration)
-    )
-    rows = []
+    ends, rows = iter(END_CONDITIONS), []
     for group, _ in programme.groups:
         if group == "end":
-            rows.append((0.0, 0.0) if next(ends) is not None else (-np.inf, np.inf))
+            free = getattr(problem, next(ends)) is None
+            rows.append((-np.inf, np.inf) if free else (0.0, 0.0))
         else:
             rows.append(bounds["reach" if group.startswith("geometric") else group])
     lower, upper = np.repeat(np.transpose(rows), [count for _, count in programme.groups], axis=1)
