@@ -18,13 +18,7 @@ from manikin.planning.guide.roadmap import (
     grow,
     unfit_end,
 )
-from manikin.planning.guide.root_path import (
-    RootLimits,
-    RootPath,
-    approximate,
-    prune,
-    shorten,
-)
+from manikin.planning.guide.root_path import RootLimits, RootPath, approximate, prune, shorten
 from manikin.planning.guide.root_pose import checked_pose
 from manikin.planning.guide.sampler import PoseSampler, SamplingRegion
 from manikin.planning.guide.steering import LocalPlanner
