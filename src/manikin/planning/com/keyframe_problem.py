@@ -34,13 +34,9 @@ class RecordedCom:
     angular_momentum_rate: FloatArray | None
 
     def __init__(
-        self,
-        time: ArrayLike,
-        com: ArrayLike,
-        sequence: StanceSequence,
-        key_times: ArrayLike,
+        self, time: ArrayLike, com: ArrayLike, sequence: StanceSequence, key_times: ArrayLike,
         angular_momentum_rate: ArrayLike | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Take over the samples from the first to the last key frame; the origin of the times may be any.
 
         ``key_times`` (phases + 1,) are the changes of the support, with both ends, moved to the nearest
@@ -137,14 +133,9 @@ class KeyframeProblem:
     frame_spacing: float
 
     def __init__(
-        self,
-        mass: float,
-        recording: RecordedCom,
-        *,
-        control_points: int | None = None,
-        frame_spacing: float = FRAME_SPACING,
-        **requirements: Any,
-    ) -> None:
+        self, mass: float, recording: RecordedCom, *, control_points: int | None = None,
+        frame_spacing: float = FRAME_SPACING, **requirements: Any,
+    ) -> None:  # fmt: skip
         """Put the problem together, of a body's mass [kg].
 
         Args:

@@ -149,13 +149,9 @@ class KeyframeSolution:
 
 
 def build_keyframe_programme(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    schedule: ContactSchedule,
-    times: FloatArray,
-    positions: FloatArray,
-    control_points: int,
-) -> KeyframeProgramme:
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], schedule: ContactSchedule,
+    times: FloatArray, positions: FloatArray, control_points: int,
+) -> KeyframeProgramme:  # fmt: skip
     """Write the programme of [Qiu2012]_ 5.3.2 for (f,) times of key frames, both ends among them [s].
 
     Args:
@@ -228,13 +224,9 @@ def _grams(problem: CentroidalProblem, knots: FloatArray, duration: float) -> Fl
 
 
 def _balance_rows(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    schedule: ContactSchedule,
-    times: FloatArray,
-    positions: FloatArray,
-    knots: FloatArray,
-) -> list[np.ndarray]:
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], schedule: ContactSchedule,
+    times: FloatArray, positions: FloatArray, knots: FloatArray,
+) -> list[np.ndarray]:  # fmt: skip
     """Rows ``H m [a - g; p x (a - g)] + slope d <= h`` with p given; both polytopes at a key instant.
 
     They are followed by slopes, bounds, and the key frame and phase of each.

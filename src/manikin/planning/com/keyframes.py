@@ -244,11 +244,9 @@ def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolyt
 
 
 def _measure(
-    problem: KeyframeProblem,
-    trajectory: CentroidalTrajectory,
-    polytopes: Sequence[WrenchPolytope],
+    problem: KeyframeProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope],
     frames: Sequence[int],
-) -> Residuals:
+) -> Residuals:  # fmt: skip
     """Measure the requirements every millisecond, and the distance from the recording at the key frames."""
     certificate = measure(problem.requirements, trajectory, polytopes)
     times = problem.recording.time[list(frames)]

@@ -163,14 +163,9 @@ def build_programme(problem: CentroidalProblem, facets: Rows, faces: Rows = ()) 
 
 
 def optimise(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    facets: Rows,
-    targets: MarginTargets,
-    bezier: FloatArray,
-    durations: FloatArray,
-    faces: Rows = (),
-) -> Attempt:
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], facets: Rows, targets: MarginTargets,
+    bezier: FloatArray, durations: FloatArray, faces: Rows = (),
+) -> Attempt:  # fmt: skip
     """Run the solver once from Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s].
 
     The W_i of the phases are about ``problem.reference``; facets and faces of the regions are those imposed.

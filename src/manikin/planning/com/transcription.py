@@ -295,12 +295,9 @@ def bernstein_gram(degree: int) -> FloatArray:
 
 
 def spline_from_bezier(
-    bezier: FloatArray,
-    durations: FloatArray,
-    *,
-    start: tuple[FloatArray | None, ...],
+    bezier: FloatArray, durations: FloatArray, *, start: tuple[FloatArray | None, ...],
     goal: tuple[FloatArray | None, ...],
-) -> BSpline:
+) -> BSpline:  # fmt: skip
     """B-spline on normalised time with the key instants as internal knots ([Qiu2012]_ 5.4.3).
 
     Bezier points are (phases, k + 1, 3) [m], durations (phases,) [s]. Position, velocity and acceleration at

@@ -64,12 +64,9 @@ class ReachabilityChecker:
     """
 
     def __init__(
-        self,
-        abstraction: Abstraction,
-        scene: Scene,
-        condition: Condition | None = None,
+        self, abstraction: Abstraction, scene: Scene, condition: Condition | None = None,
         margins: Margins | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Prepare the queries.
 
         Raises:

@@ -31,12 +31,9 @@ class UsableSurface:
     smallest_area: float
 
     def __init__(
-        self,
-        direction: ArrayLike | None = None,
-        max_angle: float = 0.5 * np.pi,
-        obstacles: Sequence[str] | None = None,
-        smallest_area: float = 0.0,
-    ) -> None:
+        self, direction: ArrayLike | None = None, max_angle: float = 0.5 * np.pi,
+        obstacles: Sequence[str] | None = None, smallest_area: float = 0.0,
+    ) -> None:  # fmt: skip
         unit = None
         if direction is not None:
             vector = frozen_array(direction, "usable surface direction", (3,), SceneError)

@@ -124,13 +124,9 @@ class Roadmap:
 
 
 def grow(
-    roadmap: Roadmap,
-    sampler: PoseSampler,
-    planner: LocalPlanner,
-    rng: np.random.Generator,
-    samples: int,
+    roadmap: Roadmap, sampler: PoseSampler, planner: LocalPlanner, rng: np.random.Generator, samples: int,
     failures: int | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Draw poses and let the roadmap consider them, at most ``samples``.
 
     It ends earlier when so many poses were rejected in a row (``failures``, the settings' when

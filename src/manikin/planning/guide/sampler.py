@@ -57,13 +57,9 @@ class SamplingRegion:
     roll: tuple[float, float] | None
 
     def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        yaw: Sequence[float] | None = None,
-        pitch: Sequence[float] | None = None,
-        roll: Sequence[float] | None = None,
-    ) -> None:
+        self, lower: ArrayLike, upper: ArrayLike, yaw: Sequence[float] | None = None,
+        pitch: Sequence[float] | None = None, roll: Sequence[float] | None = None,
+    ) -> None:  # fmt: skip
         object.__setattr__(self, "lower", frozen_array(lower, "sampling region lower [m]", (3,)))
         object.__setattr__(self, "upper", frozen_array(upper, "sampling region upper [m]", (3,)))
         if not np.all(self.lower < self.upper):

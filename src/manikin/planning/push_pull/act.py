@@ -128,13 +128,9 @@ PALM_RESERVE = 0.75
 
 
 def largest_force(
-    body: BodyModel,
-    q: FloatArray,
-    contacts: Sequence[Contact],
-    act: Act,
-    friction: float = 0.7,
+    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float = 0.7,
     friction_model: FrictionModel = "outer",
-) -> BracedForces | None:
+) -> BracedForces | None:  # fmt: skip
     """The largest force that a posture (nq,) can exert the way of an act, or None where it cannot even stand.
 
     The contacts are those of feet and hands; the friction is the Coulomb coefficient of pressing palms, the
@@ -145,13 +141,9 @@ def largest_force(
 
 
 def share_force(
-    body: BodyModel,
-    q: FloatArray,
-    contacts: Sequence[Contact],
-    act: Act,
-    friction: float = 0.7,
+    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float = 0.7,
     friction_model: FrictionModel = "outer",
-) -> BracedForces | None:
+) -> BracedForces | None:  # fmt: skip
     """The act's force with the smallest share of any joint's strength, or None where friction forbids it.
 
     A share above 1 is more than the joints have. Pressing palms use :data:`PALM_RESERVE` of their friction.

@@ -75,12 +75,9 @@ def guess_path(
 
 
 def detours(
-    obstacles: Sequence[WalkObstacle],
-    times: Sequence[float],
-    walker: Walker,
-    start: FloatArray,
+    obstacles: Sequence[WalkObstacle], times: Sequence[float], walker: Walker, start: FloatArray,
     goal: FloatArray,
-) -> Iterator[list[FloatArray]]:
+) -> Iterator[list[FloatArray]]:  # fmt: skip
     """Ways around obstacles, each a list of places to pass in order [m].
 
     Of more than two obstacles, all are passed on the same side. ``times`` are the instants at which the

@@ -62,14 +62,9 @@ class WalkObstacle:
     displacements: FloatArray
 
     def __init__(
-        self,
-        name: str,
-        corners: ArrayLike,
-        radius: float = 0.0,
-        *,
-        times: ArrayLike = (0.0,),
+        self, name: str, corners: ArrayLike, radius: float = 0.0, *, times: ArrayLike = (0.0,),
         displacements: ArrayLike = ((0.0, 0.0),),
-    ) -> None:
+    ) -> None:  # fmt: skip
         where = f"obstacle {name!r}"
         instants = frozen_array(times, f"{where} times [s]", (None,))
         moved = frozen_array(displacements, f"{where} displacements [m]", (len(instants), 2))

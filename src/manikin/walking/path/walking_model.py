@@ -142,11 +142,9 @@ def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
 
 
 def runge_kutta(
-    derivative: Callable[[FloatArray, FloatArray], FloatArray],
-    state: FloatArray,
-    controls: FloatArray,
+    derivative: Callable[[FloatArray, FloatArray], FloatArray], state: FloatArray, controls: FloatArray,
     step: float | FloatArray,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(n + 1, ...) states after every step by the classical rule of fourth order.
 
     Args:
