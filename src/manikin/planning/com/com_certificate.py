@@ -18,7 +18,6 @@ STEP = 1e-3
 TOLERANCE = 1e-6
 """Violation up to which a requirement counts as met [SI unit of the requirement]."""
 
-
 _BLOCK = 1024
 
 UNIT_SCALE = {"m": 0.01, "m/s": 0.01, "m/s^2": 0.1, "s": 0.01, "N.m": 10.0, "N": 100.0}
@@ -130,26 +129,22 @@ def phase_margins(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> list[FloatArray]:
     """Margin at the instants of :func:`phase_times`; at key instants in both polytopes [N.m] or [N]."""
-    return [
-        np.concatenate(
-            [block.min(axis=1) for block in facet_margins(problem, trajectory, polytope, times, phase)]
-        )
-        for phase, (polytope, times) in enumerate(zip(polytopes, phase_times(trajectory), strict=True))
-    ]
+    blocks = facet_margins(problem, trajectory, polytopes)
+    return [np.concatenate([block.min(axis=1) for block in phase]) for phase in blocks]
 
 
 def facet_margins(
-    problem: CentroidalProblem,
-    trajectory: CentroidalTrajectory,
-    polytope: WrenchPolytope,
-    times: FloatArray,
-    phase: int,
-) -> Iterator[FloatArray]:
-    """(up to 1024, facets) distances to every facet at the given times of a phase, in blocks [N.m] or [N]."""
-    for start in range(0, len(times), _BLOCK):
-        part = times[start : start + _BLOCK]
-        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference, phase))
-        yield distances / row_slopes(polytope, problem, trajectory.position(part))
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> Iterator[Iterator[FloatArray]]:
+    """Of each phase (n, facets) distances to the facets at :func:`phase_times`, in blocks [N.m] or [N]."""
+
+    def blocks(phase: int, polytope: WrenchPolytope, times: FloatArray) -> Iterator[FloatArray]:
+        for part in np.split(times, range(_BLOCK, len(times), _BLOCK)):
+            distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference, phase))
+            yield distances / row_slopes(polytope, problem, trajectory.position(part))
+
+    pairs = zip(polytopes, phase_times(trajectory), strict=True)
+    return (blocks(phase, *pair) for phase, pair in enumerate(pairs))
 
 
 def measure(
@@ -164,11 +159,9 @@ def measure(
     lowest = [float(values.min()) for values in margins]
     phase = int(np.argmin(lowest))
     time = float(times[phase][np.argmin(margins[phase])])
-    shortfall = Residual(
-        "balance margin", problem.required_margin - lowest[phase], problem.margin_unit, phase, time
-    )
+    lack, unit = problem.required_margin - lowest[phase], problem.margin_unit
     items = (
-        shortfall,
+        Residual("balance margin", lack, unit, phase, time),
         *_end_residuals(problem, trajectory),
         *_position_residuals(problem, trajectory, times),
         *_duration_residuals(problem, trajectory),
@@ -181,20 +174,12 @@ def measure(
 
 
 def _end_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
-    wanted = {
-        "start": (problem.start_com, problem.start_velocity, problem.start_acceleration),
-        "goal": (problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
-    }
-    measured = (
-        ("position", "m", trajectory.position),
-        ("velocity", "m/s", trajectory.velocity),
-        ("acceleration", "m/s^2", trajectory.acceleration),
-    )
-    for end, values in wanted.items():
-        time, phase = (0.0, 0) if end == "start" else (trajectory.duration, len(problem.sequence) - 1)
-        for (name, unit, evaluate), value in zip(measured, values, strict=True):
+    units = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+    for end, time, phase in (("start", 0.0, 0), ("goal", trajectory.duration, len(problem.sequence) - 1)):
+        for name, unit in units.items():
+            value = getattr(problem, f"{end}_{'com' if name == 'position' else name}")
             if value is not None:
-                error = float(np.abs(evaluate(time) - value).max())
+                error = float(np.abs(getattr(trajectory, name)(time) - value).max())
                 yield Residual(f"{end} {name}", error, unit, phase, time)
 
 
@@ -204,20 +189,14 @@ def position_excess(
     """Name of each constraint on the position and its violation at the instants of each phase [m]."""
     positions = [trajectory.position(instants) for instants in times]
     if problem.support_distance is not None:
-        excess = [
-            np.max(
-                [np.linalg.norm(p - c.position, axis=1) for c in phase.stance] or [np.zeros(len(p))], axis=0
-            )
-            - problem.support_distance
-            for p, phase in zip(positions, problem.sequence, strict=True)
-        ]
+        excess = []
+        for p, phase in zip(positions, problem.sequence, strict=True):
+            away = [np.linalg.norm(p - c.position, axis=1) for c in phase.stance] or [np.zeros(len(p))]
+            excess.append(np.max(away, axis=0) - problem.support_distance)
         yield "support distance", excess
     if problem.regions:
-        none = ComRegion.everywhere()
-        yield (
-            "reach",
-            [(region or none).violation(p) for p, region in zip(positions, problem.regions, strict=True)],
-        )
+        regions = [region or ComRegion.everywhere() for region in problem.regions]
+        yield "reach", [region.violation(p) for p, region in zip(positions, regions, strict=True)]
     for constraint in problem.geometric:
         yield constraint.name, [constraint.violation(p) for p in positions]
 
@@ -231,9 +210,8 @@ def _position_residuals(
         yield Residual(requirement, float(excess[phase][worst]), "m", phase, float(times[phase][worst]))
     for index, plane in enumerate(problem.key_planes):
         time = float(trajectory.schedule.instants[plane.key])
-        carried = trajectory.position(time) + plane.lead * trajectory.velocity(time)
-        beyond = float(plane.violation(carried))
-        yield Residual(f"key plane {index} at T_{plane.key}", beyond, "m", plane.key - 1, time)
+        beyond = plane.violation(trajectory.position(time) + plane.lead * trajectory.velocity(time))
+        yield Residual(f"key plane {index} at T_{plane.key}", float(beyond), "m", plane.key - 1, time)
 
 
 def _duration_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:

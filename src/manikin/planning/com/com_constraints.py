@@ -1,9 +1,8 @@
 """Geometric constraints on the CoM: smooth ones for numbers and CasADi symbols, and planes at key instants.
 
-Below an overhead obstacle the height of the CoM is bounded: where the body, with the CoM at (x, y), would
-reach below the obstacle, the CoM must not be higher than the body can fold to; away from it the bound rises
-smoothly to a height that no posture reaches.  [Qiu2012]_ 5.29 drew such a surface by hand and left its
-construction open (8.2.2); this is our own.
+Where the body would reach below an overhead obstacle, its CoM must not be higher than the body can fold to;
+away from there the bound rises smoothly to a height that no posture reaches. [Qiu2012]_ 5.29 drew such a
+surface by hand and left its construction open (8.2.2); this is our own.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,10 +21,9 @@ from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 class KeyPlane:
     """Constraint that keeps the CoM behind a plane at one key instant: ``normal . p(T_key) <= offset``.
 
-    At a key instant the CoM is the last Bezier point of a phase, an unknown of the programme:
-    the constraint is linear and met exactly, and nothing is asked of the rest of the motion.
-    With a lead it is kept of ``p + lead v``, where its velocity would carry the CoM: that bounds its speed.
-    It is ours; [Qiu2012]_ 7.2.3 only says that "some constraints" are modified.
+    It is linear in the last Bezier point of a phase and met exactly. With a lead it is kept of ``p + lead
+    v``, where its velocity would carry the CoM: that bounds its speed. It is ours; [Qiu2012]_ 7.2.3 only
+    says that "some constraints" are modified.
 
     Attributes:
         key: Index of the key instant; 1 is the end of the first phase.
@@ -42,8 +40,7 @@ class KeyPlane:
     def __init__(self, key: int, normal: ArrayLike, offset: float, lead: float = 0.0) -> None:
         """Normalise the normal, and the offset with it."""
         vector = frozen_array(normal, "key plane normal", (3,))
-        length = float(np.linalg.norm(vector))
-        if length < 1e-9:
+        if (length := float(np.linalg.norm(vector))) < 1e-9:
             raise InputError(f"key plane normal is {vector.tolist()}; valid: not zero")
         if isinstance(key, bool) or not isinstance(key, (int, np.integer)) or key < 1:
             raise InputError(f"key plane is at key instant {key!r}; valid: an integer >= 1")
@@ -54,15 +51,10 @@ class KeyPlane:
 
     @classmethod
     def towards(cls, key: int, start: ArrayLike, goal: ArrayLike, beyond: float = 0.0) -> "KeyPlane":
-        """The plane through ``goal`` that cuts off ``start``, moved on by ``beyond`` [m].
-
-        Where ``goal`` is the nearest point of a convex set, it cuts off none of the set (but for
-        what ``beyond`` takes).
-        """
+        """The plane through ``goal`` that cuts off ``start``, moved on by ``beyond`` [m]."""
         from_here, to_there = np.asarray(start, dtype=np.float64), np.asarray(goal, dtype=np.float64)
         normal = from_here - to_there
-        length = float(np.linalg.norm(normal))
-        if length < 1e-9:
+        if (length := float(np.linalg.norm(normal))) < 1e-9:
             raise InputError(f"key plane is through its start {from_here.tolist()}; valid: another goal")
         return cls(key, normal / length, float(normal @ to_there) / length - beyond)
 
@@ -81,10 +73,8 @@ class GeometricConstraint:
 
     Attributes:
         name: How messages call it, such as ``"height above the lower surface"``.
-        function: Takes the three coordinates [m] as numpy arrays or as CasADi symbols and
-            returns the violation [m], element-wise; numpy's elementary functions work on both.
-        impassable: Why no position on the far side can be reached through the constraint; empty
-            when it can be met everywhere. It is what a failure then names.
+        function: Violation [m] of the three coordinates [m], numpy arrays or CasADi symbols, element-wise.
+        impassable: Why no position on the far side can be reached, for a failure; empty when one can.
     """
 
     name: str
@@ -121,19 +111,13 @@ class BentSurface:
 
 
 @dataclass(frozen=True)
-class _Above:
+class _Height:
     surface: CoordinateFunction
+    above: bool
 
     def __call__(self, x: Any, y: Any, z: Any) -> Any:
-        return self.surface(x, y, z) - z
-
-
-@dataclass(frozen=True)
-class _Below:
-    surface: CoordinateFunction
-
-    def __call__(self, x: Any, y: Any, z: Any) -> Any:
-        return z - self.surface(x, y, z)
+        height = self.surface(x, y, z)
+        return height - z if self.above else z - height
 
 
 def height_band(
@@ -141,8 +125,8 @@ def height_band(
 ) -> tuple[GeometricConstraint, GeometricConstraint]:
     """Constraints that keep the CoM between two heights [m] at (x, y, z) ([Qiu2012]_ 5.29)."""
     return (
-        GeometricConstraint("height above the lower surface", _Above(lower)),
-        GeometricConstraint("height below the upper surface", _Below(upper)),
+        GeometricConstraint("height above the lower surface", _Height(lower, above=True)),
+        GeometricConstraint("height below the upper surface", _Height(upper, above=False)),
     )
 
 
@@ -171,28 +155,28 @@ class Zone:
 
     @classmethod
     def below(cls, outline: ArrayLike, footprints: Sequence[FloatArray], onset: float) -> "Zone":
-        """CoM positions at which a body reaches below an obstacle.
-
-        The outline is widened by the mirrored footprint (their Minkowski sum): a footprint
-        placed at the CoM meets the outline exactly when the CoM is in the sum.
+        """CoM positions at which a body reaches below an obstacle: their Minkowski sum, the body mirrored.
 
         Args:
             outline: (n, 2) points whose convex hull is the obstacle seen from above [m].
-            footprints: (m, 2) corners of the convex region that the body covers, relative to
-                the CoM in world axes; one for each heading, of which the widest counts [m].
-                Without any the zone is the outline itself.
+            footprints: (m, 2) corners of the convex region that the body covers, relative to the CoM in
+                world axes; one for each heading, of which the widest counts [m]. May be none.
             onset: See :class:`Zone`.
         """
         points = frozen_array(outline, "overhead outline [m]", (None, 2))
-        normals = _distinct(np.vstack([_edge_normals(points), *(_edge_normals(-f) for f in footprints)]))
+        edges = [ConvexHull(corners).equations[:, :2] for corners in (points, *(-f for f in footprints))]
+        kept: list[FloatArray] = []
+        for normal in np.vstack(edges):
+            if all(normal @ other < 1.0 - _PARALLEL for other in kept):
+                kept.append(normal)
+        normals = np.array(kept)
         reach = np.max([(-f @ normals.T).max(axis=0) for f in footprints] or [np.zeros(len(normals))], axis=0)
         return cls(normals, (points @ normals.T).max(axis=0) + reach, onset)
 
     def share(self, x: Any, y: Any) -> Any:
-        """Share of the zone at (x, y): 1 inside, 0 beyond the onset of any edge, smooth between (C2).
+        """Share of the zone at (x, y) [m]: 1 inside, 0 beyond the onset of any edge, smooth between (C2).
 
-        The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges, of floats, arrays or
-        CasADi symbols [m].
+        The product of ``6 u^5 - 15 u^4 + 10 u^3`` over the edges, of floats, arrays or CasADi symbols.
         """
         share = 1.0
         for normal, offset in zip(self.normals, self.offsets, strict=True):
@@ -204,9 +188,9 @@ class Zone:
     def crosses(self, start: ArrayLike, goal: ArrayLike) -> bool:
         """Whether the straight line between two points (2,) meets the polygon itself."""
         a, b = np.asarray(start, dtype=np.float64), np.asarray(goal, dtype=np.float64)
-        first, last = self.normals @ a - self.offsets, self.normals @ b - self.offsets
         enter, leave = 0.0, 1.0
-        for before, after in zip(first, last, strict=True):
+        ends = self.normals @ a - self.offsets, self.normals @ b - self.offsets
+        for before, after in zip(*ends, strict=True):
             if before > 0.0 and after > 0.0:
                 return False
             if before > 0.0:
@@ -252,7 +236,7 @@ class _Outside:
 
 def height_below(name: str, surface: CeilingHeight) -> GeometricConstraint:
     """Constraint that keeps the CoM below the greatest height that a named overhead obstacle allows."""
-    return GeometricConstraint(f"height below '{name}'", _Below(surface))
+    return GeometricConstraint(f"height below '{name}'", _Height(surface, above=False))
 
 
 def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
@@ -264,16 +248,3 @@ def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
         reason: Why nothing passes, for the explanation of a failure.
     """
     return GeometricConstraint(f"way around '{name}'", _Outside(zone), reason)
-
-
-def _edge_normals(points: FloatArray) -> FloatArray:
-    """(k, 2) outward normals of the edges of the convex hull of (n, 2) points."""
-    return np.asarray(ConvexHull(points).equations[:, :2], dtype=np.float64)
-
-
-def _distinct(normals: FloatArray) -> FloatArray:
-    kept: list[FloatArray] = []
-    for normal in normals:
-        if all(normal @ other < 1.0 - _PARALLEL for other in kept):
-            kept.append(normal)
-    return np.array(kept)

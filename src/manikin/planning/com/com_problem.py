@@ -1,7 +1,7 @@
 """The CoM trajectory, and the problem that asks for one: stances, bounds and weights ([Qiu2012]_ 5.4)."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Literal, Self
 
@@ -22,8 +22,7 @@ from manikin.runtime.display import Displayed
 class CentroidalTrajectory(Displayed):
     """CoM in time, ``p(t) = p_s(sigma t)`` with ``sigma = 1 / T`` ([Qiu2012]_ 5.2-5.6).
 
-    Before the start and after the end the body rests: the position is held and all
-    derivatives are zero.
+    Before and after, the position is held and all derivatives are zero.
 
     Attributes:
         mass: Mass of the body [kg].
@@ -43,13 +42,11 @@ class CentroidalTrajectory(Displayed):
 
     def __post_init__(self) -> None:
         finite_number(self.mass, "centroidal trajectory mass [kg]", above=0.0)
-        if self.spline.domain != (0.0, 1.0) or self.spline.control_points.shape[1] != 3:
+        if not _spatial(self.spline):
             raise SplineError(
                 "centroidal trajectory needs a spline over [0, 1]; valid: with (n, 3) control points"
             )
-        if self.turning is not None and (
-            self.turning.domain != (0.0, 1.0) or self.turning.control_points.shape[1] != 3
-        ):
+        if self.turning is not None and not _spatial(self.turning):
             raise SplineError(
                 "centroidal trajectory has turning of another domain or dimension; valid: a spline over "
                 "[0, 1] with (n, 3) control points"
@@ -76,10 +73,8 @@ class CentroidalTrajectory(Displayed):
         if self.turning is not None or other.turning is not None:
             raise SplineError("trajectories that turn cannot be joined; valid: those of point masses")
         k, leading, following = self.spline.degree, self.spline, other.spline
-        gaps = [
-            float(np.abs(self._derivative(self.duration, d) - other._derivative(0.0, d)).max())
-            for d in range(3)
-        ]
+        steps = [self._derivative(self.duration, d) - other._derivative(0.0, d) for d in range(3)]
+        gaps = np.abs(steps).max(axis=1)
         if following.degree != k or max(gaps) > 1e-4:
             raise SplineError(
                 f"trajectories of degrees {k} and {following.degree} meet with gaps of {gaps[0]:.2g} m, "
@@ -87,15 +82,13 @@ class CentroidalTrajectory(Displayed):
                 "first ends"
             )
         total = self.duration + other.duration
-        first, second = (
-            leading.knots * (self.duration / total),
-            1.0 - (1.0 - following.knots) * (other.duration / total),
-        )
+        first = leading.knots * (self.duration / total)
+        second = 1.0 - (1.0 - following.knots) * (other.duration / total)
         # Two continuous derivatives: the joint is k - 2 knots.
         joint = np.full(k - 2, self.duration / total)
         knots = np.concatenate([first[: -k - 1], joint, second[k + 1 :]])
-        inner = np.unique(knots)
-        times = np.unique(np.concatenate([np.linspace(a, b, 4 * k) for a, b in itertools.pairwise(inner)]))
+        spans = itertools.pairwise(np.unique(knots))
+        times = np.unique(np.concatenate([np.linspace(a, b, 4 * k) for a, b in spans]))
         before = times <= joint[0]
         wanted = np.concatenate([
             leading(np.clip(times[before] * total / self.duration, 0.0, 1.0)),
@@ -104,10 +97,9 @@ class CentroidalTrajectory(Displayed):
         spline = BSpline.fit(
             k, knots, times, wanted, first=leading.control_points[:1], last=following.control_points[-1:]
         )
-        phases = (*self.schedule.sequence, *other.schedule.sequence)
+        phases = StanceSequence((*self.schedule.sequence, *other.schedule.sequence))
         instants = np.concatenate([self.schedule.instants, self.duration + other.schedule.instants[1:]])
-        schedule = ContactSchedule(StanceSequence(phases), instants)
-        return CentroidalTrajectory(self.mass, spline, schedule)
+        return CentroidalTrajectory(self.mass, spline, ContactSchedule(phases, instants))
 
     def position(self, time: ArrayLike) -> FloatArray:
         """(..., 3) CoM at each time [m] ([Qiu2012]_ 5.5)."""
@@ -178,9 +170,9 @@ class CentroidalTrajectory(Displayed):
             SplineError: If knots and control points do not make a clamped spline.
         """
         wanted = ("mass_kg", "degree", "knots", "control_points_m", "key_instants_s")
-        missing = [key for key in wanted if key not in data]
-        if missing:
-            raise InputError(f"centroidal trajectory lacks {missing[0]!r}; valid keys: {', '.join(wanted)}")
+        for key in wanted:
+            if key not in data:
+                raise InputError(f"centroidal trajectory lacks {key!r}; valid keys: {', '.join(wanted)}")
         spline = BSpline(data["degree"], data["knots"], data["control_points_m"])
         schedule = ContactSchedule(sequence, data["key_instants_s"])
         rate = data.get("turning")
@@ -193,6 +185,10 @@ class CentroidalTrajectory(Displayed):
         if order > 0:
             values = np.where(((t >= 0.0) & (t <= self.duration))[..., None], values, 0.0)
         return values
+
+
+def _spatial(spline: BSpline) -> bool:
+    return spline.domain == (0.0, 1.0) and spline.control_points.shape[1] == 3
 
 
 MarginSpace = Literal["wrench", "force", "wrench_about_origin"]
@@ -208,9 +204,8 @@ _UNITS: dict[str, str] = {"wrench": "N.m", "force": "N", "wrench_about_origin": 
 class Weights:
     """Weights of the objectives ([Qiu2012]_ 5.27-5.28).
 
-    The objective is ``- margin d_min + smoothness S + duration T`` with S the mean over time
-    of ``v' Qv v + a' Qa a + j' Qj j``, exactly integrated: the sum of the thesis divided by
-    its number of samples, in the limit of many. Its sum has no acceleration term.
+    The objective is ``- margin d_min + smoothness S + duration T`` with S the mean over time of ``v' Qv v +
+    a' Qa a + j' Qj j``, exactly integrated. The sum of the thesis over samples has no acceleration term.
 
     Attributes:
         margin: Weight of d_min [1/(N.m)] or [1/N].
@@ -236,6 +231,10 @@ class Weights:
             if np.any(diagonal < 0):
                 raise InputError(f"weights {name} are {diagonal.tolist()}; valid: numbers >= 0")
             object.__setattr__(self, name, tuple(float(value) for value in diagonal))
+
+
+END_CONDITIONS = ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration")
+"""Attributes of a :class:`CentroidalProblem` that are None where its ends are free."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,35 +284,36 @@ class CentroidalProblem:
     def __post_init__(self) -> None:
         if self.margin_space not in _UNITS:
             raise InputError(f"centroidal margin_space is {self.margin_space!r}; valid: {', '.join(_UNITS)}")
+        phases, margin = len(self.sequence), self.required_margin
         values: dict[str, object] = {
             "mass": finite_number(self.mass, "centroidal mass [kg]", above=0.0),
             "degree": _integer(self.degree, "degree", 3),
-            "required_margin": finite_number(
-                self.required_margin, "centroidal required_margin", at_least=0.0
-            ),
-            "regions": _checked_regions(self.regions, len(self.sequence)),
-            "geometric": tuple(self.geometric),
-            "key_planes": _inner_planes(self.key_planes, len(self.sequence)),
-            "samples": _integer(self.samples, "samples", 2),
+            "required_margin": finite_number(margin, "centroidal required_margin", at_least=0.0),
         }
+        if self.regions and len(self.regions) != phases:
+            raise InputError(
+                f"centroidal regions are {len(self.regions)} for {phases} phases; valid: one per phase"
+            )
+        for plane in self.key_planes:
+            if not 1 <= plane.key < phases:
+                valid = f"1 to {phases - 1}" if phases > 1 else "none with a single phase"
+                raise InputError(f"centroidal key_planes name key instant {plane.key}; valid: {valid}")
+        values |= {name: tuple(getattr(self, name)) for name in ("regions", "geometric", "key_planes")}
+        values["samples"] = _integer(self.samples, "samples", 2)
         for name, unit in (("support_distance", "m"), ("max_duration", "s")):
             if getattr(self, name) is not None:
                 values[name] = finite_number(getattr(self, name), f"centroidal {name} [{unit}]", above=0.0)
         for end in ("start", "goal"):
             for name, unit in (("com", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
                 vector = getattr(self, f"{end}_{name}")
-                if name != "com" and vector is None:
-                    continue
-                values[f"{end}_{name}"] = frozen_array(vector, f"centroidal {end}_{name} [{unit}]", (3,))
+                if name == "com" or vector is not None:
+                    values[f"{end}_{name}"] = frozen_array(vector, f"centroidal {end}_{name} [{unit}]", (3,))
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     @property
     def reference(self) -> FloatArray:
-        """(3,) middle of all contacts, about which the programmes have positions and moments [m].
-
-        Their numbers are then the same wherever the scene stands.
-        """
+        """(3,) middle of all contacts, the origin of positions and moments in the programmes [m]."""
         places = [contact.position for phase in self.sequence for contact in phase.stance]
         return np.mean(places or [self.start_com], axis=0)
 
@@ -331,20 +331,6 @@ class CentroidalProblem:
     def max_durations(self) -> FloatArray:
         """(phases,) upper bounds of the durations [s], infinite where there is none."""
         return np.array([np.inf if p.max_duration is None else p.max_duration for p in self.sequence])
-
-
-def _checked_regions(regions: Sequence[ComRegion | None], phases: int) -> tuple[ComRegion | None, ...]:
-    if regions and len(regions) != phases:
-        raise InputError(f"centroidal regions are {len(regions)} for {phases} phases; valid: one per phase")
-    return tuple(regions)
-
-
-def _inner_planes(planes: Sequence[KeyPlane], phases: int) -> tuple[KeyPlane, ...]:
-    for plane in planes:
-        if not 1 <= plane.key < phases:
-            valid = f"1 to {phases - 1}" if phases > 1 else "none with a single phase"
-            raise InputError(f"centroidal key_planes name key instant {plane.key}; valid: {valid}")
-    return tuple(planes)
 
 
 def _integer(value: object, name: str, least: int) -> int:

@@ -35,16 +35,15 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
     """Message that the friction is too low to stand still on the slopes of a stance, or None."""
     if any(contact.kind is ContactKind.GRASP for contact in stance) or not len(stance):
         return None
-    slopes = [float(np.arccos(np.clip(contact.normal[2], -1.0, 1.0))) for contact in stance]
-    steepness = list(zip(slopes, stance, strict=True))
-    if not all(np.tan(angle) > contact.friction for angle, contact in steepness):
+    slopes = [(float(np.arccos(np.clip(contact.normal[2], -1.0, 1.0))), contact) for contact in stance]
+    if not all(np.tan(angle) > contact.friction for angle, contact in slopes):
         return None
     try:
         if len(admissible_com_polygon(polytope, mass)):
             return None
     except InputError:
         return None
-    angle, contact = min(steepness, key=lambda item: item[0])
+    angle, contact = min(slopes, key=lambda item: item[0])
     return (
         f"nobody can stand on {', '.join(stance.effectors)}: a slope of {np.degrees(angle):.1f} degrees "
         f"needs a friction of at least {np.tan(angle):.2f}, {contact.effector} has {contact.friction:g}"
@@ -56,18 +55,17 @@ def low_friction(
     problem: CentroidalProblem,
     measure: Callable[[Sequence[WrenchPolytope]], float],
 ) -> str:
-    """Message that a quantity of some stances would suffice with firm friction; empty where it would not.
+    """Message that firm friction would give some stances the required margin; empty where it would not.
 
-    ``measure`` gives the quantity from the stances' polytopes; it suffices above the required margin.
+    ``measure`` gives their margin from their polytopes.
     """
     least = least_friction(stances)
-    if least >= FIRM_FRICTION:
-        return ""
-    firm = wrench_polytopes([_firm(s) for s in stances], reference=problem.reference)
-    value = measure(firm)
-    if value <= problem.required_margin:
-        return ""
-    return f"; the friction of {least:g} is too low: with {FIRM_FRICTION:g} it would be {value:.2f} N.m"
+    if least < FIRM_FRICTION:
+        value = measure(wrench_polytopes([_firm(s) for s in stances], reference=problem.reference))
+        if value > problem.required_margin:
+            firm = f"{FIRM_FRICTION:g} it would be {value:.2f} N.m"
+            return f"; the friction of {least:g} is too low: with {firm}"
+    return ""
 
 
 def least_friction(stances: Sequence[Stance]) -> float:
@@ -86,26 +84,6 @@ def _firm(stance: Stance) -> Stance:
         c if c.kind is ContactKind.GRASP else replace(c, friction=max(c.friction, FIRM_FRICTION))
         for c in stance
     ])  # fmt: skip
-
-
-def out_of_reach(problem: CentroidalProblem, phase: int) -> str | None:
-    """Message that no CoM is near enough to all contacts of a phase and keeps the constraints, or None."""
-    stance, limit = problem.sequence[phase].stance, problem.support_distance
-    if limit is None or len(stance) < 2:
-        return None
-    apart, first, second = max(
-        (float(np.linalg.norm(a.position - b.position)), a.effector, b.effector)
-        for i, a in enumerate(stance)
-        for b in stance.contacts[:i]
-    )
-    missing = _least_miss(problem, np.array([contact.position for contact in stance]), limit)
-    if missing <= REACH_TOLERANCE:
-        return None
-    return (
-        f"the step is too long: {second} and {first} are {apart:.2f} m apart in phase {phase}, and no "
-        f"centre of mass within {limit:.3f} m of both keeps the constraints on it "
-        f"(it misses them by {missing:.2f} m)"
-    )
 
 
 def _least_miss(problem: CentroidalProblem, places: FloatArray, limit: float) -> float:
@@ -180,32 +158,33 @@ def polytopes_of(problem: CentroidalProblem) -> tuple[WrenchPolytope, ...]:
 def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
     """Radius of the largest ball inside each consecutive intersection ([Qiu2012]_ 2.25, Propositions 1-2).
 
-    The thesis calls it the radius of the Chebyshev ball; the *inscribed* one is meant. An
-    empty intersection has the (negative) radius by which the facets would have to move out.
+    The thesis says Chebyshev ball; the *inscribed* one is meant. An empty intersection has the (negative)
+    radius by which the facets would have to move out.
 
     Returns:
         (n - 1,) of the W_i of n phases.
     """
-    return np.array([_largest_distance(both, np.ones(len(both))) for both in _intersections(polytopes)])
+    return np.array([_largest_distance(*both, np.ones(len(both[1]))) for both in _intersections(polytopes)])
 
 
-def _intersections(polytopes: Sequence[Polytope]) -> Iterator[Polytope]:
-    return (a.intersection(b) for a, b in itertools.pairwise(polytopes))
+def _intersections(polytopes: Sequence[Polytope]) -> Iterator[tuple[FloatArray, FloatArray]]:
+    both = (a.intersection(b) for a, b in itertools.pairwise(polytopes))
+    return ((polytope.H, polytope.h) for polytope in both)
 
 
 def margin_bounds(polytopes: Sequence[Polytope]) -> FloatArray:
     """Upper bound of the margin about the CoM at each key instant, wherever the CoM is (our own).
 
     The margin at ``x`` is the least of ``d_i / hypot(|H1 + H2 x^|, |H2|)`` over the rows of both
-    polytopes. As a row is a screw, no ``x`` makes its force part shorter than the part along its moment,
-    ``|H1 . H2| / |H2|``: with these least lengths, which no choice of the moments' point changes, the
-    bound is a linear programme in the wrench. It takes the place of the largest ball of Proposition 2
-    ([Qiu2012]_ 5.4.3), which is about a fixed point. Like that one it is necessary, not sufficient.
+    polytopes. No ``x`` makes the force part of such a screw shorter than the part along its moment, ``|H1 .
+    H2| / |H2|``: with these least lengths the bound is a linear programme in the wrench. It takes the place
+    of the largest ball of Proposition 2 ([Qiu2012]_ 5.4.3), which is about a fixed point. Like that one it
+    is necessary, not sufficient.
 
     Returns:
         (n - 1,) of the W_i of n phases about one point [N.m]; negative when no wrench is in both polytopes.
     """
-    return np.array([_largest_distance(both, _least_lengths(both.H)) for both in _intersections(polytopes)])
+    return np.array([_largest_distance(*both, _least_lengths(both[0])) for both in _intersections(polytopes)])
 
 
 def _least_lengths(H: FloatArray) -> FloatArray:
@@ -219,10 +198,9 @@ def _least_lengths(H: FloatArray) -> FloatArray:
 def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
     """Test everything that needs no optimisation, from the W_i of the phases about ``problem.reference``.
 
-    Durations against their bounds, whether the legs reach the contacts of each phase, end points against
-    their bounds, whether any phase lifts the weight, whether the friction holds the body at both ends, then
-    emptiness of the intersections (Proposition 1) and the bound of the margin in them against the required
-    one (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
+    Durations, reach of the contacts of each phase, end points, whether any phase lifts the weight, friction
+    at both ends, emptiness of the intersections (Proposition 1), the bound of the margin in them against the
+    required one (Proposition 2), and whether any acceleration balances the CoM at the ends.
     """
     radii, last = _bounds(problem, polytopes), len(problem.sequence) - 1
     failure = (
@@ -246,12 +224,10 @@ def _bounds(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> FloatA
     return intersection_radii([Polytope(rows_about(P.H, -problem.reference), P.h) for P in polytopes])
 
 
-def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
+def _largest_distance(H: FloatArray, h: FloatArray, lengths: FloatArray) -> float:
     """Largest ``d`` with ``H x + lengths d <= h`` at some x; negative when the polytope is empty."""
-    cost = np.zeros(polytope.dimension + 1)
-    cost[-1] = -1.0
-    rows = np.column_stack([polytope.H, lengths])
-    result = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
+    cost = np.append(np.zeros(H.shape[1]), -1.0)
+    result = linprog(cost, np.column_stack([H, lengths]), h, bounds=(None, None), method="highs")
     return float(result.x[-1]) if result.success else np.inf
 
 
@@ -278,37 +254,45 @@ def misplaced(
         what: The position in words.
         tolerance: Largest violation that counts as none [m].
     """
-    limit = problem.support_distance
-    for phase in phases if limit is not None else ():
+    limit = np.inf if problem.support_distance is None else problem.support_distance
+    for phase in phases:
         for contact in problem.sequence[phase].stance:
-            distance = float(np.linalg.norm(com - contact.position))
-            if limit is not None and distance > limit + tolerance:
-                return Failure(
-                    "support distance",
-                    f"{what} is {distance:.3f} m from {contact.effector}, out of reach: "
-                    f"the limit is {limit:.3f} m",
-                    phase, where=contact.effector,
-                )  # fmt: skip
+            distance, where = float(np.linalg.norm(com - contact.position)), contact.effector
+            if distance > limit + tolerance:
+                reason = f"{what} is {distance:.3f} m from {where}, out of reach: the limit is {limit:.3f} m"
+                return Failure("support distance", reason, phase, where=where)
     for phase in phases if problem.regions else ():
-        region, stance = problem.regions[phase], problem.sequence[phase].stance
-        beyond = -np.inf if region is None else float(region.violation(com))
-        if beyond > tolerance:
-            where = ", ".join(stance.effectors)
+        region = problem.regions[phase]
+        if region is not None and (beyond := float(region.violation(com))) > tolerance:
+            where = ", ".join(problem.sequence[phase].stance.effectors)
             reason = f"{what} is {beyond:.3f} m out of this body's reach on {where} in phase {phase}"
             return Failure("reach", reason, phase, where=where)
     for constraint in problem.geometric:
-        violation = float(constraint.violation(com))
-        if violation > tolerance:
+        if (violation := float(constraint.violation(com))) > tolerance:
             reason = f"{what} violates '{constraint.name}' by {violation:.4f} m"
             return Failure(constraint.name, reason, phases[-1])
     return None
 
 
 def _reach_failure(problem: CentroidalProblem) -> Failure | None:
+    """Failure of a phase in which no CoM near enough to all contacts keeps the constraints, or None."""
+    limit = problem.support_distance
     for index, phase in enumerate(problem.sequence):
-        reason = out_of_reach(problem, index)
-        if reason is not None:
-            return Failure("support distance", reason, index, where=", ".join(phase.stance.effectors))
+        stance = phase.stance
+        if limit is None or len(stance) < 2:
+            continue
+        missing = _least_miss(problem, np.array([contact.position for contact in stance]), limit)
+        if missing > REACH_TOLERANCE:
+            apart, first, second = max(
+                (float(np.linalg.norm(a.position - b.position)), a.effector, b.effector)
+                for b, a in itertools.combinations(stance, 2)
+            )
+            reason = (
+                f"the step is too long: {second} and {first} are {apart:.2f} m apart in phase {index}, and "
+                f"no centre of mass within {limit:.3f} m of both keeps the constraints on it "
+                f"(it misses them by {missing:.2f} m)"
+            )
+            return Failure("support distance", reason, index, where=", ".join(stance.effectors))
     return None
 
 
@@ -317,28 +301,27 @@ def _apart_failure(problem: CentroidalProblem) -> Failure | None:
     for key, (before, after) in enumerate(itertools.pairwise(problem.regions), start=1):
         if before is None or after is None:
             continue
-        rows = np.vstack([before.normals, after.normals])
-        room = _largest_distance(Polytope(rows, np.append(before.offsets, after.offsets)), np.ones(len(rows)))
+        rows, bounds = np.vstack([before.normals, after.normals]), np.append(before.offsets, after.offsets)
+        both = Polytope(rows, bounds)
+        room = _largest_distance(both.H, both.h, np.ones(len(both)))
         if room < -REACH_TOLERANCE:
             stances = (problem.sequence[key - 1].stance, problem.sequence[key].stance)
             where = ", ".join(dict.fromkeys(name for stance in stances for name in stance.effectors))
-            return Failure(
-                "reach",
+            reason = (
                 f"no centre of mass is in this body's reach both before and after the change at T_{key}, on "
-                f"{where}: the two regions are {-2.0 * room:.2f} m apart",
-                key, where=where,
-            )  # fmt: skip
+                f"{where}: the two regions are {-2.0 * room:.2f} m apart"
+            )
+            return Failure("reach", reason, key, where=where)
     return None
 
 
 def _slope_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
     for index in (0, len(problem.sequence) - 1):
         stance, polytope = problem.sequence[index].stance, polytopes[index]
-        reason = (
-            slipping_slope(stance, polytope, problem.mass) if isinstance(polytope, WrenchPolytope) else None
-        )
-        if reason is not None:
-            return Failure("friction", reason, index, where=", ".join(stance.effectors))
+        if isinstance(polytope, WrenchPolytope):
+            reason = slipping_slope(stance, polytope, problem.mass)
+            if reason is not None:
+                return Failure("friction", reason, index, where=", ".join(stance.effectors))
     return None
 
 
@@ -363,13 +346,11 @@ def _weight_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -
             f"on walls only friction carries, and a friction of {friction:g}{pressed} is too small: "
             "more friction or a stronger squeeze is needed"
         )
-    return Failure(
-        "weight",
+    reason = (
         f"the contacts push up with {lifts[best]:.0f} N at most, in phase {best}, and the body weighs "
-        f"{weight:.0f} N; {cause}",
-        best,
-        where=", ".join(stance.effectors),
+        f"{weight:.0f} N; {cause}"
     )
+    return Failure("weight", reason, best, where=", ".join(stance.effectors))
 
 
 def _largest_lift(polytope: Polytope) -> float:
@@ -383,57 +364,38 @@ def _largest_lift(polytope: Polytope) -> float:
 def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:
     for index, radius in enumerate(radii):
         where = f"phases {index} and {index + 1}"
-        stances = [problem.sequence[number].stance for number in (index, index + 1)]
         if radius < -VANISHING_MARGIN:
-            return Failure(
-                "intersection",
-                f"no wrench is admissible in both of {where}: their polytopes do not meet (Proposition 1)"
-                f"{low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))}",
-                index, where=where,
-            )  # fmt: skip
-        if problem.margin_space != "force" and radius <= max(problem.required_margin, VANISHING_MARGIN):
-            return Failure(
-                "intersection",
+            reason = f"no wrench is admissible in both of {where}: their polytopes do not meet"
+            reason += " (Proposition 1)"
+        elif problem.margin_space != "force" and radius <= max(problem.required_margin, VANISHING_MARGIN):
+            reason = (
                 f"the margin between {where} is at most {radius:.2f} N.m for any wrench in both polytopes "
                 f"(Proposition 2); required {problem.required_margin:.2f} N.m"
-                f"{low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))}",
-                index, where=where,
-            )  # fmt: skip
+            )
+        else:
+            continue
+        stances = [problem.sequence[number].stance for number in (index, index + 1)]
+        reason += low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))
+        return Failure("intersection", reason, index, where=where)
     return None
 
 
 def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
-    last = len(problem.sequence) - 1
-    ends = (
-        ("start", 0, problem.start_com, problem.start_acceleration),
-        ("goal", last, problem.goal_com, problem.goal_acceleration),
-    )
-    for name, phase, com, acceleration in ends:
-        margin = best_margin_at(polytopes[phase], problem, com, acceleration)
+    for name, phase in (("start", 0), ("goal", len(problem.sequence) - 1)):
+        end = problem, getattr(problem, f"{name}_com"), getattr(problem, f"{name}_acceleration")
+        margin = best_margin_at(polytopes[phase], *end)
         if margin <= max(problem.required_margin, VANISHING_MARGIN):
             stance = problem.sequence[phase].stance
-            held = ", ".join(stance.effectors)
-            what = (
-                "cannot be balanced" if margin <= VANISHING_MARGIN
-                else f"reaches a margin of at most {margin:.2f} {problem.margin_unit}"
-            )  # fmt: skip
-            return Failure(
-                f"{name} balance",
-                f"{name} CoM {np.round(com, 3).tolist()} {what} on {held or 'no contact'}; "
+            held, what = ", ".join(stance.effectors), "cannot be balanced"
+            if margin > VANISHING_MARGIN:
+                what = f"reaches a margin of at most {margin:.2f} {problem.margin_unit}"
+            reason = (
+                f"{name} CoM {np.round(end[1], 3).tolist()} {what} on {held or 'no contact'}; "
                 f"required {problem.required_margin:g} {problem.margin_unit}"
-                f"{_end_friction(stance, problem, com, acceleration)}",
-                phase, where=held,
-            )  # fmt: skip
+            )
+            reason += low_friction([stance], problem, lambda firm, end=end: best_margin_at(firm[0], *end))
+            return Failure(f"{name} balance", reason, phase, where=held)
     return None
-
-
-def _end_friction(
-    stance: Stance, problem: CentroidalProblem, com: FloatArray, acceleration: FloatArray | None
-) -> str:
-    def margin(firm: Sequence[WrenchPolytope]) -> float:
-        return best_margin_at(firm[0], problem, com, acceleration)
-
-    return low_friction([stance], problem, margin) if len(stance) else ""
 
 
 def best_margin_at(
@@ -443,23 +405,19 @@ def best_margin_at(
 
     At a fixed position the pseudo-wrench is linear in the acceleration: a linear programme.
     """
-    slopes = row_slopes(polytope, problem, com)
-    arm = com - problem.reference
+    slopes, arm = row_slopes(polytope, problem, com), com - problem.reference
     still = polytope.distances(pseudo_wrench(problem.mass, arm, np.zeros(3)))
     gain = problem.mass * np.vstack([np.eye(3), skew(arm)])
     if acceleration is not None:
         return float(np.min((still - polytope.H @ gain @ acceleration) / slopes))
-    rows = np.column_stack([polytope.H @ gain, slopes])
-    result = linprog([0.0, 0.0, 0.0, -1.0], rows, still, bounds=(None, None), method="highs")
-    return float(result.x[-1]) if result.success else np.inf
+    return _largest_distance(polytope.H @ gain, still, slopes)
 
 
 def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) -> FloatArray:
-    """(..., m) change of each row per unit of margin at CoM positions (..., 3).
+    """(..., m) change of each row per unit of the problem's margin at CoM positions (..., 3).
 
-    Its length with moments about the CoM, or about the world origin; ``|H1 + H2 p^|`` for forces.
-
-    The polytope is about ``problem.reference``; the problem says what the margin measures.
+    Its length with moments about the CoM, or about the world origin; ``|H1 + H2 p^|`` for forces. The
+    polytope is about ``problem.reference``.
     """
     place = np.asarray(com, dtype=np.float64)
     point = np.zeros_like(place) if problem.margin_space == "wrench_about_origin" else place

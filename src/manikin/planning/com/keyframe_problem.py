@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.contact import ContactSchedule, Phase, StanceSequence
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.planning.com.com_problem import CentroidalProblem, Weights
+from manikin.planning.com.com_problem import END_CONDITIONS, CentroidalProblem
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,21 +34,13 @@ class RecordedCom:
     angular_momentum_rate: FloatArray | None
 
     def __init__(
-        self,
-        time: ArrayLike,
-        com: ArrayLike,
-        sequence: StanceSequence,
-        key_times: ArrayLike,
+        self, time: ArrayLike, com: ArrayLike, sequence: StanceSequence, key_times: ArrayLike,
         angular_momentum_rate: ArrayLike | None = None,
-    ) -> None:
-        """Take over the samples from the first to the last key frame.
+    ) -> None:  # fmt: skip
+        """Take over the samples from the first to the last key frame; the origin of the times may be any.
 
-        Args:
-            time: (n,) [s], increasing; any origin.
-            com: (n, 3) [m].
-            sequence: Stances, one per phase, each with at least one contact.
-            key_times: (phases + 1,) changes of the support, with both ends; moved to the nearest sample [s].
-            angular_momentum_rate: (n, 3) about the CoM [N.m]; None where it is not known.
+        ``key_times`` (phases + 1,) are the changes of the support, with both ends, moved to the nearest
+        sample [s]; the other arguments are as the attributes.
 
         Raises:
             InputError: If a number is not finite, times do not increase, or a phase has no
@@ -59,11 +51,11 @@ class RecordedCom:
         wanted = frozen_array(key_times, "recording key times [s]", (len(sequence) + 1,))
         _check_increasing(times, "recording time")
         _check_increasing(wanted, "recording key times")
-        for number, phase in enumerate(sequence):
-            if not len(phase.stance):
-                raise InputError(
-                    f"recording has no support in phase {number}; valid: at least one contact in every phase"
-                )
+        empty = [number for number, phase in enumerate(sequence) if not len(phase.stance)]
+        if empty:
+            raise InputError(
+                f"recording has no support in phase {empty[0]}; valid: at least one contact in every phase"
+            )
         slack = float(np.median(np.diff(times)))
         if wanted[0] < times[0] - slack or wanted[-1] > times[-1] + slack:
             raise InputError(
@@ -78,10 +70,9 @@ class RecordedCom:
             )
         kept = slice(frames[0], frames[-1] + 1)
         durations = np.diff(times[frames] - times[frames[0]]).tolist()
-        turning = angular_momentum_rate
+        turning, name = angular_momentum_rate, "recording angular momentum rate [N.m]"
         if turning is not None:
-            turning = frozen_array(turning, "recording angular momentum rate [N.m]", (len(times), 3))
-            turning = frozen_array(turning[kept], "recording angular momentum rate [N.m]")
+            turning = frozen_array(frozen_array(turning, name, (len(times), 3))[kept], name)
         key_frames = frames - frames[0]
         key_frames.setflags(write=False)
         values = {
@@ -89,8 +80,7 @@ class RecordedCom:
             "com": frozen_array(positions[kept], "recording com [m]"),
             "key_frames": key_frames,
             "sequence": StanceSequence([
-                Phase(part.stance, lasting, lasting)
-                for part, lasting in zip(sequence, durations, strict=True)
+                Phase(part.stance, t, t) for part, t in zip(sequence, durations, strict=True)
             ]),
             "angular_momentum_rate": turning,
         }  # fmt: skip
@@ -143,37 +133,41 @@ class KeyframeProblem:
     frame_spacing: float
 
     def __init__(
-        self,
-        mass: float,
-        recording: RecordedCom,
-        *,
-        control_points: int | None = None,
-        frame_spacing: float = FRAME_SPACING,
-        **requirements: Any,
-    ) -> None:
-        """Put the problem together.
+        self, mass: float, recording: RecordedCom, *, control_points: int | None = None,
+        frame_spacing: float = FRAME_SPACING, **requirements: Any,
+    ) -> None:  # fmt: skip
+        """Put the problem together, of a body's mass [kg].
 
         Args:
             mass: Mass of the body [kg].
             recording: Samples, key frames and stances.
             control_points: At least one more than there are key frames and end conditions; the
                 number of key frames plus 7 when omitted.
-            frame_spacing: Least distance of an added key frame from the others [s].
-            requirements: Further arguments of :class:`CentroidalProblem`: degree, conditions at the ends (an
-                acceleration needs a velocity), margin, support distance, geometric constraints, and weights,
-                of which those of margin and duration play no part.
+            frame_spacing: See above [s].
+            requirements: Further arguments of :class:`CentroidalProblem`. An acceleration at an end needs a
+                velocity there; the weights of margin and duration play no part.
 
         Raises:
             InputError: If a value is not usable or there are too few control points.
         """
-        asked = CentroidalProblem(
-            mass, recording.sequence, recording.com[0], recording.com[-1], **requirements
-        )
-        frames = len(recording.key_frames)
+        com, frames = recording.com, len(recording.key_frames)
+        asked = CentroidalProblem(mass, recording.sequence, com[0], com[-1], **requirements)
         if control_points is None:
             control_points = max(frames + EXTRA_CONTROL_POINTS, asked.degree + 1)
-        _check_control_points(control_points, frames, asked)
-        _check_weights(asked.weights)
+        conditions = sum(getattr(asked, name) is not None for name in END_CONDITIONS)
+        least, count = max(frames + conditions + 1, asked.degree + 1), control_points
+        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < least:
+            raise InputError(
+                f"keyframes control_points is {count!r}; valid: an integer >= {least} for {frames} key "
+                f"frames, {conditions} end conditions and degree {asked.degree}"
+            )
+        weights = asked.weights
+        total = np.array([weights.velocity, weights.acceleration, weights.jerk]).sum(axis=0)
+        if weights.smoothness == 0 or np.any(total == 0):
+            raise InputError(
+                "keyframes weights of velocity, acceleration and jerk are all zero along an axis; "
+                "valid: one of them, and smoothness, > 0"
+            )
         spacing = finite_number(frame_spacing, "keyframes frame_spacing [s]", above=0.0)
         values = {
             "recording": recording, "requirements": asked,
@@ -186,43 +180,11 @@ class KeyframeProblem:
     def of(
         cls, problem: CentroidalProblem, recording: RecordedCom, control_points: int | None = None
     ) -> "KeyframeProblem":
-        """Problem with the requirements of another one, and the ends and timing of a recording.
-
-        Args:
-            problem: Whose body, margin, constraints, weights and conditions at the ends are taken over.
-            control_points: The number of key frames plus 7 when omitted.
+        """Problem with body and requirements of another one, and the ends and timing of a recording.
 
         Raises:
             InputError: If there are too few control points.
         """
-        names = (
-            "degree", "start_velocity", "goal_velocity", "start_acceleration", "goal_acceleration",
-            "required_margin", "margin_space", "support_distance", "geometric", "weights",
-        )  # fmt: skip
-        given = {name: getattr(problem, name) for name in names}
+        names = "degree", "required_margin", "margin_space", "support_distance", "geometric", "weights"
+        given = {name: getattr(problem, name) for name in (*names, *END_CONDITIONS)}
         return cls(problem.mass, recording, control_points=control_points, **given)
-
-
-def _check_control_points(count: object, frames: int, problem: CentroidalProblem) -> None:
-    conditions = sum(
-        value is not None
-        for value in (
-            problem.start_velocity, problem.start_acceleration, problem.goal_velocity,
-            problem.goal_acceleration,
-        )
-    )  # fmt: skip
-    least = max(frames + conditions + 1, problem.degree + 1)
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < least:
-        raise InputError(
-            f"keyframes control_points is {count!r}; valid: an integer >= {least} for {frames} key frames, "
-            f"{conditions} end conditions and degree {problem.degree}"
-        )
-
-
-def _check_weights(weights: Weights) -> None:
-    total = np.array([weights.velocity, weights.acceleration, weights.jerk]).sum(axis=0)
-    if weights.smoothness == 0 or np.any(total == 0):
-        raise InputError(
-            "keyframes weights of velocity, acceleration and jerk are all zero along an axis; "
-            "valid: one of them, and smoothness, > 0"
-        )

@@ -1,10 +1,9 @@
 """The quadratic programme of the keyframe-based method: a spline of least velocity and jerk.
 
-At a key frame the position is given, so that the pseudo-wrench there,
-``m [a - g; p x (a - g)]`` ([Qiu2012]_ 4.6), is affine in the acceleration and thus in the control
-points: the bilinear balance constraint of 5.17 is linear wherever 5.14 holds.  With the exactly
-integrated objective the problem is a convex quadratic programme.  It has one solution, which
-does not depend on a first guess, and when it has none that is certain.
+At a key frame the position is given, so that the pseudo-wrench there, ``m [a - g; p x (a - g)]`` ([Qiu2012]_
+4.6), is affine in the control points: the bilinear balance constraint of 5.17 is linear wherever 5.14 holds.
+With the exactly integrated objective this is a convex quadratic programme. It has one solution, which does
+not depend on a first guess, and when it has none that is certain.
 """
 
 from collections.abc import Sequence
@@ -18,9 +17,9 @@ from manikin.balance import WrenchPolytope
 from manikin.contact import ContactSchedule
 from manikin.errors import SolverError
 from manikin.numerics.qp import solve_qp
-from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
-from manikin.planning.com.com_problem import CentroidalProblem
+from manikin.planning.com.com_problem import END_CONDITIONS, CentroidalProblem
 from manikin.planning.com.feasibility import row_slopes
 
 TIGHTENING = 1e-4
@@ -73,13 +72,10 @@ class KeyframeProgramme:
     def solve(self, margin: float) -> "KeyframeSolution | None":
         """Find the least objective with at least ``margin`` at every key frame; None when there is none.
 
-        The equalities are eliminated, so that they hold to rounding; the rest is a dense
-        programme of a few unknowns for a dual active-set method. Where no point keeps the rows
-        it says so, or its working set cycles.
+        The equalities are eliminated, so that they hold to rounding.
         """
         room = self._room()
-        limits = room.bounds - room.slopes * (margin + TIGHTENING)
-        identity = np.eye(room.basis.shape[1])
+        limits, identity = room.bounds - room.slopes * (margin + TIGHTENING), np.eye(room.basis.shape[1])
         solution = solve_qp(identity, room.gradient, room.rows, None, limits, tolerance=1e-9)
         if not solution.solved:
             return None
@@ -89,14 +85,11 @@ class KeyframeProgramme:
     def most_margin(self) -> tuple[FloatArray, float, int]:
         """Control points with the largest least margin at the key frames, that margin, and its row.
 
-        A linear programme; it explains why :meth:`solve` found nothing.
-
         Raises:
             SolverError: If the solver fails.
         """
         room = self._room()
-        cost = np.zeros(room.basis.shape[1] + 1)
-        cost[-1] = -1.0
+        cost = np.append(np.zeros(room.basis.shape[1]), -1.0)
         # The margin's unit makes its column as long as the others.
         unit = 1.0 / float(np.median(room.slopes))
         rows = np.column_stack([room.rows, unit * room.slopes])
@@ -125,10 +118,7 @@ class KeyframeProgramme:
 
 @dataclass(frozen=True, eq=False)
 class _Room:
-    """The programme in unknowns y that keep the equalities and have the identity as Hessian.
-
-    The rows have unit length, so that neither the knots nor the weights spoil the solvers' scales.
-    """
+    """The programme in unknowns y that keep the equalities and have the identity as Hessian; unit rows."""
 
     particular: FloatArray
     basis: FloatArray
@@ -159,13 +149,9 @@ class KeyframeSolution:
 
 
 def build_keyframe_programme(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    schedule: ContactSchedule,
-    times: FloatArray,
-    positions: FloatArray,
-    control_points: int,
-) -> KeyframeProgramme:
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], schedule: ContactSchedule,
+    times: FloatArray, positions: FloatArray, control_points: int,
+) -> KeyframeProgramme:  # fmt: skip
     """Write the programme of [Qiu2012]_ 5.3.2 for (f,) times of key frames, both ends among them [s].
 
     Args:
@@ -176,30 +162,23 @@ def build_keyframe_programme(
         positions: (f, 3) CoM there [m].
         control_points: Number of control points.
     """
-    duration = float(schedule.instants[-1])
-    given = (
-        (problem.start_velocity, problem.start_acceleration),
-        (problem.goal_velocity, problem.goal_acceleration),
-    )
+    k, duration = problem.degree, float(schedule.instants[-1])
     # First and second derivative over normalised time at both ends, where imposed.
+    given = [getattr(problem, name) for name in END_CONDITIONS]
     ends = [
         [value * duration**order for order, value in enumerate(pair, start=1) if value is not None]
-        for pair in given
+        for pair in (given[:2], given[2:])
     ]
-    knots = keyframe_knots(problem.degree, times / duration, control_points, *map(len, ends))
-    k = problem.degree
+    knots = keyframe_knots(k, times / duration, control_points, *map(len, ends))
     equalities = [basis_matrix(k, knots, np.minimum(times / duration, 1.0))]
     values = [positions]
     for end, conditions in zip((0.0, 1.0), ends, strict=True):
         for order, value in enumerate(conditions, start=1):
             equalities.append(basis_matrix(k, knots, end, order))
             values.append(value[None, :])
-    rows, slopes, bounds, owners, phases = _balance_rows(
-        problem, polytopes, schedule, times, positions, knots
-    )
     return KeyframeProgramme(
         k, knots, np.vstack(equalities), np.vstack(values), _grams(problem, knots, duration),
-        rows, slopes, bounds, owners, phases,
+        *_balance_rows(problem, polytopes, schedule, times, positions, knots),
     )  # fmt: skip
 
 
@@ -208,18 +187,10 @@ def keyframe_knots(
 ) -> FloatArray:
     """Knots for which every key frame and end condition can be met, and freedom is spread evenly.
 
-    As many sites as control points are laid out: the key frames, the ends once more for each
-    condition on a derivative there, and the rest one by one in the middle of the longest gap.
-    The inner knots are the means of ``degree`` successive sites (de Boor's rule), for which
-    interpolation at the sites has exactly one solution (Schoenberg and Whitney). The thesis
-    gives no rule for the knots.
-
-    Args:
-        degree: Degree k.
-        key_frames: (f,) increasing, from 0 to 1.
-        control_points: At least f plus the numbers of derivatives imposed at start and goal.
-        start_derivatives: Number of derivatives imposed at the start.
-        goal_derivatives: Number of derivatives imposed at the goal.
+    As many sites as control points are laid out: the key frames (f,) from 0 to 1, the ends once more for each
+    derivative imposed there, and the rest one by one in the middle of the longest gap. The inner knots are
+    the means of ``degree`` successive sites (de Boor's rule), for which interpolation at the sites has
+    exactly one solution (Schoenberg and Whitney). The thesis gives no rule for the knots.
 
     Returns:
         (control_points + degree + 1,).
@@ -253,31 +224,24 @@ def _grams(problem: CentroidalProblem, knots: FloatArray, duration: float) -> Fl
 
 
 def _balance_rows(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    schedule: ContactSchedule,
-    times: FloatArray,
-    positions: FloatArray,
-    knots: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray, np.ndarray]:
-    """Rows ``H m [a - g; p x (a - g)] + slope d <= h`` with p given; both polytopes at a key instant."""
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], schedule: ContactSchedule,
+    times: FloatArray, positions: FloatArray, knots: FloatArray,
+) -> list[np.ndarray]:  # fmt: skip
+    """Rows ``H m [a - g; p x (a - g)] + slope d <= h`` with p given; both polytopes at a key instant.
+
+    They are followed by slopes, bounds, and the key frame and phase of each.
+    """
     duration = float(schedule.instants[-1])
     second = basis_matrix(problem.degree, knots, np.minimum(times / duration, 1.0), 2) / duration**2
-    gravity = np.array([0.0, 0.0, -GRAVITY])
-    rows, slopes, bounds, owners, phases = [], [], [], [], []
+    parts = []
     for index, (time, position) in enumerate(zip(times, positions, strict=True)):
         for phase in phases_touching(schedule, float(time)):
             polytope = polytopes[phase]
             gain = problem.mass * polytope.H @ np.vstack([np.eye(3), skew(position - problem.reference)])
-            rows.append(np.einsum("i,rj->rij", second[index], gain).reshape(len(gain), -1))
-            slopes.append(row_slopes(polytope, problem, position))
-            bounds.append(polytope.h + gain @ gravity)
-            owners.append(np.full(len(gain), index))
-            phases.append(np.full(len(gain), phase))
-    return (
-        np.vstack(rows), np.concatenate(slopes), np.concatenate(bounds), np.concatenate(owners),
-        np.concatenate(phases),
-    )  # fmt: skip
+            rows = np.einsum("i,rj->rij", second[index], gain).reshape(len(gain), -1)
+            slopes, bounds = row_slopes(polytope, problem, position), polytope.h + gain @ GRAVITY_VECTOR
+            parts.append((rows, slopes, bounds, *(np.full(len(gain), number) for number in (index, phase))))
+    return [np.concatenate(part) for part in zip(*parts, strict=True)]
 
 
 def phases_touching(schedule: ContactSchedule, time: float) -> tuple[int, ...]:

@@ -1,18 +1,19 @@
 """The keyframe-based method: a smooth CoM through recorded positions ([Qiu2012]_ 5.3).
 
-The CoM passes the recorded positions at the instants at which the support changes and has the
-least velocity and jerk in between. Balance is imposed at these key frames and measured every
-millisecond afterwards; where it is lost in between, the recorded position there becomes one
-more key frame and the programme is solved again (5.3.3).
+The CoM passes the recorded positions where the support changes, with the least velocity and jerk in between.
+Balance is imposed at these key frames and measured every millisecond afterwards; where it is lost in between,
+the recorded position there becomes one more key frame and the programme is solved again (5.3.3).
 """
 
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 
 from manikin.balance import WrenchPolytope
+from manikin.numerics.polytope import Polytope
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com.com_certificate import (
     TOLERANCE,
@@ -78,10 +79,9 @@ class KeyframeResult(CentroidalResult):
 def plan_com_through_key_frames(problem: KeyframeProblem) -> KeyframeResult:
     """Find the smoothest balanced CoM trajectory through the key frames of a recording.
 
-    Every programme is convex and solved to its one optimum; see
-    :mod:`manikin.planning.com.keyframe_spline`. A trajectory that does not meet its own
-    certificate, measured every millisecond, gets key frames until it does or no sample of the
-    recording is left that would help; then the result says which requirement could not be met.
+    Every programme is convex and solved to its one optimum (:mod:`manikin.planning.com.keyframe_spline`). A
+    trajectory that does not meet its own certificate, measured every millisecond, gets key frames until it
+    does or no sample is left that would help; then the result says which requirement could not be met.
     """
     return _KeyFrameSearch(problem).run()
 
@@ -108,9 +108,8 @@ class _KeyFrameSearch:
         began = clock.perf_counter()
         self.polytopes = polytopes_of(self.problem.requirements)
         # Propositions 1 and 2 and the ends, then each recorded position by itself.
-        feasibility = assess_feasibility(self.problem.requirements, self.polytopes)
-        failure, attempt = feasibility.failure or _position_failure(self.problem), None
-        failure = failure or _key_frame_failure(self.problem, self.polytopes)
+        feasibility, attempt = assess_feasibility(self.problem.requirements, self.polytopes), None
+        failure = feasibility.failure or _key_frame_failure(self.problem, self.polytopes)
         feasibility = replace(feasibility, failure=failure)
         if failure is None:
             first = tuple(self.problem.recording.key_frames.tolist())
@@ -193,8 +192,7 @@ class _KeyFrameSearch:
 
     def _unsolvable(self, frames: tuple[int, ...]) -> Failure:
         """Say how much margin the given key frames allow, and which of them limits it."""
-        requirements = self.problem.requirements
-        programme = self._programme(frames)
+        requirements, programme = self.problem.requirements, self._programme(frames)
         points, margin, row = programme.most_margin()
         phase = int(programme.phases[row])
         time = float(self.problem.recording.time[frames[programme.frames[row]]])
@@ -207,10 +205,9 @@ class _KeyFrameSearch:
 
     def _explain(self, attempt: _Attempt) -> Failure:
         """Name what the best attempt breaks between its key frames."""
-        certificate = attempt.certificate
+        certificate, worst = attempt.certificate, attempt.certificate.largest
         count = len(attempt.frames) - len(self.problem.recording.key_frames)
         tried = f"with {count} key frames added, and no further sample of the recording helps"
-        worst = certificate.largest
         if worst.requirement != "balance margin":
             return Failure(worst.requirement, f"{worst} {tried}", worst.phase, worst.time)
         what = f"the largest margin found is {certificate.min_margin:.2f}"
@@ -220,55 +217,43 @@ class _KeyFrameSearch:
         )  # fmt: skip
 
 
-def _position_failure(problem: KeyframeProblem) -> Failure | None:
-    """Find a key frame whose recorded position breaks a constraint; passing it, the motion would as well."""
-    recording = problem.recording
+def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Failure | None:
+    """Failure of a key frame whose recorded position breaks a constraint, or else cannot be balanced."""
+    requirements, recording, frames = problem.requirements, problem.recording, []
     for number, frame in enumerate(recording.key_frames):
         time, com = float(recording.time[frame]), recording.com[frame]
         what = f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s"
-        phases = phases_touching(recording.schedule, time)
-        failure = misplaced(problem.requirements, com, phases, what, TOLERANCE)
+        frames.append((time, com, what, phases_touching(recording.schedule, time)))
+    for time, com, what, phases in frames:
+        failure = misplaced(requirements, com, phases, what, TOLERANCE)
         if failure is not None:
             return replace(failure, time=time)
-    return None
-
-
-def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Failure | None:
-    requirements, schedule = problem.requirements, problem.recording.schedule
-    for number, frame in enumerate(problem.recording.key_frames):
-        time, com = float(problem.recording.time[frame]), problem.recording.com[frame]
-        phases = phases_touching(schedule, time)
-        both = polytopes[phases[0]]
-        for phase in phases[1:]:
-            both = both.intersection(polytopes[phase])
-        margin = best_margin_at(both, requirements, com, None)
+    for time, com, what, phases in frames:
+        both = reduce(Polytope.intersection, [polytopes[phase] for phase in phases])
+        margin, unit = best_margin_at(both, requirements, com, None), requirements.margin_unit
         if margin <= max(requirements.required_margin, VANISHING_MARGIN):
-            stances = [schedule.sequence[phase].stance for phase in phases]
+            stances = [recording.sequence[phase].stance for phase in phases]
             names = [name for name in stances[0].effectors if all(name in stance for stance in stances)]
             held = ", ".join(names) or "no contact"
-            return Failure(
-                "key frame balance",
-                f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s reaches a "
-                f"margin of at most {margin:.2f} {requirements.margin_unit} with any acceleration on {held}; "
-                f"required {requirements.required_margin:g} {requirements.margin_unit}",
-                phases[-1], time, held,
-            )  # fmt: skip
+            reason = (
+                f"{what} reaches a margin of at most {margin:.2f} {unit} with any acceleration on {held}; "
+                f"required {requirements.required_margin:g} {unit}"
+            )
+            return Failure("key frame balance", reason, phases[-1], time, held)
     return None
 
 
 def _measure(
-    problem: KeyframeProblem,
-    trajectory: CentroidalTrajectory,
-    polytopes: Sequence[WrenchPolytope],
+    problem: KeyframeProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope],
     frames: Sequence[int],
-) -> Residuals:
+) -> Residuals:  # fmt: skip
     """Measure the requirements every millisecond, and the distance from the recording at the key frames."""
     certificate = measure(problem.requirements, trajectory, polytopes)
     times = problem.recording.time[list(frames)]
     errors = np.linalg.norm(trajectory.position(times) - problem.recording.com[list(frames)], axis=1)
     worst = int(np.argmax(errors))
-    phase = int(trajectory.schedule.phase_at(times[worst]))
-    distance = Residual("key frame position", float(errors[worst]), "m", phase, float(times[worst]))
+    time, phase = float(times[worst]), int(trajectory.schedule.phase_at(times[worst]))
+    distance = Residual("key frame position", float(errors[worst]), "m", phase, time)
     return replace(certificate, items=(*certificate.items, distance))
 
 

@@ -1,19 +1,17 @@
 """A balanced CoM near the key frames of a recording: the keyframe-based method for noisy ones.
 
-:func:`~manikin.planning.com.keyframes.plan_com_through_key_frames` passes the recorded positions exactly, as
-[Qiu2012]_ 5.3 does. Where a walk's supports last a tenth of a second, a centimetre of error asks for
-accelerations that no foot can give, and further key frames make it worse. Here the key frames pull, and the
-motion is measured every millisecond. Where it strays from the recording, the sample that is farthest off
-becomes one more key frame.
+[Qiu2012]_ 5.3 passes the recorded positions exactly. Where a walk's supports last a tenth of a second, a
+centimetre of error asks for accelerations that no foot can give. Here the key frames pull, and where the
+motion strays from the recording, the sample that is farthest off becomes one more key frame.
 
 Balance is imposed every ten milliseconds by a quadratic programme: the pseudo-wrench ``m [a - g; p x (a -
-g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is linearised about the last solution; the
-rows' lengths, which make the margin one about the CoM, are those at the last solution. Where the recorded
-rate of the angular momentum is known, the plan has one too, near it, and both wrenches keep their balance:
-that of the point mass, as in the thesis, and that of the body which turns ([Qiu2012]_ 4.51). More margin than
-has to be kept is wished for, and what lacks of it is paid for. All this is our own.
+g)]`` ([Qiu2012]_ 4.6) is linearised about the last solution, whose position gives the rows their lengths
+about the CoM. Where the recorded rate of the angular momentum is known, the plan has one too, near it, and
+both wrenches keep their balance: that of the point mass, as in the thesis, and that of the body which turns
+([Qiu2012]_ 4.51). More margin than has to be kept is wished for. All this is our own.
 """
 
+import itertools
 import time as clock
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,11 +25,11 @@ from manikin.balance.margin import wrench_levers
 from manikin.contact import ContactSchedule
 from manikin.errors import InputError
 from manikin.numerics.qp import solve_sparse_qp
-from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
 from manikin.planning.com.com_certificate import TOLERANCE, Residuals, measure, phase_margins
 from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory, Weights
-from manikin.planning.com.feasibility import Failure, Feasibility, assess_feasibility, polytopes_of
+from manikin.planning.com.feasibility import Failure, assess_feasibility, polytopes_of
 from manikin.planning.com.keyframe_problem import KeyframeProblem, RecordedCom
 from manikin.planning.com.keyframe_spline import quadrature
 from manikin.planning.com.timing_free import CentroidalResult
@@ -55,20 +53,16 @@ TURN = 100.0
 """Unit of the rate of the angular momentum among the unknowns [N.m]."""
 
 TURN_PULL = 2.0
-"""Cost of its mean squared distance from the recorded one, in that unit: 10 N.m cost as much as the
-key frames missed by a little more than a millimetre."""
+"""Cost of its mean squared distance from the recorded one: 10 N.m cost as much as 1 mm at key frames."""
 
 RESERVE = 5.8
-"""Margin of the body that turns beyond that of the point mass: arms and legs meet the rate of its angular
-momentum only nearly [N.m]."""
+"""Margin of the body that turns beyond the point mass's: it keeps its planned turning only nearly [N.m]."""
 
 ROOM = 14.5
-"""Margin wished for beyond that: whoever follows a plan needs some to come back to it. A controller that
-keeps its forces 1 cm inside the soles has 5 N.m less [N.m]."""
+"""Margin wished for beyond that, for whoever follows the plan to come back to it [N.m]."""
 
 ROOM_PULL = 1.0
-"""Cost of the mean square of the share of it that lacks: all of it costs as much as key frames missed by a
-centimetre."""
+"""Cost of the mean square of the share of it that lacks: as much as key frames missed by a centimetre."""
 
 TURN_BEND = 1e-7
 """Cost of its mean squared second derivative, in that unit [s^4]."""
@@ -111,8 +105,7 @@ class NearProgramme:
         """
         schedule = recording.schedule
         duration = float(schedule.instants[-1])
-        spans = max(1, round(duration / KNOT_SPACING))
-        knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, spans + 1))
+        knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, max(1, round(duration / KNOT_SPACING)) + 1))
         costs = {1: weights.velocity[0], 2: weights.acceleration[0], 3: weights.jerk[0]}
         times, phases = _instants(schedule)
         shares = np.minimum(times / duration, 1.0)
@@ -131,12 +124,8 @@ class NearProgramme:
         return None if self.turning is None else BSpline(DEGREE, self.knots, TURN * points[:, 3:])
 
     def free(self, shares: FloatArray, wanted: FloatArray) -> FloatArray:
-        """(n, 3 or 6) control points near (f, 3) ``wanted`` [m] at (f,) ``shares`` of [0, 1], unbalanced.
-
-        The last three of six are those of the turning.
-        """
-        solved = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
-        return np.asarray(np.hstack(solved), dtype=np.float64)
+        """(n, 3 or 6) control points, of CoM and turning, near (f, 3) ``wanted`` [m], unbalanced."""
+        return np.hstack([np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)])
 
     def solve(
         self, shares: FloatArray, wanted: FloatArray, margin: FloatArray, near: FloatArray
@@ -154,9 +143,8 @@ class NearProgramme:
         rows, bounds = self._balance(margin, near)
         axes = [np.diag(np.repeat(np.arange(len(parts)) == number, 3)) for number in range(len(parts))]
         whole = sum(np.kron(quadratic, axis) for (quadratic, _), axis in zip(parts, axes, strict=True))
-        lacking = len(self.phases)
+        lacking, free = len(self.phases), np.full(linear.size, np.inf)
         cost = sparse.block_diag([whole, ROOM_PULL / lacking * sparse.eye_array(lacking)])
-        free = np.full(linear.size, np.inf)
         solution = solve_sparse_qp(
             2.0 * cost, 2.0 * np.append(linear.ravel(), np.zeros(lacking)), rows, None, bounds,
             (np.append(-free, np.zeros(lacking)), np.append(free, np.ones(lacking))),
@@ -174,13 +162,11 @@ class NearProgramme:
 
     def _balance(self, margin: FloatArray, near: FloatArray) -> tuple[Any, FloatArray]:
         """Rows and bounds of unit length; ``p x b`` is ``p0 x b + p x b0 - p0 x b0`` with ``b = a - g``."""
-        blocks, bounds = [], []
-        gravity = np.array([0.0, 0.0, -GRAVITY])
+        blocks, bounds, gravity = [], [], GRAVITY_VECTOR
         for row, phase in enumerate(self.phases):
-            polytope = self.polytopes[phase]
+            polytope, place, change = self.polytopes[phase], self.position[row], self.acceleration[row]
             force, moment = self.mass * polytope.H[:, :3], self.mass * polytope.H[:, 3:]
-            p = self.position[row] @ near[:, :3] - self.reference
-            b = self.acceleration[row] @ near[:, :3] - gravity
+            p, b = place @ near[:, :3] - self.reference, change @ near[:, :3] - gravity
             length = wrench_levers(polytope.H, p[None])[0]
             by_acceleration, by_position = force + moment @ skew(p), -moment @ skew(b)
             bound = polytope.h - margin[phase] * length + by_acceleration @ gravity + moment @ np.cross(p, b)
@@ -188,24 +174,20 @@ class NearProgramme:
             bound += by_position @ self.reference
             # Derivatives (facets, 3) by the turning: None of the point mass, those of the body that turns.
             for turn in (None,) if self.turning is None else (None, TURN * polytope.H[:, 3:]):
-                room = still - (0.0 if turn is None else turn @ (self.position[row] @ near[:, 3:]))
+                room = still - (0.0 if turn is None else turn @ (place @ near[:, 3:]))
                 chosen = np.argsort(room / length, kind="stable")[:FACETS]
-                block = (
-                    self.acceleration[row][:, None] * by_acceleration[chosen, None]
-                    + self.position[row][:, None] * by_position[chosen, None]
-                )
+                block = change[:, None] * by_acceleration[chosen, None]
+                block = block + place[:, None] * by_position[chosen, None]
                 if self.turning is not None:
                     by_turn = np.zeros((len(chosen), 3)) if turn is None else turn[chosen]
-                    turned = self.position[row][:, None] * by_turn[:, None]
-                    block = np.concatenate([block, turned], axis=2)
+                    block = np.concatenate([block, place[:, None] * by_turn[:, None]], axis=2)
                 block = block.reshape(len(chosen), -1)
                 scale = np.linalg.norm(block, axis=1)
                 # Only the wrench that is planned for, not that of the point mass beside it, has room.
                 wished = 0.0 if turn is None and self.turning is not None else ROOM
-                lacks = sparse.csr_matrix(
-                    (-wished * length[chosen] / scale, (np.arange(len(chosen)), np.full(len(chosen), row))),
-                    shape=(len(chosen), len(self.phases)),
-                )
+                where = np.arange(len(chosen)), np.full(len(chosen), row)
+                lacking = -wished * length[chosen] / scale
+                lacks = sparse.csr_matrix((lacking, where), shape=(len(chosen), len(self.phases)))
                 blocks.append(sparse.hstack([block / scale[:, None], lacks]))
                 spare = wished + (0.0 if turn is None else RESERVE)
                 bounds.append((bound[chosen] - spare * length[chosen]) / scale)
@@ -213,12 +195,9 @@ class NearProgramme:
 
 
 def _instants(schedule: ContactSchedule) -> tuple[FloatArray, np.ndarray]:
-    times, phases = [], []
-    for index, (start, end) in enumerate(zip(schedule.instants[:-1], schedule.instants[1:], strict=True)):
-        count = int(np.ceil((end - start) / BALANCE_STEP)) + 1
-        times.append(np.linspace(start, end, count))
-        phases.append(np.full(count, index))
-    return np.concatenate(times), np.concatenate(phases)
+    spans = itertools.pairwise(schedule.instants)
+    times = [np.linspace(a, b, int(np.ceil((b - a) / BALANCE_STEP)) + 1) for a, b in spans]
+    return np.concatenate(times), np.repeat(np.arange(len(times)), [len(part) for part in times])
 
 
 def _turning(
@@ -294,18 +273,19 @@ class _NearAttempt:
 def plan_com_near_key_frames(problem: KeyframeProblem) -> NearKeyFramesResult:
     """Find a smooth CoM that keeps its balance and comes near the key frames of a recording.
 
-    The ends are free: position and velocity of the first and last sample pull like those of any key frame.
-    The number of control points follows from the duration.
-
-    Args:
-        problem: What to find, without conditions on velocity or acceleration of the ends, with a margin in
-            the space of wrenches. A distance from the supports and geometric constraints are measured, not
-            sought.
+    The ends are free: the first and last sample pull like any key frame. The number of control points follows
+    from the duration. A distance from the supports and geometric constraints are measured, not sought.
 
     Raises:
-        InputError: If the problem has conditions on the ends, or a margin in the space of forces.
+        InputError: If the problem has conditions on velocity or acceleration of the ends, or a margin that
+            is not one in the space of wrenches.
     """
-    _check(problem)
+    asked = problem.requirements
+    for name in ("start_velocity", "goal_velocity", "start_acceleration", "goal_acceleration"):
+        if getattr(asked, name) is not None:
+            raise InputError(f"near key frames {name} is given; valid: None, for the recording pulls there")
+    if asked.margin_space != "wrench":
+        raise InputError(f"near key frames margin_space is {asked.margin_space!r}; valid: wrench")
     return _NearSearch(problem).run()
 
 
@@ -321,7 +301,9 @@ class _NearSearch:
     def run(self) -> NearKeyFramesResult:
         began = clock.perf_counter()
         feasibility = assess_feasibility(self.problem.requirements, self.polytopes)
-        failure, best = _hopeless(feasibility), None
+        failure, best = feasibility.failure, None
+        if failure is not None and failure.requirement in ("start balance", "goal balance"):
+            failure = None  # the recorded ends are only wished for
         if failure is None:
             # The nearest of the balanced attempts, each with more key frames than the one before.
             best = min(self._attempts(), key=self._order, default=None)
@@ -400,7 +382,7 @@ class _NearSearch:
     def _straying(self, attempt: _NearAttempt) -> list[int]:
         """The farthest sample between each two key frames, where it is too far off and not too near them."""
         distance, time, frames = self._distance(attempt), self.recording.time, []
-        for before, after in zip(attempt.frames[:-1], attempt.frames[1:], strict=True):
+        for before, after in itertools.pairwise(attempt.frames):
             away = np.minimum(time - time[before], time[after] - time)
             usable = np.where(away >= self.problem.frame_spacing - TOLERANCE, distance, 0.0)
             if usable.max() > STRAY:
@@ -409,9 +391,8 @@ class _NearSearch:
 
     def _explain(self, best: _NearAttempt | None) -> Failure | None:
         if best is None:
-            return Failure(
-                "balance margin", "no smooth centre of mass near the key frames keeps its balance all along"
-            )
+            reason = "no smooth centre of mass near the key frames keeps its balance all along"
+            return Failure("balance margin", reason)
         if best.certificate.within():
             return None
         worst = best.certificate.largest
@@ -421,18 +402,3 @@ class _NearSearch:
 def _ways(trajectory: CentroidalTrajectory) -> tuple[CentroidalTrajectory, ...]:
     """The trajectory, and the same without its turning."""
     return (trajectory,) if trajectory.turning is None else (trajectory, replace(trajectory, turning=None))
-
-
-def _hopeless(feasibility: Feasibility) -> Failure | None:
-    """What no motion can do; the recorded ends are only wished for."""
-    failure = feasibility.failure
-    return None if failure is None or failure.requirement in ("start balance", "goal balance") else failure
-
-
-def _check(problem: KeyframeProblem) -> None:
-    asked = problem.requirements
-    for name in ("start_velocity", "goal_velocity", "start_acceleration", "goal_acceleration"):
-        if getattr(asked, name) is not None:
-            raise InputError(f"near key frames {name} is given; valid: None, for the recording pulls there")
-    if asked.margin_space != "wrench":
-        raise InputError(f"near key frames margin_space is {asked.margin_space!r}; valid: wrench")

@@ -1,9 +1,7 @@
 """One optimisation of the timing-free method: from a guess to a measured attempt.
 
-By far not all facets of the polytopes limit a motion: near an upright stance those of friction and of the
-normal-force cap are hundreds of newtons away. The programme is given the nearest ones only,
-and every solution is measured against all of them; facets found violated are added and the
-programme is solved again (constraint generation).
+Few facets of the polytopes limit a motion. The programme is given the nearest ones only, and every solution
+is measured against all of them; facets found violated are added and the programme is solved again.
 """
 
 from collections.abc import Sequence
@@ -16,7 +14,7 @@ from manikin.balance import WrenchPolytope
 from manikin.contact import ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com.com_certificate import TOLERANCE, Residuals, facet_margins, measure, phase_times
-from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
+from manikin.planning.com.com_problem import END_CONDITIONS, CentroidalProblem, CentroidalTrajectory
 from manikin.planning.com.feasibility import row_slopes
 from manikin.planning.com.transcription import (
     MARGIN_SCALE,
@@ -29,38 +27,29 @@ from manikin.planning.com.transcription import (
 FIRST_COUNT = 12
 """Facets per phase in the first round."""
 
-FacetIndices = tuple[NDArray[np.int64], ...]
-"""Indices of the chosen facets of each phase."""
+Rows = tuple[NDArray[np.int64], ...]
+"""Indices of the chosen facets of each phase's polytope, or faces of its region."""
 
 
 def facet_distances(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> list[FloatArray]:
     """Least distance of the pseudo-wrench from every facet of each phase [N.m] or [N]."""
-    return [
-        np.min(
-            [block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times, phase)],
-            axis=0,
-        )
-        for phase, (polytope, times) in enumerate(zip(polytopes, phase_times(trajectory), strict=True))
-    ]
+    blocks = facet_margins(problem, trajectory, polytopes)
+    return [np.min([block.min(axis=0) for block in phase], axis=0) for phase in blocks]
 
 
-def nearest_facets(distances: Sequence[FloatArray], count: int = FIRST_COUNT) -> FacetIndices:
+def nearest_facets(distances: Sequence[FloatArray], count: int = FIRST_COUNT) -> Rows:
     """Indices of the ``count`` facets with the smallest distances in each phase, in facet order."""
     return tuple(np.sort(np.argsort(values, kind="stable")[:count]) for values in distances)
 
 
 def with_violated(
-    chosen: FacetIndices, distances: Sequence[FloatArray], margin: float, step: int = FIRST_COUNT // 2
-) -> FacetIndices:
+    chosen: Rows, distances: Sequence[FloatArray], margin: float, step: int = FIRST_COUNT // 2
+) -> Rows:
     """Add to each phase up to ``step`` nearest facets left out so far if one is nearer than ``margin``.
 
-    Args:
-        chosen: Facets of the last programme.
-        distances: Distances of its solution, see :func:`facet_distances` [N.m] or [N].
-        margin: Distance that all facets should keep [N.m] or [N].
-        step: Number of facets that a phase with a violation receives.
+    ``distances`` are those of the last solution, see :func:`facet_distances` [N.m] or [N].
     """
     grown = []
     for indices, values in zip(chosen, distances, strict=True):
@@ -71,29 +60,14 @@ def with_violated(
     return tuple(grown)
 
 
-ReachRows = tuple[NDArray[np.int64], ...]
-"""Indices of the imposed faces of each phase's region."""
-
-
-def no_reach_rows(problem: CentroidalProblem) -> ReachRows:
-    """No face of any region."""
-    return tuple(np.zeros(0, dtype=np.int64) for _ in problem.regions)
-
-
-def with_broken_faces(
-    problem: CentroidalProblem, trajectory: CentroidalTrajectory, chosen: ReachRows
-) -> ReachRows:
+def with_broken_faces(problem: CentroidalProblem, trajectory: CentroidalTrajectory, chosen: Rows) -> Rows:
     """Add to each phase the faces of its region that a trajectory breaks, or is about to break."""
-    if not problem.regions:
-        return chosen
-    grown: list[NDArray[np.int64]] = []
-    for region, rows, times in zip(problem.regions, chosen, phase_times(trajectory), strict=True):
-        if region is None or region.empty:
-            grown.append(rows)
-            continue
-        beyond = (trajectory.position(times) @ region.normals.T - region.offsets).max(axis=0)
-        broken = bool((beyond > TOLERANCE).any())
-        grown.append(np.union1d(rows, np.flatnonzero(beyond > -FACE_ROOM)) if broken else rows)
+    grown = list(chosen)
+    for phase, (region, times) in enumerate(zip(problem.regions, phase_times(trajectory), strict=False)):
+        if region is not None and not region.empty:
+            beyond = (trajectory.position(times) @ region.normals.T - region.offsets).max(axis=0)
+            if (beyond > TOLERANCE).any():
+                grown[phase] = np.union1d(chosen[phase], np.flatnonzero(beyond > -FACE_ROOM))
     return tuple(grown)
 
 
@@ -125,26 +99,22 @@ class MarginTargets:
     @classmethod
     def of(cls, problem: CentroidalProblem) -> "MarginTargets":
         """Targets of the first round; the ends may lie closer to the constraints than the rest."""
-        ends = ((problem.sequence[0], problem.start_com), (problem.sequence[-1], problem.goal_com))
-        room = [-float(item.violation(com)) for item in problem.geometric for _, com in ends]
-        if problem.support_distance is not None:
-            room += [
-                problem.support_distance - float(np.linalg.norm(com - contact.position))
-                for phase, com in ends
-                for contact in phase.stance
-            ]
-        if problem.regions:
-            outer = ((problem.regions[0], problem.start_com), (problem.regions[-1], problem.goal_com))
-            room += [-float(region.violation(com)) for region, com in outer if region is not None]
-        position = min(cls.position, *(0.5 * max(slack, 0.0) for slack in room)) if room else cls.position
+        room, limit = [], problem.support_distance
+        for end, com in ((0, problem.start_com), (-1, problem.goal_com)):
+            room += [-float(item.violation(com)) for item in problem.geometric]
+            if limit is not None:
+                stance = problem.sequence[end].stance
+                room += [limit - float(np.linalg.norm(com - contact.position)) for contact in stance]
+            if problem.regions and (region := problem.regions[end]) is not None:
+                room.append(-float(region.violation(com)))
+        position = min([cls.position, *(0.5 * max(slack, 0.0) for slack in room)])
         return cls(problem.required_margin + 1e-3, position)
 
     def grown(self, problem: CentroidalProblem, certificate: Residuals) -> "MarginTargets":
         """Targets that make up for what the last solution broke between its samples."""
-        names = ["support distance"] if problem.support_distance is not None else []
-        names += ["reach"] if problem.regions else []
-        names += [constraint.name for constraint in problem.geometric]
-        position = max((certificate[name].value for name in names), default=0.0)
+        names = {"support distance", "reach", *(constraint.name for constraint in problem.geometric)}
+        measured = names & {item.requirement for item in certificate.items}
+        position = max((certificate[name].value for name in measured), default=0.0)
         return replace(
             self,
             margin=self.margin + 1.2 * max(certificate["balance margin"].value, 0.0),
@@ -174,7 +144,7 @@ class Attempt:
     converged: bool
 
 
-def build_programme(problem: CentroidalProblem, facets: FacetIndices, faces: ReachRows = ()) -> ComProgram:
+def build_programme(problem: CentroidalProblem, facets: Rows, faces: Rows = ()) -> ComProgram:
     """The compiled optimisation of a problem, shared by all problems of the same structure."""
     return transcribe(
         ComStructure(
@@ -193,24 +163,12 @@ def build_programme(problem: CentroidalProblem, facets: FacetIndices, faces: Rea
 
 
 def optimise(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    facets: FacetIndices,
-    targets: MarginTargets,
-    bezier: FloatArray,
-    durations: FloatArray,
-    faces: ReachRows = (),
-) -> Attempt:
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], facets: Rows, targets: MarginTargets,
+    bezier: FloatArray, durations: FloatArray, faces: Rows = (),
+) -> Attempt:  # fmt: skip
     """Run the solver once from Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s].
 
-    Args:
-        problem: What to find.
-        polytopes: W_i of the phases about ``problem.reference``.
-        facets: Indices of the facets imposed in each phase.
-        targets: Bounds used at the samples.
-        bezier: Where to begin.
-        durations: Where to begin.
-        faces: Indices of the faces of the regions imposed in each phase.
+    The W_i of the phases are about ``problem.reference``; facets and faces of the regions are those imposed.
     """
     programme = build_programme(problem, facets, faces)
     lower, upper = _unknown_bounds(programme, problem)
@@ -234,10 +192,7 @@ def optimise(
 
 
 def _parameters(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    facets: FacetIndices,
-    faces: ReachRows = (),
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], facets: Rows, faces: Rows = ()
 ) -> dict[str, object]:
     weights, reference = problem.weights, problem.reference
     values: dict[str, object] = {
@@ -245,7 +200,7 @@ def _parameters(
         "weights": (weights.margin, weights.smoothness, weights.duration, SHORTFALL_WEIGHT),
         "velocity": weights.velocity, "acceleration": weights.acceleration, "jerk": weights.jerk,
     }  # fmt: skip
-    for name in ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration"):
+    for name in END_CONDITIONS:
         value = getattr(problem, name)
         values[name] = np.zeros(3) if value is None else value
     for index, (phase, polytope, rows) in enumerate(zip(problem.sequence, polytopes, facets, strict=True)):
@@ -255,7 +210,6 @@ def _parameters(
         values[f"H{index}"] = polytope.H[rows] / length[:, None]
         values[f"h{index}"] = polytope.h[rows] / length
         values[f"contacts{index}"] = [contact.position - reference for contact in phase.stance]
-    for index, phase in enumerate(problem.sequence):
         if phase.load is not None:
             values[f"load{index}"] = (phase.load.mass, *phase.load.offset)
     for index, (region, rows) in enumerate(zip(problem.regions, faces, strict=False)):
@@ -295,20 +249,15 @@ def _row_bounds(
         "total_duration": (0.0, 0.0),
         "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
     }
-    ends = iter(
-        (problem.start_velocity, problem.start_acceleration, problem.goal_velocity, problem.goal_acceleration)
-    )
-    lower, upper = [], []
-    for group, count in programme.groups:
+    ends, rows = iter(END_CONDITIONS), []
+    for group, _ in programme.groups:
         if group == "end":
-            low, high = (0.0, 0.0) if next(ends) is not None else (-np.inf, np.inf)
-        elif group.startswith("geometric"):
-            low, high = -np.inf, -targets.position
+            free = getattr(problem, next(ends)) is None
+            rows.append((-np.inf, np.inf) if free else (0.0, 0.0))
         else:
-            low, high = bounds[group]
-        lower.append(np.full(count, low))
-        upper.append(np.full(count, high))
-    return np.concatenate(lower), np.concatenate(upper)
+            rows.append(bounds["reach" if group.startswith("geometric") else group])
+    lower, upper = np.repeat(np.transpose(rows), [count for _, count in programme.groups], axis=1)
+    return lower, upper
 
 
 def trajectory_of(

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 
@@ -34,7 +33,6 @@ from manikin.planning.com.optimise import (
     MarginTargets,
     facet_distances,
     nearest_facets,
-    no_reach_rows,
     optimise,
     trajectory_of,
     with_broken_faces,
@@ -56,9 +54,6 @@ class GuessStyle:
     pull: float | None
     stretch: float
 
-
-INFEASIBLE = 2
-"""Status of a linear programme without a solution."""
 
 GUESS_STYLES = (GuessStyle(0.5, 1.5), GuessStyle(0.3, 1.2), GuessStyle(0.7, 2.5))
 """Ways of guessing any motion."""
@@ -87,36 +82,26 @@ def guess(
     if style.pull is None:
         return _pendulum(problem, instants).bezier_points(), durations
     path = PchipInterpolator(instants, _guess_key_positions(problem, instants, style.pull))
-    k = problem.degree
-    knots = clamped_knots(k, instants)
-    rest = (problem.start_velocity, problem.goal_velocity)
+    k, knots = problem.degree, clamped_knots(problem.degree, instants)
     times = np.linspace(0.0, instants[-1], 20 * len(durations) + 1)
-    spline = BSpline.fit(
-        k, knots, times, path(times),
-        first=start_control_points(k, knots, problem.start_com, rest[0]),
-        last=end_control_points(k, knots, problem.goal_com, rest[1]),
-    )  # fmt: skip
-    return spline.bezier_points(), durations
+    first = start_control_points(k, knots, problem.start_com, problem.start_velocity)
+    last = end_control_points(k, knots, problem.goal_com, problem.goal_velocity)
+    return BSpline.fit(k, knots, times, path(times), first=first, last=last).bezier_points(), durations
 
 
 def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
     """Path of a linear inverted pendulum whose zero moment point is near the middles of the supports.
 
-    Its height is that of the start. With ``c`` the middle of a phase's supports and ``h`` the height above
-    them, the spline minimises ``|p - h / g p'' - c|^2 + w^2 |p^(3)|^2`` over samples of the motion; as ``h``
-    is given, this is linear least squares. The true height changes evenly along the way.
+    With ``c`` the middle of a phase's supports and ``h`` the height of the start above them, the spline
+    minimises ``|p - h / g p'' - c|^2 + w^2 |p^(3)|^2`` over samples. The true height changes evenly.
     """
-    k = problem.degree
-    knots = clamped_knots(k, instants)
-    count = len(knots) - k - 1
+    k, knots = problem.degree, clamped_knots(problem.degree, instants)
+    count, durations = len(knots) - k - 1, np.diff(instants)
     share = (np.arange(_PENDULUM_SAMPLES) + 0.5) / _PENDULUM_SAMPLES
-    durations = np.diff(instants)
     times = (instants[:-1, None] + durations[:, None] * share).ravel()
     weight = np.repeat(np.sqrt(durations), _PENDULUM_SAMPLES)[:, None]
-    middles = np.array([
-        np.mean([contact.points_in_world.mean(axis=0) for contact in phase.stance], axis=0)
-        for phase in problem.sequence
-    ])  # fmt: skip
+    stances = [phase.stance for phase in problem.sequence]
+    middles = np.array([np.mean([c.points_in_world.mean(axis=0) for c in s], axis=0) for s in stances])
     wanted = np.repeat(middles[:, :2], _PENDULUM_SAMPLES, axis=0)
     height = problem.start_com[2] - middles[0, 2]
     basis = BSpline(k, knots, np.eye(count))
@@ -161,7 +146,7 @@ def can_rest(polytope: WrenchPolytope, mass: float) -> bool:
     weight = -mass * GRAVITY_VECTOR
     rows, bounds = polytope.H[:, 3:] @ -skew(weight), polytope.h - polytope.H[:, :3] @ weight
     result = linprog(np.zeros(3), rows, bounds, bounds=(None, None), method="highs")
-    return result.status != INFEASIBLE
+    return result.status != 2  # infeasible
 
 
 def _guess_key_positions(problem: CentroidalProblem, instants: FloatArray, pull: float) -> FloatArray:
@@ -234,9 +219,8 @@ class CentroidalResult(Displayed):
         """What limits the smallest margin: contact, what gives way there and in which direction."""
         if self.trajectory is None or self.certificate is None:
             return None
-        certificate = self.certificate
-        polytope = self.polytopes[certificate.limiting_phase]
-        return limiting_at(self.problem, self.trajectory, polytope, certificate.limiting_time)
+        polytope = self.polytopes[self.certificate.limiting_phase]
+        return limiting_at(self.problem, self.trajectory, polytope, self.certificate.limiting_time)
 
     @property
     def limiting_contact(self) -> str | None:
@@ -262,10 +246,9 @@ class CentroidalResult(Displayed):
 def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     """Find control points, key instants and margin of a CoM trajectory ([Qiu2012]_ 5.20-5.28).
 
-    Every solution is measured every millisecond against all facets and all bounds. Where a
-    requirement is broken between the samples it is asked for with more distance, where by a
-    facet that was left out the facet is added, and the programme is solved again. A result
-    that does not meet its own certificate is a failure that says which requirement could not be met.
+    Every solution is measured every millisecond against all facets and all bounds. Where a requirement is
+    broken between the samples it is asked for with more distance, and solved again. A result that does not
+    meet its own certificate is a failure that says which requirement could not be met.
     """
     began = time.perf_counter()
     polytopes = polytopes_of(problem)
@@ -273,7 +256,10 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     attempts: list[Attempt] = []
     failure, best = feasibility.failure, None
     if failure is None:
-        attempts = _search(problem, polytopes)
+        for style in guess_styles(problem):
+            attempts.extend(_rounds(problem, polytopes, style))
+            if attempts[-1].certificate.within():
+                break
         best = min(attempts, key=lambda attempt: attempt.certificate.rank)
         if not best.certificate.within():
             failure = _explain(problem, polytopes, best)
@@ -286,15 +272,6 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     )  # fmt: skip
 
 
-def _search(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]) -> list[Attempt]:
-    attempts: list[Attempt] = []
-    for style in guess_styles(problem):
-        attempts.extend(_rounds(problem, polytopes, style))
-        if attempts[-1].certificate.within():
-            break
-    return attempts
-
-
 def _rounds(
     problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], style: GuessStyle
 ) -> Iterator[Attempt]:
@@ -302,7 +279,7 @@ def _rounds(
     bezier, durations = guess(problem, style, polytopes)
     trajectory = trajectory_of(problem, bezier, durations)
     facets = nearest_facets(facet_distances(problem, trajectory, polytopes))
-    targets, faces = MarginTargets.of(problem), no_reach_rows(problem)
+    targets, faces = MarginTargets.of(problem), (np.zeros(0, dtype=np.int64),) * len(problem.regions)
     for _ in range(MAX_ROUNDS):
         attempt = optimise(problem, polytopes, facets, targets, bezier, durations, faces)
         yield attempt
@@ -310,17 +287,13 @@ def _rounds(
         kept = min(float(values[rows].min()) for values, rows in zip(distances, facets, strict=True))
         more_facets = with_violated(facets, distances, kept - NEGLIGIBLE * abs(kept))
         more_faces = with_broken_faces(problem, attempt.trajectory, faces)
-        enough = _same(more_facets, facets) and _same(more_faces, faces)
+        enough = [*map(len, more_facets + more_faces)] == [*map(len, facets + faces)]
         hopeless = not attempt.converged or attempt.margin < targets.margin - 1e-3
         if enough and (attempt.certificate.within() or hopeless):
             return  # a violation that is more than an effect of sampling stays
         if enough:
             targets = targets.grown(problem, attempt.certificate)
         facets, faces, bezier, durations = more_facets, more_faces, attempt.bezier, attempt.durations
-
-
-def _same(new: Sequence[NDArray[np.int64]], old: Sequence[NDArray[np.int64]]) -> bool:
-    return all(len(rows) == len(before) for rows, before in zip(new, old, strict=True))
 
 
 def limiting_at(
@@ -335,23 +308,15 @@ def limiting_at(
 def _friction_cause(problem: CentroidalProblem) -> str:
     """Say that the same problem has a plan with firm friction; empty where it has none or is not slippery."""
     least = least_friction([phase.stance for phase in problem.sequence])
-    if least >= SLIPPERY:
+    firm = plan_com(with_firm_friction(problem)) if least < SLIPPERY else None
+    if firm is None or firm.d_min is None or not firm.succeeded:
         return ""
-    firm = plan_com(with_firm_friction(problem))
-    if firm.d_min is None or not firm.succeeded:
-        return ""
-    return (
-        f"; the friction of {least:g} is too low: with {FIRM_FRICTION:g} it would be {firm.d_min:.2f} "
-        f"{problem.margin_unit}"
-    )
+    would = f"{FIRM_FRICTION:g} it would be {firm.d_min:.2f} {problem.margin_unit}"
+    return f"; the friction of {least:g} is too low: with {would}"
 
 
 def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], best: Attempt) -> Failure:
-    """Name the requirement that fails in the best attempt.
-
-    The required margin is penalised and not imposed, so that an attempt that breaks nothing
-    else has the largest margin that was found.
-    """
+    """Name the requirement that fails in the best attempt; its margin is the largest if nothing else does."""
     certificate, worst = best.certificate, best.certificate.largest
     barrier = next((item for item in problem.geometric if item.impassable), None)
     if barrier is not None:
@@ -361,10 +326,8 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
         where = ", ".join(problem.sequence[worst.phase].stance.effectors) if worst.phase is not None else ""
         what = f"{worst} in the best attempt"
         if worst.requirement == "reach":
-            what = (
-                f"at {worst.time:.3f} s the centre of mass is {worst.value:.3f} m out of this body's reach "
-                f"on {where} in phase {worst.phase}, in the best attempt"
-            )
+            what = f"at {worst.time:.3f} s the centre of mass is {worst.value:.3f} m out of this body's "
+            what += f"reach on {where} in phase {worst.phase}, in the best attempt"
         return Failure(worst.requirement, f"no trajectory found: {what}", worst.phase, worst.time, where)
     what = f"the largest margin found is {certificate.min_margin:.2f}"
     phase, instant = certificate.limiting_phase, certificate.limiting_time
@@ -375,19 +338,11 @@ def missed_margin(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope],
     phase: int, time: float, what: str, tried: str = "",
 ) -> Failure:  # fmt: skip
-    """Failure that names the contact limiting the margin of the best trajectory.
+    """Failure that names the contact limiting the margin of the best trajectory, in a phase at a time [s].
 
-    Args:
-        problem: What was asked.
-        trajectory: The best one found.
-        polytopes: W_i of the phases about ``problem.reference``.
-        phase: Phase in which the margin is smallest.
-        time: When [s].
-        what: How large the margin is, in words without the unit.
-        tried: What was tried, in words.
+    How large the margin is (without the unit) and what was tried are in words.
     """
-    limit = limiting_at(problem, trajectory, polytopes[phase], time)
-    unit = problem.margin_unit
+    limit, unit = limiting_at(problem, trajectory, polytopes[phase], time), problem.margin_unit
     reason = (
         f"{what} {unit}, limited in phase {phase} at {time:.3f} s by {limit.description}{tried}; "
         f"required {problem.required_margin:.2f} {unit}"

@@ -1,12 +1,9 @@
 """The nonlinear programme of the timing-free method, written in Bezier pieces.
 
-A spline of degree k whose simple internal knots are the key instants is the same thing as one
-polynomial of degree k per phase with k - 1 continuous derivatives across the key instants.
-The programme is written in the Bezier points of the pieces and the durations: every
-expression is then a low-order polynomial of few unknowns, its derivatives are cheap, and the
-symbolic knots appear only as ratios of consecutive durations. :func:`spline_from_bezier`
-turns the solution into the control points and knots of [Qiu2012]_ 5.20. The published
-formulation has the control points themselves as unknowns; the set of trajectories is the same.
+A spline of degree k whose simple internal knots are the key instants is one polynomial of degree k per phase
+with k - 1 continuous derivatives across the key instants. In the pieces' Bezier points and the durations
+every expression is a low-order polynomial of few unknowns, with cheap derivatives. :func:`spline_from_bezier`
+turns the solution into the control points and knots of [Qiu2012]_ 5.20, the published unknowns.
 """
 
 import warnings
@@ -68,9 +65,9 @@ class ComProgram:
     """The compiled programme and the order of its rows.
 
     Attributes:
-        solver: CasADi function made by ``nlpsol``; unknowns are the Bezier points of each
-            phase (column by column), the durations and their sum [s], d_min and its shortfall below
-            the required margin, both over MARGIN_SCALE.
+        solver: CasADi's ``nlpsol``; unknowns are the Bezier points of each phase (column by column), the
+            durations and their sum [s], d_min and its shortfall below the required margin, both over
+            MARGIN_SCALE.
         groups: Names of the row groups with their number of rows, in order. ``end`` rows are
             start velocity, start acceleration, goal velocity, goal acceleration.
         parameters: Names and shapes of the parameters, in order.
@@ -80,11 +77,6 @@ class ComProgram:
     solver: ca.Function
     groups: tuple[tuple[str, int], ...]
     parameters: tuple[tuple[str, tuple[int, int]], ...]
-
-    @property
-    def point_count(self) -> int:
-        """Number of unknowns that are coordinates of Bezier points."""
-        return 3 * (self.structure.degree + 1) * self.structure.phases
 
     def pack_parameters(self, values: dict[str, Any]) -> FloatArray:
         """Parameter vector from arrays by name."""
@@ -102,10 +94,9 @@ class ComProgram:
 
     def unpack_unknowns(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Bezier points (phases, k + 1, 3), durations (phases,) and d_min."""
-        phases, k = self.structure.phases, self.structure.degree
-        bezier = unknowns[: self.point_count].reshape(phases, 3, k + 1).transpose(0, 2, 1)
-        durations = unknowns[self.point_count : self.point_count + phases]
-        return bezier, durations, float(unknowns[-2]) * MARGIN_SCALE[self.structure.margin_space]
+        phases, margin = self.structure.phases, float(unknowns[-2])
+        bezier = unknowns[: -phases - 3].reshape(phases, 3, -1).transpose(0, 2, 1)
+        return bezier, unknowns[-phases - 3 : -3], margin * MARGIN_SCALE[self.structure.margin_space]
 
 
 class _Builder:
@@ -116,12 +107,9 @@ class _Builder:
         self.parameters: dict[str, ca.SX] = {}
         self.rows: list[ca.SX] = []
         self.groups: list[tuple[str, int]] = []
-        size = structure.degree + 1
-        self.bezier = [ca.SX.sym(f"b{i}", size, 3) for i in range(structure.phases)]
+        self.bezier = [ca.SX.sym(f"b{i}", structure.degree + 1, 3) for i in range(structure.phases)]
         self.durations = ca.SX.sym("h", structure.phases)
-        self.total = ca.SX.sym("T")
-        self.margin = ca.SX.sym("d")
-        self.shortfall = ca.SX.sym("e")
+        self.total, self.margin, self.shortfall = (ca.SX.sym(name) for name in "Tde")
 
     def parameter(self, name: str, rows: int, columns: int = 1) -> ca.SX:
         self.parameters[name] = ca.SX.sym(name, rows, columns)
@@ -151,9 +139,9 @@ def transcribe(structure: ComStructure) -> ComProgram:
     builder.add("total_duration", ca.sum1(builder.durations) - builder.total)
     builder.add("required_margin", builder.margin + builder.shortfall)
     objective = _objective(builder)
-    bezier = [ca.vec(points) for points in builder.bezier]
+    bezier = map(ca.vec, builder.bezier)
     unknowns = ca.vertcat(*bezier, builder.durations, builder.total, builder.margin, builder.shortfall)
-    parameters = ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()])
+    parameters = ca.vertcat(*map(ca.vec, builder.parameters.values()))
     problem = {"x": unknowns, "p": parameters, "f": objective, "g": ca.vertcat(*builder.rows)}
     shapes = tuple((name, p.shape) for name, p in builder.parameters.items())
     return ComProgram(structure, _compile(problem), tuple(builder.groups), shapes)
@@ -165,10 +153,8 @@ def _compile(problem: dict[str, ca.SX]) -> ca.Function:
         "alpha_for_y": "min-dual-infeas", "max_iter": 250, "tol": 1e-5, "constr_viol_tol": 1e-8,
         "bound_relax_factor": 0.0, "linear_solver": "mumps",
     }  # fmt: skip
-    options = {
-        "print_time": False, "error_on_fail": False, "calc_lam_p": False, "no_nlp_grad": True, "ipopt": ipopt,
-    }  # fmt: skip
-    return ca.nlpsol("timing_free", "ipopt", problem, options)
+    options = {"print_time": False, "error_on_fail": False, "calc_lam_p": False, "no_nlp_grad": True}
+    return ca.nlpsol("timing_free", "ipopt", problem, options | {"ipopt": ipopt})
 
 
 def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
@@ -177,8 +163,7 @@ def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
     points, duration = builder.bezier[phase], builder.durations[phase]
     position = ca.DM(bernstein_matrix(k, s)) @ points
     second = ca.DM(k * (k - 1) * bernstein_matrix(k - 2, s)) @ _differences(points, 2)
-    acceleration = second / duration**2
-    _add_balance(builder, phase, mass, position, acceleration)
+    _add_balance(builder, phase, mass, position, second / duration**2)
     if structure.limited_distance:
         centres = builder.parameter(f"contacts{phase}", structure.contacts[phase], 3)
         for index in range(structure.contacts[phase]):
@@ -186,15 +171,14 @@ def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
             builder.add("distance", ca.sum2(offset * offset))
     inner = slice(1 if phase == 0 else 0, len(s) - 1 if phase == structure.phases - 1 else len(s))
     faces = structure.reach[phase] if structure.reach else 0
+    within = position[inner, :]
     if faces:
         normals = builder.parameter(f"faces{phase}", faces, 3)
         offsets = builder.parameter(f"ends{phase}", faces)
-        beyond = position[inner, :] @ normals.T - ca.repmat(offsets.T, len(s[inner]), 1)
-        builder.add("reach", beyond)
+        builder.add("reach", within @ normals.T - ca.repmat(offsets.T, len(s[inner]), 1))
     for index, function in enumerate(structure.geometric):
-        within = position[inner, :]
-        values = _symbolic(function, within + ca.repmat(builder.parameters["reference"], within.shape[0], 1))
-        builder.add(f"geometric{index}", values)
+        places = within + ca.repmat(builder.parameters["reference"], within.shape[0], 1)
+        builder.add(f"geometric{index}", _symbolic(function, places))
 
 
 def _symbolic(function: Callable[[Any, Any, Any], Any], position: ca.SX) -> ca.SX:
@@ -213,8 +197,7 @@ def _add_balance(builder: _Builder, phase: int, mass: ca.SX, position: ca.SX, ac
     """
     structure = builder.structure
     facets, count = builder.structure.rows[phase], position.shape[0]
-    H = builder.parameter(f"H{phase}", facets, 6)
-    h = builder.parameter(f"h{phase}", facets)
+    H, h = builder.parameter(f"H{phase}", facets, 6), builder.parameter(f"h{phase}", facets)
     force = mass * (acceleration - ca.repmat(ca.DM([[0.0, 0.0, -GRAVITY]]), count, 1))
     wrench = ca.horzcat(force, _cross(position, force))
     if phase in structure.loaded:  # a further mass that moves with the CoM, at an offset from it
@@ -248,8 +231,7 @@ def _add_continuity(builder: _Builder, phase: int) -> None:
     before, after = builder.bezier[phase], builder.bezier[phase + 1]
     ratio = builder.durations[phase] / builder.durations[phase + 1]
     for order in range(builder.structure.degree):
-        left = _differences(before, order)[-1, :]
-        right = _differences(after, order)[0, :]
+        left, right = _differences(before, order)[-1, :], _differences(after, order)[0, :]
         builder.add("continuity", left - ratio**order * right)
 
 
@@ -278,15 +260,13 @@ def _add_key_planes(builder: _Builder) -> None:
 def _objective(builder: _Builder) -> ca.SX:
     """Weighted objectives ([Qiu2012]_ 5.27-5.28), the sums exactly integrated.
 
-    The required margin is asked for by an exact penalty, so that the largest margin is found
-    when it cannot be reached. The total duration is an unknown of its own: as a sum of all durations it
-    would tie each phase to every other one in the second derivatives, here it ties each to itself only.
+    An exact penalty asks for the required margin, so that the largest is found when it cannot be reached. The
+    total duration is an unknown of its own, which keeps the second derivatives sparse.
     """
     weights = builder.parameter("weights", 4)
     diagonals = [builder.parameter(name, 1, 3) for name in ("velocity", "acceleration", "jerk")]
-    total = builder.total
+    total, smoothness = builder.total, ca.SX(0)
     scale = MARGIN_SCALE[builder.structure.margin_space]
-    smoothness = ca.SX(0)
     for points, duration in zip(builder.bezier, ca.vertsplit(builder.durations), strict=True):
         for order, diagonal in enumerate(diagonals, start=1):
             smoothness += _squared_integral(points, duration, order, diagonal)
@@ -315,19 +295,13 @@ def bernstein_gram(degree: int) -> FloatArray:
 
 
 def spline_from_bezier(
-    bezier: FloatArray,
-    durations: FloatArray,
-    *,
-    start: tuple[FloatArray | None, ...],
+    bezier: FloatArray, durations: FloatArray, *, start: tuple[FloatArray | None, ...],
     goal: tuple[FloatArray | None, ...],
-) -> BSpline:
+) -> BSpline:  # fmt: skip
     """B-spline on normalised time with the key instants as internal knots ([Qiu2012]_ 5.4.3).
 
-    Args:
-        bezier: (phases, k + 1, 3) Bezier points of the phases [m].
-        durations: (phases,) [s].
-        start: Position, velocity and acceleration at the start, met exactly up to the first that is None.
-        goal: Position, velocity and acceleration at the goal, likewise.
+    Bezier points are (phases, k + 1, 3) [m], durations (phases,) [s]. Position, velocity and acceleration at
+    start and goal are met exactly up to the first that is None.
     """
     k = bezier.shape[1] - 1
     instants = np.concatenate([[0.0], np.cumsum(durations)])

@@ -3,13 +3,7 @@
 from manikin.planning.guide.abstraction import Abstraction, LimbReach, TrunkShape, abstraction_of
 from manikin.planning.guide.checker import NO_MARGINS, Margins, ReachabilityChecker
 from manikin.planning.guide.condition import Condition, LimbRule, UsableSurface
-from manikin.planning.guide.guide import (
-    GuideResult,
-    GuideTask,
-    GuideWorld,
-    offline_roadmap,
-    plan_guide,
-)
+from manikin.planning.guide.guide import GuideResult, GuideTask, GuideWorld, offline_roadmap, plan_guide
 from manikin.planning.guide.roadmap import Roadmap, RoadmapSettings, Route, request
 from manikin.planning.guide.root_path import RootLimits, RootPath
 from manikin.planning.guide.root_pose import root_pose

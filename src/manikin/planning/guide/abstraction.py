@@ -1,8 +1,7 @@
 """The creature as its trunk and what its limbs can reach ([Tonneau2015]_ 4.3.4, 6.1).
 
-``A = A_trunk U A_ROM`` is rigid and described by the pose of the root alone: the trunk's shapes
-in one posture, slightly enlarged so that the limbs' own roots have room, and for each limb the
-convex hull of the places its effector can take.
+``A = A_trunk U A_ROM`` is rigid: the trunk's shapes in one posture, slightly enlarged so that the limbs' own
+roots have room, and for each limb the convex hull of the places its effector can take.
 """
 
 from collections.abc import Mapping, Sequence
@@ -84,20 +83,14 @@ class LimbReach:
             ) from None
         rows = hull.equations
         centre, radius = inscribed_ball(rows[:, :3], -rows[:, 3])
-        values = {
-            "vertices": points[hull.vertices], "normals": rows[:, :3], "offsets": -rows[:, 3],
-            "centre": centre,
-        }  # fmt: skip
-        for key, value in values.items():
+        arrays = (points[hull.vertices], rows[:, :3], -rows[:, 3], centre)
+        for key, value in zip(("vertices", "normals", "offsets", "centre"), arrays, strict=True):
             object.__setattr__(self, key, frozen_array(value, key))
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "radius", radius)
 
     def coarse(self, directions: int) -> FloatArray:
-        """(k, 3) vertices that are outermost in evenly spread directions, k <= ``directions``.
-
-        Their hull lies inside the volume and is quicker to test.
-        """
+        """(k, 3) vertices that are outermost in evenly spread directions, k <= ``directions``."""
         height = (np.arange(directions) + 0.5) / directions * 2.0 - 1.0
         angle = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(directions)
         ring = np.sqrt(1.0 - height**2)
@@ -107,8 +100,7 @@ class LimbReach:
     def shrunk(self, margin: float, vertices: FloatArray | None = None) -> FloatArray:
         """(n, 3) vertices drawn towards the centre so that each has ``margin`` [m] to every face.
 
-        With the ball's radius r the factor is ``1 - margin / r``, at least 1/2: a volume less than
-        ``2 margin`` deep loses less.
+        With the ball's radius r the factor is ``1 - margin / r``, at least 1/2.
         """
         factor = max(0.5, 1.0 - margin / self.radius)
         drawn = self.vertices if vertices is None else vertices
@@ -128,10 +120,9 @@ class Abstraction:
     limbs: tuple[LimbReach, ...]
 
     def __post_init__(self) -> None:
-        if not self.trunk:
-            raise BodyError("abstraction has no trunk shape; valid: at least one")
-        if not self.limbs:
-            raise BodyError("abstraction has no limb; valid: at least one")
+        for parts, what in ((self.trunk, "trunk shape"), (self.limbs, "limb")):
+            if not parts:
+                raise BodyError(f"abstraction has no {what}; valid: at least one")
         twice = sorted({name for name in self.limb_names if self.limb_names.count(name) > 1})
         if twice:
             raise BodyError(f"abstraction has limb {twice[0]!r} twice; valid: one volume per limb")
@@ -166,9 +157,7 @@ def abstraction_of(
         for name in _outside_limbs(body, volumes)
         for shape in body.segment(name).shapes
     ]  # fmt: skip
-    limbs = [
-        LimbReach(volume.limb.name, _moved(frames[volume.segment], volume.vertices)) for volume in volumes
-    ]
+    limbs = [LimbReach(item.limb.name, _moved(frames[item.segment], item.vertices)) for item in volumes]
     return Abstraction(tuple(shapes), tuple(limbs))
 
 
@@ -180,13 +169,10 @@ def _moved(frame: pin.SE3, points: FloatArray) -> FloatArray:
 def _segment_frames(body: BodyModel, angles: Mapping[str, float] | None) -> dict[str, pin.SE3]:
     """Frame of every segment in the root's frame in a posture."""
     wanted = {**body.standing_angles, **(angles or {})}
-    q = body.posture({
-        name: finite_number(angle, f"angle of {name!r} [rad]", error=BodyError)
-        for name, angle in wanted.items()
-    })  # fmt: skip
-    model = body.pinocchio
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
+    checked = [finite_number(a, f"angle of {name!r} [rad]", error=BodyError) for name, a in wanted.items()]
+    q = body.posture(dict(zip(wanted, checked, strict=True)))
+    data = body.pinocchio.createData()
+    pin.framesForwardKinematics(body.pinocchio, data, q)
     root = data.oMf[body.segment_frame(body.segments[0].name)].inverse()
     return {s.name: root * data.oMf[body.segment_frame(s.name)] for s in body.segments}
 

@@ -1,11 +1,11 @@
 """Whether poses satisfy the reachability condition, and motions between them.
 
-The collision queries run in Coal. A pose of a plan is checked with a skin around the trunk and
-with the limbs' volumes drawn in; a motion whose checked poses are so close that nothing moves
-farther than that between them then satisfies the plain condition everywhere, not only where it
-was checked.
+The collision queries run in Coal. A pose of a plan is checked with a skin around the trunk and with the
+limbs' volumes drawn in; a motion of which nothing moves farther than that between checked poses then
+satisfies the plain condition everywhere.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -47,8 +47,8 @@ class Margins:
     reach: float = REACH_MARGIN
 
     def __post_init__(self) -> None:
-        finite_number(self.trunk, "margins trunk [m]", at_least=0.0)
-        finite_number(self.reach, "margins reach [m]", at_least=0.0)
+        for name, value in vars(self).items():
+            finite_number(value, f"margins {name} [m]", at_least=0.0)
 
 
 NO_MARGINS = Margins(0.0, 0.0)
@@ -64,12 +64,9 @@ class ReachabilityChecker:
     """
 
     def __init__(
-        self,
-        abstraction: Abstraction,
-        scene: Scene,
-        condition: Condition | None = None,
+        self, abstraction: Abstraction, scene: Scene, condition: Condition | None = None,
         margins: Margins | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Prepare the queries.
 
         Raises:
@@ -86,24 +83,22 @@ class ReachabilityChecker:
             [[(part.geometry, _place(part)) for part in self._parts]] * len(abstraction.trunk),
         )
         triangles = SceneTriangles.of(scene)
-        targets: dict[str, list[_Target]] = {}
-        for limb in abstraction.limbs:
-            surface = self.condition.surface(limb.name)
-            if surface.key not in targets:
-                targets[surface.key] = _targets(scene, triangles, surface)
+        surfaces = [self.condition.surface(name) for name in abstraction.limb_names]
+        targets = {x.key: _targets(scene, triangles, x) for x in {x.key: x for x in surfaces}.values()}
         self._limbs = _Queries(
             [_volume_object(limb, self.margins.reach) for limb in abstraction.limbs],
-            [targets[self.condition.surface(limb.name).key] for limb in abstraction.limbs],
+            [targets[surface.key] for surface in surfaces],
         )
         self._trunk_radius = max(shape.radius_about_root for shape in abstraction.trunk)
         self.reach_radius = float(max(np.linalg.norm(x.vertices, axis=1).max() for x in abstraction.limbs))
         self._reach_margin = min(min(self.margins.reach, 0.5 * limb.radius) for limb in abstraction.limbs)
+        # By how much the tilt may differ between a checked pose and its neighbours [rad].
+        self._tilt_slack = 2.0 * self.margins.trunk / self._trunk_radius if self.margins.trunk > 0.0 else 0.0
 
     def holds(self, pose: FloatArray) -> bool:
         """Whether a pose (7,) keeps the trunk free and the limbs within reach of the scene.
 
-        A trunk wholly inside a closed mesh that is not convex counts as free here, because such
-        meshes are hollow to Coal; see :meth:`inside_solid`.
+        A closed mesh that is not convex is hollow to Coal: see :meth:`inside_solid`.
         """
         return self.trunk_is_free(pose) and self.limbs_reach(pose)
 
@@ -125,9 +120,9 @@ class ReachabilityChecker:
             if rule.holds_at(lean, self._tilt_slack):
                 optional = (row for row, name in enumerate(limbs) if name not in rule.required)
                 wanted = max(rule.at_least - len(rule.required), 0)
-                if not all(reaches(limbs.index(name)) for name in rule.required):
-                    return False
-                if len(list(islice(filter(reaches, optional), wanted))) < wanted:
+                if not all(reaches(limbs.index(name)) for name in rule.required) or (
+                    len(list(islice(filter(reaches, optional), wanted))) < wanted
+                ):
                     return False
         return True
 
@@ -139,17 +134,13 @@ class ReachabilityChecker:
     def blocking(self, pose: FloatArray) -> tuple[str, str] | None:
         """(trunk shape, obstacle) of the first pair that meets, or None."""
         pair = self._trunk.first(pose)
-        if pair is None:
-            return None
-        return self.abstraction.trunk[pair[0]].name, self._parts[pair[1]].obstacle
+        return None if pair is None else (self.abstraction.trunk[pair[0]].name, self._parts[pair[1]].obstacle)
 
     def inside_solid(self, pose: FloatArray) -> str | None:
         """Name of a closed, non-convex mesh in which a trunk shape's centre lies, or None."""
         rotation, origin = pin.XYZQUATToSE3(pose).rotation, pose[:3]
-        for part in self._parts:
-            if part.surface is None:
-                continue
-            for shape in self.abstraction.trunk:
+        for part, shape in itertools.product(self._parts, self.abstraction.trunk):
+            if part.surface is not None:
                 point = part.rotation.T @ (origin + rotation @ shape.translation - part.translation)
                 inside = np.all(point > part.low) and np.all(point < part.high)
                 if inside and part.surface.signed(point)[0] < 0.0:
@@ -180,12 +171,8 @@ class ReachabilityChecker:
     def steps(self, way: float, angle: float) -> int:
         """Number of steps into which a motion is cut so that nothing is missed between checked poses.
 
-        Between two poses every point moves by at most ``way + radius angle``, so that it is never
-        farther from where it was checked than half of that. The margins must not be zero.
-
-        Args:
-            way: Length of the path of the root's origin [m].
-            angle: Angle turned [rad].
+        Between two poses, whose origins are a ``way`` [m] and an ``angle`` [rad] apart, a point is never
+        farther from where it was checked than half of ``way + radius angle``. The margins must not be zero.
         """
         trunk = (way + self._trunk_radius * angle) / (2.0 * self.margins.trunk)
         reach = (way + self.reach_radius * angle) / (2.0 * self._reach_margin)
@@ -201,11 +188,6 @@ class ReachabilityChecker:
             if result.isCollision():
                 return True
         return False
-
-    @property
-    def _tilt_slack(self) -> float:
-        """By how much the tilt may differ between a checked pose and its neighbours [rad]."""
-        return 2.0 * self.margins.trunk / self._trunk_radius if self.margins.trunk > 0.0 else 0.0
 
 
 _Target = tuple[coal.CollisionGeometry, pin.SE3]
@@ -225,16 +207,15 @@ class _Queries:
         for row, (geometry, place) in enumerate(moving):
             self._shapes.addGeometryObject(pin.GeometryObject(f"moving/{row}", root, 0, place, geometry))
         known: dict[int, int] = {}
-        self.rows: list[list[int]] = []
+        self.rows: list[range] = []
         self._pairs: list[tuple[int, int]] = []
         for row, fixed in enumerate(targets):
-            self.rows.append([])
+            self.rows.append(range(len(self._pairs), len(self._pairs) + len(fixed)))
             for number, (geometry, place) in enumerate(fixed):
                 index = known.setdefault(id(geometry), len(moving) + len(known))
                 if index == len(self._shapes.geometryObjects):
                     item = pin.GeometryObject(f"fixed/{index}", 0, 0, place, geometry)
                     self._shapes.addGeometryObject(item)
-                self.rows[-1].append(len(self._pairs))
                 self._pairs.append((row, number))
                 self._shapes.addCollisionPair(pin.CollisionPair(row, index))
         self._data = self._model.createData()
@@ -248,9 +229,8 @@ class _Queries:
         """Whether any pair meets at a pose (7,)."""
         if not self._pairs:
             return False
-        if self._tree is not None:
-            return pin.computeCollisions(self._model, self._data, self._tree, pose, True)
-        return pin.computeCollisions(self._model, self._data, self._shapes, self._found, pose, True)
+        asked = (self._shapes, self._found) if self._tree is None else (self._tree,)
+        return pin.computeCollisions(self._model, self._data, *asked, pose, True)
 
     def first(self, pose: FloatArray) -> tuple[int, int] | None:
         """First pair (row, number of the target) that meets, or None."""

@@ -18,8 +18,7 @@ class UsableSurface:
     """Surfaces that count as within reach of a limb ([Tonneau2015]_ 6.4.2).
 
     Attributes:
-        direction: (3,) unit direction in the world that a surface's normal should have, or None
-            for any.
+        direction: (3,) unit direction in the world that a normal should have, or None for any.
         max_angle: Largest angle between the two [rad].
         obstacles: Names of the only obstacles that count, or None for all.
         smallest_area: Triangles smaller than this do not count [m^2].
@@ -31,19 +30,15 @@ class UsableSurface:
     smallest_area: float
 
     def __init__(
-        self,
-        direction: ArrayLike | None = None,
-        max_angle: float = 0.5 * np.pi,
-        obstacles: Sequence[str] | None = None,
-        smallest_area: float = 0.0,
-    ) -> None:
-        unit = None
+        self, direction: ArrayLike | None = None, max_angle: float = 0.5 * np.pi,
+        obstacles: Sequence[str] | None = None, smallest_area: float = 0.0,
+    ) -> None:  # fmt: skip
+        unit, name = None, "usable surface direction"
         if direction is not None:
-            vector = frozen_array(direction, "usable surface direction", (3,), SceneError)
-            length = float(np.linalg.norm(vector))
-            if length < 1e-9:
+            vector = frozen_array(direction, name, (3,), SceneError)
+            if (length := float(np.linalg.norm(vector))) < 1e-9:
                 raise SceneError("usable surface direction is zero; valid: a direction")
-            unit = frozen_array(vector / length, "usable surface direction", (3,), SceneError)
+            unit = frozen_array(vector / length, name, (3,), SceneError)
         limits = {"at_least": 0.0, "error": SceneError}
         values = {
             "direction": unit,
@@ -80,8 +75,7 @@ class SceneTriangles:
         corners: (n, 3, 3) three corners each [m].
         normals: (n, 3) unit normals, outward where the piece is closed.
         areas: (n,) [m^2].
-        closed: (n,) whether the triangle belongs to a closed surface, so that its normal points
-            out of something solid.
+        closed: (n,) whether the triangle belongs to the closed surface of something solid.
         obstacle: (n,) index of the obstacle in the scene.
     """
 
@@ -94,23 +88,14 @@ class SceneTriangles:
     @classmethod
     def of(cls, scene: Scene) -> "SceneTriangles":
         """Triangles of every obstacle that is not endless; round shapes become many."""
-        parts = [
-            (index, *part) for index, item in enumerate(scene) for part in _triangles(item) if len(part[0])
-        ]
-        if not parts:
-            empty = np.empty(0)
-            return cls(np.empty((0, 3, 3)), np.empty((0, 3)), empty, empty > 0, empty.astype(np.int64))
-        corners = np.vstack([part[1] for part in parts])
+        parts = [(index, *part) for index, item in enumerate(scene) for part in _triangles(item)]
+        corners = np.vstack([np.empty((0, 3, 3)), *(part[1] for part in parts)])
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(cross, axis=1)
-        counts = [len(part[1]) for part in parts]
-        return cls(
-            corners,
-            cross / length[:, None],
-            0.5 * length,
-            np.repeat([part[2] for part in parts], counts),
-            np.repeat(np.array([part[0] for part in parts], dtype=np.int64), counts),
-        )
+        counts = np.array([len(part[1]) for part in parts], dtype=np.int64)
+        closed = np.repeat(np.array([part[2] for part in parts], dtype=bool), counts)
+        obstacle = np.repeat(np.array([part[0] for part in parts], dtype=np.int64), counts)
+        return cls(corners, cross / length[:, None], 0.5 * length, closed, obstacle)
 
     def usable(self, scene: Scene, surface: UsableSurface) -> NDArray[np.bool_]:
         """(n,) which triangles count for a limb."""
@@ -201,7 +186,7 @@ class Condition:
 
     def surface(self, limb: str) -> UsableSurface:
         """Surfaces that count for a limb."""
-        return self.surfaces.get(limb, _ANY)
+        return self.surfaces.get(limb, UsableSurface())
 
     def check_names(self, limbs: Sequence[str]) -> None:
         """Raise an InputError if a name is none of these limbs, or more limbs are wanted than there are."""
@@ -212,6 +197,3 @@ class Condition:
         most = max((rule.at_least for rule in self.rules), default=0)
         if most > len(limbs):
             raise InputError(f"condition wants {most} limbs; valid: at most {len(limbs)}")
-
-
-_ANY = UsableSurface()

@@ -18,13 +18,7 @@ from manikin.planning.guide.roadmap import (
     grow,
     unfit_end,
 )
-from manikin.planning.guide.root_path import (
-    RootLimits,
-    RootPath,
-    approximate,
-    prune,
-    shorten,
-)
+from manikin.planning.guide.root_path import RootLimits, RootPath, approximate, prune, shorten
 from manikin.planning.guide.root_pose import checked_pose
 from manikin.planning.guide.sampler import PoseSampler, SamplingRegion
 from manikin.planning.guide.steering import LocalPlanner
@@ -102,8 +96,7 @@ class GuideResult:
 def offline_roadmap(world: GuideWorld, rng: np.random.Generator) -> Roadmap:
     """Roadmap of a world without a task in mind, to be asked many times ([Tonneau2015]_ Algorithm 4)."""
     checker, roadmap = world.checker(), Roadmap(world.roadmap)
-    sampler = PoseSampler(checker, world.region)
-    grow(roadmap, sampler, LocalPlanner(checker), rng, roadmap.settings.samples)
+    grow(roadmap, PoseSampler(checker, world.region), LocalPlanner(checker), rng, world.roadmap.samples)
     return roadmap
 
 
@@ -137,8 +130,7 @@ def _search(
 ) -> Route:
     """Grow the roadmap until start and goal are joined, and ask it for the way."""
     sampler = PoseSampler(planner.checker, world.region)
-    start = attach(roadmap, task.start, planner, rng)
-    goal = attach(roadmap, task.goal, planner, rng)
+    start, goal = (attach(roadmap, pose, planner, rng) for pose in (task.start, task.goal))
     for _ in range(0, world.roadmap.samples, CHUNK):
         if roadmap.joined(start, goal):
             break

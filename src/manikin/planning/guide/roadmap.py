@@ -1,9 +1,8 @@
 """Visibility roadmaps of root poses ([Tonneau2015]_ Algorithm 4, corrected).
 
-A pose that sees no guard becomes a guard; one that sees guards of several parts of the roadmap
-joins them; any other is rejected.  In print the visible guard is never remembered, so that every
-pose would become a guard; the test is the other way round here.  A request joins start and goal and finds the
-shortest way by A*, or says why there is none ([Tonneau2015]_ 6.3.1).
+A pose that sees no guard becomes a guard; one that sees guards of several parts of the roadmap joins them;
+any other is rejected. (In print every pose becomes a guard, as the visible one is not remembered.) A request
+joins start and goal and finds the shortest way by A*, or says why there is none ([Tonneau2015]_ 6.3.1).
 """
 
 import itertools
@@ -37,9 +36,8 @@ class RoadmapSettings:
     farthest: float = 2.5
 
     def __post_init__(self) -> None:
-        finite_number(self.failures, "roadmap failures", at_least=1)
-        finite_number(self.samples, "roadmap samples", at_least=1)
-        finite_number(self.nearest, "roadmap nearest", at_least=1)
+        for name in ("failures", "samples", "nearest"):
+            finite_number(getattr(self, name), f"roadmap {name}", at_least=1)
         finite_number(self.farthest, "roadmap farthest", above=0.0)
 
 
@@ -77,11 +75,10 @@ class Roadmap:
 
     def nearest_nodes(self, pose: FloatArray, *, guards_only: bool) -> list[int]:
         """Nodes near a pose (7,), the nearest first, as many as the settings allow."""
-        away = distance(self.poses, pose)
+        away, nodes = distance(self.poses, pose), self.graph.nodes
         order = np.argsort(away, kind="stable")
-        order = order[away[order] <= self.settings.farthest]
-        kept = [int(node) for node in order if not guards_only or self.graph.nodes[int(node)]["guard"]]
-        return kept[: self.settings.nearest]
+        near = map(int, order[away[order] <= self.settings.farthest])
+        return [n for n in near if not guards_only or nodes[n]["guard"]][: self.settings.nearest]
 
     def add(self, pose: FloatArray, *, guard: bool) -> int:
         """Add a node and return its number."""
@@ -124,22 +121,16 @@ class Roadmap:
 
 
 def grow(
-    roadmap: Roadmap,
-    sampler: PoseSampler,
-    planner: LocalPlanner,
-    rng: np.random.Generator,
-    samples: int,
+    roadmap: Roadmap, sampler: PoseSampler, planner: LocalPlanner, rng: np.random.Generator, samples: int,
     failures: int | None = None,
-) -> None:
-    """Draw poses and let the roadmap consider them, at most ``samples``.
+) -> None:  # fmt: skip
+    """Draw poses and let the roadmap consider them, at most ``samples`` and those of the settings.
 
-    It ends earlier when so many poses were rejected in a row (``failures``, the settings' when
-    omitted), or as many drawn in all as the settings allow.
+    It ends earlier when so many were rejected in a row (``failures``, the settings' when omitted).
     """
-    limits = roadmap.settings
-    most = limits.failures if failures is None else failures
+    most = roadmap.settings.failures if failures is None else failures
     for _ in range(samples):
-        if roadmap.rejected >= most or roadmap.samples >= limits.samples:
+        if roadmap.rejected >= most or roadmap.samples >= roadmap.settings.samples:
             return
         roadmap.samples += 1
         pose = sampler.draw(rng)
@@ -199,15 +190,11 @@ def find_route(roadmap: Roadmap, planner: LocalPlanner, start: int, goal: int) -
     """
     if not roadmap.joined(start, goal):
         return Route(None, failure=_walled_off(roadmap, start, goal), where="roadmap")
-
-    def estimate(first: int, second: int) -> float:
-        return float(distance(roadmap.poses[first], roadmap.poses[second]))
-
-    nodes = nx.astar_path(roadmap.graph, start, goal, heuristic=estimate, weight="weight")
-    pieces = [roadmap.poses[start][None]]
+    poses = roadmap.poses
+    nodes = nx.astar_path(roadmap.graph, start, goal, lambda a, b: float(distance(poses[a], poses[b])))
+    pieces = [poses[start][None]]
     for a, b in itertools.pairwise(nodes):
-        points = planner.waypoints(roadmap.poses[a], roadmap.poses[b], roadmap.way(a, b).turn_at)
-        pieces.append(points[1:])
+        pieces.append(planner.waypoints(poses[a], poses[b], roadmap.way(a, b).turn_at)[1:])
     length = float(nx.path_weight(roadmap.graph, nodes, "weight"))
     return Route(np.vstack(pieces), tuple(nodes), length)
 
@@ -220,15 +207,13 @@ def request(
     if unfit is not None:
         return unfit
     asked = roadmap.copy()
-    first = attach(asked, start, planner, rng)
-    last = attach(asked, goal, planner, rng)
+    first, last = (attach(asked, pose, planner, rng) for pose in (start, goal))
     return find_route(asked, planner, first, last)
 
 
 def _walled_off(roadmap: Roadmap, start: int, goal: int) -> str:
     """Reason in words why no way joins two nodes."""
-    from_start = sorted(nx.node_connected_component(roadmap.graph, start))
-    from_goal = sorted(nx.node_connected_component(roadmap.graph, goal))
+    from_start, from_goal = (sorted(nx.node_connected_component(roadmap.graph, end)) for end in (start, goal))
     places, others = roadmap.poses[from_start], roadmap.poses[from_goal]
     apart = np.array([distance(others, pose) for pose in places])
     row, column = np.unravel_index(int(np.argmin(apart)), apart.shape)

@@ -1,16 +1,15 @@
 """A path of the root: a clamped B-spline of poses and the time it takes within speed limits.
 
-Positions and quaternions are blended by the same basis functions and the quaternion is made unit
-afterwards, so that a control pose acts on its neighbourhood only.  The three Euler angles of
-[Tonneau2015]_ would be singular for a crawling trunk.
+Positions and quaternions are blended by the same basis functions and the quaternion is made unit afterwards,
+so that a control pose acts on its neighbourhood only.
 
 A polygonal way becomes a short, smooth path in three steps ([Tonneau2015]_ 6.3.2).
 
 1. Pruning (Algorithm 6, read "if l(P_i, P_j) then remove").
-2. Approximation by a B-spline whose control poses lie on the way, more of them until the condition
-   holds along the whole spline; they are spread by the time the way takes.
+2. Approximation by a B-spline whose control poses lie on the way, spread by the time it takes, more of them
+   until the condition holds along the whole spline.
 3. Shortcuts: a stretch of control poses is replaced by the straight way between its ends where that
-   takes less time and the condition still holds.  Only the spans that change are checked.
+   takes less time and the condition still holds. Only the spans that change are checked.
 """
 
 import itertools
@@ -83,7 +82,11 @@ class RootPath:
         times = check_clamped(degree, knots, len(points))
         if times[0] != 0.0 or times[-1] != 1.0:
             raise InputError(f"root path knots span {times[0]:g} to {times[-1]:g}; valid: 0 to 1")
-        points[:, 3:] = _one_hemisphere(points[:, 3:])
+        # Unit quaternions, neighbours less than half a turn apart.
+        unit = points[:, 3:] / np.linalg.norm(points[:, 3:], axis=1, keepdims=True)
+        flips = np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0)
+        unit[1:] *= np.cumprod(flips)[:, None]
+        points[:, 3:] = unit
         object.__setattr__(self, "degree", degree)
         object.__setattr__(self, "knots", frozen_array(times, "root path knots"))
         object.__setattr__(self, "control_points", frozen_array(points, "root path control_points"))
@@ -148,8 +151,7 @@ class RootPath:
         """(n, 6) linear (world axes) and angular (root axes) rates per unit of the parameter."""
         s = np.clip(np.atleast_1d(np.asarray(shares, dtype=np.float64)), 0.0, 1.0)
         raw, change = self._spline(s), self._derivative(s)
-        x, w = raw[:, 3:6], raw[:, 6:]
-        dx, dw = change[:, 3:6], change[:, 6:]
+        x, w, dx, dw = raw[:, 3:6], raw[:, 6:], change[:, 3:6], change[:, 6:]
         turn = w * dx - dw * x - np.cross(x, dx)
         return np.hstack([change[:, :3], 2.0 * turn / (raw[:, 3:] ** 2).sum(axis=1, keepdims=True)])
 
@@ -157,24 +159,22 @@ class RootPath:
     def span_bounds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Spans of the parameter and upper bounds of the motion within each.
 
-        The derivative stays in the hull of its own control points, and the blended quaternion is no
-        shorter than the root of the smallest product of two of those that it blends.
+        A blended quaternion is no shorter than the root of the smallest product of two that it blends.
 
         Returns:
             (spans + 1,) borders; (spans,) path length of the origin [m]; (spans,) angle turned [rad].
         """
         borders = np.unique(self.knots)
         change = derivative_matrix(self.degree, self.knots, 1) @ self.control_points
-        way = np.linalg.norm(change[:, :3], axis=1)
-        turn = np.linalg.norm(change[:, 3:], axis=1)
-        lengths, angles = np.empty(len(borders) - 1), np.empty(len(borders) - 1)
-        for row, (low, high) in enumerate(itertools.pairwise(borders)):
+        way, turn = (np.linalg.norm(part, axis=1) for part in (change[:, :3], change[:, 3:]))
+        bounds = []
+        for low, high in itertools.pairwise(borders):
             span = int(np.searchsorted(self.knots, low, side="right")) - 1
-            blended = self.control_points[span - self.degree : span + 1, 3:]
-            least = float(np.sqrt(max((blended @ blended.T).min(), 1e-4)))
             rows = slice(span - self.degree, span)
-            lengths[row] = (high - low) * way[rows].max()
-            angles[row] = (high - low) * 2.0 * turn[rows].max() / least
+            blended = self.control_points[rows.start : span + 1, 3:]
+            least = float(np.sqrt(max((blended @ blended.T).min(), 1e-4)))
+            bounds.append(((high - low) * way[rows].max(), (high - low) * 2.0 * turn[rows].max() / least))
+        lengths, angles = np.array(bounds).T
         return borders, lengths, angles
 
     @cached_property
@@ -203,17 +203,8 @@ class RootPath:
         return grid, np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _one_hemisphere(quaternions: FloatArray) -> FloatArray:
-    """Unit quaternions with signs such that neighbours are less than half a turn apart."""
-    unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
-    flips = np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0)
-    unit[1:] *= np.cumprod(flips)[:, None]
-    return unit
-
-
 _MOST_CONTROL_POSES = 300
 _SMALL_TURN = 0.2  # [rad]; the speed of a blended turn is then even within 0.4 %
-
 
 SHORTCUTS = 150
 """N, random shortcuts tried; our choice, as the other numbers that 6.3.2 leaves open."""
@@ -241,18 +232,14 @@ def traverse_times(poses: FloatArray, limits: RootLimits) -> FloatArray:
     The print has ``sqrt(P_i^2 - P_{i-1}^2) / v_max`` ([Tonneau2015]_ 4.4.2), which is no duration.
     """
     turns = Rotation.from_quat(poses[:, 3:])
-    angle = (turns[:-1].inv() * turns[1:]).as_rotvec()
-    change = np.hstack([np.diff(poses[:, :3], axis=0), angle])
+    change = np.hstack([np.diff(poses[:, :3], axis=0), (turns[:-1].inv() * turns[1:]).as_rotvec()])
     return np.concatenate([[0.0], np.cumsum((np.abs(change) / limits.both).max(axis=1))])
 
 
 def approximate(
     poses: FloatArray, planner: LocalPlanner, limits: RootLimits, rng: np.random.Generator
 ) -> RootPath:
-    """Spline close to a way of (n, 7) poses joined by straight ways, along all of which the condition holds.
-
-    With many control poses it becomes the way itself; it is of degree 1 where no other was found.
-    """
+    """Spline close to a way of (n, 7) poses joined by straight ways; of degree 1 where no other was found."""
     poses = _without_repeats(poses)
     times = traverse_times(poses, limits)
     count = max(DEGREE + 1, len(poses), int(np.ceil(times[-1] / SPACING)) + 1)
@@ -265,10 +252,7 @@ def approximate(
 
 
 def path_holds(path: RootPath, planner: LocalPlanner, low: float = 0.0, high: float = 1.0) -> bool:
-    """Whether the condition holds along a path between two values of its parameter.
-
-    The poses asked are as close as the bounds of the path's motion demand.
-    """
+    """Whether the condition holds along a path between two values of its parameter."""
     borders, ways, angles = path.span_bounds
     pieces = [
         np.linspace(a, b, planner.checker.steps(way, angle), endpoint=False)
@@ -284,23 +268,20 @@ def shorten(path: RootPath, planner: LocalPlanner, rng: np.random.Generator) -> 
     if path.degree < 2 or len(path.control_points) < 4:
         return path
     for _ in range(SHORTCUTS):
-        first, last = sorted(rng.choice(len(path.control_points), 2, replace=False).tolist())
-        if last - first >= 2:
-            path = _tried(path, first, last, planner)
+        points = path.control_points
+        first, last = sorted(rng.choice(len(points), 2, replace=False).tolist())
+        if last - first < 2:
+            continue
+        straight = between(points[first], points[last], np.arange(last - first + 1) / (last - first))
+        shorter = np.vstack([points[:first], straight, points[last + 1 :]])
+        before = traverse_times(points, path.limits)[-1]
+        if traverse_times(shorter, path.limits)[-1] > before * (1.0 - 1e-6):
+            continue
+        candidate = RootPath(path.degree, path.knots, shorter, path.limits)
+        low, high = path.knots[first + 1], path.knots[last + path.degree]
+        if path_holds(candidate, planner, float(low), float(high)):
+            path = candidate
     return path
-
-
-def _tried(path: RootPath, first: int, last: int, planner: LocalPlanner) -> RootPath:
-    """The path with the control poses between two replaced by a straight way, if that is better."""
-    points = path.control_points
-    straight = between(points[first], points[last], np.arange(last - first + 1) / (last - first))
-    shorter = np.vstack([points[:first], straight, points[last + 1 :]])
-    before = traverse_times(points, path.limits)[-1]
-    if traverse_times(shorter, path.limits)[-1] > before * (1.0 - 1e-6):
-        return path
-    candidate = RootPath(path.degree, path.knots, shorter, path.limits)
-    low, high = path.knots[first + 1], path.knots[last + path.degree]
-    return candidate if path_holds(candidate, planner, float(low), float(high)) else path
 
 
 def _spread(poses: FloatArray, times: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:

@@ -1,8 +1,7 @@
 """Poses of the root: seven numbers each, their distance and the straight way between two.
 
-A pose is ``[position (3), quaternion xyzw (4)]``, the first seven entries of a body's
-configuration. [Tonneau2015]_ uses three Euler angles instead; they are singular for a trunk that
-lies horizontally, so angles here are those of the shortest turn between two poses.
+A pose is ``[position (3), quaternion xyzw (4)]``, the first seven entries of a body's configuration. The
+three Euler angles of [Tonneau2015]_ are singular for a trunk that lies horizontally.
 """
 
 import math
@@ -18,9 +17,7 @@ _NEARLY_ALIGNED = 1.0 - 1e-12  # cosine above which the two quaternions are blen
 
 
 def root_pose(position: ArrayLike, rotation: ArrayLike | None = None) -> FloatArray:
-    """Make a pose (7,) of a position in the world (3,) [m] and a rotation root-to-world (3, 3).
-
-    It is upright and looks along x when the rotation is omitted.
+    """Make a pose (7,) of a position in the world (3,) [m] and a rotation root-to-world (3, 3), or upright.
 
     Raises:
         InputError: If a part is not finite or not a rotation.
@@ -53,23 +50,16 @@ def angles_between(first: FloatArray, second: FloatArray) -> FloatArray:
 def distance(first: FloatArray, second: FloatArray, share: float = 0.5) -> FloatArray:
     """Scaled Euclidean distance ``sqrt(s |dp|^2 + (1 - s) angle^2)`` ([Tonneau2015]_ 6.3).
 
-    The print has ``|d|`` in place of the squares, which is not the Euclidean distance that its
-    text names; squares are used. It is a metric, so A* with it as estimate finds shortest paths.
-    Poses are (..., 7), and the share s in [0, 1] is the weight of the positions.
+    The print has ``|d|`` in place of the squares, unlike its text. It is a metric, so A* with it as estimate
+    finds shortest paths. Poses are (..., 7), and the share s in [0, 1] is the weight of the positions.
     """
     way = np.sum((first[..., :3] - second[..., :3]) ** 2, axis=-1)
     return np.sqrt(share * way + (1.0 - share) * angles_between(first, second) ** 2)
 
 
 def between(first: FloatArray, second: FloatArray, shares: FloatArray) -> FloatArray:
-    """Poses (n, 7) at (n,) shares in [0, 1] of the straight way from one pose (7,) to another.
-
-    Positions are on a line, and the shortest turn has a constant speed.
-    """
-    out = np.empty((len(shares), 7))
-    t = shares[:, None]
-    out[:, :3] = (1.0 - t) * first[:3] + t * second[:3]
-    start, end = first[3:], second[3:]
+    """Poses (n, 7) at (n,) shares in [0, 1] of the straight way from one pose (7,) to another."""
+    t, start, end = shares[:, None], first[3:], second[3:]
     cosine = float(start @ end)
     if cosine < 0.0:
         end, cosine = -end, -cosine
@@ -78,8 +68,8 @@ def between(first: FloatArray, second: FloatArray, shares: FloatArray) -> FloatA
     else:
         angle = np.arccos(cosine)
         blend = (np.sin((1.0 - t) * angle) * start + np.sin(t * angle) * end) / np.sin(angle)
-    out[:, 3:] = blend / np.linalg.norm(blend, axis=1, keepdims=True)
-    return out
+    turned = blend / np.linalg.norm(blend, axis=1, keepdims=True)
+    return np.hstack([(1.0 - t) * first[:3] + t * second[:3], turned])
 
 
 def tilt(pose: FloatArray) -> float:

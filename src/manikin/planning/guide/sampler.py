@@ -1,11 +1,9 @@
 """Random poses near obstacles: Algorithm 3 of [Tonneau2015]_, corrected.
 
-A random triangle of the scene is chosen, the root is put on a random point of it and moved off in
-a random direction, step by step, turning at random, until the reachability condition holds or the
-triangle is out of the limbs' reach.  Corrections: the inner counter starts anew for every triangle
-(in print the inner loop runs for the first triangle only), and the first step is taken before the
-limbs' reach is asked, because a limb's volume need not hold the root itself.  Our own: from the
-surface of something solid the root moves to the free side.
+The root is put on a random point of a random triangle of the scene and moved off in a random direction, step
+by step, turning at random, until the condition holds or the triangle is out of the limbs' reach.
+Corrections: the inner counter starts anew for every triangle, and the first step is taken before the limbs'
+reach is asked. Our own: from the surface of something solid the root moves to the free side.
 """
 
 from collections.abc import Sequence
@@ -33,8 +31,6 @@ UNIFORM_SHARE = 0.5
 STEP = 0.6
 """Largest step away from the triangle [m]; the thesis has 1."""
 
-_FULL_TURN = (-float(np.pi), float(np.pi))
-
 
 @dataclass(frozen=True, eq=False)
 class SamplingRegion:
@@ -57,13 +53,9 @@ class SamplingRegion:
     roll: tuple[float, float] | None
 
     def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        yaw: Sequence[float] | None = None,
-        pitch: Sequence[float] | None = None,
-        roll: Sequence[float] | None = None,
-    ) -> None:
+        self, lower: ArrayLike, upper: ArrayLike, yaw: Sequence[float] | None = None,
+        pitch: Sequence[float] | None = None, roll: Sequence[float] | None = None,
+    ) -> None:  # fmt: skip
         object.__setattr__(self, "lower", frozen_array(lower, "sampling region lower [m]", (3,)))
         object.__setattr__(self, "upper", frozen_array(upper, "sampling region upper [m]", (3,)))
         if not np.all(self.lower < self.upper):
@@ -75,10 +67,11 @@ class SamplingRegion:
 
     def turns(self, count: int, rng: np.random.Generator) -> FloatArray:
         """(count, 4) random quaternions xyzw within the bounds."""
-        if self.yaw is None and self.pitch is None and self.roll is None:
+        pairs = self.yaw, self.pitch, self.roll
+        if pairs == (None, None, None):
             raw = rng.normal(size=(count, 4))
             return raw / np.linalg.norm(raw, axis=1, keepdims=True)
-        angles = [rng.uniform(*(pair or _FULL_TURN), count) for pair in (self.yaw, self.pitch, self.roll)]
+        angles = [rng.uniform(*(pair or (-np.pi, np.pi)), count) for pair in pairs]
         return Rotation.from_euler("ZYX", np.column_stack(angles)).as_quat()
 
     def holds(self, position: FloatArray) -> bool:
@@ -128,18 +121,16 @@ class PoseSampler:
     def draw(self, rng: np.random.Generator) -> FloatArray | None:
         """Draw one pose (7,) that satisfies the condition, or None after so many triangles."""
         for triangle in self.pick(TRIANGLES, rng):
-            points, directions = self._departures(int(triangle), TURNS, rng)
-            turns = self._region.turns(TURNS, rng)
-            steps = STEP * (1.0 - rng.uniform(size=(TURNS, TURNS)))
-            pose = self._search(int(triangle), points, directions, turns, steps)
+            pose = self._search(int(triangle), rng)
             if pose is not None:
                 return pose
         return None
 
-    def _search(
-        self, triangle: int, points: FloatArray, directions: FloatArray, turns: FloatArray, steps: FloatArray
-    ) -> FloatArray | None:
-        """Inner loops of Algorithm 3 over one triangle, on numbers drawn before."""
+    def _search(self, triangle: int, rng: np.random.Generator) -> FloatArray | None:
+        """Inner loops of Algorithm 3 over one triangle."""
+        points, directions = self._departures(triangle, rng)
+        turns = self._region.turns(TURNS, rng)
+        steps = STEP * (1.0 - rng.uniform(size=(TURNS, TURNS)))
         tries = 0
         while tries < len(points):
             position, direction = points[tries], directions[tries]
@@ -153,15 +144,13 @@ class PoseSampler:
                     break
         return None
 
-    def _departures(
-        self, triangle: int, count: int, rng: np.random.Generator
-    ) -> tuple[FloatArray, FloatArray]:
-        """Random points of a triangle and directions away from it, (count, 3) each."""
+    def _departures(self, triangle: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+        """Random points of a triangle and directions away from it, (TURNS, 3) each."""
         a, b, c = self.corners[triangle]
-        u, v = rng.uniform(size=(2, count, 1))
+        u, v = rng.uniform(size=(2, TURNS, 1))
         root = np.sqrt(u)
         points = (1.0 - root) * a + root * (1.0 - v) * b + root * v * c
-        directions = rng.normal(size=(count, 3))
+        directions = rng.normal(size=(TURNS, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         if self._closed[triangle]:
             height = directions @ self._normals[triangle]

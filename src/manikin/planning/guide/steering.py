@@ -1,8 +1,7 @@
 """Local planners: whether a simple way joins two poses ([Tonneau2015]_ 6.2.3).
 
-Along the whole way the condition must hold.  The two ends of a task may satisfy it without the
-margins that planning keeps elsewhere (a standing person's legs are nearly at the end of their
-reach), so near them the plain condition counts, checked at closer poses.
+Along the whole way the condition must hold. The two ends of a task may satisfy it without the margins that
+planning keeps elsewhere, so near them the plain condition counts, checked at closer poses.
 """
 
 import itertools
@@ -29,11 +28,7 @@ FINER = 8
 
 @dataclass(frozen=True)
 class Way:
-    """Way that joins two poses.
-
-    Attributes:
-        turn_at: Share of the way at which the root turns on the spot, or None when straight.
-    """
+    """Way that joins two poses: the share at which the root turns on the spot, or None when straight."""
 
     turn_at: float | None
 
@@ -58,8 +53,7 @@ class LocalPlanner:
         """
         if min(checker.margins.trunk, checker.margins.reach) <= 0.0:
             raise InputError(f"local planner has {checker.margins}; valid: margins > 0")
-        self.checker = checker
-        self.ends = tuple(ends)
+        self.checker, self.ends = checker, tuple(ends)
 
     @cached_property
     def plain(self) -> ReachabilityChecker:
@@ -79,10 +73,7 @@ class LocalPlanner:
         )
 
     def straight(self, first: FloatArray, second: FloatArray) -> bool:
-        """Whether the condition holds along the straight way between two poses that satisfy it.
-
-        The answer does not depend on the order of the two.
-        """
+        """Whether the condition holds along the straight way between poses that satisfy it, either way."""
         if tuple(first) > tuple(second):
             first, second = second, first
         way = float(np.linalg.norm(second[:3] - first[:3]))
@@ -91,10 +82,7 @@ class LocalPlanner:
         return self.poses_hold(poses, ends_hold=True)
 
     def poses_hold(self, poses: FloatArray, *, ends_hold: bool = False) -> bool:
-        """Whether the condition holds along a densely sampled motion.
-
-        The poses are asked in bit-reversed order, because a way that fails mostly fails near its
-        middle.
+        """Whether the condition holds along a densely sampled motion, asked near its middle first.
 
         Args:
             poses: (n, 7), as close to each other as :meth:`ReachabilityChecker.steps` tells.
@@ -103,9 +91,8 @@ class LocalPlanner:
         last = len(poses) - 1
         plain_only = []
         for index in _middle_first(len(poses)):
-            if ends_hold and not self.ends and index in (0, last):
-                continue
-            if self.checker.holds(poses[index]):
+            known = ends_hold and not self.ends and index in (0, last)
+            if known or self.checker.holds(poses[index]):
                 continue
             if not (self.near_end(poses[index]) and self.plain.holds(poses[index])):
                 return False
@@ -131,17 +118,16 @@ class LocalPlanner:
         return np.stack([first, before, after, second])
 
     def rotate_at(self, first: FloatArray, second: FloatArray, turn_at: float) -> bool:
-        """Whether the condition holds along the rotate-at-s way.
+        """Whether the condition holds along the rotate-at-s way, its turn on the spot included.
 
-        The thesis turns the root "suddenly"; here the turn on the spot is a part of the way and
-        checked like the rest.  From the other end the same way has ``1 - turn_at``.
+        From the other end the same way has ``1 - turn_at``.
         """
         points = self.waypoints(first, second, turn_at)
         if not (self.holds(points[1]) and self.holds(points[2])):
             return False
         return all(self.straight(a, b) for a, b in itertools.pairwise(points))
 
-    def connect(self, first: FloatArray, second: FloatArray, turn_at: float) -> "Way | None":
+    def connect(self, first: FloatArray, second: FloatArray, turn_at: float) -> Way | None:
         """SIMPLEPATH: the straight way, else rotate-at-s at ``turn_at`` in (0, 1), else None.
 
         Both poses (7,) satisfy the condition.

@@ -4,10 +4,9 @@
     s.t.    g(q) = tau + sum J^T f,   tau_min <= tau <= tau_max,   feet and pressing hands inside their
             friction pyramids,   sum of the forces on the hands = -F d
 
-This knows nothing of how the posture was found; its points are those of the contacts, each on the
-segment that carries it, so that a load on the tip of a sole is paid for by the toes. The pyramids are those
-of the friction model that is asked for, and never hold more than the circular cone: with ``outer`` they
-are those of ``cone``.
+The points are those of the contacts, each on the segment that carries it, so that a load on the tip of a sole
+is paid for by the toes. The pyramids never hold more than the circular cone: with the friction model
+``outer`` they are those of ``cone``.
 """
 
 from collections.abc import Iterator, Sequence
@@ -83,10 +82,9 @@ class Act:
         return Efort(pulling=self.kind is ActKind.PULL)
 
     def foot_task(self, body: BodyModel) -> Task:
-        """Task of the legs: the ground pushes them the way of the act, and carries the body.
+        """Task of the legs: the whole force that they need at rest, ``F d + m g``.
 
-        The thesis has the direction of the act alone, for which no level floor scores. Ours is that
-        of the whole force that the feet need at rest, ``F d + m g``.
+        The thesis has the direction of the act alone, for which no level floor scores.
         """
         return Task(self.force * self.direction + np.array([0.0, 0.0, body.mass * GRAVITY]))
 
@@ -96,8 +94,7 @@ class Act:
 
     def load(self, hands: tuple[Contact, ...], force: float | None = None) -> FloatArray:
         """(6,) force and moment about the world origin of the object on the hands, shared evenly."""
-        pull = self.reaction(force)
-        place = np.mean([hand.position for hand in hands], axis=0)
+        pull, place = self.reaction(force), np.mean([hand.position for hand in hands], axis=0)
         return np.concatenate([pull, np.cross(place, pull)])
 
 
@@ -110,8 +107,7 @@ class BracedForces:
         torque_share: Largest torque of a joint as a share of its limit.
         tightest: Name of the joint with the largest share.
         tau: (nv - 6,) torques [N.m].
-        contact_force: (c, 6) force of the scene on each contact, in their order, and its moment about the
-            contact's position [N, N.m].
+        contact_force: (c, 6) force of the scene on each contact and moment about its position [N, N.m].
         residual: Largest error of the six equations of the root [N, N.m].
     """
 
@@ -128,37 +124,29 @@ PALM_RESERVE = 0.75
 
 
 def largest_force(
-    body: BodyModel,
-    q: FloatArray,
-    contacts: Sequence[Contact],
-    act: Act,
-    friction: float = 0.7,
+    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float = 0.7,
     friction_model: FrictionModel = "outer",
-) -> BracedForces | None:
+) -> BracedForces | None:  # fmt: skip
     """The largest force that a posture (nq,) can exert the way of an act, or None where it cannot even stand.
 
     The contacts are those of feet and hands; the friction is the Coulomb coefficient of pressing palms, the
     friction model that of feet and palms.
     """
     programme = _Programme(body, q, contacts, act, friction, friction_model)
-    return programme.solve(np.array([-1.0, 0.0]), (0.0, None), (1.0, 1.0))
+    return programme.solve((-1.0, 0.0), (0.0, None), (1.0, 1.0))
 
 
 def share_force(
-    body: BodyModel,
-    q: FloatArray,
-    contacts: Sequence[Contact],
-    act: Act,
-    friction: float = 0.7,
+    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float = 0.7,
     friction_model: FrictionModel = "outer",
-) -> BracedForces | None:
+) -> BracedForces | None:  # fmt: skip
     """The act's force with the smallest share of any joint's strength, or None where friction forbids it.
 
     A share above 1 is more than the joints have. Pressing palms use :data:`PALM_RESERVE` of their friction.
     The arguments are those of :func:`largest_force`.
     """
     programme = _Programme(body, q, contacts, act, PALM_RESERVE * friction, friction_model)
-    return programme.solve(np.array([0.0, 1.0]), (act.force, act.force), (0.0, None))
+    return programme.solve((0.0, 1.0), (act.force, act.force), (0.0, None))
 
 
 class _Programme:
@@ -168,7 +156,7 @@ class _Programme:
         self, body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float,
         friction_model: FrictionModel,
     ) -> None:  # fmt: skip
-        self._body, self._direction = body, act.direction
+        self._body, self._direction, state = body, act.direction, Configuration(body, q)
         model = ContactModel("cone" if friction_model == "outer" else friction_model)
         touching = [_touching(contact, act, friction) for contact in contacts]
         generators = ContactGenerators.of(Stance(touching, model=model), grasp_moments=False)
@@ -177,15 +165,13 @@ class _Programme:
         self._owner, force = generators.contact[kept], generators.force[kept]
         places = np.array([contact.position for contact in contacts])[generators.contact]
         self._wrenches = generators.about(places)[:, kept]
-        state = Configuration(body, q)
+        maps = []
         rows = np.array_split(np.arange(len(force)), np.flatnonzero(np.diff(self._owner)) + 1)
-        self._maps = np.hstack([
-            jacobian.T @ force[part].T
-            for contact, mine in zip(touching, rows, strict=True)
-            for jacobian, part in zip(
-                _jacobians(state, contact), np.split(mine, len(contact.points)), strict=True
-            )
-        ])  # fmt: skip
+        for contact, mine in zip(touching, rows, strict=True):
+            parts = np.split(mine, len(contact.points))
+            for jacobian, part in zip(_jacobians(state, contact), parts, strict=True):
+                maps.append(jacobian.T @ force[part].T)
+        self._maps = np.hstack(maps)
         held = [contact.max_force if contact.kind is ContactKind.GRASP else np.inf for contact in contacts]
         upper = np.array(held)[self._owner]
         lower = np.where(generators.normal[kept] > 0.0, 0.0, -upper)
@@ -194,21 +180,19 @@ class _Programme:
         self._on_hands = np.isin(self._owner, [k for k, c in enumerate(contacts) if c.effector in HANDS])
 
     def solve(
-        self, cost: FloatArray, force: tuple[float, float | None], share: tuple[float, float | None]
+        self, cost: tuple[float, float], force: tuple[float, float | None], share: tuple[float, float | None]
     ) -> BracedForces | None:
         """Least ``cost`` of force and share within their bounds, or None where there is no solution."""
-        count, body = self._maps.shape[1], self._body
-        zeros = np.zeros((6, 2))
-        on_hands = self._wrenches[:3] * self._on_hands
+        body, on_hands = self._body, self._wrenches[:3] * self._on_hands
         equal = np.vstack([
-            np.hstack([self._maps[:6], zeros]),
+            np.hstack([self._maps[:6], np.zeros((6, 2))]),
             np.hstack([on_hands, self._direction[:, None], np.zeros((3, 1))]),
         ])  # fmt: skip
         joints = np.hstack([self._maps[6:], np.zeros((len(body.torque_upper), 1))])
         most, least = body.torque_upper[:, None], body.torque_lower[:, None]
         below = np.vstack([np.hstack([-joints, -most]), np.hstack([joints, least])])
         result = linprog(
-            np.concatenate([np.zeros(count), cost]),
+            np.concatenate([np.zeros(self._maps.shape[1]), cost]),
             A_ub=below, b_ub=np.concatenate([-self._bias[6:], self._bias[6:]]),
             A_eq=equal, b_eq=np.concatenate([self._bias[:6], np.zeros(3)]),
             bounds=[*self._limits, force, share],
@@ -219,10 +203,7 @@ class _Programme:
             raise InputError(
                 f"forces of the posture cannot be computed ({result.message}); valid: finite values"
             )
-        return self._forces(np.array(result.x))
-
-    def _forces(self, x: FloatArray) -> BracedForces:
-        multipliers = x[:-2]
+        x, multipliers = result.x, result.x[:-2]
         needed = self._bias - self._maps @ multipliers
         shares = self._body.torque_share(needed[6:])
         worst = int(np.argmax(shares))
@@ -240,10 +221,12 @@ def _touching(contact: Contact, act: Act, friction: float) -> Contact:
     """A contact as it is in an act: hands rub as palms, and hold on only where they pull."""
     if contact.effector not in HANDS:
         return contact
-    if contact.kind is ContactKind.GRASP and act.kind is ActKind.PUSH:
-        rotation = contact.rotation_contact_to_world
-        return point(contact.effector, contact.position, friction=friction, rotation=rotation)
-    return contact if contact.kind is ContactKind.GRASP else replace(contact, friction=friction)
+    if contact.kind is not ContactKind.GRASP:
+        return replace(contact, friction=friction)
+    if act.kind is not ActKind.PUSH:
+        return contact
+    rotation = contact.rotation_contact_to_world
+    return point(contact.effector, contact.position, friction=friction, rotation=rotation)
 
 
 def _jacobians(state: Configuration, contact: Contact) -> Iterator[FloatArray]:

@@ -42,11 +42,7 @@ class Timing:
 
 @dataclass(frozen=True, eq=False)
 class PlannedAct:
-    """A motion that ends with an act.
-
-    Attributes:
-        wishes: What each hand should feel.
-    """
+    """A motion that ends with an act, and what each hand should feel."""
 
     motion: Motion
     schedule: ContactSchedule
@@ -59,12 +55,8 @@ def plan_act(
 ) -> PlannedAct:
     """Append an act to a motion that ends at rest with its hands on the object.
 
-    Args:
-        motion: Up to the act.
-        schedule: Its contacts; the last stance has feet and hands.
-        forces: Forces of its last posture with the act's force, contacts in the order of the last stance.
-        ramp: Time in which the force rises [s].
-        hold: Time for which it is held [s].
+    The last stance of the schedule has feet and hands, and the forces are those of the last posture with the
+    act's force, contacts in that order. They rise for ``ramp`` and are held for ``hold`` [s].
     """
     timing = Timing(float(motion.time[-1]), ramp, hold)
     stance = schedule.sequence[-1].stance
@@ -73,9 +65,8 @@ def plan_act(
         for k, contact in enumerate(stance)
         if contact.effector in HANDS
     )
-    instants = np.append(schedule.instants[:-1], timing.end)
-    held = _held(motion, stance, forces, timing)
-    return PlannedAct(held, ContactSchedule(schedule.sequence, instants), timing, wishes)
+    prolonged = ContactSchedule(schedule.sequence, np.append(schedule.instants[:-1], timing.end))
+    return PlannedAct(_held(motion, stance, forces, timing), prolonged, timing, wishes)
 
 
 def _held(motion: Motion, stance: Stance, forces: BracedForces, timing: Timing) -> Motion:
@@ -87,19 +78,14 @@ def _held(motion: Motion, stance: Stance, forces: BracedForces, timing: Timing) 
     tau[6:] = forces.tau
     for k, contact in enumerate(stance):
         force[motion.contact_names.index(contact.effector)] = forces.contact_force[k]
-    added: dict[str, Any] = {
-        name: np.repeat(values[-1:], len(time), axis=0)
-        for name, values in motion.arrays().items() if name not in ("time", "v", "a", "angular_momentum")
-    }  # fmt: skip
-    added["time"] = time
+    arrays = motion.arrays()
+    added: dict[str, Any] = {name: np.repeat(rows[-1:], len(time), axis=0) for name, rows in arrays.items()}
     for name in ("v", "a", "angular_momentum"):
-        added[name] = np.zeros((len(time), *getattr(motion, name).shape[1:]))
-    added["tau"] = motion.tau[-1] + share[:, None] * (tau - motion.tau[-1])
+        added[name] = np.zeros((len(time), *arrays[name].shape[1:]))
     last = motion.contact_force[-1]
+    added |= {"time": time, "tau": motion.tau[-1] + share[:, None] * (tau - motion.tau[-1])}
     added["contact_force"] = last + share[:, None, None] * (force - last)
-    return replace(
-        motion, **{name: np.concatenate([getattr(motion, name), rows]) for name, rows in added.items()}
-    )
+    return replace(motion, **{name: np.concatenate([arrays[name], rows]) for name, rows in added.items()})
 
 
 @dataclass(frozen=True)
@@ -145,26 +131,24 @@ def measure_act(
         return None
     stance = schedule.sequence[-1].stance
     hands = [k for k, name in enumerate(motion.contact_names) if name in HANDS and name in stance]
-    on_object = -motion.contact_force[held][:, hands, :3].sum(axis=1)
+    forces = motion.contact_force[held][:, hands, :3]
+    on_object = -forces.sum(axis=1)
     along = on_object @ act.direction
     across = np.linalg.norm(on_object - along[:, None] * act.direction, axis=1)
     return MeasuredAct(
         float(along.mean()), float(along.min()), float(across.max()),
-        _palm_friction(motion.contact_force[held][:, hands, :3], act, stance, hands, motion, friction),
+        _palm_friction(forces, stance, [motion.contact_names[k] for k in hands], friction)
+        if act.kind is ActKind.PUSH else 0.0,
         float(_feet_margin(motion, stance, acting, mass).min()),
         float(motion.time[held][-1] - timing.start - timing.ramp),
     )  # fmt: skip
 
 
-def _palm_friction(
-    forces: FloatArray, act: Act, stance: Stance, hands: list[int], motion: Motion, friction: float
-) -> float:
+def _palm_friction(forces: FloatArray, stance: Stance, hands: list[str], friction: float) -> float:
     """Largest tangential force over the friction limit of palms that press."""
-    if act.kind is not ActKind.PUSH:
-        return 0.0
     shares = []
-    for column, k in enumerate(hands):
-        normal = stance[motion.contact_names[k]].normal
+    for column, hand in enumerate(hands):
+        normal = stance[hand].normal
         pressing = forces[:, column] @ normal
         tangential = np.linalg.norm(forces[:, column] - pressing[:, None] * normal, axis=1)
         shares.append(float((tangential / np.maximum(friction * pressing, 1e-6)).max()))

@@ -120,10 +120,9 @@ def find_braced_posture(
     level: float = 0.0, settings: BraceSettings | None = None, hands_by: Heuristic | None = None,
     feet_by: Heuristic | None = None, reference: FloatArray | None = None,
 ) -> BraceResult:  # fmt: skip
-    """Find where hands and feet act with EFORT, and a posture that can.
+    """Find where hands and feet of a body act with EFORT, and a posture that can.
 
     Args:
-        body: A body with arms, legs and soles.
         near: (2,) where the body comes from; it acts on the part of the object nearest to there [m].
         level: Height of the ground [m].
         hands_by: What hands prefer; EFORT, pulling EFORT for a pull, when omitted.
@@ -146,8 +145,10 @@ class _BraceSearch:
         asked = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
         self._poser = PostureFinder(body, scene, self._reference, asked)
         self._reasons: dict[int, Counter[str]] = {step: Counter() for step in _STEPS}
-        self._tried = 0
-        self._strongest = 0.0
+        self._tried, self._strongest = 0, 0.0
+        facing = act.facing
+        self._across = np.array([-facing[1], facing[0], 0.0])
+        self._yaw = float(np.arctan2(facing[1], facing[0]))
 
     def run(self, near: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> BraceResult:
         faces = [
@@ -158,14 +159,9 @@ class _BraceSearch:
         if not faces:
             reason = f"{self._act.obstacle} has no face against {self._act.kind}ing hands"
             return BraceResult(None, self._tried, self._strongest, reason)
-        braces: list[Brace] = []
-        for q in self._trunks(faces, near):
-            self._tried += 1
-            brace = self._at(q, hands_by, feet_by)
-            if brace is not None:
-                braces.append(brace)
-            if len(braces) >= self._settings.enough:
-                break
+        tries = (self._at(q, hands_by, feet_by) for q in self._trunks(faces, near))
+        found = (brace for brace in tries if brace is not None)
+        braces = list(itertools.islice(found, self._settings.enough))
         if not braces:
             return BraceResult(None, self._tried, self._strongest, self._why())
         best = min(braces, key=lambda item: item.forces.torque_share)
@@ -173,23 +169,20 @@ class _BraceSearch:
 
     def _trunks(self, faces: list[Surface], near: FloatArray) -> Iterator[FloatArray]:
         """Postures before the nearest face, the trunk at the settings' places."""
-        act, settings = self._act, self._settings
-        facing = act.facing
-        across = np.array([-facing[1], facing[0], 0.0])
-        yaw = float(np.arctan2(facing[1], facing[0]))
+        settings, facing, across = self._settings, self._act.facing, self._across
         face = min(faces, key=lambda item: float((item.polygon @ facing).min()))
         depth = float((face.polygon @ facing).min())
         sides = face.polygon @ across
         low, high = float(sides.min()) + HANDS_ROOM, float(sides.max()) - HANDS_ROOM
         middle = 0.5 * (low + high) if low >= high else float(np.clip(float(near @ across), low, high))
         size = stature_of(self._body) / 1.75
-        forwards = 1.0 if act.kind is ActKind.PUSH else -1.0
-        places = itertools.product(settings.leans, settings.heights, settings.distances)
-        for lean, height, distance in places:
+        forwards = 1.0 if self._act.kind is ActKind.PUSH else -1.0
+        for lean, height, distance in itertools.product(settings.leans, settings.heights, settings.distances):
+            self._tried += 1
             q = np.array(self._reference)
             q[:2] = ((depth - distance * size) * facing + middle * across)[:2]
             q[2] = near[2] + height * q[2]
-            q[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, forwards * lean, yaw)).coeffs()
+            q[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, forwards * lean, self._yaw)).coeffs()
             yield q
 
     def _at(self, q: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> Brace | None:
@@ -197,8 +190,7 @@ class _BraceSearch:
         posture, hands = self._hands(q, hands_by)
         if hands is None:
             return None
-        held = tuple(hands.values())
-        both = np.array([np.zeros(6), self._act.load(held)])
+        both = np.array([np.zeros(6), self._act.load(tuple(hands.values()))])
         loads = Loads(self._body.mass, both, self._settings.friction_model)
         posture, feet = self._feet(posture, loads, feet_by)
         if feet is None:
@@ -235,9 +227,7 @@ class _BraceSearch:
         return Brace(q, feet, hands, forces, largest, margin)
 
     def _hands(self, q: FloatArray, heuristic: Heuristic) -> tuple[FloatArray, dict[str, Contact] | None]:
-        task, hands = self._act.hand_task(ARMS), {}
-        middle, across = np.array(q[:3]), np.array([-self._act.facing[1], self._act.facing[0], 0.0])
-        order = heuristic
+        task, hands, middle, order = self._act.hand_task(ARMS), {}, np.array(q[:3]), heuristic
         for arm in ARMS:
             answer = self._generator.request(q, arm, task, order, kind=self._act.touch)
             if answer.contact is None or answer.q is None:
@@ -253,15 +243,14 @@ class _BraceSearch:
             )  # fmt: skip
             if len(hands) == 2 and answer.score < 0.5 * BALANCED:
                 return q, self._none(_HANDS, "the hands cannot act side by side")
-            alike = Mirrored(answer.contact.position, middle, across)
+            alike = Mirrored(contact.position, middle, self._across)
             order = WeightedSum([(1.0, heuristic), (BALANCED, alike)])
         return q, hands
 
     def _feet(
         self, q: FloatArray, loads: Loads, heuristic: Heuristic
     ) -> tuple[FloatArray, dict[str, Contact] | None]:
-        task = self._act.foot_task(self._body)
-        natural = Natural(float(np.arctan2(self._act.facing[1], self._act.facing[0])))
+        task, natural = self._act.foot_task(self._body), Natural(self._yaw)
         order = WeightedSum([(1.0, heuristic), (BALANCED, natural)])
         first = self._generator.request(q, LEGS[0], task, order)
         if first.contact is None or first.q is None:
@@ -276,8 +265,7 @@ class _BraceSearch:
         return second.q, {item.effector: item for item in (first.contact, second.contact)}
 
     def _why(self) -> str:
-        act = self._act
-        farthest = max((step for step in _STEPS if self._reasons[step]), default=_HANDS)
+        act, farthest = self._act, max((step for step in _STEPS if self._reasons[step]), default=_HANDS)
         most = self._reasons[farthest].most_common(1)
         why = f"; nearest to it: {most[0][0]}" if most else ""
         best = f" (the strongest balanced one {self._strongest:.0f} N)" if self._strongest > 0.0 else ""

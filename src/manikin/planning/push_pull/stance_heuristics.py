@@ -26,31 +26,21 @@ class Loads:
     friction_model: FrictionModel = "outer"
 
     def margins(self, feet: list[Contact], places: FloatArray) -> FloatArray:
-        """(n,) least margin about the CoM of all loads at each place (n, 3) of it [N.m].
-
-        It is minus infinity where feet in one plane slide or the ZMP leaves them.
-        """
+        """(n,) least margin about the CoM of all loads at each place (n, 3) of it [N.m]; -inf without ZMP."""
         margins = np.full(len(places), -np.inf)
         if any(self._slides(feet, load) for load in self.wrenches):
             return margins
         stance = Stance(feet, model=ContactModel.of_body(self.mass, self.friction_model))
         needed = pseudo_wrench(self.mass, places, np.zeros(3)) - self.wrenches[:, None]
-        plane = support_plane(stance)
-        possible = np.ones(len(places), dtype=bool)
+        plane, possible = support_plane(stance), np.ones(len(places), dtype=bool)
         if plane is not None:
             possible = (plane.zmp_distance(needed) >= 0.0).all(axis=0)
         if not possible.any():
             return margins
         (polytope,) = wrench_polytopes([stance])
-        margins[possible] = np.min(
-            [
-                stability_margins(
-                    polytope, wrench_about(wrench[possible], polytope.reference), places[possible]
-                ).wrench_about_com
-                for wrench in needed
-            ],
-            axis=0,
-        )
+        wrenches = (wrench_about(wrench[possible], polytope.reference) for wrench in needed)
+        found = [stability_margins(polytope, wrench, places[possible]) for wrench in wrenches]
+        margins[possible] = np.min([item.wrench_about_com for item in found], axis=0)
         return margins
 
     def _slides(self, feet: list[Contact], load: FloatArray) -> bool:
@@ -68,8 +58,7 @@ class Loads:
     ) -> tuple[FloatArray, float]:
         """(2,) place of the centre of mass on feet with the largest least margin, and that margin [N.m].
 
-        The places looked at are around a point (3,) at the height of the CoM, as far as (2,) along x and y
-        [m].
+        The places are around a point (3,) at the height of the CoM, as far as (2,) along x and y [m].
         """
         x, y = (np.linspace(-r, r, 2 * int(np.ceil(r / 0.02)) + 1) for r in reach)
         grid = np.stack(np.meshgrid(near[0] + x, near[1] + y, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -130,16 +119,13 @@ class Mirrored:
 class Footing:
     """Balance of two natural feet under every load ([Tonneau2015]_ 7.5-7.6, forces on the hands): 1 or 0.
 
-    The centre of mass may be moved within ``reach`` of where the body has it. Candidates within
-    ``spacing`` on one surface share one answer.
-
     Attributes:
         loads: What the feet stand against.
         other: Contact of the other foot.
         natural: Places that this foot may have; others count as 0.
         margin: Least margin that counts as balance [N.m].
-        reach: (2,) how far the centre of mass may be moved [m].
-        spacing: Largest distance of candidates that share an answer [m].
+        reach: (2,) how far the centre of mass may be moved from where the body has it [m].
+        spacing: Largest distance of candidates on one surface that share an answer [m].
     """
 
     loads: Loads
@@ -152,14 +138,11 @@ class Footing:
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`manikin.planning.contacts.Heuristic`."""
-        asked = self.natural.score(situation, candidates) > 0.0
-        score = cached_score(
-            candidates, self.spacing, lambda row: self._stands(situation, candidates, row), asked
-        )
-        return score * asked
 
-    def _stands(self, situation: Situation, candidates: Candidates, row: int) -> bool:
-        contact = contact_at(situation, candidates, row, situation.limb.kind, self.rules)
-        near = situation.state.com
-        _, margin = self.loads.best_place([self.other, contact], near, np.array(self.reach))
-        return margin >= self.margin
+        def stands(row: int) -> bool:
+            contact = contact_at(situation, candidates, row, situation.limb.kind, self.rules)
+            feet, near = [self.other, contact], situation.state.com
+            return self.loads.best_place(feet, near, np.array(self.reach))[1] >= self.margin
+
+        asked = self.natural.score(situation, candidates) > 0.0
+        return cached_score(candidates, self.spacing, stands, asked) * asked

@@ -33,8 +33,8 @@ from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective
 from manikin.walking.path.walking_path import WalkingPath, WalkingTask
 
 GUESSES = ("straight", "turning", "other first turn", "other last turn")
-"""Guesses without obstacles: the heading turns evenly; or first to the goal, then along, then to its end; or
-so with one of the turns the other way round, where that turn is nearly half a turn."""
+"""Guesses without obstacles: the heading turns evenly; or to the goal, along, and to its end; or so with one
+of the turns the other way round, where that turn is nearly half a turn."""
 
 _HALF_TURN = np.radians(150.0)
 """Least turn for which the other way round is tried as well [rad]."""
@@ -75,12 +75,9 @@ def guess_path(
 
 
 def detours(
-    obstacles: Sequence[WalkObstacle],
-    times: Sequence[float],
-    walker: Walker,
-    start: FloatArray,
+    obstacles: Sequence[WalkObstacle], times: Sequence[float], walker: Walker, start: FloatArray,
     goal: FloatArray,
-) -> Iterator[list[FloatArray]]:
+) -> Iterator[list[FloatArray]]:  # fmt: skip
     """Ways around obstacles, each a list of places to pass in order [m].
 
     Of more than two obstacles, all are passed on the same side. ``times`` are the instants at which the
@@ -88,9 +85,8 @@ def detours(
     """
     along = (goal[:2] - start[:2]) / np.hypot(*(goal[:2] - start[:2]))
     left = np.array([-along[1], along[0]])
-    centres = [
-        item.corners.mean(axis=0) + item.displacement(t) for item, t in zip(obstacles, times, strict=True)
-    ]
+    pairs = zip(obstacles, times, strict=True)
+    centres = [item.corners.mean(axis=0) + item.displacement(t) for item, t in pairs]
     order = np.argsort([centre @ along for centre in centres])
     count = len(obstacles)
     resting = [item for item in obstacles if not item.moves]
@@ -128,11 +124,8 @@ class Grid:
 
     def __init__(self, obstacles: Sequence[WalkObstacle], start: FloatArray, goal: FloatArray) -> None:
         """Lay out the cells from the resting ones of the obstacles and (3,) x, y [m], heading [rad]."""
-        resting = [item for item in obstacles if not item.moves]
-        ends = np.vstack([start[:2], goal[:2]])
-        corners = [
-            item.corners + item.displacements[0] + sign * item.radius for item in resting for sign in (-1, 1)
-        ]
+        resting, ends = [item for item in obstacles if not item.moves], np.vstack([start[:2], goal[:2]])
+        corners = [x.corners + x.displacements[0] + sign * x.radius for x in resting for sign in (-1, 1)]
         points = np.vstack([ends, *corners])
         self._low, high = points.min(axis=0) - 1.0, points.max(axis=0) + 1.0
         self._cell = max(0.05, float((high - self._low).max()) / 160)
@@ -232,18 +225,15 @@ def walking_path(
 def _check(task: WalkingTask) -> None:
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
     if not NEAREST <= distance <= FARTHEST:
-        raise InputError(
-            f"walking goal is {distance:g} m from the start; valid: {NEAREST:g} to {FARTHEST:g} m"
-        )
+        valid = f"{NEAREST:g} to {FARTHEST:g} m"
+        raise InputError(f"walking goal is {distance:g} m from the start; valid: {valid}")
     resting = [item for item in task.obstacles if not item.moves]
     for name, place, obstacles in (("start", task.start, task.obstacles), ("goal", task.goal, resting)):
         distances = clearance(obstacles, task.walker, place[None], np.zeros(1))[0]
         for obstacle, left in zip(obstacles, distances, strict=True):
             if left < task.room:
-                raise InputError(
-                    f"walking {name} leaves {left:.3g} m to obstacle {obstacle.name!r}; "
-                    f"valid: at least {task.room:g} m"
-                )
+                room = f"{left:.3g} m to obstacle {obstacle.name!r}"
+                raise InputError(f"walking {name} leaves {room}; valid: at least {task.room:g} m")
 
 
 def _guesses(task: WalkingTask) -> Iterator[Guess]:
@@ -261,11 +251,14 @@ def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
     short = lacking(kept)
     if free.succeeded and np.all(short <= 0.0):
         return kept
-    # Ways over a grid depend on its axes: with those of the start, a scene elsewhere has the same ones.
+    # Ways over a grid depend on its axes: with those of the start, a scene elsewhere has the same ones. The
+    # places are rounded, so that they leave no trace of where the start is.
     x, y, heading = task.start.tolist()
     transform_start_to_world = PlanarTransform(x, y, math.degrees(heading))
     transform_world_to_start = transform_start_to_world.inverse
-    from_start = _from_start(task, transform_world_to_start)
+    goal = np.append(transform_world_to_start.points(task.goal[:2]), task.goal[2] - task.start[2])
+    moved = tuple(item.moved(transform_world_to_start, GRID) for item in task.obstacles)
+    from_start = replace(task, start=np.zeros(3), goal=goal.round(GOAL_GRID), obstacles=moved)
     blocking = [item for item, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]
     best = _on_ways(from_start, _in_frame(kept, from_start, transform_world_to_start, GRID), blocking)
     return _in_frame(best, task, transform_start_to_world)
@@ -283,24 +276,12 @@ def _on_ways(task: WalkingTask, free: WalkingPath, blocking: Sequence[WalkObstac
     return cheapest([solve(task, guess) for guess in guesses])
 
 
-def _from_start(task: WalkingTask, transform_world_to_start: PlanarTransform) -> WalkingTask:
-    """The task in the frame of its start, its places on a grid that leaves no trace of where that is."""
-    goal = transform_world_to_start.points(task.goal[:2])
-    return replace(
-        task,
-        start=np.zeros(3),
-        goal=np.append(goal, task.goal[2] - task.start[2]).round(GOAL_GRID),
-        obstacles=tuple(item.moved(transform_world_to_start, GRID) for item in task.obstacles),
-    )
-
-
 def _in_frame(
     path: WalkingPath, task: WalkingTask, transform: PlanarTransform, decimals: int | None = None
 ) -> WalkingPath:
     """A path in the frame of another task, whose places are moved by a transform."""
-    points = path.spline.control_points
+    points, duration = path.spline.control_points, path.duration
     moved = np.column_stack([transform.points(points[:, :2]), points[:, 2] + transform.yaw])
-    duration = path.duration
     if decimals is not None:
         moved, duration = moved.round(decimals), round(duration, decimals)
     spline = BSpline(path.spline.degree, path.spline.knots, moved)
@@ -332,8 +313,8 @@ def _detour_guesses(
     room = clearance(blocking, task.walker, free.place_at(times), times)
     nearest = [float(times[i]) for i in room.argmin(axis=0)]
     for number, via in enumerate(detours(blocking, nearest, task.walker, task.start, task.goal)):
-        way = guess_path(structure, "turning", task.start, task.goal, via)
-        yield Guess(f"detour {number}", way, 1.2 * free.duration)
+        points = guess_path(structure, "turning", task.start, task.goal, via)
+        yield Guess(f"detour {number}", points, 1.2 * free.duration)
     if any(item.moves for item in blocking):
         for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
             yield Guess(name, free.spline.control_points, factor * free.duration)

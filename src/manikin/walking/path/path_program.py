@@ -1,16 +1,14 @@
 """The nonlinear programme of a walking path, written once per structure; numbers are its parameters.
 
-x, y and heading are flat outputs of the unified model
-(:func:`manikin.walking.path.walking_model.body_motion`), so the programme has no dynamics: its unknowns are
-the inner control points of one spline through place and heading, over normalised time, and the logarithm of
-the end time. The ends of the spline hold start and goal exactly, the integrals of (5.6) are Gauss sums
-within each piece, and derivatives are exact. Without obstacles nothing is constrained. This transcription is
-our own; the thesis used another, unpublished one.
+x, y and heading are flat outputs of the model (:func:`manikin.walking.path.walking_model.body_motion`), so
+the programme has no dynamics: its unknowns are the inner control points of one spline through place and
+heading, over normalised time, and the logarithm of the end time. The ends of the spline hold start and goal
+exactly, the integrals of (5.6) are Gauss sums within each piece. This transcription is our own.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 from typing import Any
 
 import casadi as ca
@@ -72,12 +70,7 @@ class PathProgram:
     @cached_property
     def solver(self) -> ca.Function:
         """IPOPT on the programme."""
-        quiet = {
-            "print_time": False,
-            "error_on_fail": False,
-            "calc_lam_p": False,
-            "show_eval_warnings": False,
-        }
+        quiet = dict.fromkeys(("print_time", "error_on_fail", "calc_lam_p", "show_eval_warnings"), False)
         ipopt = {"print_level": 0, "sb": "yes", "tol": 1e-6, "max_iter": 100, "bound_relax_factor": 0.0}
         ipopt |= {"mu_strategy": "adaptive", "linear_solver": "mumps"}
         problem = {name: self.symbols[name] for name in ("x", "p", "f", "g")}
@@ -141,14 +134,12 @@ def transcribe(structure: PathStructure) -> PathProgram:
     objective = ca.dot(parameter("weights", 5), terms)
     rows = _obstacle_rows(structure, points, duration, parameter)
     if structure.limited_speed:
-        rows.append(_speed_rows(structure, points, duration, parameter("max_speed", 1)))
-    symbols = {
-        "x": ca.vertcat(ca.vec(inner), log_duration),
-        "p": ca.vertcat(*[ca.vec(p) for p in parameter.values()]),
-        "f": objective,
-        "g": ca.vertcat(*rows),
-        "terms": terms,
-    }
+        # Room below the speed limit, as a difference of squares over the limit [m/s].
+        limit = parameter("max_speed", 1)
+        rate = _basis(structure, structure.sample_shares, 1) @ points[:, :2] / duration
+        rows.append(limit - ca.sum2(rate**2) / limit)
+    unknowns, packed = ca.vertcat(ca.vec(inner), log_duration), ca.vertcat(*map(ca.vec, parameter.values()))
+    symbols = {"x": unknowns, "p": packed, "f": objective, "g": ca.vertcat(*rows), "terms": terms}
     shapes = tuple((name, p.shape) for name, p in parameter.items())
     return PathProgram(structure, symbols, shapes, tuple(row.numel() for row in rows))
 
@@ -191,10 +182,8 @@ def _obstacle_rows(
     offsets, room = parameter("offsets", structure.discs), parameter("room", len(structure.obstacles))
     rows = []
     for index, (corners, instants) in enumerate(structure.obstacles):
-        corner = parameter(f"corners{index}", corners, 2)
-        radius = parameter(f"radius{index}", 1)
-        times = parameter(f"times{index}", instants)
-        changes = parameter(f"changes{index}", instants, 2)
+        corner, radius = parameter(f"corners{index}", corners, 2), parameter(f"radius{index}", 1)
+        times, changes = parameter(f"times{index}", instants), parameter(f"changes{index}", instants, 2)
         moved = [
             sum(changes[k, i] * ca.fmax(time - times[k], 0.0) for k in range(instants)) for i in range(2)
         ]
@@ -216,16 +205,8 @@ def _distance(x: ca.SX, y: ca.SX, corners: ca.SX) -> ca.SX:
         along = ca.fmin(ca.fmax((dx * ex + dy * ey) / (ex**2 + ey**2), 0.0), 1.0)
         squares.append((dx - along * ex) ** 2 + (dy - along * ey) ** 2)
         depth.append((dx * ey - dy * ex) / ca.sqrt(ex**2 + ey**2))
-    outside, inside = squares[0], depth[0]
-    for square, plane in zip(squares[1:], depth[1:], strict=True):
-        outside, inside = ca.fmin(outside, square), ca.fmax(inside, plane)
+    outside, inside = reduce(ca.fmin, squares), reduce(ca.fmax, depth)
     return ca.if_else(inside < 0.0, inside, ca.sqrt(outside + 1e-12))
-
-
-def _speed_rows(structure: PathStructure, points: ca.SX, duration: ca.SX, limit: ca.SX) -> ca.SX:
-    """Room below the speed limit, as a difference of squares over the limit [m/s]."""
-    rate = _basis(structure, structure.sample_shares, 1) @ points[:, :2] / duration
-    return limit - ca.sum2(rate**2) / limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,14 +224,9 @@ def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
     It has 20 pieces up to 10 m and 40 beyond, times ``finer``.
     """
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
-    return transcribe(
-        PathStructure(
-            pieces=finer * (20 if distance <= 10.0 else 40),
-            obstacles=tuple((len(item.corners), len(item.times)) for item in task.obstacles),
-            discs=len(task.walker.offsets) if task.obstacles else 1,
-            limited_speed=task.max_speed is not None,
-        )
-    )
+    obstacles = tuple((len(item.corners), len(item.times)) for item in task.obstacles)
+    discs, pieces = len(task.walker.offsets) if obstacles else 1, finer * (20 if distance <= 10.0 else 40)
+    return transcribe(PathStructure(pieces, obstacles, discs, task.max_speed is not None))
 
 
 def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatArray) -> dict[str, Any]:
@@ -260,16 +236,12 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
     the limit [m/s].
     """
     values: dict[str, Any] = {
-        "start": task.start,
-        "goal": turned_goal,
-        "start_rate": to_world(task.start[2], task.start_velocity),
-        "goal_rate": to_world(task.goal[2], task.goal_velocity),
-        "fade": task.objective.goal_fade,
-        "weights": task.objective.weights,
-        "offsets": task.walker.offsets,
+        "start": task.start, "start_rate": to_world(task.start[2], task.start_velocity),
+        "goal": turned_goal, "goal_rate": to_world(task.goal[2], task.goal_velocity),
+        "fade": task.objective.goal_fade, "weights": task.objective.weights, "offsets": task.walker.offsets,
         "room": task.walker.depth / 2 + task.room + tightening[:-1],
         "max_speed": (task.max_speed or 0.0) - tightening[-1],
-    }
+    }  # fmt: skip
     for index, obstacle in enumerate(task.obstacles):
         values |= obstacle_parameters(index, obstacle)
     return values
@@ -278,8 +250,8 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
 def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
     """Optimise from one guess, again with more room where the path between the samples had too little.
 
-    The result is the last iterate, whose ``failure`` says if it is no solution. The number of pieces is
-    ``finer`` times the usual one; the guess has as many control points.
+    The result is the last iterate, whose ``failure`` says if it is no solution. The pieces, and the guess's
+    control points, are ``finer`` than usual.
     """
     programme = programme_of(task, finer)
     tightening = np.zeros(len(task.obstacles) + 1)
@@ -299,15 +271,18 @@ def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
         if failure is not None or np.all(short <= 0.5 * TOLERANCE):
             break
         tightening = tightening + 1.2 * np.maximum(short, 0.0) + 1e-5
-    return path if np.all(short <= TOLERANCE) else _refused(path, short)
+    if np.all(short <= TOLERANCE):
+        return path
+    worst = int(np.argmax(short))
+    reason = f"the speed limit is exceeded by {short[worst]:.3g} m/s"
+    if worst < len(task.obstacles):
+        name = task.obstacles[worst].name
+        reason = f"no way around obstacle {name!r} was found; the nearest attempt lacks {short[worst]:.3g} m"
+    return replace(path, failure=reason)
 
 
 def sharpened(path: WalkingPath) -> WalkingPath:
-    """The same path, or one of finer pieces if its cost is not what a denser sum says it is.
-
-    Pieces are too coarse where much happens on little of the way: goals a few centimetres away, long walks
-    whose goal term fades late, extreme weights.
-    """
+    """The same path, or one of finer pieces if its cost is not what a denser sum says it is."""
     for finer in (3, 9):
         dense = float(path.task.objective.weights @ path.term_integrals(600))
         if not path.succeeded or abs(dense / path.cost - 1.0) <= 1e-3:
@@ -322,8 +297,7 @@ def bent(path: WalkingPath, task: WalkingTask, finer: int = 1) -> tuple[FloatArr
     structure = programme_of(replace(task, obstacles=()), finer).structure
     share = np.linspace(0.0, 1.0, structure.pieces + 4)[:, None]
     points = path.spline.control_points
-    if len(points) != len(share):
-        points = path.spline(share[:, 0])
+    points = points if len(points) == len(share) else path.spline(share[:, 0])
     goal = task.goal.copy()
     goal[2] += 2.0 * np.pi * np.round((points[-1, 2] - goal[2]) / (2.0 * np.pi))
     moved = points + (1.0 - share) * (task.start - points[0]) + share * (goal - points[-1])
@@ -347,17 +321,6 @@ def lacking(path: WalkingPath) -> FloatArray:
 def cheapest(paths: Sequence[WalkingPath]) -> WalkingPath:
     """The cheapest of those that are solutions, or else the one that is nearest to a solution."""
     solutions = [path for path in paths if path.succeeded]
-    if solutions:
-        best = min(solutions, key=lambda path: path.cost)
-    else:
-        best = min(paths, key=lambda path: lacking(path).max())
+    best = min(solutions, key=lambda path: path.cost, default=None)
+    best = best or min(paths, key=lambda path: lacking(path).max())
     return replace(best, others={path.guess: path.cost for path in solutions})
-
-
-def _refused(path: WalkingPath, short: FloatArray) -> WalkingPath:
-    worst = int(np.argmax(short))
-    if worst == len(path.task.obstacles):
-        return replace(path, failure=f"the speed limit is exceeded by {short[worst]:.3g} m/s")
-    name = path.task.obstacles[worst].name
-    reason = f"no way around obstacle {name!r} was found; the nearest attempt lacks {short[worst]:.3g} m"
-    return replace(path, failure=reason)

@@ -4,7 +4,6 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,11 +22,11 @@ SMALLEST = 1e-6
 
 
 def spot_turn(task: WalkingTask) -> WalkingPath:
-    """Turn from rest to rest, the shorter way round.
+    """Turn from rest to rest, the shorter way round; obstacles are not considered.
 
     Without a way to go the criterion ([Truong2010]_ 5.6) is ``a0 T + a3 int u_angular^2``. The cheapest turn
     by ``D`` in the time ``T`` is the cubic ``D (3 s^2 - 2 s^3)``, for ``12 D^2 / T^3``, so that ``T^4 = 36 a3
-    D^2 / a0``. The task's goal is its start but for the heading; obstacles are not considered.
+    D^2 / a0``.
     """
     turn = float(np.angle(np.exp(1j * (task.goal[2] - task.start[2]))))
     weights = task.objective
@@ -62,10 +61,8 @@ class Waypoint:
         finite_number(self.speed, "waypoint speed [m/s]", at_least=0.0)
         finite_number(self.wait, "waypoint wait [s]", at_least=0.0)
         if self.speed > 0.0 and self.wait > 0.0:
-            raise InputError(
-                f"waypoint is passed with {self.speed:g} m/s and has a wait of {self.wait:g} s; "
-                "valid: one of them"
-            )
+            both = f"is passed with {self.speed:g} m/s and has a wait of {self.wait:g} s"
+            raise InputError(f"waypoint {both}; valid: one of them")
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +154,7 @@ def walking_route(
 ) -> WalkRoute:  # fmt: skip
     """Walk past waypoints: a path from each to the next, or a turn on the spot where only headings differ.
 
-    The thesis predefines such routes (6.7.1); here each leg is found by the criterion, between the velocities
-    at its ends. Legs are found one after the other, so that a leg does not pay for the one after it.
+    The thesis predefines such routes (6.7.1); here legs are found one after the other by the criterion.
 
     Args:
         start: (3,) x, y [m], heading [rad]; at rest.
@@ -204,19 +200,20 @@ def walking_route(
         apart = float(np.hypot(*(waypoint.place - place)[:2]))
         turn = abs(float(np.angle(np.exp(1j * (waypoint.place[2] - place[2])))))
         if apart >= NEAREST:
-            leg = _walked(
-                where, place, waypoint.place, objective, obstacles=still, walker=walker,
-                room=room - max(lack, 0.0) if legs else room,
-                max_speed=max_speed, start_velocity=velocity, goal_velocity=goal_velocity,
-            )  # fmt: skip
+            try:
+                leg = walking_path(
+                    place, waypoint.place, objective, obstacles=still, walker=walker,
+                    room=room - max(lack, 0.0) if legs else room,
+                    max_speed=max_speed, start_velocity=velocity, goal_velocity=goal_velocity,
+                )  # fmt: skip
+            except InputError as error:
+                raise InputError(str(error).replace("walking goal", where)) from None
         elif np.any(velocity != 0.0) or turn < SMALLEST:
             raise InputError(f"{where} is where the walker already is; valid: {NEAREST:g} m away, or a turn")
         else:
-            task = WalkingTask(
-                place, np.append(place[:2], waypoint.place[2]), objective, tuple(still), walker, room,
-                max_speed, velocity, goal_velocity,
-            )  # fmt: skip
-            leg = spot_turn(task)
+            goal = np.append(place[:2], waypoint.place[2])
+            given = tuple(still), walker, room, max_speed, velocity, goal_velocity
+            leg = spot_turn(WalkingTask(place, goal, objective, *given))
         legs.append(leg)
         if not leg.succeeded:
             break
@@ -227,24 +224,15 @@ def walking_route(
     return replace(route, blocked=_blocked(route, obstacles, walker, room)) if route.succeeded else route
 
 
-def _walked(
-    where: str, start: FloatArray, goal: FloatArray, objective: WalkObjective, **options: Any
-) -> WalkingPath:
-    """A walking path whose error messages name its waypoint."""
-    try:
-        return walking_path(start, goal, objective, **options)
-    except InputError as error:
-        raise InputError(str(error).replace("walking goal", where)) from None
-
-
 def _blocked(route: WalkRoute, obstacles: Sequence[WalkObstacle], walker: Walker, room: float) -> str | None:
     """Which obstacle first comes too near on the whole route and, as long as anything moves, after it."""
     end = max([route.duration, *(float(item.times[-1]) for item in obstacles if item.moves)])
     time = np.linspace(0.0, end, int(np.ceil(end / SAMPLING)) + 1)
     left = clearance(obstacles, walker, route.place_at(time), time)
-    if not np.any(left < room - OVERLOOKED):
+    near = np.any(left < room - OVERLOOKED, axis=1)
+    if not near.any():
         return None
-    first = int(np.argmax(np.any(left < room - OVERLOOKED, axis=1)))
+    first = int(np.argmax(near))
     nearest = int(left[first].argmin())
     return (
         f"obstacle {obstacles[nearest].name!r} comes within {left[first, nearest]:.3g} m "
@@ -267,7 +255,5 @@ def _later(obstacle: WalkObstacle, clock: float) -> WalkObstacle:
     """An obstacle as it moves after an instant."""
     if not obstacle.moves:
         return obstacle
-    return WalkObstacle(
-        obstacle.name, obstacle.corners, obstacle.radius, times=obstacle.times - clock,
-        displacements=obstacle.displacements,
-    )  # fmt: skip
+    track = {"times": obstacle.times - clock, "displacements": obstacle.displacements}
+    return WalkObstacle(obstacle.name, obstacle.corners, obstacle.radius, **track)

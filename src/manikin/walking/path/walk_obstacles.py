@@ -17,8 +17,6 @@ from manikin.scene import Capsule, Cylinder, HalfSpace, Obstacle, Plane, Scene, 
 class Walker:
     """The walker seen from above: three discs side by side, one in the middle and one under each shoulder.
 
-    Turned sideways, it passes gaps that are too narrow for its shoulders.
-
     Attributes:
         depth: Diameter of the discs [m].
         width: From the left edge to the right edge [m], at least the depth.
@@ -62,26 +60,17 @@ class WalkObstacle:
     displacements: FloatArray
 
     def __init__(
-        self,
-        name: str,
-        corners: ArrayLike,
-        radius: float = 0.0,
-        *,
-        times: ArrayLike = (0.0,),
+        self, name: str, corners: ArrayLike, radius: float = 0.0, *, times: ArrayLike = (0.0,),
         displacements: ArrayLike = ((0.0, 0.0),),
-    ) -> None:
+    ) -> None:  # fmt: skip
         where = f"obstacle {name!r}"
         instants = frozen_array(times, f"{where} times [s]", (None,))
         moved = frozen_array(displacements, f"{where} displacements [m]", (len(instants), 2))
         if len(instants) == 0 or np.any(np.diff(instants) <= 0):
             raise InputError(f"{where} times are {instants.tolist()}; valid: at least one, increasing")
-        vars(self).update(
-            name=name,
-            corners=_convex(frozen_array(corners, f"{where} corners [m]", (None, 2)), where),
-            radius=finite_number(radius, f"{where} radius [m]", at_least=0.0),
-            times=instants,
-            displacements=moved,
-        )
+        hull = _convex(frozen_array(corners, f"{where} corners [m]", (None, 2)), where)
+        size = finite_number(radius, f"{where} radius [m]", at_least=0.0)
+        vars(self).update(name=name, corners=hull, radius=size, times=instants, displacements=moved)
 
     @classmethod
     def disc(cls, name: str, centre: ArrayLike, radius: float) -> Self:
@@ -103,13 +92,9 @@ class WalkObstacle:
 
         Its first corner is that of least x, and of least y among those.
         """
-        moved = type(self)(
-            self.name,
-            transform.points(self.corners).round(decimals),
-            self.radius,
-            times=self.times,
-            displacements=transform.directions(self.displacements).round(decimals),
-        )
+        corners = transform.points(self.corners).round(decimals)
+        displacements = transform.directions(self.displacements).round(decimals)
+        moved = type(self)(self.name, corners, self.radius, times=self.times, displacements=displacements)
         first = int(np.lexsort(moved.corners.T[::-1])[0])
         object.__setattr__(moved, "corners", frozen_array(np.roll(moved.corners, -first, axis=0), "corners"))
         return moved
@@ -170,9 +155,8 @@ def _convex(corners: FloatArray, where: str) -> FloatArray:
     try:
         hull = ConvexHull(corners)
     except (QhullError, ValueError):
-        raise InputError(
-            f"{where} has {len(corners)} corners without area; valid: one, or a polygon"
-        ) from None
+        message = f"{where} has {len(corners)} corners without area; valid: one, or a polygon"
+        raise InputError(message) from None
     return frozen_array(corners[hull.vertices], where)
 
 
@@ -184,14 +168,10 @@ CORNERS = 12
 
 
 def floor_plan(scene: Scene, height: float) -> tuple[WalkObstacle, ...]:
-    """Discs and convex polygons that a body of a height has to walk around.
+    """Discs and convex polygons that a body of a height [m] has to walk around, on a level floor.
 
     Each is the convex hull of an obstacle seen from above, even where only a part of the obstacle is in the
     way. What hangs above the head and what lies flat on the floor are left out.
-
-    Args:
-        scene: Scene with a level floor.
-        height: Height of the body [m].
 
     Raises:
         InputError: If the scene has no floor, or an endless obstacle other than a level one below it.

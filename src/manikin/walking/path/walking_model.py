@@ -24,11 +24,10 @@ TERMS = ("time", "forward", "lateral", "angular", "goal")
 class WalkObjective:
     """``T + a1 int u_forward^2 + a2 int u_lateral^2 + a3 int u_angular^2 + a4 int w(r) psi^2`` (5.6).
 
-    ``psi`` is the direction of the goal from the body's heading, in (-pi, pi] (5.7). At the goal it has no
-    value, and the thesis does not say what it does there. Here it fades with the distance ``r`` of the goal
-    as ``w = r^2 / (r^2 + goal_fade^2)``. The default lets the direction go within the radius in which the
-    thesis' subjects stepped sideways without turning (4.6, Fig. 4.23); a fade of a few centimetres gives the
-    criterion as it is printed, under which a goal half a metre aside is approached in an arc.
+    ``psi`` is the direction of the goal from the body's heading, in (-pi, pi] (5.7), which at the goal has no
+    value. Here it fades with the distance ``r`` of the goal as ``w = r^2 / (r^2 + goal_fade^2)``, by default
+    within the radius in which the thesis' subjects stepped sideways without turning (4.6, Fig. 4.23); a fade
+    of a few centimetres gives the criterion as it is printed.
 
     The defaults are the numbers of (5.8) in the order of the text of 5.5.1: lateral accelerations cost about
     1.5 times what forward ones do, angular ones less. Read literally, (5.5) and (5.8) swap the two:
@@ -78,8 +77,7 @@ RECORDED_WALKS = WalkObjective(forward=4.4, lateral=2.7, angular=0.82, goal=1.2)
 RECORDED_TURNS = WalkObjective(forward=2.8, lateral=0.58, angular=0.63, goal=1.1)
 """Identified from the 15 of them in which somebody turns a corner, so that heading and way part; ours.
 
-With these weights most walks to goals 1 to 3 m away begin and end holonomically, as those of the thesis'
-subjects do (4.5); with the printed ones few do (``docs/patterns.md``)."""
+With these weights most walks to goals 1 to 3 m away begin and end holonomically, as in the thesis (4.5)."""
 
 
 def goal_direction(place: FloatArray, goal: FloatArray) -> FloatArray:
@@ -94,9 +92,7 @@ def cost_rates(
 ) -> FloatArray:
     """(n, 5) integrands of the terms without their weights, on the way to a goal (3,).
 
-    Args:
-        place: (n, 3) x, y [m], heading [rad].
-        acceleration: (n, 3) forward, left [m/s^2], angular [rad/s^2].
+    Places are (n, 3) x, y [m], heading [rad], accelerations (n, 3) forward, left [m/s^2], angular [rad/s^2].
     """
     square = np.sum((goal[:2] - place[:, :2]) ** 2, axis=1)
     faded = square / (square + objective.goal_fade**2) * goal_direction(place, goal) ** 2
@@ -112,8 +108,7 @@ def experiment_targets() -> FloatArray:
 
     The thesis states 106 targets at 32 places of [-3, 3] x [-1, 1] m, 16 on either side, with headings out
     of eight from 0 to 7 pi/4; which ones is in a drawing only. Here the places are 0.5, 1, 2 and 3 m to
-    either side and -1, 0, 0.5 and 1 m ahead, mirrored, with three or four of the headings at each, so that
-    every heading and its mirror image occur.
+    either side and -1, 0, 0.5 and 1 m ahead, with three or four of the headings at each.
 
     Returns:
         (106, 3) x, y [m], heading [rad], in [0, 2 pi).
@@ -142,16 +137,13 @@ def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
 
 
 def runge_kutta(
-    derivative: Callable[[FloatArray, FloatArray], FloatArray],
-    state: FloatArray,
-    controls: FloatArray,
+    derivative: Callable[[FloatArray, FloatArray], FloatArray], state: FloatArray, controls: FloatArray,
     step: float | FloatArray,
-) -> FloatArray:
-    """(n + 1, ...) states after every step by the classical rule of fourth order.
+) -> FloatArray:  # fmt: skip
+    """(n + 1, ...) states after every step by the classical rule of fourth order, from a state (...).
 
     Args:
         derivative: Rate of a state under a control.
-        state: (...) at the start.
         controls: (2 n + 1, ...) at the ends and the middle of every step.
         step: Length of a step, a number or of a shape that multiplies states.
     """
@@ -168,27 +160,23 @@ def runge_kutta(
 
 def to_world(heading: ArrayLike, velocity: ArrayLike) -> FloatArray:
     """(..., 3) rates of x, y and heading of (..., 3) forward, left and angular velocity."""
-    v = _last(velocity, 3, "body velocity")
+    ahead, left, turn = np.moveaxis(_last(velocity, 3, "body velocity"), -1, 0)
     cos, sin = np.cos(heading), np.sin(heading)
-    return np.stack(
-        [cos * v[..., 0] - sin * v[..., 1], sin * v[..., 0] + cos * v[..., 1], v[..., 2]], axis=-1
-    )
+    return np.stack([cos * ahead - sin * left, sin * ahead + cos * left, turn], axis=-1)
 
 
 def to_body(heading: ArrayLike, rate: ArrayLike) -> FloatArray:
     """(..., 3) forward, left and angular velocity of (..., 3) rates of x, y and heading."""
-    v = _last(rate, 3, "rate of the place")
+    x, y, turn = np.moveaxis(_last(rate, 3, "rate of the place"), -1, 0)
     cos, sin = np.cos(heading), np.sin(heading)
-    return np.stack(
-        [cos * v[..., 0] + sin * v[..., 1], cos * v[..., 1] - sin * v[..., 0], v[..., 2]], axis=-1
-    )
+    return np.stack([cos * x + sin * y, cos * y - sin * x, turn], axis=-1)
 
 
 def body_motion(place: ArrayLike, rate: ArrayLike, second: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """(..., 3) velocities and (..., 3) accelerations that move the body along a given path.
 
-    x, y and heading (..., 3) as functions of time, with their first and second derivatives, are flat outputs
-    of the model: its other states and its controls follow from them, for any twice differentiable path.
+    x, y and heading (..., 3) with their first and second derivatives are flat outputs of the model: its other
+    states and its controls follow from them.
     """
     heading = _last(place, 3, "place")[..., 2]
     velocity, acceleration = to_body(heading, rate), to_body(heading, second)

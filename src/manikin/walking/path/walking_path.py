@@ -190,10 +190,7 @@ class WalkingPath(SampledWalk):
 
     @property
     def holonomic(self) -> NDArray[np.bool_]:
-        """(n,) whether the body goes elsewhere than ahead, by 15 degrees or more ([Truong2010]_ 4.2.1).
-
-        The thesis looks at both shoulders of recordings; this, at the angle between heading and motion.
-        """
+        """(n,) whether heading and motion are 15 degrees or more apart ([Truong2010]_ 4.2.1)."""
         return np.abs(self.deviation) >= HOLONOMIC_ANGLE
 
     def place_at(self, time: ArrayLike) -> FloatArray:
@@ -202,9 +199,9 @@ class WalkingPath(SampledWalk):
 
     def motion_at(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """(..., 3) velocities and (..., 3) accelerations of the body at (...) times within the walk [s]."""
-        share = np.asarray(time, dtype=np.float64) / self.duration
-        rate, second = self.spline(share, 1) / self.duration, self.spline(share, 2) / self.duration**2
-        return body_motion(self.spline(share), rate, second)
+        share, duration = np.asarray(time, dtype=np.float64) / self.duration, self.duration
+        place, rate, second = (self.spline(share, order) for order in range(3))
+        return body_motion(place, rate / duration, second / duration**2)
 
     def term_integrals(self, intervals: int = _DENSE) -> FloatArray:
         """(5,) integrals of the terms without their weights, by Simpson's rule over evenly many intervals."""
@@ -236,11 +233,9 @@ class WalkingPath(SampledWalk):
 
     def _integrated(self) -> FloatArray:
         """(n, 6) states of the model (5.5) from the start, by Runge and Kutta's rule between the instants."""
-        step = (self.time[1] - self.time[0]) / 4
         halves = np.linspace(0.0, self.duration, 8 * (len(self.time) - 1) + 1)
-        control = self.motion_at(halves)[1]
-        state = np.concatenate([self.task.start, self.task.start_velocity])
-        return runge_kutta(state_derivative, state, control, step)[::4]
+        state, step = np.append(self.task.start, self.task.start_velocity), (self.time[1] - self.time[0]) / 4
+        return runge_kutta(state_derivative, state, self.motion_at(halves)[1], step)[::4]
 
     @cached_property
     def _dense(self) -> "_Dense":
