@@ -62,8 +62,8 @@ class Shape:
             raise BodyError(f"{where} size is {dimensions.tolist()}; valid: metres > 0")
         centre = frozen_array(translation, f"{where} translation", (3,), BodyError)
         turn = check_rotation(np.eye(3) if rotation is None else rotation, f"{where} rotation", BodyError)
-        for field_, value in zip(fields(self), (name, shape_kind, dimensions, centre, turn), strict=True):
-            object.__setattr__(self, field_.name, value)
+        for item, value in zip(fields(self), (name, shape_kind, dimensions, centre, turn), strict=True):
+            object.__setattr__(self, item.name, value)
 
     def distance_to(self, point: FloatArray) -> float:
         """Distance of a point (3,) of the segment frame to the shape, 0 inside [m]."""
