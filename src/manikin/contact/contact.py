@@ -319,7 +319,7 @@ def grasp(
 
 
 def rolling_front(contact: Contact, radius: float) -> Contact:
-    """The front edge of a whole sole, of a radius [m] > 0, on which it rolls; ContactError for another one."""
+    """The front edge of a whole sole, of a radius [m] > 0, on which it rolls; ContactError for any other."""
     if contact.kind is not ContactKind.SOLE or contact.part is not SolePart.FULL or contact.hangs_over:
         raise ContactError(f"front of '{contact.effector}' is taken from what is no whole sole")
     name = f"sole '{contact.effector}' edge radius [m]"

@@ -49,7 +49,7 @@ class Stance(Displayed):
         self, contacts: Sequence[Contact], normal_force_cap: float | None = None,
         friction_model: FrictionModel = "outer", *, model: ContactModel | None = None,
     ) -> None:  # fmt: skip
-        """Make a stance of one contact per effector, else ContactError, with a contact model or its values."""
+        """Make a stance of one contact per effector (ContactError) with a contact model or its two values."""
         for item in contacts:
             if not isinstance(item, Contact):
                 raise ContactError(f"stance contains {item!r}; valid: contacts made by sole, point or grasp")
