@@ -29,7 +29,7 @@ Our choices, for want of one table that fits the others:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from types import MappingProxyType
 
@@ -38,16 +38,10 @@ import numpy as np
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, finite_number
 
-STATURE_RANGE = (1.40, 2.10)
-"""Accepted stature [m]."""
-MASS_RANGE = (35.0, 160.0)
-"""Accepted body mass [kg]."""
-BODY_MASS_INDEX_RANGE = (10.0, 60.0)
-"""Accepted mass / stature^2 [kg/m^2]."""
-SOLE_LENGTH_RANGE = (0.15, 0.40)
-"""Accepted sole length [m]."""
-SOLE_WIDTH_RANGE = (0.05, 0.16)
-"""Accepted sole width [m]."""
+STATURE_RANGE, SOLE_LENGTH_RANGE, SOLE_WIDTH_RANGE = (1.40, 2.10), (0.15, 0.40), (0.05, 0.16)
+"""Accepted stature and size of the soles [m]."""
+MASS_RANGE, BODY_MASS_INDEX_RANGE = (35.0, 160.0), (10.0, 60.0)
+"""Accepted body mass [kg] and mass / stature^2 [kg/m^2]."""
 
 ANKLE_HEIGHT = 0.043
 """Ankle joint above the sole, per stature."""
@@ -67,13 +61,8 @@ HIP_JOINT_DISTANCE = 0.100
 """Distance of the hip joint centres, per stature."""
 
 MEASURED_LENGTHS: Mapping[str, tuple[float, float]] = MappingProxyType({
-    "hips": (0.04, 0.40),
-    "thigh": (0.20, 0.70),
-    "shank": (0.20, 0.70),
-    "trunk": (0.25, 0.80),
-    "shoulders": (0.15, 0.60),
-    "upper_arm": (0.12, 0.50),
-    "forearm": (0.12, 0.50),
+    "hips": (0.04, 0.40), "thigh": (0.20, 0.70), "shank": (0.20, 0.70), "trunk": (0.25, 0.80),
+    "shoulders": (0.15, 0.60), "upper_arm": (0.12, 0.50), "forearm": (0.12, 0.50),
 })  # fmt: skip
 """Lengths between joint centres that may be given instead of scaled, and what is accepted [m].
 
@@ -97,8 +86,7 @@ class SegmentParameters:
         mass: Fraction of the body mass.
         length: [m] for the mean stature of the sample.
         com: Distance of the centre of mass from the first-named landmark, per length.
-        radii: Radii of gyration about the sagittal (fore-aft), transverse (left-right)
-            and longitudinal axes of the anatomical position, per length.
+        radii: Of gyration about the sagittal (fore-aft), transverse and longitudinal axes, per length.
     """
 
     mass: float
@@ -190,12 +178,11 @@ class Anthropometry:
             )
         length = 0.16 * height if sole_length is None else sole_length
         width = 0.12 / 1.75 * height if sole_width is None else sole_width
-        object.__setattr__(self, "stature", height)
-        object.__setattr__(self, "mass", weight)
-        object.__setattr__(self, "sex", Sex(sex))
-        object.__setattr__(self, "sole_length", _within(length, "body sole_length [m]", SOLE_LENGTH_RANGE))
-        object.__setattr__(self, "sole_width", _within(width, "body sole_width [m]", SOLE_WIDTH_RANGE))
-        object.__setattr__(self, "lengths", _measured(lengths or {}))
+        length = _within(length, "body sole_length [m]", SOLE_LENGTH_RANGE)
+        width = _within(width, "body sole_width [m]", SOLE_WIDTH_RANGE)
+        values = (height, weight, Sex(sex), length, width, _measured(lengths or {}))
+        for item, value in zip(fields(self), values, strict=True):
+            object.__setattr__(self, item.name, value)
 
     @property
     def table(self) -> dict[str, SegmentParameters]:

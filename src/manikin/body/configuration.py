@@ -18,25 +18,19 @@ _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 class Configuration:
     """The state ``(q, v)`` of a body, with everything computed at most once per update.
 
-    Velocities of points and frames, Jacobians and momenta are in world axes; ``v`` itself has
-    the root's linear and angular velocity in the root segment's axes. Returned arrays are
-    read-only and stay valid after the next update.
+    Velocities of points and frames, Jacobians and momenta are in world axes; ``v`` itself has the root's in
+    the root segment's axes. Returned arrays are read-only and stay valid after the next update.
     """
 
     def __init__(self, body: BodyModel, q: ArrayLike | None = None, v: ArrayLike | None = None) -> None:
         self.body = body
-        model = body.pinocchio
-        self._frames = model.createData()
+        self._frames = body.pinocchio.createData()
         self._results: dict[Any, Any] = {}
         self._zero = np.zeros(body.nv)
         self.update(body.standing_posture() if q is None else q, v)
 
     def update(self, q: ArrayLike, v: ArrayLike | None = None) -> Self:
-        """Move to another configuration (nq,) and velocity (nv,), zero when left out.
-
-        Raises:
-            BodyError: If a vector has another length.
-        """
+        """Move to ``q`` (nq,) and ``v`` (nv,), zero when left out; BodyError if a length is wrong."""
         self.q = _vector(q, self.body.nq, "q")
         self.v = _vector(self._zero if v is None else v, self.body.nv, "v")
         self._results.clear()
@@ -50,15 +44,10 @@ class Configuration:
         return self.body.pinocchio.createData()
 
     def _once(self, key: Any, compute: Callable[[], Any]) -> Any:
-        try:
-            return self._results[key]
-        except KeyError:
+        if key not in self._results:
             result = compute()
-            if isinstance(result, np.ndarray):
-                result = np.array(result)
-                result.setflags(write=False)
-            self._results[key] = result
-            return result
+            self._results[key] = _read_only(result) if isinstance(result, np.ndarray) else result
+        return self._results[key]
 
     @property
     def com(self) -> FloatArray:
@@ -115,7 +104,11 @@ class Configuration:
         return jacobian[:3] + np.cross(jacobian[3:], arm, axisa=0, axisb=0, axisc=0)
 
     def _placement(self, frame: int) -> tuple[FloatArray, FloatArray]:
-        return self._once(("placement", frame), lambda: _read_only_placement(self._frames.oMf[frame]))
+        def compute() -> tuple[FloatArray, FloatArray]:
+            place = self._frames.oMf[frame]
+            return _read_only(place.rotation), _read_only(place.translation)
+
+        return self._once(("placement", frame), compute)
 
     def _jacobian(self, frame: int) -> FloatArray:
         model = self.body.pinocchio
@@ -130,23 +123,19 @@ class Configuration:
         return self._once("mass_matrix", self._compute_mass_matrix)
 
     def _compute_mass_matrix(self) -> FloatArray:
-        model, data = self.body.pinocchio, self._dynamics
-        upper = np.triu(pin.crba(model, data, self.q, pin.Convention.WORLD))
+        upper = np.triu(pin.crba(self.body.pinocchio, self._dynamics, self.q, pin.Convention.WORLD))
         return upper + np.triu(upper, 1).T
 
     @property
     def nonlinear_effects(self) -> FloatArray:
         """(nv,) ``h``: Coriolis, centrifugal and gravity forces [N, N.m]."""
-        model = self.body.pinocchio
-        return self._once(
-            "nonlinear_effects", lambda: pin.nonLinearEffects(model, self._dynamics, self.q, self.v)
-        )
+        state = self.body.pinocchio, self._dynamics, self.q, self.v
+        return self._once("nonlinear_effects", lambda: pin.nonLinearEffects(*state))
 
 
 def integrate(body: BodyModel, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> FloatArray:
     """(nq,) configuration reached from ``q`` with the constant velocity ``v`` during ``dt`` [s]."""
-    step = dt * _vector(v, body.nv, "v")
-    return pin.integrate(body.pinocchio, _vector(q, body.nq, "q"), step)
+    return pin.integrate(body.pinocchio, _vector(q, body.nq, "q"), dt * _vector(v, body.nv, "v"))
 
 
 def difference(body: BodyModel, start: ArrayLike, end: ArrayLike) -> FloatArray:
@@ -175,8 +164,7 @@ def _vector(value: ArrayLike, size: int, name: str) -> FloatArray:
     return array
 
 
-def _read_only_placement(placement: Any) -> tuple[FloatArray, FloatArray]:
-    rotation, position = np.array(placement.rotation), np.array(placement.translation)
-    rotation.setflags(write=False)
-    position.setflags(write=False)
-    return rotation, position
+def _read_only(values: FloatArray) -> FloatArray:
+    copy = np.array(values)
+    copy.setflags(write=False)
+    return copy

@@ -1,9 +1,8 @@
 """Creatures of any shape from robot descriptions, with limbs that are named ([Tonneau2015]_ 4.3.1).
 
-A robot description has no limbs; the caller names where they end. Its frames may be turned any way; ours
-are all parallel to the root's in the zero posture, so that axes, inertias and shapes are turned. Links on
-fixed joints become part of what they are fixed to. A chain of massless links at one point becomes
-one segment with several hinges.
+A robot description has no limbs; the caller names where they end. Its frames may be turned any way; ours are
+all parallel to the root's in the zero posture. Links on fixed joints become part of what they are fixed to. A
+chain of massless links at one point becomes one segment with several hinges.
 """
 
 from collections.abc import Mapping
@@ -79,15 +78,12 @@ def creature_from_urdf(
     effectors = {spec.tip: tree.effector(name, spec) for name, spec in specs.items()}
     if len(effectors) != len(specs):
         raise BodyError(f"{path}: two limbs have the same tip; valid: one limb per link")
+    angles = _standing(tree.segments, standing or {})
+    chains = tuple(tree.limb(name, spec) for name, spec in specs.items())
     body = BodyModel(
-        name=robot.name,
-        segments=tree.segments,
-        effectors=effectors,
-        standing_angles=_standing(tree.segments, standing or {}),
-        sole_length=sole_length,
-        sole_width=sole_width,
-        limbs=tuple(tree.limb(name, spec) for name, spec in specs.items()),
-    )
+        robot.name, tree.segments, effectors, angles, sole_length=sole_length, sole_width=sole_width,
+        limbs=chains,
+    )  # fmt: skip
     upright = [spec.tip for spec in specs.values() if spec.normal is None]
     return _with_soft_pairs(_with_mirrors(_with_upright(body, upright)))
 
@@ -142,43 +138,33 @@ class _SegmentTree:
     """Segments of a robot, and where its links went."""
 
     def __init__(self, robot: Urdf, where: str) -> None:
-        self.robot = robot
-        self.where = where
+        self.robot, self.where = robot, where
         self.members: dict[str, _Member] = {}
         for name in robot.links:
             self.members[name] = self._member(name)
-        hinges = {name: self._hinges(name) for name in self._heads()}
+        heads = [name for name, member in self.members.items() if member.segment == name]
+        hinges = {name: self._hinges(name) for name in heads}
         above = {name: joint.parent for name, joint in robot.joints.items()}
-        parents = {
-            name: self.members[above[name]].segment if name in above else None for name in self._heads()
-        }
+        parents = {name: self.members[above[name]].segment if name in above else None for name in heads}
         self._fold(hinges, parents)
-        self.folded = {name for name in self._heads() if name not in hinges}
+        self.folded = {name for name in heads if name not in hinges}
         self.segments = tuple(self._segment(name, parents[name], hinges[name]) for name in hinges)
-
-    def _heads(self) -> list[str]:
-        """Links that begin a segment."""
-        return [name for name, member in self.members.items() if member.segment == name]
 
     def _member(self, name: str) -> _Member:
         joint = self.robot.joints.get(name)
         if joint is None:
             return _Member(name, np.eye(3), np.zeros(3))
         above = self.members[joint.parent]
-        return _Member(
-            above.segment if joint.kind == "fixed" else name,
-            above.rotation @ joint.rotation,
-            above.place + above.rotation @ joint.translation,
-        )
+        segment = above.segment if joint.kind == "fixed" else name
+        place = above.place + above.rotation @ joint.translation
+        return _Member(segment, above.rotation @ joint.rotation, place)
 
     def _hinges(self, name: str) -> tuple[Hinge, ...]:
         joint: UrdfJoint | None = self.robot.joints.get(name)
         if joint is None:
             return ()
-        axis = _tidy(self.members[name].rotation @ joint.axis)
-        return (
-            Hinge(joint.name, axis, joint.lower, joint.upper, joint.velocity, -joint.effort, joint.effort),
-        )
+        axis, effort = _tidy(self.members[name].rotation @ joint.axis), joint.effort
+        return (Hinge(joint.name, axis, joint.lower, joint.upper, joint.velocity, -effort, effort),)
 
     def _fold(self, hinges: dict[str, tuple[Hinge, ...]], parents: dict[str, str | None]) -> None:
         """Give the hinges of massless segments to their only child at the same place."""
@@ -203,10 +189,8 @@ class _SegmentTree:
         return np.zeros(3) if parent is None else _tidy(self.members[name].place - self.members[parent].place)
 
     def _segment(self, name: str, parent: str | None, hinges: tuple[Hinge, ...]) -> Segment:
-        mass, com, inertia = self._inertia(name)
-        return Segment(
-            name, parent, self._origin(name, parent), hinges, mass, com, inertia, tuple(self._shapes(name))
-        )
+        origin, shapes = self._origin(name, parent), tuple(self._shapes(name))
+        return Segment(name, parent, origin, hinges, *self._inertia(name), shapes)
 
     def _inertia(self, segment: str) -> tuple[float, FloatArray, FloatArray]:
         """Mass, centre and inertia about it of all links of a segment, in its frame."""
@@ -278,16 +262,14 @@ class _SegmentTree:
 
 def _standing(segments: tuple[Segment, ...], wanted: Mapping[str, float]) -> dict[str, float]:
     """Angles within the ranges; those not wanted as near to 0 as they can be."""
-    hinges = {hinge.name: hinge for segment in segments for hinge in segment.hinges}
-    angles = {name: float(np.clip(0.0, hinge.lower, hinge.upper)) for name, hinge in hinges.items()}
+    hinges = {hinge.name: (hinge.lower, hinge.upper) for segment in segments for hinge in segment.hinges}
+    angles = {name: float(np.clip(0.0, *ends)) for name, ends in hinges.items()}
     for name, angle in wanted.items():
         if name not in hinges:
             raise BodyError(f"standing angle of {name!r}; valid: one of {list(hinges)}")
-        hinge = hinges[name]
-        if not hinge.lower <= angle <= hinge.upper:
-            raise BodyError(
-                f"standing angle of {name!r} is {angle:g} rad; valid: {hinge.lower:g} to {hinge.upper:g}"
-            )
+        lower, upper = hinges[name]
+        if not lower <= angle <= upper:
+            raise BodyError(f"standing angle of {name!r} is {angle:g} rad; valid: {lower:g} to {upper:g}")
         angles[name] = float(angle)
     return {name: angle for name, angle in angles.items() if angle != 0.0}
 

@@ -51,12 +51,7 @@ def point_mass(mass: float) -> BodyModel:
 
 @dataclass(frozen=True)
 class PartSize:
-    """One row of [Kudoh2002]_ Table 3.1.
-
-    Attributes:
-        mass: [kg].
-        length: [m].
-    """
+    """One row of [Kudoh2002]_ Table 3.1: mass [kg] and length [m]."""
 
     mass: float
     length: float
@@ -64,7 +59,7 @@ class PartSize:
     @property
     def radius(self) -> float:
         """Radius of the cylinder of the density of water [m]; ours."""
-        return float(np.sqrt(self.mass / (DENSITY * np.pi * self.length)))
+        return float(np.sqrt(self.mass / (1000.0 * np.pi * self.length)))
 
     @property
     def inertia(self) -> FloatArray:
@@ -72,19 +67,10 @@ class PartSize:
         return cylinder_inertia(self.mass, self.radius, self.length)
 
 
-DENSITY = 1000.0
-"""Density of the cylinders [kg/m^3]; ours."""
-
 PARTS: Mapping[str, PartSize] = MappingProxyType({
-    "head": PartSize(4.90, 0.25),
-    "chest": PartSize(18.06, 0.40),
-    "loins": PartSize(12.04, 0.20),
-    "upper_arm": PartSize(2.52, 0.25),
-    "forearm": PartSize(1.54, 0.25),
-    "hand": PartSize(0.49, 0.10),
-    "thigh": PartSize(7.98, 0.40),
-    "shank": PartSize(3.71, 0.40),
-    "foot": PartSize(1.26, 0.25),
+    "head": PartSize(4.90, 0.25), "chest": PartSize(18.06, 0.40), "loins": PartSize(12.04, 0.20),
+    "upper_arm": PartSize(2.52, 0.25), "forearm": PartSize(1.54, 0.25), "hand": PartSize(0.49, 0.10),
+    "thigh": PartSize(7.98, 0.40), "shank": PartSize(3.71, 0.40), "foot": PartSize(1.26, 0.25),
 })  # fmt: skip
 """Mass and length of each rigid part, limbs of one side ([Kudoh2002]_ Table 3.1)."""
 
@@ -104,7 +90,6 @@ _ARMS = ("upper_arm", "forearm", "hand")
 _LEGS = ("thigh", "shank", "foot")
 _SIDES = (("left", 1.0), ("right", -1.0))
 
-
 TORQUES: Mapping[str, float] = MappingProxyType({
     "lumbar_flexion": 350, "lumbar_side_bend": 250, "lumbar_rotation": 150,
     "thorax_flexion": 250, "thorax_side_bend": 180, "thorax_rotation": 120,
@@ -123,10 +108,9 @@ TORQUES_FOR = 79.0 * 1.75
 def kudoh() -> BodyModel:
     """Make the body of [Kudoh2002]_: 15 segments, 34 joint angles and the free loins, 70 kg.
 
-    Neck, waist, shoulders, wrists, hips and ankles are balls of three hinges, elbows and knees pins.
-    Frames, postures and effectors are those of :func:`manikin.body.human`: the loins' frame lies midway
-    between the hip joints and every other one in its proximal joint, and effectors are ``left_foot``,
-    ``right_foot``, ``left_hand``, ``right_hand``, ``head`` and ``pelvis`` (the loins).
+    Neck, waist, shoulders, wrists, hips and ankles are balls of three hinges, elbows and knees pins. Frames,
+    postures and effectors (feet, hands, ``head`` and ``pelvis``, the loins) are as in
+    :func:`manikin.body.human`.
     """
     limbs = [part for make in (_arm, _leg) for side, sign in _SIDES for part in make(side, sign)]
     return BodyModel(
@@ -200,19 +184,14 @@ def _upright(
 
 def _arm(side: str, sign: float) -> list[Segment]:
     shoulder = np.array([0.0, 0.5 * sign * SHOULDER_WIDTH, PARTS["chest"].length])
-    return [
-        _hanging(side, "upper_arm", "chest", shoulder),
-        _hanging(side, "forearm", f"{side}_upper_arm", _below("upper_arm")),
-        _hanging(side, "hand", f"{side}_forearm", _below("forearm")),
-    ]
+    upper = _hanging(side, "upper_arm", "chest", shoulder)
+    fore = _hanging(side, "forearm", f"{side}_upper_arm", _below("upper_arm"))
+    return [upper, fore, _hanging(side, "hand", f"{side}_forearm", _below("forearm"))]
 
 
 def _leg(side: str, sign: float) -> list[Segment]:
-    return [
-        _hanging(side, "thigh", "loins", np.array([0.0, 0.5 * sign * HIP_WIDTH, 0.0])),
-        _hanging(side, "shank", f"{side}_thigh", _below("thigh")),
-        _foot(side),
-    ]
+    thigh = _hanging(side, "thigh", "loins", np.array([0.0, 0.5 * sign * HIP_WIDTH, 0.0]))
+    return [thigh, _hanging(side, "shank", f"{side}_thigh", _below("thigh")), _foot(side)]
 
 
 def _below(name: str) -> FloatArray:
@@ -226,10 +205,8 @@ def _hanging(side: str, name: str, parent: str, origin: FloatArray) -> Segment:
     radius = min(part.radius, 0.49 * part.length)
     start = -radius if name == "hand" else 0.0
     shape = upright_capsule(name, radius, start, radius - part.length)
-    com = 0.5 * _below(name)
-    return Segment(
-        f"{side}_{name}", parent, origin, _joint(name, side), part.mass, com, part.inertia, (shape,)
-    )
+    hinges, com = _joint(name, side), 0.5 * _below(name)
+    return Segment(f"{side}_{name}", parent, origin, hinges, part.mass, com, part.inertia, (shape,))
 
 
 def _foot(side: str) -> Segment:
@@ -239,9 +216,8 @@ def _foot(side: str) -> Segment:
     box = np.array([part.length, SOLE_WIDTH, 0.75 * ANKLE_HEIGHT])
     sole = Shape("sole", ShapeKind.BOX, box, (middle[0], 0.0, 0.5 * box[2] - ANKLE_HEIGHT))
     inertia, hinges = ALONG_X @ part.inertia @ ALONG_X.T, _joint("foot", side)
-    return Segment(
-        f"{side}_foot", f"{side}_shank", _below("shank"), hinges, part.mass, middle, inertia, (sole,)
-    )
+    name, parent = f"{side}_foot", f"{side}_shank"
+    return Segment(name, parent, _below("shank"), hinges, part.mass, middle, inertia, (sole,))
 
 
 def _effectors() -> list[Effector]:

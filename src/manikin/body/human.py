@@ -45,17 +45,17 @@ _SOFT_PAIRS = (
 
 _ARM_SPREAD = np.deg2rad(14.0)
 
+_SIDES = (("left", 1.0), ("right", -1.0))
+
+# Shares of the stature; our choice.
 SEAT_DEPTH = 0.07
-"""Depth of the pressed buttocks below the hip joints, as a share of the stature; our choice."""
-
+"""Depth of the pressed buttocks below the hip joints."""
 SEAT_LENGTH = 0.08
-"""Length, back to front, of the patch that presses on a seat, as a share of the stature."""
-
+"""Length, back to front, of the patch that presses on a seat."""
 BUTTOCK_RADIUS = 0.027
-"""Radius of the buttocks' lines and of their ends, on which a leaning body rolls, likewise; our choice."""
-
+"""Radius of the buttocks' lines and of their ends, on which a leaning body rolls."""
 SEAT_WIDTH = 0.14
-"""Distance between the two lines that press on a seat, as a share of the stature."""
+"""Distance between the two lines that press on a seat."""
 
 FRONT_OF_KNEE = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 """Rotation from the knee's effector to the lower leg."""
@@ -76,30 +76,27 @@ def human(
 ) -> BodyModel:  # fmt: skip
     """Make a human body of 19 segments and 45 degrees of freedom ([Qiu2012]_ Table 2.1, B.1).
 
-    The free pelvis carries the legs and the spine (lumbar, thorax, neck, 3 hinges each; the
-    head is rigid on the neck). Shoulders and hips have 3 hinges, elbows, wrists, knees and
-    ankles 2, toes 1. Proportions and inertias: :mod:`manikin.body.anthropometry`; axes, ranges
-    and speeds: :mod:`manikin.body.human_parts`; strengths: :mod:`manikin.body.strength`.
+    The free pelvis carries the legs and the spine (lumbar, thorax, neck, 3 hinges each; the head is rigid on
+    the neck). Shoulders and hips have 3 hinges, elbows, wrists, knees and ankles 2, toes 1. Proportions and
+    inertias: :mod:`manikin.body.anthropometry`; axes, ranges and speeds: :mod:`manikin.body.human_parts`;
+    strengths: :mod:`manikin.body.strength`.
 
-    In the zero posture the body stands upright with hanging arms, palms inward, and all
-    segment frames parallel to the world. A segment's frame lies in its proximal joint, the
-    pelvis' midway between the hip joints, the lumbar's and thorax' at the height of navel and
-    xiphoid (the borders of de Leva's trunk parts), the neck's at C7.
+    In the zero posture the body stands upright with hanging arms, palms inward, and all segment frames
+    parallel to the world. A segment's frame lies in its proximal joint, the pelvis' midway between the hip
+    joints, the lumbar's and thorax' at the height of navel and xiphoid (the borders of de Leva's trunk
+    parts), the neck's at C7.
 
-    Effectors: ``left_foot``, ``right_foot`` (sole centre, x to the toes, z up),
-    ``left_hand``, ``right_hand`` (palm centre, x along the fingers, z out of the back of the
-    hand: parallel to the world when the palm lies on a table, fingers forward),
-    ``left_fist``, ``right_fist`` (end of the hand, z to the wrist),
-    ``left_knee``, ``right_knee`` (before the thigh's round end, z through the joint, backwards),
-    ``head`` (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on
-    a seat, axes as the pelvis).
+    Effectors: ``left_foot``, ``right_foot`` (sole centre, x to the toes, z up), ``left_hand``, ``right_hand``
+    (palm centre, x along the fingers, z out of the back of the hand: parallel to the world when the palm lies
+    on a table, fingers forward), ``left_fist``, ``right_fist`` (end of the hand, z to the wrist),
+    ``left_knee``, ``right_knee`` (before the thigh's round end, z through the joint, backwards), ``head``
+    (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on a seat, axes as the
+    pelvis). Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``; knees, elbows and the pelvis too
+    with :func:`manikin.body.limbs.with_further_contacts`.
 
-    Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``; knees, elbows and the pelvis too with
-    :func:`manikin.body.limbs.with_further_contacts`.
-
-    Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all
-    other breadths and girths are our choice. They scale with stature and (within 12 %) with the
-    square root of the body mass index, so that limbs standing side by side stay 2 cm apart.
+    Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all other
+    breadths and girths are our choice. They scale with stature and (within 12 %) with the square root of the
+    body mass index, so that limbs standing side by side stay 2 cm apart.
 
     Args:
         stature: Sole to vertex [m], 1.40 to 2.10.
@@ -122,31 +119,17 @@ def human(
     finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
     finite_number(strength, "strength", above=0.0, error=BodyError)
     builder = _HumanBuilder(size, off_axis_masses, age, strength)
+    effectors = {effector.name: effector for effector in builder.effectors()}
     return BodyModel(
-        name="human",
-        segments=builder.segments(),
-        effectors={effector.name: effector for effector in builder.effectors()},
-        standing_angles=standing_angles(),
-        soft_pairs=_soft_pairs(),
-        stature=size.stature,
-        sex=str(size.sex),
-        sole_length=size.sole_length,
-        sole_width=size.sole_width,
-        nominal_mass=size.mass,
-        limbs=arms_and_legs(("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot")),
-        age=age,
-        strength=strength,
-        lengths=size.lengths,
-        off_axis_masses=off_axis_masses,
-    )
+        "human", builder.segments(), effectors, standing_angles(), _soft_pairs(), size.stature, str(size.sex),
+        size.sole_length, size.sole_width, nominal_mass=size.mass,
+        limbs=arms_and_legs(("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot")), age=age,
+        strength=strength, lengths=size.lengths, off_axis_masses=off_axis_masses,
+    )  # fmt: skip
 
 
 def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
-    """Make the body that :meth:`BodyModel.signature` described.
-
-    Raises:
-        BodyError: If the model is unknown or a value is missing or out of its range.
-    """
+    """Make the body that :meth:`BodyModel.signature` described; BodyError if a value is missing or wrong."""
     model = signature.get("model")
     if model != "human":
         raise BodyError(f"body model is {model!r}; valid: human")
@@ -154,14 +137,14 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
     missing = [key for key in wanted if key not in signature]
     if missing:
         raise BodyError(f"body signature has no {missing[0]!r}; valid: {', '.join(wanted)}")
-    values: dict[str, Any] = {key: signature[key] for key in wanted}
+    given = (*wanted, "age", "strength")
+    values: dict[str, Any] = {key: signature[key] for key in given if key in signature}
     measured: dict[str, Any] = {
         name: signature[f"{name}_length"] for name in MEASURED_LENGTHS if f"{name}_length" in signature
     }
     masses = signature.get("masses")
     if masses not in (None, OFF_AXIS):
         raise BodyError(f"body masses are {masses!r}; valid: {OFF_AXIS}, or none")
-    values |= {key: signature[key] for key in ("age", "strength") if key in signature}
     body = human(**values, lengths=measured, off_axis_masses=masses == OFF_AXIS)
     for hand, effectors in HANDS.items():
         load = signature.get(f"{effectors[0]}_load")
@@ -173,7 +156,6 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
 def standing_angles() -> dict[str, float]:
     """Angles [rad]; the arms hang 14 degrees away from the trunk, straight to the side."""
     angles = {name: float(np.deg2rad(value)) for name, value in _STANDING_DEG.items()}
-    # Direction of the arm on the oblique shoulder axes of range_of_motion.
     arm = np.array([0.0, np.sin(_ARM_SPREAD), -np.cos(_ARM_SPREAD)])
     lift, spread = (np.array(entry.axis) for entry in HUMAN_HINGES["upper_arm"][:2])
     angles["shoulder_flexion"] = float(np.arctan2(arm @ spread, -arm[2]))
@@ -218,16 +200,16 @@ class _HumanBuilder:
         self.stature, self.girth = size.stature, size.girth
         self._seat_x = -0.017 * self.stature  # the buttocks' middle, behind the hip joints
         self._hand_thickness = 0.016 * self.stature
+        self._thigh_radius, self._shank_radius = (k * self.stature * self.girth for k in (0.038, 0.029))
         # Height of the shoulder joints above the thorax' origin.
         self._shoulder_in_thorax = (
             size.shoulder_height - size.length("lower_trunk") - size.length("middle_trunk")
         )
 
     def segments(self) -> tuple[Segment, ...]:
-        trunk = [self._pelvis(), self._lumbar(), self._thorax(), *self._neck_and_head()]
-        arms = [part for side in ("left", "right") for part in self._arm(side)]
-        legs = [part for side in ("left", "right") for part in self._leg(side)]
-        return (*trunk, *arms, *legs)
+        arms = [part for side, sign in _SIDES for part in self._arm(side, sign)]
+        legs = [part for side, sign in _SIDES for part in self._leg(side, sign)]
+        return (*self._trunk(), *self._neck_and_head(), *arms, *legs)
 
     def effectors(self) -> list[Effector]:
         size = self.size
@@ -237,139 +219,104 @@ class _HumanBuilder:
             Effector("head", "head", np.array([0.0, 0.0, head_length])),
             Effector("buttocks", "pelvis", np.array([self._seat_x, 0.0, -SEAT_DEPTH * self.stature])),
         ]
-        for side, sign in (("left", 1.0), ("right", -1.0)):
+        for side, sign in _SIDES:
             sole = np.array([(0.5 - ANKLE_FROM_HEEL) * size.sole_length, 0.0, -size.ankle_height])
-            effectors.append(Effector(f"{side}_foot", f"{side}_foot", sole))
             palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
-            effectors.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
             fist = np.array([0.0, 0.0, -size.length("hand") - SKIN])
-            effectors.append(Effector(f"{side}_fist", f"{side}_hand", fist))
-            knee = np.array([self._leg_radii[0] + SKIN, 0.0, 0.0])
-            effectors.append(Effector(f"{side}_knee", f"{side}_leg", knee, FRONT_OF_KNEE))
+            knee = np.array([self._thigh_radius + SKIN, 0.0, 0.0])
+            effectors += [
+                Effector(f"{side}_foot", f"{side}_foot", sole),
+                Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)),
+                Effector(f"{side}_fist", f"{side}_hand", fist),
+                Effector(f"{side}_knee", f"{side}_leg", knee, FRONT_OF_KNEE),
+            ]
         return effectors
-
-    @property
-    def _leg_radii(self) -> tuple[float, float]:
-        """Radii of thigh and shank [m]."""
-        return 0.038 * self.stature * self.girth, 0.029 * self.stature * self.girth
 
     def _strength(self, hinge: str) -> tuple[float, float]:
         size = self.size
         against, along = hinge_strength(hinge, size.mass, size.stature, str(size.sex), self.age)
         return self.strength * against, self.strength * along
 
-    def _pelvis(self) -> Segment:
-        length = self.size.length("lower_trunk")
-        hips = across("hips", 0.060 * self.stature, 0.191 * self.stature * self.girth, 0.35 * length)
-        return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (hips, *self._buttocks()))
-
-    def _buttocks(self) -> tuple[Shape, Shape]:
-        """Two short capsules from back to front; their lowest lines are what a seat carries."""
-        radius, half = BUTTOCK_RADIUS * self.stature, 0.5 * SEAT_LENGTH * self.stature
-        height, aside = radius - SEAT_DEPTH * self.stature, 0.5 * SEAT_WIDTH * self.stature
-        left, right = (
+    def _trunk(self) -> tuple[Segment, ...]:
+        """Pelvis, lumbar spine and thorax."""
+        stature, girth, shoulders = self.stature, self.girth, self.size.shoulder_distance
+        lower, middle, upper = (self.size.length(f"{part}_trunk") for part in ("lower", "middle", "upper"))
+        hips = across("hips", 0.060 * stature, 0.191 * stature * girth, 0.35 * lower)
+        waist = across("waist", 0.058 * stature, 0.77 * shoulders * girth, 0.5 * middle)
+        chest = across("chest", 0.062 * stature, 0.80 * shoulders * girth, 0.4 * upper)
+        girdle = across("shoulders", 0.035 * stature, shoulders, self._shoulder_in_thorax)
+        # Two short capsules from back to front; their lowest lines are what a seat carries.
+        radius, half = BUTTOCK_RADIUS * stature, 0.5 * SEAT_LENGTH * stature
+        height, aside = radius - SEAT_DEPTH * stature, 0.5 * SEAT_WIDTH * stature
+        buttocks = [
             Shape(
                 f"{side}_buttock", ShapeKind.CAPSULE, (radius, 2 * half),
                 (self._seat_x, sign * aside, height), ALONG_X,
             )
-            for side, sign in (("left", 1.0), ("right", -1.0))
-        )  # fmt: skip
-        return left, right
-
-    def _lumbar(self) -> Segment:
-        length, border = self.size.length("middle_trunk"), self.size.length("lower_trunk")
-        breadth = 0.77 * self.size.shoulder_distance * self.girth
-        waist = across("waist", 0.058 * self.stature, breadth, 0.5 * length)
-        return self._trunk_segment("lumbar", "pelvis", "middle_trunk", border, (waist,))
-
-    def _thorax(self) -> Segment:
-        size = self.size
-        length, border = size.length("upper_trunk"), size.length("middle_trunk")
-        breadth = 0.80 * size.shoulder_distance * self.girth
-        chest = across("chest", 0.062 * self.stature, breadth, 0.4 * length)
-        girdle = across("shoulders", 0.035 * self.stature, size.shoulder_distance, self._shoulder_in_thorax)
-        return self._trunk_segment("thorax", "lumbar", "upper_trunk", border, (chest, girdle))
+            for side, sign in _SIDES
+        ]  # fmt: skip
+        return (
+            self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (hips, *buttocks)),
+            self._trunk_segment("lumbar", "pelvis", "middle_trunk", lower, (waist,)),
+            self._trunk_segment("thorax", "lumbar", "upper_trunk", middle, (chest, girdle)),
+        )
 
     def _trunk_segment(
         self, name: str, parent: str | None, row: str, height: float, shapes: tuple[Shape, ...]
     ) -> Segment:
         """Trunk part whose origin is its lower border; the table measures from the upper one."""
-        size = self.size
+        size, origin = self.size, np.array([0.0, 0.0, height])
         com = self._com(row, size.length(row) - size.com_from_start(row))
         hinges = human_hinges(name, "", self._strength) if parent else ()
-        origin = np.array([0.0, 0.0, height])
-        return Segment(
-            name, parent, origin, hinges, size.segment_mass(row), com, np.diag(size.moments(row)), shapes
-        )
+        inertia = np.diag(size.moments(row))
+        return Segment(name, parent, origin, hinges, size.segment_mass(row), com, inertia, shapes)
 
     def _neck_and_head(self) -> tuple[Segment, Segment]:
-        size, length = self.size, self.size.length("head_and_neck")
+        """Neck; head with a skull reaching up to the vertex and a jaw below it."""
+        row, size, stature = "head_and_neck", self.size, self.stature
+        length, moments = size.length(row), np.diag(size.moments(row))
         neck_length = NECK_LENGTH_SHARE * length
-        both = _Inertia(
-            size.segment_mass("head_and_neck"),
-            self._com("head_and_neck", length - size.com_from_start("head_and_neck")),
-            np.diag(size.moments("head_and_neck")),
-        )
+        both = _Inertia(size.segment_mass(row), self._com(row, length - size.com_from_start(row)), moments)
         neck_mass = NECK_MASS_SHARE * both.mass
-        neck_moments = cylinder_inertia(neck_mass, NECK_RADIUS * self.stature, neck_length)
-        neck = _Inertia(neck_mass, self._com("head_and_neck", 0.5 * neck_length), neck_moments)
+        neck_moments = cylinder_inertia(neck_mass, NECK_RADIUS * stature, neck_length)
+        neck = _Inertia(neck_mass, self._com(row, 0.5 * neck_length), neck_moments)
         head = both.without(neck)
+        base, top = np.array([0.0, 0.0, size.length("upper_trunk")]), np.array([0.0, 0.0, neck_length])
         hinges = human_hinges("neck", "", self._strength)
-        base = np.array([0.0, 0.0, size.length("upper_trunk")])
-        top = np.array([0.0, 0.0, neck_length])
-        radius = 0.034 * self.stature
-        shape = upright_capsule("neck", radius, 0.0, neck_length)
-        return (
-            Segment("neck", "thorax", base, hinges, neck.mass, neck.com, neck.moments, (shape,)),
-            Segment(
-                "head", "neck", top, (), head.mass, head.com - top, head.moments,
-                self._head_shapes(length - neck_length),
-            ),
-        )  # fmt: skip
-
-    def _head_shapes(self, vertex: float) -> tuple[Shape, ...]:
-        """Skull reaching up to the vertex and jaw below it; head breadth and length, bare."""
-        radius = 0.044 * self.stature
-        half = 0.0125 * self.stature
-        skull = Shape("skull", ShapeKind.CAPSULE, (radius, 2 * half), (half, 0.0, vertex - radius), ALONG_X)
-        jaw_radius = 0.036 * self.stature
+        throat = upright_capsule("neck", NECK_RADIUS * stature, 0.0, neck_length)
+        radius, half, jaw_radius = 0.044 * stature, 0.0125 * stature, 0.036 * stature
+        middle = (half, 0.0, length - neck_length - radius)
+        skull = Shape("skull", ShapeKind.CAPSULE, (radius, 2 * half), middle, ALONG_X)
         jaw = Shape("jaw", ShapeKind.SPHERE, (jaw_radius,), (0.75 * jaw_radius, 0.0, 0.45 * jaw_radius))
-        return skull, jaw
+        return (
+            Segment("neck", "thorax", base, hinges, neck.mass, neck.com, neck.moments, (throat,)),
+            Segment("head", "neck", top, (), head.mass, head.com - top, head.moments, (skull, jaw)),
+        )
 
-    def _arm(self, side: str) -> list[Segment]:
-        size = self.size
-        sign = 1.0 if side == "left" else -1.0
+    def _arm(self, side: str, sign: float) -> list[Segment]:
+        size, stature = self.size, self.stature
         shoulder = (0.0, 0.5 * sign * size.shoulder_distance, self._shoulder_in_thorax)
         upper, lower, hand = (size.length(row) for row in ("upper_arm", "forearm", "hand"))
-        radius = 0.025 * self.stature * self.girth
+        radius = 0.025 * stature * self.girth
+        upper_shape = upright_capsule("arm", radius, 0.0, -upper)
+        lower_shape = upright_capsule("arm", 0.8 * radius, 0.0, -lower)
+        extents = (0.048 * stature, self._hand_thickness, hand)
+        palm = Shape("palm", ShapeKind.BOX, extents, (0.0, 0.0, -0.5 * hand))
+        elbow, wrist = (0.0, 0.0, -upper), (0.0, 0.0, -lower)
         return [
-            self._limb(
-                side, "upper_arm", "thorax", "upper_arm", shoulder,
-                (upright_capsule("arm", radius, 0.0, -upper),),
-            ),
-            self._limb(
-                side, "forearm", f"{side}_upper_arm", "forearm", (0.0, 0.0, -upper),
-                (upright_capsule("arm", 0.8 * radius, 0.0, -lower),), sideways=True,
-            ),
-            self._limb(
-                side, "hand", f"{side}_forearm", "hand", (0.0, 0.0, -lower),
-                (Shape("palm", ShapeKind.BOX, (0.048 * self.stature, self._hand_thickness, hand),
-                       (0.0, 0.0, -0.5 * hand)),),
-                sideways=True,
-            ),
-        ]  # fmt: skip
+            self._limb(side, "upper_arm", "thorax", "upper_arm", shoulder, upper_shape),
+            self._limb(side, "forearm", f"{side}_upper_arm", "forearm", elbow, lower_shape, sideways=True),
+            self._limb(side, "hand", f"{side}_forearm", "hand", wrist, palm, sideways=True),
+        ]
 
-    def _leg(self, side: str) -> list[Segment]:
-        size = self.size
-        thigh_radius, shank_radius = self._leg_radii
-        sign = 1.0 if side == "left" else -1.0
-        thigh, shank = size.length("thigh"), size.length("shank")
-        hip = (0.0, 0.5 * sign * size.hip_distance, 0.0)
-        thigh_shape = upright_capsule("thigh", thigh_radius, 0.0, -thigh)
-        shank_shape = upright_capsule("shank", shank_radius, 0.0, 0.012 * self.stature - shank)
+    def _leg(self, side: str, sign: float) -> list[Segment]:
+        thigh, shank = self.size.length("thigh"), self.size.length("shank")
+        hip, knee = (0.0, 0.5 * sign * self.size.hip_distance, 0.0), (0.0, 0.0, -thigh)
+        thigh_shape = upright_capsule("thigh", self._thigh_radius, 0.0, -thigh)
+        shank_shape = upright_capsule("shank", self._shank_radius, 0.0, 0.012 * self.stature - shank)
         return [
-            self._limb(side, "thigh", "pelvis", "thigh", hip, (thigh_shape,)),
-            self._limb(side, "leg", f"{side}_thigh", "shank", (0.0, 0.0, -thigh), (shank_shape,)),
+            self._limb(side, "thigh", "pelvis", "thigh", hip, thigh_shape),
+            self._limb(side, "leg", f"{side}_thigh", "shank", knee, shank_shape),
             *self._foot_and_toes(side, (0.0, 0.0, -shank)),
         ]
 
@@ -393,24 +340,23 @@ class _HumanBuilder:
         toes = _Inertia(toe_mass, toe_com, cuboid_inertia(toe_mass, toe_extents))
         foot = both.without(toes)
 
-        toe_box = np.array([tip - hinge_x, size.sole_width, toe_height])
         toe_centre = (0.5 * (tip - hinge_x), 0.0, 0.0)
-        foot_box = np.array([hinge_x - heel, size.sole_width, foot_height])
+        toe_box = Shape("sole", ShapeKind.BOX, (tip - hinge_x, size.sole_width, toe_height), toe_centre)
         foot_centre = (0.5 * (heel + hinge_x), 0.0, 0.5 * foot_height - size.ankle_height)
+        foot_box = Shape("sole", ShapeKind.BOX, (hinge_x - heel, size.sole_width, foot_height), foot_centre)
         return [
             Segment(
                 f"{side}_foot", f"{side}_leg", np.array(ankle), human_hinges("foot", side, self._strength),
-                foot.mass, foot.com, foot.moments, (Shape("sole", ShapeKind.BOX, foot_box, foot_centre),),
+                foot.mass, foot.com, foot.moments, (foot_box,),
             ),
             Segment(
                 f"{side}_toes", f"{side}_foot", hinge, human_hinges("toes", side, self._strength),
-                toes.mass, toe_com - hinge, toes.moments,
-                (Shape("sole", ShapeKind.BOX, toe_box, toe_centre),),
+                toes.mass, toe_com - hinge, toes.moments, (toe_box,),
             ),
         ]  # fmt: skip
 
     def _limb(
-        self, side: str, name: str, parent: str, row: str, origin: ArrayLike, shapes: tuple[Shape, ...],
+        self, side: str, name: str, parent: str, row: str, origin: ArrayLike, shape: Shape,
         sideways: bool = False,
     ) -> Segment:  # fmt: skip
         """Limb part hanging down from its joint; ``sideways``, the table's fore-aft axis is our y."""
@@ -420,7 +366,7 @@ class _HumanBuilder:
         return Segment(
             f"{side}_{name}", parent, np.array(origin), human_hinges(name, side, self._strength),
             size.segment_mass(row), self._com(row, -size.com_from_start(row), side),
-            np.diag([x, y, longitudinal]), shapes,
+            np.diag([x, y, longitudinal]), (shape,),
         )  # fmt: skip
 
     def _com(self, row: str, height: float, side: str = "") -> FloatArray:

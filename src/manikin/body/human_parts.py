@@ -1,12 +1,12 @@
 """Shapes, inertias, axes, ranges and limbs that the parts of human bodies have in common.
 
-De Leva's table places each segment's mass on the line from joint to joint. Tables measured in three
-dimensions have the masses of thighs, shanks, trunk and head a little behind that line, which moves the
-centre of mass of the whole body back by a good centimetre. Source of these offsets: Dumas, Chèze and
-Verriest, "Adjustments to McConville et al. and Young et al. body segment inertial parameters", J. Biomech.
-40(3), 2007, Table 2, the anterior and lateral parts only. Arms, hands and feet have none: theirs move the
-body by less than a millimetre. The reference lines of the trunk end at the lumbosacral joint and at C7/T1,
-ours at the hips and at C7; the pelvis, whose offset is given from the lumbosacral joint alone, has none.
+De Leva's table places each segment's mass on the line from joint to joint. Measured in three dimensions, the
+masses of thighs, shanks, trunk and head are a little behind that line, which moves the centre of mass of the
+whole body back by a good centimetre. Source of these offsets: Dumas, Chèze and Verriest, "Adjustments to
+McConville et al. and Young et al. body segment inertial parameters", J. Biomech. 40(3), 2007, Table 2, the
+anterior and lateral parts only. Arms, hands and feet have none: theirs move the body by less than a
+millimetre. The reference lines of the trunk end at the lumbosacral joint and at C7/T1, ours at the hips and
+at C7; the pelvis, whose offset is given from the lumbosacral joint alone, has none.
 
 Ranges follow the normal values of the American Academy of Orthopaedic Surgeons ("Joint Motion: Method of
 Measuring and Recording", 1965), Boone and Azen (J. Bone Joint Surg. 61-A, 1979) and, for the spine, Kapandji
@@ -20,9 +20,8 @@ the middle angle of every ball joint away from 90 degrees:
 
 * hip, neck and spine: flexion, then abduction or side bend, then rotation;
 * shoulder: the same, but the axes of flexion and abduction are turned by 30 degrees about the vertical:
-  positive flexion lifts the arm forward and 30 degrees outward (near the plane of the scapula), and abduction
-  then moves it sideways and backwards. The two directions in which the first and the third axis coincide are
-  then sideways-backwards and across the chest, at the ends of the reach.
+  positive flexion lifts the arm forward and 30 degrees outward (near the plane of the scapula). The first and
+  the third axis then coincide sideways-backwards and across the chest, at the ends of the reach.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,37 +35,19 @@ from manikin.body.segments import Hinge, Limb, Shape, ShapeKind
 from manikin.contact import ContactKind
 from manikin.numerics.spatial import FloatArray
 
-
-@dataclass(frozen=True)
-class Offset:
-    """Offset of a centre of mass from the line between the joints of its segment.
-
-    Attributes:
-        forward: Per length of the segment.
-        outward: To the side away from the body's middle, per length; 0 in the trunk.
-    """
-
-    forward: float
-    outward: float = 0.0
-
-
 TORSO_LENGTH = {Sex.FEMALE: 0.429 / 1.61, Sex.MALE: 0.477 / 1.77}
 """Lumbosacral joint to C7/T1 in the sample, per stature."""
 
 HEAD_LENGTH = {Sex.FEMALE: 0.243 / 1.61, Sex.MALE: 0.277 / 1.77}
 """C7/T1 to vertex, per stature."""
 
-OFFSETS: Mapping[Sex, Mapping[str, Offset]] = MappingProxyType({
-    Sex.FEMALE: MappingProxyType({
-        "torso": Offset(-0.016), "head_and_neck": Offset(-0.070),
-        "thigh": Offset(-0.077, 0.009), "shank": Offset(-0.049, 0.031),
-    }),
-    Sex.MALE: MappingProxyType({
-        "torso": Offset(-0.036), "head_and_neck": Offset(-0.062),
-        "thigh": Offset(-0.041, 0.033), "shank": Offset(-0.048, 0.007),
-    }),
+OFFSETS: Mapping[Sex, Mapping[str, tuple[float, float]]] = MappingProxyType({
+    Sex.FEMALE: {"torso": (-0.016, 0.0), "head_and_neck": (-0.070, 0.0),
+                 "thigh": (-0.077, 0.009), "shank": (-0.049, 0.031)},
+    Sex.MALE: {"torso": (-0.036, 0.0), "head_and_neck": (-0.062, 0.0),
+               "thigh": (-0.041, 0.033), "shank": (-0.048, 0.007)},
 })  # fmt: skip
-"""Dumas et al. (2007), Table 2."""
+"""Forward and away from the body's middle, per length of the segment: Dumas et al. (2007), Table 2."""
 
 _TRUNK = ("middle_trunk", "upper_trunk")
 
@@ -79,16 +60,13 @@ def off_axis(size: Anthropometry, name: str, side: str = "") -> FloatArray:
         side: ``"left"`` or ``"right"`` of a limb, empty for the trunk.
     """
     row = "torso" if name in _TRUNK else name
-    offset = OFFSETS[size.sex].get(row)
-    if offset is None:
+    if row not in OFFSETS[size.sex]:
         return np.zeros(3)
+    forward, outward = OFFSETS[size.sex][row]
     sign = {"left": 1.0, "right": -1.0, "": 0.0}[side]
-    lengths = {
-        "torso": TORSO_LENGTH[size.sex] * size.stature,
-        "head_and_neck": HEAD_LENGTH[size.sex] * size.stature,
-    }
-    length = lengths.get(row) or size.length(row)
-    return length * np.array([offset.forward, sign * offset.outward, 0.0])
+    per_stature = {"torso": TORSO_LENGTH, "head_and_neck": HEAD_LENGTH}.get(row)
+    length = size.length(row) if per_stature is None else per_stature[size.sex] * size.stature
+    return length * np.array([forward, sign * outward, 0.0])
 
 
 HingeStrength = Callable[[str], tuple[float, float]]
@@ -125,49 +103,31 @@ class HingeRange:
 
 
 HUMAN_HINGES: dict[str, tuple[HingeRange, ...]] = {
-    "lumbar": (
-        HingeRange("lumbar_flexion", _FORWARD_DOWN, -25, 60, 6),
-        HingeRange("lumbar_side_bend", _OUTWARD, -25, 25, 6),
-        HingeRange("lumbar_rotation", _TURN_LEFT, -10, 10, 6),
-    ),
-    "thorax": (
-        HingeRange("thorax_flexion", _FORWARD_DOWN, -20, 40, 6),
-        HingeRange("thorax_side_bend", _OUTWARD, -20, 20, 6),
-        HingeRange("thorax_rotation", _TURN_LEFT, -35, 35, 6),
-    ),
-    "neck": (
-        HingeRange("neck_flexion", _FORWARD_DOWN, -60, 50, 8),
-        HingeRange("neck_side_bend", _OUTWARD, -45, 45, 8),
-        HingeRange("neck_rotation", _TURN_LEFT, -75, 75, 8),
-    ),
-    "upper_arm": (
-        HingeRange("shoulder_flexion", _SHOULDER_LIFT, -60, 180, 12),
-        HingeRange("shoulder_abduction", _SHOULDER_SPREAD, -75, 80, 12),
-        HingeRange("shoulder_rotation", _TURN_IN, -90, 80, 15),
-    ),
-    "forearm": (
-        HingeRange("elbow_flexion", _FORWARD_UP, 0, 145, 15),
-        HingeRange("forearm_pronation", _TURN_IN, -80, 80, 15),
-    ),
-    "hand": (
-        HingeRange("wrist_flexion", _INWARD, -70, 80, 15),
-        HingeRange("wrist_radial_deviation", _FORWARD_UP, -30, 20, 15),
-    ),
-    "thigh": (
-        HingeRange("hip_flexion", _FORWARD_UP, -25, 130, 10),
-        HingeRange("hip_abduction", _OUTWARD, -30, 45, 10),
-        HingeRange("hip_rotation", _TURN_IN, -45, 45, 10),
-    ),
-    "leg": (
-        HingeRange("knee_flexion", _FORWARD_DOWN, 0, 150, 14),
-        HingeRange("knee_rotation", _TURN_IN, -30, 20, 10),
-    ),
-    "foot": (
-        HingeRange("ankle_dorsiflexion", _FORWARD_UP, -50, 40, 12),
-        HingeRange("ankle_inversion", _INWARD, -20, 35, 10),
-    ),
+    "lumbar": (HingeRange("lumbar_flexion", _FORWARD_DOWN, -25, 60, 6),
+               HingeRange("lumbar_side_bend", _OUTWARD, -25, 25, 6),
+               HingeRange("lumbar_rotation", _TURN_LEFT, -10, 10, 6)),
+    "thorax": (HingeRange("thorax_flexion", _FORWARD_DOWN, -20, 40, 6),
+               HingeRange("thorax_side_bend", _OUTWARD, -20, 20, 6),
+               HingeRange("thorax_rotation", _TURN_LEFT, -35, 35, 6)),
+    "neck": (HingeRange("neck_flexion", _FORWARD_DOWN, -60, 50, 8),
+             HingeRange("neck_side_bend", _OUTWARD, -45, 45, 8),
+             HingeRange("neck_rotation", _TURN_LEFT, -75, 75, 8)),
+    "upper_arm": (HingeRange("shoulder_flexion", _SHOULDER_LIFT, -60, 180, 12),
+                  HingeRange("shoulder_abduction", _SHOULDER_SPREAD, -75, 80, 12),
+                  HingeRange("shoulder_rotation", _TURN_IN, -90, 80, 15)),
+    "forearm": (HingeRange("elbow_flexion", _FORWARD_UP, 0, 145, 15),
+                HingeRange("forearm_pronation", _TURN_IN, -80, 80, 15)),
+    "hand": (HingeRange("wrist_flexion", _INWARD, -70, 80, 15),
+             HingeRange("wrist_radial_deviation", _FORWARD_UP, -30, 20, 15)),
+    "thigh": (HingeRange("hip_flexion", _FORWARD_UP, -25, 130, 10),
+              HingeRange("hip_abduction", _OUTWARD, -30, 45, 10),
+              HingeRange("hip_rotation", _TURN_IN, -45, 45, 10)),
+    "leg": (HingeRange("knee_flexion", _FORWARD_DOWN, 0, 150, 14),
+            HingeRange("knee_rotation", _TURN_IN, -30, 20, 10)),
+    "foot": (HingeRange("ankle_dorsiflexion", _FORWARD_UP, -50, 40, 12),
+             HingeRange("ankle_inversion", _INWARD, -20, 35, 10)),
     "toes": (HingeRange("toe_extension", _FORWARD_UP, -30, 70, 12),),
-}
+}  # fmt: skip
 """Hinges of each segment to its parent, in order; sides share one entry."""
 
 
@@ -181,24 +141,15 @@ def human_hinges(segment: str, side: str, strength: HingeStrength) -> tuple[Hing
             of its name without the side.
     """
     prefix = f"{side}_" if side else ""
-    torques = [strength(entry.name) for entry in HUMAN_HINGES[segment]]
-    return tuple(
-        Hinge(
-            name=prefix + entry.name,
-            axis=_mirrored(entry.axis) if side == "right" else np.array(entry.axis),
-            lower=float(np.deg2rad(entry.lower_deg)),
-            upper=float(np.deg2rad(entry.upper_deg)),
-            velocity_limit=entry.speed,
-            torque_lower=-against,
-            torque_upper=along,
-        )
-        for entry, (against, along) in zip(HUMAN_HINGES[segment], torques, strict=True)
-    )
-
-
-def _mirrored(axis: tuple[float, float, float]) -> np.ndarray:
-    """Rotation axis reflected in the sagittal plane (an axial vector keeps its y)."""
-    return np.array([-axis[0], axis[1], -axis[2]])
+    # An axis of rotation reflected in the sagittal plane keeps its y.
+    reflection = np.array([-1.0, 1.0, -1.0]) if side == "right" else np.ones(3)
+    hinges = []
+    for entry in HUMAN_HINGES[segment]:
+        lower, upper = float(np.deg2rad(entry.lower_deg)), float(np.deg2rad(entry.upper_deg))
+        against, along = strength(entry.name)
+        axis = reflection * entry.axis
+        hinges.append(Hinge(prefix + entry.name, axis, lower, upper, entry.speed, -against, along))
+    return tuple(hinges)
 
 
 ALONG_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

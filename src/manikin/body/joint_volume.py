@@ -1,15 +1,15 @@
 """Range of motion of a ball joint as a volume of its three angles ([Tonneau2015]_ 4.3.3).
 
 The angles of a hip or shoulder depend on each other: how far an arm turns inward depends on where it points.
-One interval for each angle either holds postures that are impossible or forbids some that people
-do take. The thesis therefore takes the non-convex hull of recorded angles, which it then treats as a
-polytope; a polytope, though, is convex. We keep the hull as the signed distance to its surface, on a grid.
+The thesis therefore takes the non-convex hull of recorded angles, which it then treats as a polytope; a
+polytope, though, is convex. We keep the hull as the signed distance to its surface, on a grid.
 
 The hull: all points of angle space within ``closing`` of a recorded one, then drawn in by ``closing``
 minus ``margin``. So gaps between recordings narrower than twice ``closing`` are filled, hollows that are
 wider stay, and every recorded point is about ``margin`` inside. Only its largest connected part is kept.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -43,12 +43,9 @@ def ball_angles(axes: ArrayLike, rotations: ArrayLike, middle: ArrayLike = (0.0,
     others is defined, and nearby they are sensitive.
 
     Args:
-        axes: (3, 3) unit axes, one a row, each perpendicular to the next.
+        axes: (3, 3) unit axes, one a row, each perpendicular to the next; BodyError if they are not.
         rotations: (..., 3, 3).
         middle: (3,) the first and the third angle are within half a turn of these [rad].
-
-    Raises:
-        BodyError: If the axes are not perpendicular.
     """
     first, second, third = np.asarray(axes, dtype=np.float64)
     basis = np.column_stack([first, second, np.cross(first, second)])
@@ -65,14 +62,8 @@ def ball_angles(axes: ArrayLike, rotations: ArrayLike, middle: ArrayLike = (0.0,
     return centre + (angles - centre + np.pi) % (2.0 * np.pi) - np.pi
 
 
-STEP = float(np.deg2rad(5.0))
-"""Spacing of the grid [rad]; our choice."""
-
-CLOSING = float(np.deg2rad(30.0))
-"""Half the width of the gaps between recorded angles that are filled [rad]; our choice."""
-
-MARGIN = float(np.deg2rad(10.0))
-"""Reach of the volume beyond recorded angles [rad]; our choice, for recordings of everyday movement.
+STEP, CLOSING, MARGIN = (float(np.deg2rad(angle)) for angle in (5.0, 30.0, 10.0))
+"""Defaults of :func:`volume_of` [rad]; our choice, for recordings of everyday movement.
 
 Those of the thesis are of the largest movement that the subject could do."""
 
@@ -103,9 +94,8 @@ class JointVolume:
         finite_number(self.step, "volume step [rad]", above=0.0, error=BodyError)
         table = frozen_array(self.distances, "volume distances", (None, None, None), BodyError)
         if min(table.shape) < 2 or table.max() <= 0.0:
-            raise BodyError(
-                f"volume of shape {table.shape} holds nothing; valid: 2 points each way, one inside"
-            )
+            shape = table.shape
+            raise BodyError(f"volume of shape {shape} holds nothing; valid: 2 points each way, one inside")
         object.__setattr__(self, "distances", table)
 
     @cached_property
@@ -120,21 +110,16 @@ class JointVolume:
         Linear between the grid's points; off the grid that of its nearest point, less the distance to it.
         """
         x, beyond = self._on_grid(angles)
-        cell, share = self._cell(x)
         total = np.zeros(x.shape[:-1])
-        for corner in np.ndindex(2, 2, 2):
-            weight = np.prod(np.where(corner, share, 1.0 - share), axis=-1)
-            total += weight * self._at(cell, corner)
+        for _, factors, value in self._corners(x):
+            total += np.prod(factors, axis=-1) * value
         return total - beyond
 
     def gradient(self, angles: ArrayLike) -> FloatArray:
         """(..., 3) derivative of :meth:`distance`."""
         x, beyond = self._on_grid(angles)
-        cell, share = self._cell(x)
         slope = np.zeros(x.shape)
-        for corner in np.ndindex(2, 2, 2):
-            factors = np.where(corner, share, 1.0 - share)
-            value = self._at(cell, corner)
+        for corner, factors, value in self._corners(x):
             for axis in range(3):
                 others = np.prod(np.delete(factors, axis, axis=-1), axis=-1)
                 slope[..., axis] += (1.0 if corner[axis] else -1.0) * others * value
@@ -153,21 +138,19 @@ class JointVolume:
         x = np.clip(wanted, 0.0, np.array(self.distances.shape) - 1.0)
         return x, self.step * np.linalg.norm(wanted - x, axis=-1)
 
-    def _cell(self, x: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    def _corners(self, x: FloatArray) -> Iterator[tuple[tuple[int, ...], FloatArray, FloatArray]]:
+        """Corners of the cells of points (..., 3), the factors (..., 3) of their weights and their values."""
         cell = np.minimum(np.floor(x).astype(np.int64), np.array(self.distances.shape) - 2)
-        return cell, x - cell
-
-    def _at(self, cell: NDArray[np.int64], corner: tuple[int, ...]) -> FloatArray:
-        return self.distances[tuple(cell[..., axis] + corner[axis] for axis in range(3))]
+        share = x - cell
+        for corner in np.ndindex(2, 2, 2):
+            value = self.distances[tuple(cell[..., axis] + corner[axis] for axis in range(3))]
+            yield corner, np.where(corner, share, 1.0 - share), value
 
 
 def volume_of(
-    angles: ArrayLike,
-    closing: float = CLOSING,
-    margin: float = MARGIN,
-    step: float = STEP,
+    angles: ArrayLike, closing: float = CLOSING, margin: float = MARGIN, step: float = STEP,
     fewest: int = FEWEST,
-) -> JointVolume:
+) -> JointVolume:  # fmt: skip
     """Volume that holds recorded angles, see the module.
 
     Args:
@@ -178,8 +161,7 @@ def volume_of(
         fewest: Frames with which a cell of that one counts as seen.
 
     Raises:
-        BodyError: If a value is out of its range, no cell is seen often enough, or the angles are
-            spread too wide for the step.
+        BodyError: If a value is out of its range, no cell is seen enough, or the angles are too far apart.
     """
     recorded = frozen_array(angles, "recorded angles", (None, 3), BodyError)
     margin = finite_number(margin, "margin [rad]", at_least=0.0, error=BodyError)
@@ -192,8 +174,7 @@ def volume_of(
     hull = fine * _distance_to_zeros(parts == largest) > closing - margin
     inside, outside = (fine * _distance_to_zeros(part) for part in (hull, ~hull))
     signed = np.where(hull, inside - 0.5 * fine, 0.5 * fine - outside)
-    kept = signed[::_FINER, ::_FINER, ::_FINER]
-    return _cropped(origin, _FINER * fine, kept)
+    return _cropped(origin, _FINER * fine, signed[::_FINER, ::_FINER, ::_FINER])
 
 
 def _seen(

@@ -2,14 +2,14 @@
 
 :func:`insect`: [Tonneau2015]_ prints 4 degrees of freedom per leg and 33 in all in one place and 5 per leg in
 another; 33 fits neither with a free root. We take the insect of the results: six legs of five hinges and a
-free root, 36 degrees of freedom (Fig. 8.1). It prints no dimension, so proportions, ranges, speeds and
-strengths are our own choice.
+free root, 36 degrees of freedom (Fig. 8.1).
 
-:func:`quadruped`: trunk, head and four legs of three hinges, as dogs and walking robots have them.
-Proportions, ranges, speeds and strengths are our own choice, near those of walking robots that climb stairs:
-legs as long as three quarters of the trunk, knees behind the feet as elbows are, torques of up to a third of
-weight times length.  Shanks end in thin feet: a body is planned to touch with its tips, and touches with its
-shapes, which have to be near them at any lean.
+:func:`quadruped`: trunk, head and four legs of three hinges, near walking robots that climb stairs: legs as
+long as three quarters of the trunk, knees behind the feet, torques of up to a third of weight times length.
+Shanks end in thin feet: a body is planned to touch with its tips, and touches with its shapes, which have to
+be near them at any lean.
+
+Proportions, ranges, speeds and strengths of both are our own choice.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,8 +34,7 @@ class _LegPlan:
     """Legs of a creature, lengths as shares of the trunk's, masses as shares of the body's.
 
     Attributes:
-        hips: Place of the hips of each pair along the trunk.
-        aside: Their distance from its middle.
+        hips: Place of each pair along the trunk; ``aside`` is their distance from its middle.
         axis: Axis along which all parts point in the zero posture.
         parts: Length, radius and mass of each part, from the hip to the tip.
         hinges: Of each part: name, axis of the left leg, range [deg], strength [weight times length].
@@ -162,46 +161,38 @@ def _legged(
             parts = _leg(plan, leg, pair, sign, length, mass)
             end = plan.direction(sign) * (list(plan.parts.values())[-1][0] * length)
             effectors[f"{leg}_tip"] = Effector(f"{leg}_tip", parts[-1].name, end, turns[side])
-            for joint, angle in plan.standing_deg[pair].items():
-                angles[f"{leg}_{joint}"] = float(np.deg2rad(angle))
+            angles |= {f"{leg}_{k}": float(np.deg2rad(a)) for k, a in plan.standing_deg[pair].items()}
             chain = tuple(part.name for part in parts)
             limbs.append(Limb(f"{leg}_leg", f"{leg}_tip", chain, ContactKind.POINT, f"{other}_{pair}_leg"))
             segments += parts
-    return BodyModel(
-        name=name, segments=tuple(segments), effectors=effectors, standing_angles=angles, limbs=tuple(limbs)
-    )
+    return BodyModel(name, tuple(segments), effectors, angles, limbs=tuple(limbs))
 
 
 def _leg(plan: _LegPlan, leg: str, pair: str, sign: float, length: float, mass: float) -> list[Segment]:
-    """Parts of a leg from the hip to the tip; a shape ends at the next joint, the last one before its tip."""
+    """Parts of a leg from the hip to the tip; a shape ends at the next joint, the last one before its tip.
+
+    Right hinges reflect the left ones.
+    """
     origin, parent = np.array([plan.hips[pair] * length, sign * plan.aside * length, 0.0]), "trunk"
     direction, parts = plan.direction(sign), []
+    reflection, strength = np.array([sign, 1.0, sign]), 9.81 * mass * length
     for part, (share, thick, mass_share) in plan.parts.items():
         reach, radius, part_mass = direction * (share * length), thick * length, mass_share * mass
         span = share * length - radius * (1.0 + (plan.tip_free if part == list(plan.parts)[-1] else 0.0))
         turn = ALONG_Y if plan.axis == 1 else None
         shape = Shape(part, ShapeKind.CAPSULE, (radius, span), direction * (0.5 * span), turn)
-        hinges = _mirrored_hinges(leg, sign, 9.81 * mass * length, plan.hinges[part])
+        hinges = tuple(
+            Hinge(
+                f"{leg}_{joint}", reflection * np.array(axis), float(np.deg2rad(lower)),
+                float(np.deg2rad(upper)), _SPEED, -torque * strength, torque * strength,
+            )
+            for joint, axis, lower, upper, torque in plan.hinges[part]
+        )  # fmt: skip
         inertia = cylinder_inertia(part_mass, radius, share * length, plan.axis)
-        parts.append(
-            Segment(f"{leg}_{part}", parent, origin, hinges, part_mass, 0.5 * reach, inertia, (shape,))
-        )
-        parent, origin = f"{leg}_{part}", reach
+        name = f"{leg}_{part}"
+        parts.append(Segment(name, parent, origin, hinges, part_mass, 0.5 * reach, inertia, (shape,)))
+        parent, origin = name, reach
     return parts
-
-
-def _mirrored_hinges(
-    leg: str, sign: float, strength: float, entries: Sequence[_HingeEntry]
-) -> tuple[Hinge, ...]:
-    """Hinges of one part, torques in units of ``strength`` [N.m]; right ones reflect the left ones."""
-    reflection = np.ones(3) if sign > 0.0 else np.array([-1.0, 1.0, -1.0])
-    return tuple(
-        Hinge(
-            f"{leg}_{joint}", reflection * np.array(axis), float(np.deg2rad(lower)),
-            float(np.deg2rad(upper)), _SPEED, -torque * strength, torque * strength,
-        )
-        for joint, axis, lower, upper, torque in entries
-    )  # fmt: skip
 
 
 def _point(mass: float, at: FloatArray) -> FloatArray:

@@ -1,10 +1,9 @@
 """The limbs of a body: which joints move an effector, where the chain begins and ends, and its reflection.
 
-Knees, elbows and the pelvis are further contacts of a human ([Tonneau2015]_ 5.4.1, left open there). They are
-on the segments that exist: the knee in front of the origin of the lower leg, the elbow behind that of the
-forearm, each on the thickest shape of the joint. Their z axes, the normals of contacts, point through the
-joint, backwards and forwards. What a human sits on, the effector ``buttocks``, belongs to the root: no joint
-moves it, so its limb has none.
+Knees, elbows and the pelvis are further contacts of a human ([Tonneau2015]_ 5.4.1, left open there): the knee
+in front of the origin of the lower leg, the elbow behind that of the forearm, each on the thickest shape of
+the joint. Their z axes, the normals of contacts, point through the joint, backwards and forwards. What a
+human sits on, the effector ``buttocks``, belongs to the root: no joint moves it, so its limb has none.
 """
 
 from collections.abc import Collection
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.body.configuration import Configuration
 from manikin.body.human import FRONT_OF_KNEE, SEAT_LENGTH, SEAT_WIDTH, SKIN
+from manikin.body.human_parts import ALONG_X
 from manikin.body.model import BodyModel, look_up
 from manikin.body.segments import Effector, Hinge, Limb, Segment, ShapeKind
 from manikin.contact import ContactKind
@@ -36,15 +36,11 @@ def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
 
 def hangs(body: BodyModel, effector: str) -> bool:
     """Whether an effector is at the end of a limb, so that it can reach by itself."""
-    root = next(segment.name for segment in body.segments if segment.parent is None)
-    return body.effector(effector).segment != root
+    return body.effector(effector).segment != body.segments[0].name
 
 
 def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
-    """Names of the segments with which an effector touches.
-
-    They are its own and the one hanging on it; of a knee or an elbow both that meet in the joint.
-    """
+    """Names of the segments with which an effector touches: its own, and what hangs on it or meets it."""
     own, parent = body.effector(effector).segment, _meeting(body, effector)
     if parent is not None:
         return own, parent
@@ -82,10 +78,7 @@ def hinge_line(body: BodyModel, effector: str) -> float | None:
 
 
 def carrying_segment(body: BodyModel, effector: str, point: FloatArray) -> str:
-    """Name of the end segment that carries a point (3,) of the effector frame [m].
-
-    What lies beyond the hinge of the hanging segment is carried by it.
-    """
+    """Name of the segment, the hanging one beyond its hinge, that carries a point (3,) of an effector [m]."""
     own = body.effector(effector).segment
     hanging, line = hanging_segment(body, own), hinge_line(body, effector)
     return hanging.name if hanging is not None and line is not None and point[0] > line else own
@@ -94,25 +87,21 @@ def carrying_segment(body: BodyModel, effector: str, point: FloatArray) -> str:
 def mirrored_name(name: str) -> str:
     """Name of the same part on the other side; one in the middle keeps its name."""
     side, _, part = name.partition("_")
-    other = {"left": "right", "right": "left"}.get(side)
-    return name if other is None else f"{other}_{part}"
+    return {"left": f"right_{part}", "right": f"left_{part}"}.get(side, name)
 
 
 def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
     """Hinges on the other side (nv - 6,) and factors (nv - 6,), 1 or -1, of the mirrored posture.
 
-    They are such that ``mirrored = factors * angles[..., indices]``.
-
-    Raises:
-        BodyError: If a hinge has no counterpart with a reflected axis.
+    It is ``factors * angles[..., indices]``; BodyError if a hinge has no counterpart with a reflected axis.
     """
-    names = list(body.joint_names)
-    indices, factors = np.empty(len(names), dtype=np.int64), np.empty(len(names))
+    count = len(body.hinges)
+    indices, factors = np.empty(count, dtype=np.int64), np.empty(count)
     for place, hinge in enumerate(body.hinges):
         other = mirrored_name(hinge.name)
-        if other not in names:
+        if other not in body.joint_names:
             raise BodyError(f"hinge {hinge.name!r} has no counterpart; valid: a body of two equal sides")
-        indices[place] = names.index(other)
+        indices[place] = body.joint_index(other)
         # An axis of rotation keeps its y component under the reflection and changes the others' signs.
         along = float(-REFLECTION * body.hinges[indices[place]].axis @ hinge.axis)
         if abs(abs(along) - 1.0) > 1e-9:
@@ -122,11 +111,7 @@ def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
 
 
 def mirrored(body: BodyModel, q: ArrayLike) -> FloatArray:
-    """(..., nq) postures reflected in the world's plane y = 0, for a body of two equal sides.
-
-    Raises:
-        BodyError: If the shape does not fit or the body's sides differ.
-    """
+    """(..., nq) postures reflected in the world's plane y = 0; BodyError if the body's sides differ."""
     posture = np.asarray(q, dtype=np.float64)
     if posture.ndim == 0 or posture.shape[-1] != body.nq:
         raise BodyError(f"posture has shape {posture.shape}; valid: (..., {body.nq})")
@@ -137,12 +122,8 @@ def mirrored(body: BodyModel, q: ArrayLike) -> FloatArray:
     return reflected
 
 
-_FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-_JOINTS = (
-    # Contact, the segments of the limb, where the contact is seen from the joint.
-    ("knee", ("thigh", "leg"), 1.0),
-    ("elbow", ("upper_arm", "forearm"), -1.0),
-)
+_JOINTS = (("knee", ("thigh", "leg"), 1.0), ("elbow", ("upper_arm", "forearm"), -1.0))
+"""Contact, the segments of the limb, where the contact is seen from the joint."""
 
 FURTHER = ("knees", "elbows", "pelvis")
 """Kinds of further contacts."""
@@ -152,12 +133,9 @@ def with_further_contacts(body: BodyModel, kinds: Collection[str] = FURTHER) -> 
     """Give a human further limbs.
 
     Args:
-        body: Like that of :func:`manikin.body.human`.
+        body: Like that of :func:`manikin.body.human`; BodyError if it lacks the parts.
         kinds: Of :data:`FURTHER`: ``left_knee`` and ``right_knee``, ``left_elbow`` and ``right_elbow``,
             ``pelvis``.
-
-    Raises:
-        BodyError: If a kind is not known, or the body lacks the parts.
     """
     unknown = sorted(set(kinds) - set(FURTHER))
     if unknown:
@@ -185,9 +163,8 @@ def _pelvis(body: BodyModel) -> Limb:
     """Limb that presses on a seat: a patch of the root, with no joint between."""
     if body.stature is None or "buttocks" not in body.effectors:
         raise BodyError(f"body {body.name!r} has no buttocks; valid: a human")
-    segment = body.effector("buttocks").segment
     patch = (SEAT_LENGTH * body.stature, SEAT_WIDTH * body.stature)
-    return Limb("pelvis", "buttocks", (segment,), ContactKind.SOLE, patch=patch)
+    return Limb("pelvis", "buttocks", (body.effector("buttocks").segment,), ContactKind.SOLE, patch=patch)
 
 
 def _effector(body: BodyModel, name: str, chain: tuple[str, ...], ahead: float) -> Effector:
@@ -195,7 +172,7 @@ def _effector(body: BodyModel, name: str, chain: tuple[str, ...], ahead: float) 
     radii = [float(shape.size[0]) for shape in shapes if shape.kind is ShapeKind.CAPSULE]
     if not radii:
         raise BodyError(f"{name} has no round shape around it; valid: a body with capsules for limbs")
-    turn = FRONT_OF_KNEE if ahead > 0.0 else _FORWARD
+    turn = FRONT_OF_KNEE if ahead > 0.0 else ALONG_X
     return Effector(name, chain[-1], np.array([ahead * max(radii), 0.0, 0.0]), turn)
 
 
@@ -210,11 +187,10 @@ def with_root(body: BodyModel) -> tuple[BodyModel, str]:
     """
     if PELVIS in body.effectors:
         return body, PELVIS
-    name = body.segments[0].name
+    name = segment = body.segments[0].name
     while name in body.effectors:
         name += "_root"
-    root = Effector(name, body.segments[0].name, np.zeros(3))
-    return replace(body, effectors={**body.effectors, name: root}), name
+    return replace(body, effectors={**body.effectors, name: Effector(name, segment, np.zeros(3))}), name
 
 
 REFLECTION = np.array([1.0, -1.0, 1.0])
@@ -222,11 +198,7 @@ REFLECTION = np.array([1.0, -1.0, 1.0])
 
 
 def limb_named(body: BodyModel, name: str) -> Limb:
-    """Limb by name.
-
-    Raises:
-        BodyError: If there is none.
-    """
+    """Limb by name; BodyError if there is none."""
     return look_up({limb.name: limb for limb in body.limbs}, name, "limb")
 
 
@@ -280,26 +252,23 @@ def limb_placement(state: Configuration, limb: Limb) -> tuple[FloatArray, FloatA
 def are_mirrored(body: BodyModel, first: Limb, second: Limb) -> bool:
     """Whether equal angles of two limbs are postures reflected in the sagittal plane.
 
-    Both must hang on the same segment and have reflected origins, axes and effectors and equal
-    ranges. An axis of rotation keeps its y component and changes the sign of the others.
+    Both must hang on the same segment, with reflected origins, axes and effectors and equal ranges.
     """
-    same_parent = parent_segment(body, first) == parent_segment(body, second)
-    if len(first.segments) != len(second.segments) or not same_parent:
+    if len(first.segments) != len(second.segments):
         return False
     pairs = zip(first.segments, second.segments, strict=True)
     end, other = body.effector(first.effector), body.effector(second.effector)
-    reflected = np.outer(REFLECTION, REFLECTION) * end.rotation
     return (
-        all(_segments_mirrored(body.segment(a), body.segment(b)) for a, b in pairs)
+        parent_segment(body, first) == parent_segment(body, second)
+        and all(_segments_mirrored(body.segment(a), body.segment(b)) for a, b in pairs)
         and _close(REFLECTION * end.translation, other.translation)
-        and _close(reflected, other.rotation)
+        and _close(np.outer(REFLECTION, REFLECTION) * end.rotation, other.rotation)
     )
 
 
 def _segments_mirrored(first: Segment, second: Segment) -> bool:
-    if len(first.hinges) != len(second.hinges):
-        return False
-    return _close(REFLECTION * first.origin, second.origin) and all(
+    same_count = len(first.hinges) == len(second.hinges)
+    return (same_count and _close(REFLECTION * first.origin, second.origin)) and all(
         _close(-REFLECTION * a.axis, b.axis) and (a.lower, a.upper) == (b.lower, b.upper)
         for a, b in zip(first.hinges, second.hinges, strict=True)
     )

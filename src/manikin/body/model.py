@@ -22,7 +22,6 @@ from manikin.body.segments import (
     Shape,
     ShapeKind,
     check_limbs,
-    hinges_of,
     segments_by_name,
 )
 from manikin.errors import BodyError
@@ -35,22 +34,26 @@ OFF_AXIS = "off axis"
 _MAPPINGS = ("effectors", "standing_angles", "lengths", "loads")
 
 
+def _of_hinges(name: str) -> cached_property[FloatArray]:
+    """Attribute of a body with one value of every hinge."""
+    return cached_property(lambda body: frozen_array([getattr(hinge, name) for hinge in body.hinges], name))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class BodyModel(Displayed):
     """A floating tree of rigid segments on hinges.
 
-    The configuration vector is ``q = [root position (3), root quaternion xyzw (4), hinge
-    angles]`` and the velocity ``v = [root linear (3), root angular (3), hinge rates]`` with the
-    root's parts in the *root segment's* axes, as in Pinocchio. Make a human with
-    :func:`manikin.body.human`.
+    The configuration vector is ``q = [root position (3), root quaternion xyzw (4), hinge angles]`` and the
+    velocity ``v = [root linear (3), root angular (3), hinge rates]`` with the root's parts in the *root
+    segment's* axes, as in Pinocchio. Make a human with :func:`manikin.body.human`.
 
     Attributes:
         name: What the body is.
         segments: The segments, parents first; the first is the free root.
         effectors: Effectors by name.
         standing_angles: Hinge angles of the standing posture [rad]; hinges left out are 0.
-        soft_pairs: Pairs of segments that are not adjacent and yet are not checked for
-            collision, because a short link or soft flesh lies between them.
+        soft_pairs: Pairs of segments, not adjacent, that are not checked for collision, because a short link
+            or soft flesh lies between them.
         stature: Sole to vertex [m], or None for another creature.
         sex: ``"male"``, ``"female"`` or None.
         sole_length: Length of the sole rectangles [m], or None.
@@ -61,8 +64,8 @@ class BodyModel(Displayed):
         strength: Torque limits relative to those of a healthy human of that sex, size and age.
         lengths: Lengths of a human that were measured instead of scaled [m].
         off_axis_masses: Whether a human's centres of mass lie off the lines between joints.
-        loads: What each hand carries [kg], by the name of its effector; the masses are part of the hands'
-            segments, see :func:`manikin.body.strength.carrying`.
+        loads: What each hand carries [kg], by the name of its effector, as part of the hand's segment, see
+            :func:`manikin.body.strength.carrying`.
     """
 
     name: str
@@ -116,9 +119,8 @@ class BodyModel(Displayed):
     @cached_property
     def mass(self) -> float:
         """Total mass, with what the hands carry [kg]."""
-        if self.nominal_mass is not None:
-            return self.nominal_mass
-        return fsum(segment.mass for segment in self.segments)
+        nominal = self.nominal_mass
+        return fsum(segment.mass for segment in self.segments) if nominal is None else nominal
 
     @property
     def own_mass(self) -> float:
@@ -128,7 +130,7 @@ class BodyModel(Displayed):
     @cached_property
     def hinges(self) -> tuple[Hinge, ...]:
         """Every hinge, in the order of ``q[7:]``."""
-        return hinges_of(self.segments)
+        return tuple(hinge for segment in self.segments for hinge in segment.hinges)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
@@ -150,30 +152,16 @@ class BodyModel(Displayed):
         """Size of the configuration vector."""
         return 7 + len(self.hinges)
 
-    @cached_property
-    def lower(self) -> FloatArray:
-        """(nv - 6,) smallest hinge angles [rad]."""
-        return frozen_array([hinge.lower for hinge in self.hinges], "lower")
-
-    @cached_property
-    def upper(self) -> FloatArray:
-        """(nv - 6,) largest hinge angles [rad]."""
-        return frozen_array([hinge.upper for hinge in self.hinges], "upper")
-
-    @cached_property
-    def velocity_limit(self) -> FloatArray:
-        """(nv - 6,) largest hinge speeds [rad/s]."""
-        return frozen_array([hinge.velocity_limit for hinge in self.hinges], "velocity_limit")
-
-    @cached_property
-    def torque_lower(self) -> FloatArray:
-        """(nv - 6,) most negative hinge torques [N.m]."""
-        return frozen_array([hinge.torque_lower for hinge in self.hinges], "torque_lower")
-
-    @cached_property
-    def torque_upper(self) -> FloatArray:
-        """(nv - 6,) largest hinge torques [N.m]."""
-        return frozen_array([hinge.torque_upper for hinge in self.hinges], "torque_upper")
+    lower = _of_hinges("lower")
+    """(nv - 6,) smallest hinge angles [rad]."""
+    upper = _of_hinges("upper")
+    """(nv - 6,) largest hinge angles [rad]."""
+    velocity_limit = _of_hinges("velocity_limit")
+    """(nv - 6,) largest hinge speeds [rad/s]."""
+    torque_lower = _of_hinges("torque_lower")
+    """(nv - 6,) most negative hinge torques [N.m]."""
+    torque_upper = _of_hinges("torque_upper")
+    """(nv - 6,) largest hinge torques [N.m]."""
 
     def torque_share(self, torque: ArrayLike) -> FloatArray:
         """(..., nv - 6) hinge torques [N.m] over the limits in their directions: at least 0, 1 at a limit."""
@@ -204,18 +192,14 @@ class BodyModel(Displayed):
     def pinocchio(self) -> Any:
         """The ``pin.Model``; shared by everyone, so never change it.
 
-        Joint ``"root"`` is the free flyer, then one revolute joint per hinge with the hinge's
-        name. Frames ``"segment/<name>"`` and ``"effector/<name>"`` exist for every segment and
-        effector (a segment and an effector may have the same name).
+        Joint ``"root"`` is the free flyer, then one revolute joint per hinge with the hinge's name. Every
+        segment and effector has a frame ``"segment/<name>"`` or ``"effector/<name>"``.
         """
         return _build_pinocchio(self)
 
     @cached_property
     def geometry(self) -> Any:
-        """The ``pin.GeometryModel`` of Coal shapes named ``"segment/shape"``; never change it.
-
-        Its collision pairs are :attr:`collision_pairs`.
-        """
+        """The ``pin.GeometryModel`` of shapes ``"segment/shape"``, with its pairs; never change it."""
         return _build_geometry(self)
 
     @cached_property
@@ -237,9 +221,8 @@ class BodyModel(Displayed):
     @cached_property
     def segment_pairs(self) -> tuple[tuple[str, str], ...]:
         """Segments that must not touch: all but those that overlap at a joint, and :attr:`soft_pairs`."""
-        names = [segment.name for segment in self.segments]
-        parents = {frozenset((s.name, s.parent)) for s in self.segments if s.parent is not None}
-        skipped = parents | self.soft_pairs
+        skipped = {frozenset((s.name, s.parent)) for s in self.segments} | self.soft_pairs
+        names = (segment.name for segment in self.segments)
         return tuple((a, b) for a, b in combinations(names, 2) if frozenset((a, b)) not in skipped)
 
     @cached_property
@@ -320,12 +303,8 @@ def _build_pinocchio(body: BodyModel) -> Any:
     for effector in body.effectors.values():
         carrier = model.frames[frame_of[effector.segment]]
         placement = carrier.placement * pin.SE3(np.array(effector.rotation), np.array(effector.translation))
-        model.addFrame(
-            pin.Frame(
-                f"effector/{effector.name}", carrier.parentJoint, frame_of[effector.segment], placement,
-                pin.FrameType.OP_FRAME,
-            )
-        )  # fmt: skip
+        name, parent_frame = f"effector/{effector.name}", frame_of[effector.segment]
+        model.addFrame(pin.Frame(name, carrier.parentJoint, parent_frame, placement, pin.FrameType.OP_FRAME))
     model.lowerPositionLimit[:7], model.upperPositionLimit[:7] = -np.inf, np.inf
     return model
 
@@ -362,21 +341,16 @@ def _build_geometry(body: BodyModel) -> Any:
         frame = body.pinocchio.frames[frame_id]
         for shape in segment.shapes:
             placement = frame.placement * pin.SE3(np.array(shape.rotation), np.array(shape.translation))
+            name, solid = f"{segment.name}/{shape.name}", coal_shape(shape)
             geometry.addGeometryObject(
-                pin.GeometryObject(
-                    f"{segment.name}/{shape.name}", frame.parentJoint, frame_id, placement, coal_shape(shape)
-                )
+                pin.GeometryObject(name, frame.parentJoint, frame_id, placement, solid)
             )
-    for first, second in body.collision_pairs:
-        pair = pin.CollisionPair(geometry.getGeometryId(first), geometry.getGeometryId(second))
-        geometry.addCollisionPair(pair)
+    for pair in body.collision_pairs:
+        geometry.addCollisionPair(pin.CollisionPair(*(geometry.getGeometryId(name) for name in pair)))
     return geometry
 
 
 def coal_shape(shape: Shape) -> Any:
     """The Coal shape of a neutral one; capsules lie along their local z axis."""
-    if shape.kind == ShapeKind.SPHERE:
-        return coal.Sphere(float(shape.size[0]))
-    if shape.kind == ShapeKind.CAPSULE:
-        return coal.Capsule(float(shape.size[0]), float(shape.size[1]))
-    return coal.Box(*(float(side) for side in shape.size))
+    kinds = {ShapeKind.SPHERE: coal.Sphere, ShapeKind.CAPSULE: coal.Capsule, ShapeKind.BOX: coal.Box}
+    return kinds[shape.kind](*shape.size.tolist())

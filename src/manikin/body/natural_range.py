@@ -56,14 +56,11 @@ def load_volumes(path: str | Path) -> dict[str, JointVolume]:
         with np.load(path, allow_pickle=False) as archive:
             if str(archive["format"]) != FORMAT:
                 raise ValueError(f"format {archive['format']}")
-            names = sorted({key.split("/")[0] for key in archive.files if "/" in key})
-            return {
-                name: JointVolume(
-                    archive[f"{name}/origin"], float(archive[f"{name}/step"]),
-                    UNIT * archive[f"{name}/distances"],
-                )
-                for name in names
-            }  # fmt: skip
+            volumes = {}
+            for name in sorted({key.split("/")[0] for key in archive.files if "/" in key}):
+                origin, step, table = (archive[f"{name}/{key}"] for key in ("origin", "step", "distances"))
+                volumes[name] = JointVolume(origin, float(step), UNIT * table)
+            return volumes
     except FileNotFoundError:
         raise BodyError(f"{path}: there is no such file; valid: a file of joint volumes") from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
@@ -73,12 +70,9 @@ def load_volumes(path: str | Path) -> dict[str, JointVolume]:
 
 @dataclass(frozen=True, eq=False)
 class BallRange:
-    """A ball joint's volume within the intervals of its hinges.
+    """A ball joint's volume within the intervals (3,) of its hinges [rad].
 
-    Attributes:
-        lower: (3,) smallest angles [rad].
-        upper: (3,) largest angles [rad].
-        radius: Of the largest ball of angles that is inside both [rad].
+    The radius is that of the largest ball of angles that is inside both [rad].
     """
 
     volume: JointVolume
@@ -101,10 +95,6 @@ class NaturalRange:
     interval. Of a limb it is the least of its joints: 0 at a violation, negative beyond, and 1 only where
     every joint is as far from its limits as it can be. 0.1 rad in one angle change it by no more than 0.1 rad
     over that radius (over half the interval), times the square root of 3 at worst where the grid is coarse.
-
-    Attributes:
-        balls: Its ball joints: the columns of their angles and their ranges.
-        columns: (h,) columns of the other hinges.
     """
 
     def __init__(self, body: BodyModel, limb: Limb) -> None:
@@ -113,36 +103,35 @@ class NaturalRange:
         self.lower = np.array([hinge.lower for hinge in hinges])
         self.upper = np.array([hinge.upper for hinge in hinges])
         places = (limb_slots(body, limb) - 7).tolist()
-        self.balls: tuple[tuple[slice, BallRange], ...] = tuple(
+        self._balls: tuple[tuple[slice, BallRange], ...] = tuple(
             (slice(start := places.index(joint.hinges.start), start + 3), joint.range)
             for joint in learnt_joints(body, [body.segment(name) for name in limb.segments])
         )
-        taken = {column for where, _ in self.balls for column in range(where.start, where.stop)}
-        self.columns = np.array([c for c in range(len(hinges)) if c not in taken], dtype=np.int64)
+        taken = {column for where, _ in self._balls for column in range(where.start, where.stop)}
+        self._others = np.array([c for c in range(len(hinges)) if c not in taken], dtype=np.int64)
 
     @property
     def learnt(self) -> bool:
         """Whether a joint of the limb has a learnt volume."""
-        return bool(self.balls)
+        return bool(self._balls)
 
     def normalised(self, angles: ArrayLike) -> FloatArray:
         """(n,) normalised distance of (n, k) angles, negative outside."""
         q, least = np.asarray(angles, dtype=np.float64), self.volume_distance(angles)
-        if not len(self.columns):
+        if not len(self._others):
             return np.minimum(least, 1.0)
-        lower, upper, part = self.lower[self.columns], self.upper[self.columns], q[:, self.columns]
+        lower, upper, part = self.lower[self._others], self.upper[self._others], q[:, self._others]
         of_hinges = np.min(np.minimum(part - lower, upper - part) / (0.5 * (upper - lower)), axis=1)
         return np.minimum(least, of_hinges)
 
     def volume_distance(self, angles: ArrayLike) -> FloatArray:
         """(n,) the same of the ball joints with volumes alone; infinite without one."""
         q = np.asarray(angles, dtype=np.float64)
-        if q.ndim != 2 or q.shape[1] != len(self.lower):
-            raise BodyError(
-                f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self.lower)})"
-            )
+        count = len(self.lower)
+        if q.ndim != 2 or q.shape[1] != count:
+            raise BodyError(f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {count})")
         least = np.full(len(q), np.inf)
-        for columns, ball in self.balls:
+        for columns, ball in self._balls:
             least = np.minimum(least, ball.normalised(q[:, columns]))
         return least
 
@@ -159,12 +148,7 @@ class NaturalRange:
 
 @dataclass(frozen=True, eq=False)
 class LearntJoint:
-    """A ball joint of a body that has a learnt volume.
-
-    Attributes:
-        segment: Name of the segment that it moves.
-        hinges: Places of its three angles among those of all hinges.
-    """
+    """A ball joint with a learnt volume: the segment that it moves, and its three places among all hinges."""
 
     segment: str
     hinges: slice
@@ -184,11 +168,7 @@ def learnt_joints(body: BodyModel, segments: Sequence[Segment] | None = None) ->
 
 
 def ball_range(volume: JointVolume, lower: ArrayLike, upper: ArrayLike) -> BallRange:
-    """Volume within the intervals of three hinges from ``lower`` to ``upper``, (3,) each [rad].
-
-    Raises:
-        BodyError: If nothing of the volume is within them.
-    """
+    """Volume within intervals of three hinges, (3,) each [rad]; BodyError if nothing of it is within them."""
     low, high = (frozen_array(end, "range of a ball joint", (3,), BodyError) for end in (lower, upper))
     ball = BallRange(volume, low, high, 1.0)
     radius = float(ball.normalised(volume.points).max())

@@ -5,9 +5,8 @@ posture all segment frames are parallel to the world: x forward, y to the left, 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 import trimesh
@@ -24,8 +23,7 @@ class ShapeKind(StrEnum):
     SPHERE = "sphere"
     """``(radius,)``."""
     CAPSULE = "capsule"
-    """``(radius, length)``: a cylinder of ``length`` along the local z axis with a half
-    sphere on each end; the centres of the half spheres are ``length`` apart."""
+    """``(radius, length)``: a cylinder of ``length`` along the local z axis, a half sphere on each end."""
     BOX = "box"
     """``(x, y, z)`` full extents."""
 
@@ -52,13 +50,9 @@ class Shape:
     rotation: FloatArray
 
     def __init__(
-        self,
-        name: str,
-        kind: ShapeKind | str,
-        size: ArrayLike,
-        translation: ArrayLike = (0.0, 0.0, 0.0),
+        self, name: str, kind: ShapeKind | str, size: ArrayLike, translation: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         where = f"shape {name!r}"
         if kind not in list(ShapeKind):
             raise BodyError(f"{where} kind is {kind!r}; valid: {', '.join(ShapeKind)}")
@@ -66,14 +60,10 @@ class Shape:
         dimensions = frozen_array(size, f"{where} size [m]", (_SIZE_COUNT[shape_kind],), BodyError)
         if np.any(dimensions <= 0.0):
             raise BodyError(f"{where} size is {dimensions.tolist()}; valid: metres > 0")
-        turn = np.eye(3) if rotation is None else rotation
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "kind", shape_kind)
-        object.__setattr__(self, "size", dimensions)
-        object.__setattr__(
-            self, "translation", frozen_array(translation, f"{where} translation", (3,), BodyError)
-        )
-        object.__setattr__(self, "rotation", check_rotation(turn, f"{where} rotation", BodyError))
+        centre = frozen_array(translation, f"{where} translation", (3,), BodyError)
+        turn = check_rotation(np.eye(3) if rotation is None else rotation, f"{where} rotation", BodyError)
+        for item, value in zip(fields(self), (name, shape_kind, dimensions, centre, turn), strict=True):
+            object.__setattr__(self, item.name, value)
 
     def distance_to(self, point: FloatArray) -> float:
         """Distance of a point (3,) of the segment frame to the shape, 0 inside [m]."""
@@ -125,9 +115,8 @@ class Hinge:
 class Segment:
     """A rigid segment, the hinges to its parent and its inertia.
 
-    The hinges share the segment's origin and are applied in order: the first is fixed in
-    the parent, the last is fixed in the segment. A segment without hinges is rigid on its
-    parent; the root has no parent and moves freely.
+    The hinges share the segment's origin and are applied in order, from the parent on. A segment without
+    hinges is rigid on its parent; the root has no parent and moves freely.
 
     Attributes:
         name: Unique in the body.
@@ -152,22 +141,17 @@ class Segment:
     def __post_init__(self) -> None:
         where = f"segment {self.name!r}"
         finite_number(self.mass, f"{where} mass [kg]", above=0.0, error=BodyError)
-        object.__setattr__(self, "origin", frozen_array(self.origin, f"{where} origin", (3,), BodyError))
-        object.__setattr__(self, "com", frozen_array(self.com, f"{where} com", (3,), BodyError))
-        inertia = frozen_array(self.inertia, f"{where} inertia", (3, 3), BodyError)
-        _check_inertia(inertia, where)
-        object.__setattr__(self, "inertia", inertia)
-
-
-def _check_inertia(inertia: FloatArray, where: str) -> None:
-    """Refuse a matrix that no distribution of mass can have."""
-    symmetric = np.abs(inertia - inertia.T).max() <= 1e-12 * np.abs(inertia).max()
-    moments = np.sort(np.linalg.eigvalsh(inertia))
-    if not symmetric or moments[0] <= 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - 1e-9):
-        raise BodyError(
-            f"{where} inertia has principal moments {moments.tolist()}; "
-            "valid: symmetric, positive, none larger than the sum of the other two"
-        )
+        for name, shape in (("origin", (3,)), ("com", (3,)), ("inertia", (3, 3))):
+            value = frozen_array(getattr(self, name), f"{where} {name}", shape, BodyError)
+            object.__setattr__(self, name, value)
+        inertia = self.inertia
+        symmetric = np.abs(inertia - inertia.T).max() <= 1e-12 * np.abs(inertia).max()
+        moments = np.sort(np.linalg.eigvalsh(inertia))
+        if not symmetric or moments[0] <= 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - 1e-9):
+            raise BodyError(
+                f"{where} inertia has principal moments {moments.tolist()}; "
+                "valid: symmetric, positive, none larger than the sum of the other two"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,10 +181,10 @@ class Effector:
 class Limb:
     """A chain of segments that ends in an effector made for contact ([Tonneau2015]_ 4.3.1).
 
-    Its joints are those of its segments, in order; its frame has the origin of its first segment
-    and the axes of that segment's parent. The effector's z axis is the normal of the contact, from
-    the scene into the body. A contact of the trunk, as of a pelvis on a seat, is a limb without joints:
-    its one segment is the root, whose frame is the limb's own.
+    Its joints are those of its segments, in order; its frame has the origin of its first segment and the axes
+    of that segment's parent. The effector's z axis is the normal of the contact, from the scene into the
+    body. A contact of the trunk, as of a pelvis on a seat, is a limb without joints: its one segment is the
+    root, whose frame is the limb's own.
 
     Attributes:
         name: Unique among the limbs.
@@ -225,9 +209,7 @@ def check_limbs(
 ) -> None:
     """Raise a BodyError for limbs that are no chains, lack hinges, or name what does not exist."""
     names = [limb.name for limb in limbs]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise BodyError(f"limb {twice[0]!r} occurs twice; valid: unique names")
+    _check_unique(names, "limb")
     for limb in limbs:
         _check_chain(limb, segments)
         if limb.effector not in effectors or effectors[limb.effector].segment != limb.segments[-1]:
@@ -235,6 +217,12 @@ def check_limbs(
             raise BodyError(f"limb {limb.name!r} effector is {limb.effector!r}; valid: one of {valid}")
         if limb.mirror is not None and limb.mirror not in names:
             raise BodyError(f"limb {limb.name!r} mirror is {limb.mirror!r}; valid: one of {names}")
+
+
+def _check_unique(names: list[str], kind: str) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise BodyError(f"{kind} {twice[0]!r} occurs twice; valid: unique names")
 
 
 def _check_chain(limb: Limb, segments: Mapping[str, Segment]) -> None:
@@ -263,19 +251,9 @@ def end_of(segment: Segment) -> FloatArray:
     return end * [0.0, 0.0, 1.0] if segment.name == "head" else end
 
 
-def hinges_of(segments: tuple[Segment, ...]) -> tuple[Hinge, ...]:
-    """Every hinge of the segments, in the order of the configuration vector."""
-    return tuple(hinge for segment in segments for hinge in segment.hinges)
-
-
 def segments_by_name(segments: tuple[Segment, ...]) -> Mapping[str, Segment]:
-    """Index segments by name after checking that they form one tree in topological order.
-
-    Raises:
-        BodyError: If a name occurs twice, a parent is missing or comes later, or there is
-            not exactly one root at the front.
-    """
-    index: dict[str, Any] = {}
+    """Segments by name; BodyError unless they form one tree with unique names, parents first."""
+    index: dict[str, Segment] = {}
     for number, segment in enumerate(segments):
         if segment.name in index:
             raise BodyError(f"segment {segment.name!r} occurs twice; valid: unique names")
@@ -289,10 +267,7 @@ def segments_by_name(segments: tuple[Segment, ...]) -> Mapping[str, Segment]:
         index[segment.name] = segment
     if not index:
         raise BodyError("body has no segments; valid: at least a root")
-    names = [hinge.name for hinge in hinges_of(segments)]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise BodyError(f"hinge {twice[0]!r} occurs twice; valid: unique names")
+    _check_unique([hinge.name for segment in segments for hinge in segment.hinges], "hinge")
     return index
 
 
@@ -301,20 +276,19 @@ def segment_triangles(segment: Segment, rounds: int = 24) -> tuple[FloatArray, n
     parts = [_mesh(shape, rounds) for shape in segment.shapes]
     if not parts:
         return None
-    for shape, mesh in zip(segment.shapes, parts, strict=True):
-        placement = np.eye(4)
-        placement[:3, :3], placement[:3, 3] = shape.rotation, shape.translation
-        mesh.apply_transform(placement)
     whole = trimesh.util.concatenate(parts)
     return np.asarray(whole.vertices), np.asarray(whole.faces)
 
 
 def _mesh(shape: Shape, rounds: int) -> trimesh.Trimesh:
     if shape.kind is ShapeKind.BOX:
-        return trimesh.creation.box(shape.size)
-    if shape.kind is ShapeKind.SPHERE:
-        return trimesh.creation.icosphere(subdivisions=3 if rounds > 16 else 2, radius=float(shape.size[0]))
-    radius, length = (float(value) for value in shape.size)
-    capsule = trimesh.creation.capsule(height=length, radius=radius, count=[rounds, rounds])
-    capsule.apply_translation(-capsule.bounds.mean(axis=0))  # trimesh does not centre it
-    return capsule
+        mesh = trimesh.creation.box(shape.size)
+    elif shape.kind is ShapeKind.SPHERE:
+        mesh = trimesh.creation.icosphere(subdivisions=3 if rounds > 16 else 2, radius=float(shape.size[0]))
+    else:
+        radius, length = (float(value) for value in shape.size)
+        mesh = trimesh.creation.capsule(height=length, radius=radius, count=[rounds, rounds])
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))  # trimesh does not centre it
+    placement = np.eye(4)
+    placement[:3, :3], placement[:3, 3] = shape.rotation, shape.translation
+    return mesh.apply_transform(placement)

@@ -29,11 +29,8 @@ from manikin.body.segments import Segment
 from manikin.errors import BodyError
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number
 
-DEFAULT_AGE = 30.0
-"""Age of a body that was given none [years]."""
-
-AGE_RANGE = (18.0, 90.0)
-"""Accepted age [years]."""
+DEFAULT_AGE, AGE_RANGE = 30.0, (18.0, 90.0)
+"""Age of a body that was given none, and accepted ages [years]."""
 
 PRINTED_FOR = 79.0
 """Mass that a printed torque of men is divided by [kg]; ours, the groups' masses were not printed with it."""
@@ -70,8 +67,8 @@ WOMEN: Mapping[Women, float] = MappingProxyType({
 })  # fmt: skip
 """Women's torque per kg over men's. Torques: 1/1.75, the middle of [DanneskioldSamsoe2009]_ (men 1.5 to
 2 times as strong); shoulder 0.5 (Clin. Biomech. 1989, doi 10.1016/0268-0033(89)90046-6, and
-:data:`SHOULDER_STUDY`); forearm 1/1.7
-(Axelsson et al. 2018); wrist 0.786 per kg (J. Funct. Morphol. Kinesiol. 10:377, 2025)."""
+:data:`SHOULDER_STUDY`); forearm 1/1.7 (Axelsson et al. 2018); wrist 0.786 per kg (J. Funct. Morphol.
+Kinesiol. 10:377, 2025)."""
 
 ANDERSON = "Anderson et al. 2007, Table 3"
 HARBO = "Harbo et al. 2012, men of 25 y, 1.80 m, 80 kg"
@@ -85,12 +82,7 @@ SHOULDER_STUDY = "static at 0 deg, 26 men (Dynamic shoulder flexion strength ...
 
 @dataclass(frozen=True)
 class LegStrength:
-    """Peak isometric coefficients of one direction of a leg's joint, for :data:`GROUP_AGES`.
-
-    Attributes:
-        male: ``C_1`` of men, torque per weight times stature.
-        female: Of women.
-    """
+    """Peak isometric ``C_1`` of one direction of a leg's joint, for :data:`GROUP_AGES` of men and women."""
 
     male: tuple[float, float, float]
     female: tuple[float, float, float]
@@ -141,10 +133,6 @@ def _harbo(per_kg: float, women: Women = Women.GENERAL) -> MassStrength:
     return MassStrength(per_kg, HARBO, Grade.QUOTED, women)
 
 
-def _both(strength: MassStrength) -> tuple[MassStrength, MassStrength]:
-    return strength, strength
-
-
 _HIGHER = 0.75
 _THORAX = "0.75 of the lumbar's: the same muscles, fewer of them"
 _TRUNK_TURN = _estimate(1.25, "young men, quoted without a source")
@@ -160,11 +148,11 @@ HUMAN_STRENGTH: Mapping[str, tuple[DirectionStrength, DirectionStrength]] = Mapp
     "thorax_flexion": (
         _estimate(_HIGHER * _TRUNK_EXTEND.per_kg, _THORAX), _estimate(_HIGHER * _TRUNK_BEND.per_kg, _THORAX),
     ),
-    "thorax_side_bend": _both(_estimate(_HIGHER * _TRUNK_SIDE.per_kg, _THORAX)),
-    "thorax_rotation": _both(_estimate(_HIGHER * _TRUNK_TURN.per_kg, _THORAX)),
+    "thorax_side_bend": (_estimate(_HIGHER * _TRUNK_SIDE.per_kg, _THORAX),) * 2,
+    "thorax_rotation": (_estimate(_HIGHER * _TRUNK_TURN.per_kg, _THORAX),) * 2,
     "neck_flexion": (_printed(51.0, FICE, Grade.PAPER), _printed(30.0, FICE, Grade.PAPER)),
-    "neck_side_bend": _both(_printed(32.0, FICE, Grade.PAPER)),
-    "neck_rotation": _both(_printed(13.0, FICE, Grade.PAPER)),
+    "neck_side_bend": (_printed(32.0, FICE, Grade.PAPER),) * 2,
+    "neck_rotation": (_printed(13.0, FICE, Grade.PAPER),) * 2,
     "shoulder_flexion": (
         _harbo(1.25, Women.SHOULDER), _printed(89.9, SHOULDER_STUDY, Grade.PAPER, Women.SHOULDER),
     ),
@@ -247,12 +235,9 @@ def carrying(body: BodyModel, mass: float, hand: str = "both") -> BodyModel:
     all masses, inertias, torques, forces and margins. The strength stays that of the body alone.
 
     Args:
-        body: With the effectors ``left_hand`` and ``right_hand``.
-        mass: Of the load [kg]; 0 returns the body as it is.
+        body: With the effectors ``left_hand`` and ``right_hand``; BodyError if it has no such hand.
+        mass: Of the load [kg], not negative; 0 returns the body as it is.
         hand: ``"left"``, ``"right"`` or ``"both"``.
-
-    Raises:
-        BodyError: If the mass is negative, the hand is not known, or the body has no such hand.
     """
     return with_masses(body, hand_masses(body, mass, hand))
 
@@ -275,14 +260,13 @@ def with_masses(body: BodyModel, masses: Mapping[str, float]) -> BodyModel:
     if not masses:
         return body
     loads = dict(body.loads)
-    segments = list(body.segments)
+    segments = {segment.name: segment for segment in body.segments}
     for name, share in masses.items():
         effector = body.effector(name)
-        number = next(k for k, segment in enumerate(segments) if segment.name == effector.segment)
-        segments[number] = _with_point(segments[number], share, effector.translation)
+        segments[effector.segment] = _with_point(segments[effector.segment], share, effector.translation)
         loads[name] = loads.get(name, 0.0) + share
     nominal = None if body.nominal_mass is None else body.nominal_mass + sum(masses.values())
-    return replace(body, segments=tuple(segments), loads=loads, nominal_mass=nominal)
+    return replace(body, segments=tuple(segments.values()), loads=loads, nominal_mass=nominal)
 
 
 def _with_point(segment: Segment, mass: float, position: FloatArray) -> Segment:

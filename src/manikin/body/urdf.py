@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -21,14 +22,13 @@ _THINNEST = 1e-4
 """Least side of a box around a mesh [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class UrdfShape:
-    """A collision shape in the frame of its link, as :class:`manikin.body.Shape`."""
+class UrdfShape(NamedTuple):
+    """A collision shape in the frame of its link or its geometry, as :class:`manikin.body.Shape`."""
 
     kind: ShapeKind
     size: FloatArray
-    rotation: FloatArray
-    translation: FloatArray
+    rotation: FloatArray = np.eye(3)
+    translation: FloatArray = np.zeros(3)
 
 
 def _shape(element: Element, link: str, folder: Path) -> UrdfShape:
@@ -45,27 +45,23 @@ def _shape(element: Element, link: str, folder: Path) -> UrdfShape:
     return UrdfShape(kind, size, rotation @ turn, translation + rotation @ centre)
 
 
-_Primitive = tuple[ShapeKind, FloatArray, FloatArray, FloatArray]
-
-
-def _primitive(item: Element, where: str, folder: Path) -> _Primitive:
-    """Kind, size, rotation and centre in the frame of the geometry."""
+def _primitive(item: Element, where: str, folder: Path) -> UrdfShape:
     if item.tag == "mesh":
         return _of_mesh(item, where, folder)
     if item.tag == "box":
-        return ShapeKind.BOX, _numbers(item, "size", f"{where} box"), np.eye(3), np.zeros(3)
+        return UrdfShape(ShapeKind.BOX, _numbers(item, "size", f"{where} box"))
     radius = _number(item, "radius", f"{where} {item.tag}")
     if item.tag == "sphere":
-        return ShapeKind.SPHERE, np.array([radius]), np.eye(3), np.zeros(3)
+        return UrdfShape(ShapeKind.SPHERE, np.array([radius]))
     length = _number(item, "length", f"{where} {item.tag}")
     if item.tag == "capsule":
-        return ShapeKind.CAPSULE, np.array([radius, length]), np.eye(3), np.zeros(3)
+        return UrdfShape(ShapeKind.CAPSULE, np.array([radius, length]))
     if length > 2.0 * radius:
-        return ShapeKind.CAPSULE, np.array([radius, length - 2.0 * radius]), np.eye(3), np.zeros(3)
-    return ShapeKind.BOX, np.array([2.0 * radius, 2.0 * radius, length]), np.eye(3), np.zeros(3)
+        return UrdfShape(ShapeKind.CAPSULE, np.array([radius, length - 2.0 * radius]))
+    return UrdfShape(ShapeKind.BOX, np.array([2.0 * radius, 2.0 * radius, length]))
 
 
-def _of_mesh(item: Element, where: str, folder: Path) -> _Primitive:
+def _of_mesh(item: Element, where: str, folder: Path) -> UrdfShape:
     """The shape around a mesh file."""
     name = item.get("filename", "")
     scale = _numbers(item, "scale", f"{where} mesh", np.ones(3))
@@ -79,7 +75,7 @@ def _of_mesh(item: Element, where: str, folder: Path) -> _Primitive:
 
 
 @lru_cache(maxsize=64)
-def _around_file(file: Path, stamp: int, scale: tuple[float, ...]) -> _Primitive:  # noqa: ARG001
+def _around_file(file: Path, stamp: int, scale: tuple[float, ...]) -> UrdfShape:  # noqa: ARG001
     """The shape around a file as it was at a time; limbs often have one mesh in common."""
     try:
         points = np.asarray(trimesh.load(file, force="mesh").vertices, dtype=np.float64)
@@ -94,17 +90,15 @@ def _around_file(file: Path, stamp: int, scale: tuple[float, ...]) -> _Primitive
 def _mesh_file(name: str, folder: Path) -> Path | None:
     if not name:
         return None
-    plain = name.removeprefix("file://")
-    if not name.startswith("package://"):
-        file = folder / plain
-        return file if file.is_file() else None
-    inside = name.removeprefix("package://")
-    rest = inside.partition("/")[2]
-    tried = [base / part for base in (folder, *folder.resolve().parents[:3]) for part in (inside, rest)]
+    tried = [folder / name.removeprefix("file://")]
+    if name.startswith("package://"):
+        inside = name.removeprefix("package://")
+        bases, parts = (folder, *folder.resolve().parents[:3]), (inside, inside.partition("/")[2])
+        tried = [base / part for base in bases for part in parts]
     return next((file for file in tried if file.is_file()), None)
 
 
-def _around(points: FloatArray) -> _Primitive:
+def _around(points: FloatArray) -> UrdfShape:
     """Smallest of the box, capsule and sphere around points."""
     try:
         to_box, extents = trimesh.bounds.oriented_bounds(points)
@@ -126,11 +120,11 @@ def _around(points: FloatArray) -> _Primitive:
     }
     kind = min(volumes, key=lambda item: volumes[item])
     if kind is ShapeKind.BOX:
-        return kind, extents, turn, centre
+        return UrdfShape(kind, extents, turn, centre)
     if kind is ShapeKind.SPHERE:
-        return kind, np.array([reach]), np.eye(3), centre
+        return UrdfShape(kind, np.array([reach]), np.eye(3), centre)
     upright = np.roll(np.eye(3), along - 2, axis=0)
-    return kind, np.array([radius, length]), turn @ upright, centre
+    return UrdfShape(kind, np.array([radius, length]), turn @ upright, centre)
 
 
 def _capsule(local: FloatArray, along: int) -> tuple[float, float]:
@@ -194,18 +188,10 @@ class UrdfLink:
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """A joint; its frame is that of the child link.
+    """A joint of one of :data:`JOINT_KINDS`; its frame is that of the child link.
 
-    Attributes:
-        name: Unique.
-        kind: One of :data:`JOINT_KINDS`.
-        rotation: (3, 3) from the child's axes to the parent's at angle 0.
-        translation: (3,) of the child's origin in the parent's frame [m].
-        axis: (3,) unit axis in the child's frame.
-        lower: Smallest angle [rad].
-        upper: Largest angle [rad].
-        effort: Largest torque [N.m].
-        velocity: Largest speed [rad/s].
+    Rotation (3, 3) and translation (3,) [m] take the child's frame to the parent's at angle 0; the unit axis
+    (3,) is in the child's frame. Angles in rad, the largest torque (effort) in N.m and speed in rad/s.
     """
 
     name: str
@@ -223,12 +209,9 @@ class UrdfJoint:
 
 @dataclass(frozen=True, eq=False)
 class Urdf:
-    """A robot: a tree of links.
+    """A robot: a tree of links by name, parents first, each branch as a whole.
 
-    Attributes:
-        name: Of the robot.
-        links: By name, parents first, each branch as a whole.
-        joints: The joint to its parent of each link but the root, by the link's name.
+    Joints are those of each link but the root to its parent, by the link's name.
     """
 
     name: str
@@ -255,13 +238,12 @@ def read_urdf(path: str | Path) -> Urdf:
         raise BodyError(f"{where}: no link; valid: at least one")
     _check_unique([link.name for link in links], "link", where)
     _check_unique([joint.name for joint in joints], "joint", where)
-    order = _order(links, joints, where)
     by_name = {link.name: link for link in links}
-    name = root.get("name") or file.stem
-    return Urdf(name, {n: by_name[n] for n in order}, {joint.child: joint for joint in joints})
+    ordered = {name: by_name[name] for name in _order(links, joints, where)}
+    return Urdf(root.get("name") or file.stem, ordered, {joint.child: joint for joint in joints})
 
 
-def _parsed(file: Path) -> ElementTree.Element:
+def _parsed(file: Path) -> Element:
     try:
         root = ElementTree.fromstring(file.read_bytes())
     except OSError as error:
@@ -273,7 +255,7 @@ def _parsed(file: Path) -> ElementTree.Element:
     return root
 
 
-def _link(element: ElementTree.Element, file: Path) -> UrdfLink:
+def _link(element: Element, file: Path) -> UrdfLink:
     name = _name(element, "link", str(file))
     where = f"{file}: link {name!r}"
     inertial = element.find("inertial")
@@ -293,7 +275,7 @@ def _link(element: ElementTree.Element, file: Path) -> UrdfLink:
     return UrdfLink(name, mass, com, 0.5 * (turned + turned.T), shapes)
 
 
-def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
+def _joint(element: Element, where: str) -> UrdfJoint:
     name = _name(element, "joint", where)
     place = f"{where}: joint {name!r}"
     kind = element.get("type", "")
@@ -303,10 +285,8 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         raise BodyError(f"{place} mimics another one; valid: joints that move on their own")
     rotation, translation = _placement(element.find("origin"), place)
     parent, child = (_child(element, key, place).get("link", "") for key in ("parent", "child"))
-    axis_element = element.find("axis")
-    axis = (
-        np.array([1.0, 0.0, 0.0]) if axis_element is None else _numbers(axis_element, "xyz", f"{place} axis")
-    )
+    given, x = element.find("axis"), np.array([1.0, 0.0, 0.0])
+    axis = x if given is None else _numbers(given, "xyz", f"{place} axis")
     length = float(np.linalg.norm(axis))
     if kind in ("revolute", "continuous") and length < 1e-9:
         raise BodyError(f"{place} axis is {axis.tolist()}; valid: not zero")
@@ -314,18 +294,16 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
     return UrdfJoint(name, kind, parent, child, rotation, translation, axis / max(length, 1e-9), *limits)
 
 
-def _limits(element: ElementTree.Element, kind: str, place: str) -> tuple[float, float, float, float]:
+def _limits(element: Element, kind: str, place: str) -> tuple[float, float, float, float]:
     """Lower, upper, effort, velocity."""
     if kind not in ("revolute", "continuous"):
         return 0.0, 0.0, 0.0, 0.0
     limit = _child(element, "limit", place)
     place = f"{place} limit"
     effort, velocity = (_number(limit, key, place) for key in ("effort", "velocity"))
-    lower, upper = (
-        (-CONTINUOUS, CONTINUOUS)
-        if kind == "continuous"
-        else (_number(limit, key, place, 0.0) for key in ("lower", "upper"))
-    )
+    lower, upper = -CONTINUOUS, CONTINUOUS
+    if kind == "revolute":
+        lower, upper = (_number(limit, key, place, 0.0) for key in ("lower", "upper"))
     if not (lower < upper and effort > 0.0 and velocity > 0.0):
         raise BodyError(
             f"{place} has lower {lower:g}, upper {upper:g}, effort {effort:g}, velocity {velocity:g}; "
@@ -361,14 +339,14 @@ def _check_unique(names: list[str], kind: str, where: str) -> None:
         raise BodyError(f"{where}: {kind} {twice[0]!r} occurs twice; valid: once")
 
 
-def _name(element: ElementTree.Element, kind: str, where: str) -> str:
+def _name(element: Element, kind: str, where: str) -> str:
     name = element.get("name", "")
     if not name:
         raise BodyError(f"{where}: a {kind} has no name; valid: a name")
     return name
 
 
-def _child(element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element:
+def _child(element: Element, tag: str, where: str) -> Element:
     child = element.find(tag)
     if child is None:
         raise BodyError(f"{where} has no <{tag}>; valid: one")

@@ -25,14 +25,13 @@ FrictionModel = Literal["outer", "inner", "cone"]
 
 - ``outer``: four sides that touch the cone from outside ([Qiu2012]_ 4.18-4.19). It bounds each
   tangential component by ``mu f_n``, and holds tangential forces of up to ``sqrt(2) mu f_n``.
-- ``inner``: four sides with the edges on the cone (``mu / sqrt(2)`` along each axis); forces are
-  inside the cone. It loses up to 29.3 % of the friction.
-- ``cone``: eight sides with the edges on the cone; forces are inside the cone. It loses up to 7.6 %
-  (``1 - cos(pi / 8)``) of the friction, nothing along the contact's x and y axes.
+- ``inner``: four sides inside the cone, the edges on it (``mu / sqrt(2)`` along each axis). It loses up to
+  29.3 % of the friction.
+- ``cone``: eight sides inside the cone, the edges on it. It loses up to 7.6 % (``1 - cos(pi / 8)``) of the
+  friction, nothing along the contact's x and y axes.
 """
 
 FRICTION_MODELS: tuple[FrictionModel, ...] = get_args(FrictionModel)
-"""Names of the friction models."""
 
 MOST_CORNERS = 8
 """Most corners of what of a sole touches."""
@@ -47,11 +46,7 @@ def default_normal_force_cap(mass: float) -> float:
 
 
 def friction_model(value: object) -> FrictionModel:
-    """Check the name of a friction model; ``pyramid``, the older word for ``outer``, is accepted.
-
-    Raises:
-        ContactError: If there is no such model.
-    """
+    """The friction model of a name, ``pyramid`` being the older word for ``outer``; else ContactError."""
     for name in FRICTION_MODELS:
         if value == name or (value == "pyramid" and name == "outer"):
             return name
@@ -62,14 +57,13 @@ def friction_model(value: object) -> FrictionModel:
 class ContactModel:
     """Friction cone and normal-force cap that the contacts of a stance share.
 
-    Values that differ between contacts are with each :class:`~manikin.contact.Contact`: its coefficient of
-    friction, its own normal-force cap, its torsion limit, and the force and moment limits of a grasp.
+    Values that differ between contacts are with each :class:`~manikin.contact.Contact`.
 
     Attributes:
         friction: Friction model.
-        normal_force_cap: Largest sum of the normal forces of all soles and points [N];
-            closes the wrench polytope ([Qiu2012]_ 4.26, summed along the normals so
-            that walls are bounded too). None leaves it to the contacts' own caps.
+        normal_force_cap: Largest sum of the normal forces of all soles and points [N]; closes the wrench
+            polytope ([Qiu2012]_ 4.26, summed along the normals so that walls are bounded too). None leaves it
+            to the contacts' own caps.
     """
 
     friction: FrictionModel = "outer"
@@ -77,11 +71,8 @@ class ContactModel:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "friction", friction_model(self.friction))
-        if self.normal_force_cap is not None:
-            cap = finite_number(
-                self.normal_force_cap, "stance normal_force_cap [N]", above=0.0, error=ContactError
-            )
-            object.__setattr__(self, "normal_force_cap", cap)
+        cap = _optional_limit(self.normal_force_cap, "stance normal_force_cap [N]")
+        object.__setattr__(self, "normal_force_cap", cap)
 
     @classmethod
     def of_body(cls, mass: float, friction: FrictionModel = "outer") -> "ContactModel":
@@ -128,17 +119,15 @@ class Contact(Displayed):
         points: (k, 3) points of the contact frame that carry force [m].
         friction: Coulomb coefficient; 0 for a grasp, which has its own limits.
         normal_force_cap: Largest normal force of this contact [N], or None.
-        torsion_limit: Largest moment about the normal [N.m], or None when only the
-            friction of the corner points limits it ([Qiu2012]_ 4.21, safe form).
+        torsion_limit: Largest moment about the normal [N.m], or None when only the friction of the corner
+            points limits it ([Qiu2012]_ 4.21, safe form).
         max_force: Grasp force limit per world axis [N].
         max_moment: Grasp moment limit per world axis [N.m].
         part: Part of the sole that touches; position and rotation are always those of the full sole
             lying flat, :attr:`points` only those that touch.
         oriented: Whether a grasping hand should have the rotation (a sole always does).
-        settle: Time after the touch-down in which the effector may still slide along the
-            surface to its place, as a body that sits down does [s].
-        edge_radius: Radius of the round front edge on which the effector rolls about its y axis [m];
-            0 where the part that touches is flat.
+        settle: Time after the touch-down in which the effector may still slide to its place [s].
+        edge_radius: Of the round front edge on which the effector rolls about its y axis [m], or 0.
     """
 
     effector: str
@@ -167,11 +156,9 @@ class Contact(Displayed):
         return np.array([float(self.points[:, 0].max()), 0.0, self.edge_radius])
 
     def rolled_away(self, rotation: FloatArray, position: FloatArray) -> tuple[float, float]:
-        """Distance of the pivot of an effector from where it has rolled [m], and its wrong tilt [rad].
+        """Distance of an effector's pivot from where it has rolled [m], and its wrong tilt [rad].
 
-        Args:
-            rotation: (3, 3) effector to world.
-            position: (3,) of its frame [m].
+        Of its rotation (3, 3) to the world and its position (3,) [m].
         """
         frame, along = self.rotation_contact_to_world, rotation[:, 0]
         pitch = np.arctan2(-along @ frame[:, 2], along @ frame[:, 0])
@@ -263,17 +250,16 @@ def sole(
     signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))
     corners = [[a * half_length, b * half_width, 0.0] for a, b in signs]
     if polygon is not None:
-        part = _part_of_sole(polygon, np.array([half_length, half_width]), where)
-        whole = np.abs(part[:, :2]) >= np.array([half_length, half_width]) - 1e-9
+        half = np.array([half_length, half_width])
+        part = _part_of_sole(polygon, half, where)
+        whole = np.abs(part[:, :2]) >= half - 1e-9
         corners = corners if len(part) == 4 and whole.all() else part
     made = _frictional(
         ContactKind.SOLE, effector, position, corners, yaw, friction, normal, rotation, normal_force_cap
     )
-    return replace(
-        made,
-        torsion_limit=_optional_limit(torsion_limit, f"{where} torsion_limit [N.m]"),
-        settle=finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError),
-    )
+    torsion = _optional_limit(torsion_limit, f"{where} torsion_limit [N.m]")
+    settle = finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError)
+    return replace(made, torsion_limit=torsion, settle=settle)
 
 
 def _part_of_sole(polygon: ArrayLike, half: FloatArray, where: str) -> FloatArray:
@@ -294,14 +280,9 @@ def _part_of_sole(polygon: ArrayLike, half: FloatArray, where: str) -> FloatArra
 
 
 def point(
-    effector: str,
-    position: ArrayLike,
-    *,
-    friction: float,
-    normal: ArrayLike | None = None,
-    rotation: ArrayLike | None = None,
-    normal_force_cap: float | None = None,
-) -> Contact:
+    effector: str, position: ArrayLike, *, friction: float, normal: ArrayLike | None = None,
+    rotation: ArrayLike | None = None, normal_force_cap: float | None = None,
+) -> Contact:  # fmt: skip
     """Make a frictional point contact at a position (3,) [m]; other arguments as of :func:`sole`."""
     points = [[0.0, 0.0, 0.0]]
     return _frictional(
@@ -310,13 +291,9 @@ def point(
 
 
 def grasp(
-    effector: str,
-    position: ArrayLike,
-    *,
-    max_force: float,
-    max_moment: float = 0.0,
+    effector: str, position: ArrayLike, *, max_force: float, max_moment: float = 0.0,
     rotation: ArrayLike | None = None,
-) -> Contact:
+) -> Contact:  # fmt: skip
     """Make a grasp: force and moment bounded along each world axis ([Qiu2012]_ 4.22).
 
     Args:
@@ -329,35 +306,24 @@ def grasp(
     Raises:
         ContactError: If a value is not finite or out of its range.
     """
-    where = f"grasp '{effector}'"
+    where, turn = f"grasp '{effector}'", np.eye(3) if rotation is None else rotation
     return Contact(
-        effector=effector,
-        kind=ContactKind.GRASP,
-        position=frozen_array(position, f"{where} position", (3,), ContactError),
-        rotation_contact_to_world=check_rotation(
-            np.eye(3) if rotation is None else rotation, f"{where} rotation", ContactError
-        ),
-        points=frozen_array(np.zeros((1, 3)), "points"),
+        effector, ContactKind.GRASP,
+        frozen_array(position, f"{where} position", (3,), ContactError),
+        check_rotation(turn, f"{where} rotation", ContactError),
+        frozen_array(np.zeros((1, 3)), "points"),
         max_force=finite_number(max_force, f"{where} max_force [N]", above=0.0, error=ContactError),
         max_moment=finite_number(max_moment, f"{where} max_moment [N.m]", at_least=0.0, error=ContactError),
         oriented=rotation is not None,
-    )
+    )  # fmt: skip
 
 
 def rolling_front(contact: Contact, radius: float) -> Contact:
-    """The round front edge of a full sole, on which it rolls without sliding.
-
-    Args:
-        radius: Of the edge [m].
-
-    Raises:
-        ContactError: If the contact is no whole sole or the radius is not positive.
-    """
+    """The front edge of a whole sole, of a radius [m] > 0, on which it rolls; ContactError for any other."""
     if contact.kind is not ContactKind.SOLE or contact.part is not SolePart.FULL or contact.hangs_over:
         raise ContactError(f"front of '{contact.effector}' is taken from what is no whole sole")
-    radius = finite_number(
-        radius, f"sole '{contact.effector}' edge radius [m]", above=0.0, error=ContactError
-    )
+    name = f"sole '{contact.effector}' edge radius [m]"
+    radius = finite_number(radius, name, above=0.0, error=ContactError)
     front = contact.points[contact.points[:, 0] > 0.0]
     points = frozen_array(front, "points of a front [m]", (2, 3))
     return replace(contact, points=points, part=SolePart.FRONT, torsion_limit=None, edge_radius=radius)
@@ -384,18 +350,13 @@ def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
         return contact
     if contact.hangs_over:
         raise ContactError(f"{where} is taken from a sole that hangs over an edge; valid: a whole one")
-    half_length, half_width = contact.length / 2, contact.width / 2
-    line = finite_number(
-        hinge, f"{where} hinge [m]", above=-half_length, at_most=half_length, error=ContactError
-    )
+    x, y = contact.length / 2, contact.width / 2
+    line = finite_number(hinge, f"{where} hinge [m]", above=-x, at_most=x, error=ContactError)
+    corners = [[-x, -y, 0.0], [-x, y, 0.0]]
     if part is SolePart.TOES:
-        tip = [[half_length, half_width, 0.0], [half_length, -half_width, 0.0]]
-        points = [*tip, [line, -half_width, 0.0], [line, half_width, 0.0]]
-    else:
-        points = [[-half_length, -half_width, 0.0], [-half_length, half_width, 0.0]]
-    return replace(
-        contact, points=frozen_array(points, f"{where} points", (None, 3)), part=part, torsion_limit=None
-    )
+        corners = [[x, y, 0.0], [x, -y, 0.0], [line, -y, 0.0], [line, y, 0.0]]
+    points = frozen_array(corners, f"{where} points", (None, 3))
+    return replace(contact, points=points, part=part, torsion_limit=None)
 
 
 def _frictional(
@@ -411,14 +372,13 @@ def _frictional(
     else:
         frame = rotation_from_yaw(heading)
     return Contact(
-        effector=effector,
-        kind=kind,
-        position=frozen_array(position, f"{where} position", (3,), ContactError),
-        rotation_contact_to_world=frozen_array(frame, f"{where} rotation", (3, 3), ContactError),
-        points=frozen_array(points, f"{where} points", (None, 3), ContactError),
-        friction=finite_number(friction, f"{where} friction", above=0.0, error=ContactError),
-        normal_force_cap=_optional_limit(normal_force_cap, f"{where} normal_force_cap [N]"),
-    )
+        effector, kind,
+        frozen_array(position, f"{where} position", (3,), ContactError),
+        frozen_array(frame, f"{where} rotation", (3, 3), ContactError),
+        frozen_array(points, f"{where} points", (None, 3), ContactError),
+        finite_number(friction, f"{where} friction", above=0.0, error=ContactError),
+        _optional_limit(normal_force_cap, f"{where} normal_force_cap [N]"),
+    )  # fmt: skip
 
 
 def _optional_limit(value: float | None, name: str) -> float | None:
@@ -436,8 +396,5 @@ def soles_overlap(first: Contact, second: Contact, thickness: float = 0.03) -> b
     corners, others = first.points_in_world, second.points_in_world
     if np.abs((others - first.position) @ first.normal).min() > thickness:
         return False
-    for axis in axes:
-        a, b = corners @ axis, others @ axis
-        if a.max() <= b.min() or b.max() <= a.min():
-            return False
-    return True
+    extents = ((corners @ axis, others @ axis) for axis in axes)
+    return all(a.max() > b.min() and b.max() > a.min() for a, b in extents)

@@ -18,11 +18,9 @@ from manikin.numerics.spatial import FloatArray
 
 
 def schedule_of_support(
-    time: FloatArray,
-    support: NDArray[np.bool_ | np.int8],
-    contact: Callable[[int, int], Contact],
+    time: FloatArray, support: NDArray[np.bool_ | np.int8], contact: Callable[[int, int], Contact],
     normal_force_cap: float,
-) -> ContactSchedule:
+) -> ContactSchedule:  # fmt: skip
     """Phases of a motion, from each change of its supports to the next, each with its exact duration.
 
     Args:
@@ -41,11 +39,9 @@ def schedule_of_support(
 
 
 def stance_at(
-    placements: Mapping[str, tuple[FloatArray, FloatArray]],
-    sizes: Mapping[str, tuple[float, float]],
-    friction: float,
-    normal_force_cap: float,
-) -> Stance:
+    placements: Mapping[str, tuple[FloatArray, FloatArray]], sizes: Mapping[str, tuple[float, float]],
+    friction: float, normal_force_cap: float,
+) -> Stance:  # fmt: skip
     """Stance of the effectors that touch in one sample, at their poses.
 
     Args:
@@ -54,14 +50,12 @@ def stance_at(
         friction: Coulomb coefficient of every contact.
         normal_force_cap: Largest sum of normal forces [N].
     """
-    contacts = []
-    for name, (rotation, position) in placements.items():
-        if name in sizes:
-            length, width = sizes[name]
-            made = sole(name, position, rotation=rotation, length=length, width=width, friction=friction)
-        else:
-            made = point(name, position, rotation=rotation, friction=friction)
-        contacts.append(made)
+    contacts = [
+        sole(name, position, rotation=turn, length=sizes[name][0], width=sizes[name][1], friction=friction)
+        if name in sizes
+        else point(name, position, rotation=turn, friction=friction)
+        for name, (turn, position) in placements.items()
+    ]
     return Stance(contacts, normal_force_cap)
 
 
@@ -73,8 +67,7 @@ class LevelSupport:
         first: First sample in which it touches.
         middle: The sample whose pose is taken.
         stop: The sample after the last.
-        x: Of the effector in the world [m].
-        y: As ``x``.
+        x, y: Of the effector in the world [m].
         yaw: Heading of its x axis about the vertical [rad].
     """
 
@@ -98,5 +91,5 @@ def level_supports(
     for first, stop in mask_runs(support):
         middle = (first + stop) // 2
         rotation, (x, y, _) = placement(middle)
-        yaw = math.atan2(rotation[1, 0], rotation[0, 0])
-        yield LevelSupport(first, middle, stop, float(x), float(y), yaw)
+        heading = math.atan2(rotation[1, 0], rotation[0, 0])
+        yield LevelSupport(first, middle, stop, float(x), float(y), heading)

@@ -1,9 +1,8 @@
 """Stances, their sequences and schedules, and the rolling of feet over heel, full sole and toes.
 
 Rolling feet are left open in [Qiu2012]_ 7.4.2; the expansion is our own. A foot lands on the edge of its heel
-while the other one still stands on its full sole, and rises onto its toes when the other one already does:
-the admissible wrenches of such a phase contain those of the full sole alone, so rolling never costs margin
-against single support.
+while the other one still stands on its full sole, and rises onto its toes when the other one already does: so
+rolling never costs margin against single support.
 """
 
 import itertools
@@ -43,24 +42,14 @@ class Stance(Displayed):
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
         cap = "none" if self.normal_force_cap is None else f"{self.normal_force_cap:.0f} N"
-        return {
-            "contacts": " ".join(self.effectors), "friction_model": self.friction_model,
-            "normal_force_cap": cap,
-        }  # fmt: skip
+        contacts = " ".join(self.effectors)
+        return {"contacts": contacts, "friction_model": self.friction_model, "normal_force_cap": cap}
 
     def __init__(
-        self,
-        contacts: Sequence[Contact],
-        normal_force_cap: float | None = None,
-        friction_model: FrictionModel = "outer",
-        *,
-        model: ContactModel | None = None,
-    ) -> None:
-        """Make a stance of one contact per effector, with a contact model or its two values.
-
-        Raises:
-            ContactError: If an effector is held twice or the contact model is not usable.
-        """
+        self, contacts: Sequence[Contact], normal_force_cap: float | None = None,
+        friction_model: FrictionModel = "outer", *, model: ContactModel | None = None,
+    ) -> None:  # fmt: skip
+        """Make a stance of one contact per effector (ContactError) with a contact model or its two values."""
         for item in contacts:
             if not isinstance(item, Contact):
                 raise ContactError(f"stance contains {item!r}; valid: contacts made by sole, point or grasp")
@@ -81,10 +70,9 @@ class Stance(Displayed):
         return any(contact.effector == effector for contact in self.contacts)
 
     def __getitem__(self, effector: str) -> Contact:
-        for contact in self.contacts:
-            if contact.effector == effector:
-                return contact
-        raise KeyError(f"no contact of {effector!r}; this stance has {list(self.effectors)}")
+        if effector not in self:
+            raise KeyError(f"no contact of {effector!r}; this stance has {list(self.effectors)}")
+        return next(contact for contact in self.contacts if contact.effector == effector)
 
     @property
     def effectors(self) -> tuple[str, ...]:
@@ -121,8 +109,7 @@ class CarriedLoad:
 
     Attributes:
         masses: [kg] by the name of the effector.
-        offset: (3,) from the body's CoM to the masses' common centre, world axes [m]: an estimate, for plans
-            that know no posture.
+        offset: (3,) estimate of the masses' common centre from the body's CoM, world axes [m].
     """
 
     masses: Mapping[str, float]
@@ -151,11 +138,10 @@ class Phase:
     load: CarriedLoad | None = None
 
     def __post_init__(self) -> None:
-        finite_number(self.min_duration, "phase min_duration [s]", above=0.0, error=ContactError)
-        if self.max_duration is not None:
-            finite_number(
-                self.max_duration, "phase max_duration [s]", at_least=self.min_duration, error=ContactError
-            )
+        least, most = self.min_duration, self.max_duration
+        finite_number(least, "phase min_duration [s]", above=0.0, error=ContactError)
+        if most is not None:
+            finite_number(most, "phase max_duration [s]", at_least=least, error=ContactError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +150,7 @@ class Swing:
 
     Attributes:
         effector: Name of the flying effector.
-        first_phase: Index of the first phase in which it flies.
-        last_phase: Index of the last one (inclusive).
+        first_phase, last_phase: Indices of the first and the last phase in which it flies.
         start: Contact left, or None when it was free from the beginning.
         end: Contact made, or None when it stays free to the end.
     """
@@ -179,11 +164,7 @@ class Swing:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StanceSequence(Displayed):
-    """Stances in order; consecutive ones share what the motion holds on to.
-
-    Attributes:
-        phases: At least one phase.
-    """
+    """At least one phase in order; consecutive stances share what the motion holds on to."""
 
     phases: tuple[Phase, ...]
 
@@ -272,13 +253,11 @@ class ContactSchedule(Displayed):
     def settling(self, time: ArrayLike, effector: str) -> NDArray[np.bool_]:
         """(n,) whether the contact of an effector may still slide to its place at each time."""
         times = np.atleast_1d(np.asarray(time, dtype=np.float64))
-        settling = np.zeros(len(times), dtype=bool)
-        held = False
+        settling, held = np.zeros(len(times), dtype=bool), False
         for phase, start in zip(self.sequence, self.instants, strict=False):
-            carries = effector in phase.stance
-            if carries and not held and (lasting := phase.stance[effector].settle) > 0.0:
-                settling |= (times >= start) & (times < start + lasting)
-            held = carries
+            if effector in phase.stance and not held:
+                settling |= (times >= start) & (times < start + phase.stance[effector].settle)
+            held = effector in phase.stance
         return settling
 
     def swing_interval(self, swing: Swing) -> tuple[float, float]:
@@ -286,14 +265,8 @@ class ContactSchedule(Displayed):
         return float(self.instants[swing.first_phase]), float(self.instants[swing.last_phase + 1])
 
 
-ON_HEEL = 0.08
-"""Least time on the heel's edge of a rolling foot after it landed [s]."""
-
-ON_TOES = 0.14
-"""Least time on its toes before it lifts off [s]."""
-
-FLAT = 0.04
-"""Least time in between during which both feet lie flat [s]."""
+ON_HEEL, FLAT, ON_TOES = 0.08, 0.04, 0.14
+"""Least times of a rolling foot on the heel's edge, with both feet flat, and on its toes [s]."""
 
 STRETCH = 1.5
 """The phases on heel or toes last at most this many times their least time."""
@@ -302,12 +275,8 @@ STRETCH = 1.5
 def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
     """Split every phase in which a foot lands or leaves beside another full contact.
 
-    The phases of a foot keep its place; the parts' shares are taken from the split phase's least
-    duration, which is never shortened.
-
-    Args:
-        sequence: Stances with full soles.
-        hinge: Where the hinge of the toes crosses a sole's x axis [m].
+    The parts' shares are taken from the split phase's least duration, which is never shortened. Soles are
+    full, and the hinge of the toes crosses their x axes at ``hinge`` [m].
     """
     parts = (_split(sequence, index, hinge) for index in range(len(sequence)))
     return StanceSequence([phase for split in parts for phase in split])
@@ -319,8 +288,7 @@ def _split(sequence: StanceSequence, index: int, hinge: float) -> Iterator[Phase
     leaving = _changing(phase.stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
     taken = (ON_HEEL if landing else 0.0) + (ON_TOES if leaving else 0.0)
     if landing:
-        stance = _with_part(phase.stance, landing, SolePart.HEEL, hinge)
-        yield Phase(stance, ON_HEEL, STRETCH * ON_HEEL, phase.load)
+        yield _on_part(phase, landing, SolePart.HEEL, hinge, ON_HEEL)
     if landing or leaving:
         least = max(phase.min_duration - taken, FLAT)
         most = None if phase.max_duration is None else max(phase.max_duration - taken, least)
@@ -328,8 +296,7 @@ def _split(sequence: StanceSequence, index: int, hinge: float) -> Iterator[Phase
     else:
         yield phase
     if leaving:
-        stance = _with_part(phase.stance, leaving, SolePart.TOES, hinge)
-        yield Phase(stance, ON_TOES, STRETCH * ON_TOES, phase.load)
+        yield _on_part(phase, leaving, SolePart.TOES, hinge, ON_TOES)
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:
@@ -346,8 +313,9 @@ def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:
     return changing if any(contact.kind is ContactKind.SOLE for contact in staying) else ()
 
 
-def _with_part(stance: Stance, effectors: tuple[str, ...], part: SolePart, hinge: float) -> Stance:
-    contacts: list[Contact] = [
-        sole_part(contact, part, hinge) if contact.effector in effectors else contact for contact in stance
+def _on_part(phase: Phase, effectors: Sequence[str], part: SolePart, hinge: float, least: float) -> Phase:
+    contacts = [
+        sole_part(contact, part, hinge) if contact.effector in effectors else contact
+        for contact in phase.stance
     ]
-    return stance.with_contacts(contacts)
+    return Phase(phase.stance.with_contacts(contacts), least, STRETCH * least, phase.load)

@@ -34,17 +34,16 @@ class AlignmentStep:
 
     def __init__(self, chain: LimbKinematics, *, level: bool) -> None:
         """Compile the step of one limb, which turns the effector to the normal too if it is to be level."""
-        self.q, self.moved = np.zeros(len(chain)), np.zeros(len(chain))
-        self.point, self.normal = np.zeros(3), np.zeros(3)
-        self.rotation, self.product = np.zeros(9), np.zeros(9)
-        self._missing = np.zeros(2)
-        function = _step(chain, level=level)
-        self._buffer, self._evaluate = cast(Any, function).buffer()
-        for number, item in enumerate((self.q, self.point, self.normal)):
+        k = len(chain)
+        self.q, self.point, self.normal, self.moved, missing, self.rotation, self.product = buffers = [
+            np.zeros(size) for size in (k, 3, 3, k, 2, 9, 9)
+        ]
+        self._buffer, self._evaluate = cast(Any, _step(chain, level=level)).buffer()
+        for number, item in enumerate(buffers[:3]):
             self._buffer.set_arg(number, item.data)
-        for number, item in enumerate((self.moved, self._missing, self.rotation, self.product)):
+        for number, item in enumerate(buffers[3:]):
             self._buffer.set_res(number, item.data)
-        self._read = self._missing.data
+        self._read = missing.data
 
     def __call__(self) -> tuple[float, float]:
         """Distance to the point [m], and angle to the normal [rad] at ``q``."""
@@ -57,11 +56,10 @@ def _step(chain: LimbKinematics, *, level: bool) -> ca.Function:
     place, turn, axes, hinges = _forward(chain, q)
     gap = point - place
     tilt = _tilt(turn[:, 2], turn[:, 0], normal)
-    none = ca.SX(3, 0)  # the columns of a limb without joints
+    none, z = ca.SX(3, 0), turn[:, 2]  # the first: the columns of a limb without joints
     jacobian = ca.horzcat(none, *[ca.cross(a, place - h) for a, h in zip(axes, hinges, strict=True)])
     missing, product = gap, jacobian @ jacobian.T
     if level:
-        z = turn[:, 2]
         across = ca.horzcat(none, *[a - z * ca.dot(z, a) for a in axes])
         jacobian, missing = ca.vertcat(jacobian, LEVER * across), ca.vertcat(gap, LEVER * tilt)
     moved = _moved(chain, q, jacobian, missing)
@@ -135,10 +133,8 @@ def _constant(values: FloatArray) -> Any:
     return ca.sparsify(ca.DM(np.where(np.abs(array) < _ZERO, 0.0, array)))
 
 
-POSITION_TOLERANCE = 1e-5
-"""Distance of the effector to the surface point that counts as arrived [m]."""
-TILT_TOLERANCE = 1e-4
-"""Angle between the effector's z axis and the normal that counts as aligned [rad]."""
+POSITION_TOLERANCE, TILT_TOLERANCE = 1e-5, 1e-4
+"""Distance of the effector to the surface point [m], and of its z axis to the normal [rad], that do."""
 STEPS = 7
 """Steps for position and normal, and again for the position alone."""
 _STALLED = 0.9  # what comes no nearer than this share of its distance is left alone
@@ -171,7 +167,6 @@ class Aligner:
     """Puts the effector of one limb onto points; works on buffers of its own."""
 
     def __init__(self, chain: LimbKinematics) -> None:
-        """Prepare the steps of a limb."""
         self._level = AlignmentStep(chain, level=True)
         self._shift = AlignmentStep(chain, level=False)
 
@@ -180,8 +175,7 @@ class Aligner:
     ) -> Alignment:
         """Move the effector to a point, its z axis along a normal, by damped least squares.
 
-        The joint ranges are kept. Where a tilt is allowed, the position comes first: what is not
-        there, upright, after some steps makes the last ones for the position alone.
+        The joint ranges are kept. Where a tilt is allowed, the last steps are for the position alone.
 
         Args:
             angles: (k,) to begin with [rad].

@@ -1,9 +1,7 @@
 """Reach of the centre of mass over given contacts, from the body's own kinematics.
 
-A stance leaves the centre of mass a region: each leg ends at its hip, hips and shoulders are where pelvis and
-trunk put them, and every joint has its range.  The region is a convex polytope with given normals, linear in
-a plan of the centre of mass; how far it reaches along each of them is sampled, see
-:mod:`manikin.kinematics.reach_sampler`.
+A stance leaves the centre of mass a region: a convex polytope with given normals, linear in a plan of the
+centre of mass; how far it reaches along each of them is sampled, see :mod:`manikin.kinematics.reach_sampler`.
 
 No obstacle and no balance is looked at.  Tonneau et al., "2PAC", ACM Trans. Graph. 37(5), 2018, have such
 regions for each contact of a robot alone; the common sampling of all contacts, which couples them by heading
@@ -80,13 +78,9 @@ class ComRegion:
 
 
 class ComReach:
-    """Regions of the centre of mass of one body over any of its stances.
-
-    Use :meth:`of`, which keeps what was computed for a body.
-    """
+    """Regions of the centre of mass of one body over any of its stances; :meth:`of` keeps them."""
 
     def __init__(self, body: BodyModel) -> None:
-        """Prepare a body."""
         self.parts = ReachBody(body)
         self._regions: dict[tuple[object, ...], ComRegion] = {}
         standing = Configuration(body)
@@ -104,10 +98,8 @@ class ComReach:
         """Region of the centre of mass with all contacts held.
 
         Postures keep a little from the ends of the joint ranges; feet that stand on their toes or heels may
-        pitch about them. Equal stances are computed once, wherever they stand.
-
-        Args:
-            contacts: Of one stance, one for each effector.
+        pitch about them. Equal stances are computed once, wherever they stand. Contacts are those of one
+        stance, one for each effector.
         """
         if not contacts:
             return ComRegion.everywhere()
@@ -118,16 +110,15 @@ class ComReach:
             for c in local
         )
         if key not in self._regions:
-            self._regions[key] = self._sampled(local)
+            held = ReachSampler(self.parts, local, NORMALS).held()
+            self._regions[key] = (
+                ComRegion(NORMALS, held.projections.max(axis=0))
+                if held.missed <= 0.0
+                else replace(ComRegion.everywhere(), missed=held.missed)
+            )
         found = self._regions[key]
         normals = found.normals @ frame.T
         return replace(found, normals=normals, offsets=found.offsets + normals @ origin)
-
-    def _sampled(self, contacts: Sequence[LocalContact]) -> ComRegion:
-        held = ReachSampler(self.parts, contacts, NORMALS).held()
-        if held.missed > 0.0:
-            return ComRegion(np.zeros((0, 3)), np.zeros(0), held.missed)
-        return ComRegion(NORMALS, held.projections.max(axis=0))
 
     def _heading_frame(self, contacts: Sequence[Contact]) -> tuple[FloatArray, FloatArray]:
         """Axes and origin of the stance: the middle of its contacts, heading as standing fits them best."""

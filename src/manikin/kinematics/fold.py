@@ -37,7 +37,6 @@ STEP = 0.08
 """Step in which the ceiling is lowered [m]."""
 
 _BISECTIONS = 5
-_CEILING = "ceiling"
 _SETTINGS = SolverSettings(tolerance=1e-4, clearance_tolerance=1e-3, restarts=False, explain=False)
 
 
@@ -49,8 +48,7 @@ class Fold:
         squat: CoM height with the trunk as upright as possible [m].
         stoop: CoM height with the legs as straight as possible: the greatest found [m].
         com_height: CoM height half way between them, where a posture was found as well [m].
-        footprint: (4, 2) corners of the rectangle that trunk and head cover there, relative to
-            the CoM, x forward, y left [m].
+        footprint: (4, 2) corners of the rectangle under trunk and head, from the CoM, x forward, y left [m].
         q: (nq,) that posture, facing along x with the feet about the origin.
     """
 
@@ -65,19 +63,11 @@ class Fold:
 def fold_under(body: BodyModel, height: float) -> Fold | None:
     """Fold a standing body under a ceiling at a height above its supports [m]; None without such a posture.
 
-    The ceiling is lowered onto the standing body step by step, each posture beginning from the
-    one before, so that the result does not jump between unlike postures. Results are kept by the body's
-    identity.
-
-    Raises:
-        BodyError: If the body has no stature or no soles.
+    Results are kept by the body's identity. BodyError if the body has no stature or no soles.
     """
-    q = body.standing_posture()
-    for ceiling in _heights(body, height):
-        squat = _Folder(body, ceiling).posture(None, q)
-        if not squat.succeeded:
-            return None
-        q = squat.q
+    q, lowest = _squat(body, height)
+    if lowest > height:
+        return None
     folder = _Folder(body, height)
     low, stoop = folder.com_height(q), folder.stoop(q)
     middle = folder.posture(low + HABIT * (stoop - low), q)
@@ -87,13 +77,22 @@ def fold_under(body: BodyModel, height: float) -> Fold | None:
 
 def lowest_ceiling(body: BodyModel) -> float:
     """Height of the lowest ceiling under which the body was found to fold, to :data:`STEP` [m]."""
+    return _squat(body, STEP)[1]
+
+
+def _squat(body: BodyModel, height: float) -> tuple[FloatArray, float]:
+    """Squat under a ceiling at a height, or as low as it goes, and the height of the ceiling there [m].
+
+    The ceiling is lowered onto the standing body step by step, each posture beginning from the one before, so
+    that the result does not jump between unlike postures.
+    """
     q, lowest = body.standing_posture(), np.inf
-    for ceiling in _heights(body, STEP):
+    for ceiling in _heights(body, height).tolist():
         squat = _Folder(body, ceiling).posture(None, q)
         if not squat.succeeded:
             break
         q, lowest = squat.q, ceiling
-    return float(lowest)
+    return q, lowest
 
 
 def _heights(body: BodyModel, lowest: float) -> FloatArray:
@@ -110,8 +109,7 @@ class _Folder:
 
     def __init__(self, body: BodyModel, height: float) -> None:
         self._body = body
-        thick = 1.0
-        ceiling = Obstacle(_CEILING, Box((10.0, 10.0, thick)), translation=(0.0, 0.0, height + 0.5 * thick))
+        ceiling = Obstacle("ceiling", Box((10.0, 10.0, 1.0)), translation=(0.0, 0.0, height + 0.5))
         self._proximity = Proximity(body, Scene([ceiling]))
         self._feet = tuple(_feet(body))
         self._ignored = frozenset(

@@ -25,12 +25,9 @@ _REFLECT = np.outer(REFLECTION, REFLECTION)
 class LegKinematics:
     """Forward and inverse kinematics of both legs of :func:`manikin.body.human`, without iteration.
 
-    The chain is hip (flexion, abduction, rotation), knee (flexion about y, rotation about the shank), ankle
-    (dorsiflexion about y, inversion about x). The law of cosines gives the knee; the turn of the leg about
-    the line from hip to ankle and the two angles of the ankle give the foot its orientation, with the knee's
-    rotation kept as it is. The right leg is the left one of a reflected body.
-
-    Arrays of both legs have a first axis of length 2: left, right.
+    The law of cosines gives the knee; the turn of the leg about the line from hip to ankle and the two angles
+    of the ankle give the foot its orientation, with the knee's rotation kept as it is. The right leg is the
+    left one of a reflected body. Arrays of both legs have a first axis of length 2: left, right.
     """
 
     def __init__(self, body: BodyModel) -> None:
@@ -38,9 +35,8 @@ class LegKinematics:
         sides = [[body.segment(f"{side}_{name}") for name in ("thigh", "leg", "foot")]
                  for side in ("left", "right")]  # fmt: skip
         left = [hinge for part in sides[0] for hinge in part.hinges]
-        if tuple(h.name for h in left) != tuple(f"left_{name}" for name in HINGES) or not np.allclose(
-            [h.axis for h in left], _AXES
-        ):
+        same_names = [hinge.name for hinge in left] == [f"left_{name}" for name in HINGES]
+        if not same_names or not np.allclose([hinge.axis for hinge in left], _AXES):
             raise BodyError(f"legs of body {body.name!r} have other hinges; valid: those of a human")
         if not are_mirrored(body, limb_named(body, "left_leg"), limb_named(body, "right_leg")):
             raise BodyError(f"legs of body {body.name!r} differ; valid: equal ones")

@@ -83,7 +83,6 @@ def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
 def rigid_reach(limb: Limb, segment: str, position: FloatArray, rotation: FloatArray) -> ReachVolume:
     """Reach of a limb without joints: a cube of :data:`GIVE` on each side of its effector.
 
-    The effector moves with the trunk alone; a surface that meets the cube is near enough to be touched.
     Its position (3,) [m] and its rotation (3, 3) are those in the segment that carries it.
     """
     return hull_of(limb, segment, position + GIVE * _CORNERS @ rotation.T)
@@ -103,13 +102,11 @@ def reach_volume(
     """
     if count < MIN_COUNT:
         raise BodyError(f"reach volume count is {count}; valid: at least {MIN_COUNT}")
-    chain = LimbKinematics(body, limb)
-    segment = parent_segment(body, limb)
+    chain, segment, origin = LimbKinematics(body, limb), parent_segment(body, limb), limb_origin(body, limb)
     if not len(chain):
-        return rigid_reach(limb, segment, limb_origin(body, limb) + chain.tip, chain.tip_rotation)
+        return rigid_reach(limb, segment, origin + chain.tip, chain.tip_rotation)
     source = NaturalRange(body, limb) if natural else chain
-    positions = chain.place(source.random_angles(rng, count)).positions
-    return hull_of(limb, segment, positions + limb_origin(body, limb))
+    return hull_of(limb, segment, chain.place(source.random_angles(rng, count)).positions + origin)
 
 
 _IDENTITY = np.eye(3)
@@ -138,10 +135,8 @@ class LimbKinematics:
 
     Attributes:
         slots: (k,) indices of its hinges in the configuration vector.
-        lower: (k,) smallest angles [rad].
-        upper: (k,) largest angles [rad].
-        torque_lower: (k,) most negative torques [N.m].
-        torque_upper: (k,) largest torques [N.m].
+        lower, upper: (k,) ends of the ranges [rad].
+        torque_lower, torque_upper: (k,) most negative and largest torques [N.m].
         axes: (k, 3) unit axes of the hinges, each in the axes of the one before it.
         offsets: (k, 3) translations before each hinge [m].
         tip: (3,) translation from the last hinge to the effector [m]; from the limb's origin without any.
@@ -173,11 +168,7 @@ class LimbKinematics:
         return rng.uniform(self.lower, self.upper, (count, len(self)))
 
     def place(self, angles: ArrayLike) -> EffectorPlacements:
-        """Place the effector at many joint angles (n, k) [rad].
-
-        Raises:
-            BodyError: If the angles are of another shape.
-        """
+        """Place the effector at many joint angles (n, k) [rad]; BodyError if they are of another shape."""
         q = np.asarray(angles, dtype=np.float64)
         if q.ndim != 2 or q.shape[1] != len(self):
             raise BodyError(f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self)})")
@@ -231,8 +222,7 @@ def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
     offset = np.zeros(3)
     for number, name in enumerate(limb.segments):
         segment = body.segment(name)
-        # The limb's frame is at the origin of its first segment.
-        offset = offset + (segment.origin if number else 0.0)
+        offset = offset + (segment.origin if number else 0.0)  # the limb's frame is at the first one's origin
         for _ in segment.hinges:
             offsets.append(offset)
             offset = np.zeros(3)

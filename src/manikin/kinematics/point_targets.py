@@ -30,8 +30,7 @@ class Placements:
         roots: (3, n) origins of the root [m].
         turns: (s, 3, 3, n) from the axes of each segment to the world's.
         shifts: (s, 3, n) origins of the segments, from that of the root [m].
-        columns: (nv, 6, n) linear velocity at the root's origin and angular velocity of what each joint
-            carries, when that joint moves at speed 1.
+        columns: (nv, 6, n) linear velocity at the root's origin and angular velocity per joint speed.
     """
 
     roots: FloatArray
@@ -63,12 +62,8 @@ class SegmentPlacements:
             caused: Any = pin.computeJointJacobians(model, data, posture)
             pin.updateFramePlacements(model, data)
             turns[frame], shifts[frame], columns[frame] = self._turns, self._shifts, caused.T
-        return Placements(
-            q[:, :3].T,
-            np.ascontiguousarray(turns.transpose(1, 2, 3, 0)),
-            np.ascontiguousarray(shifts.transpose(1, 2, 0)),
-            np.ascontiguousarray(columns.transpose(1, 2, 0)),
-        )
+        moved = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (turns, shifts, columns))
+        return Placements(q[:, :3].T, *moved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +97,8 @@ class PointTargets:
         if never.size:
             raise InputError(f"target {self.names[never[0]]!r} is never seen; valid: in at least one frame")
         seen.setflags(write=False)
-        object.__setattr__(self, "points", frozen_array(self.points, "target points", (k, 3)))
         object.__setattr__(self, "positions", seen)
+        object.__setattr__(self, "points", frozen_array(self.points, "target points", (k, 3)))
         object.__setattr__(self, "weights", frozen_array(self.weights, "target weights", (k,)))
         if np.any(self.weights <= 0.0):
             raise InputError("a target weighs nothing or less; valid: above 0")
@@ -114,12 +109,11 @@ class PointTargets:
 
     def and_these(self, other: "PointTargets") -> "PointTargets":
         """These targets and others of the same instants."""
+        positions = np.concatenate([self.positions, other.positions], axis=1)
+        points, weights = np.vstack([self.points, other.points]), np.append(self.weights, other.weights)
         return PointTargets(
-            self.names + other.names, self.segments + other.segments,
-            np.concatenate([self.points, other.points]),
-            np.concatenate([self.positions, other.positions], axis=1),
-            np.concatenate([self.weights, other.weights]),
-        )  # fmt: skip
+            self.names + other.names, self.segments + other.segments, points, positions, weights
+        )
 
 
 def origin_targets(centres: Mapping[str, FloatArray], segments: Sequence[str]) -> PointTargets:
@@ -129,11 +123,8 @@ def origin_targets(centres: Mapping[str, FloatArray], segments: Sequence[str]) -
     return PointTargets(names, names, np.zeros((len(names), 3)), positions, np.ones(len(names)))
 
 
-REST = 1e-3
-"""Distance [m] that weighs as much as one radian away from the resting posture."""
-
-STEADY = 3e-3
-"""Distance [m] that weighs as much as one radian away from the posture before."""
+REST, STEADY = 1e-3, 3e-3
+"""Distances [m] that weigh as much as one radian away from the resting posture, and from the one before."""
 
 HOLD = REST**2 + STEADY**2
 
@@ -145,10 +136,10 @@ class Evaluation:
     Attributes:
         q: (n, nq) the postures.
         held: (n, h) angles that the hinges are drawn to [rad].
-        columns: (nv, 6, n), see :class:`manikin.kinematics.point_targets.Placements`.
+        columns: (nv, 6, n), see :class:`Placements`.
         points: (k, 3, n) from the root [m].
-        error: (k, 3, n) of the points from their targets [m]; 0 where one is not seen.
-        weights: (k, n); 0 where one is not seen.
+        error: (k, 3, n) of the points from their targets [m]; 0 where one is not seen, as its weight is.
+        weights: (k, n).
         cost: (n,) [m^2].
     """
 
@@ -253,11 +244,8 @@ class PostureCost:
 
     def room(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Smallest and largest steps (n, d) that leave the hinges of (n, nq) postures in their ranges."""
-        lower = np.full((len(q), len(self.slots)), -np.inf)
-        upper = np.full((len(q), len(self.slots)), np.inf)
-        angles = q[:, self._angles]
-        lower[:, 6:], upper[:, 6:] = self._lower - angles, self._upper - angles
-        return lower, upper
+        angles, free = q[:, self._angles], np.full((len(q), 6), np.inf)
+        return np.hstack([-free, self._lower - angles]), np.hstack([free, self._upper - angles])
 
     def moved(self, q: FloatArray, steps: FloatArray) -> FloatArray:
         """Postures after steps (n, d), hinges within their ranges; no step turns by more than 1 rad."""

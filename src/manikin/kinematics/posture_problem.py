@@ -15,10 +15,8 @@ from manikin.body.natural_range import LearntJoint, learnt_joints
 from manikin.contact import Contact, ContactKind, SolePart
 from manikin.errors import BodyError, InputError
 from manikin.kinematics.posture_terms import (
-    ClearanceTerm,
     ComTerm,
     EdgeTerm,
-    LimitTerm,
     Linearised,
     PositionTerm,
     ReferenceTerm,
@@ -41,10 +39,6 @@ class LearntRangeTerm:
     """Violation of each ball joint's learnt volume: ``r = min(d(q) - margin, 0)`` [rad].
 
     ``d`` is the signed distance of its three angles to the surface of the volume ([Tonneau2015]_ 4.3.3).
-
-    Attributes:
-        body: The body; one without learnt joints makes no rows.
-        margin: Distance to keep to the surface, inside [rad].
     """
 
     body: BodyModel
@@ -64,7 +58,7 @@ class LearntRangeTerm:
             missing = float(volume.distance(own)) - self.margin
             if missing < 0.0:
                 residual[row] = missing
-                jacobian[row, 6 + joint.hinges.start : 6 + joint.hinges.stop] = volume.gradient(own)
+                jacobian[row, 6:][joint.hinges] = volume.gradient(own)
         return Linearised(residual, jacobian)
 
     def describe(self, residual: FloatArray) -> str:
@@ -81,10 +75,9 @@ class Placement:
     Attributes:
         position: (3,) [m], or None to leave it free.
         rotation: (3, 3) effector-to-world, or None to leave it free.
-        position_weight: None when the position is required; otherwise it is only wished, with this
-            weight [1/m^2].
-        rotation_weight: None when the rotation is required; otherwise it is only wished, with
-            this weight [1/rad^2] beside those of :class:`Preferences`.
+        rotation_weight: None when the rotation is required; otherwise it is only wished, with this weight
+            [1/rad^2] beside those of :class:`Preferences`.
+        position_weight: The same of the position [1/m^2].
     """
 
     position: FloatArray | None = None
@@ -107,7 +100,7 @@ class Preferences:
 
     Attributes:
         hinge: Of every hinge's distance from the reference [1/rad^2].
-        hinges: Replaces ``hinge`` for hinges whose name contains the key.
+        hinges: Replaces ``hinge`` for hinges whose name contains the key, the first one that fits.
         pelvis: Of the pelvis' tilt.
         trunk: Of the thorax' tilt.
         head: Of the head's tilt.
@@ -117,15 +110,13 @@ class Preferences:
     """
 
     hinge: float = 0.1
-    hinges: Mapping[str, float] = field(
-        default_factory=lambda: {
-            "knee_flexion": 0.01, "hip_flexion": 0.01, "ankle_dorsiflexion": 0.02, "knee_rotation": 1.0,
-            "hip_abduction": 0.1, "hip_rotation": 0.3, "ankle_inversion": 0.3, "toe_extension": 20.0,
-            "lumbar": 0.3, "thorax": 0.4, "neck": 0.2, "_rotation": 0.3, "side_bend": 0.6,
-            "shoulder_flexion": 0.02, "shoulder_abduction": 0.1, "shoulder_rotation": 0.1,
-            "elbow": 0.1, "wrist": 0.3, "forearm": 0.2,
-        }
-    )  # fmt: skip
+    hinges: Mapping[str, float] = field(default_factory=lambda: {
+        "knee_flexion": 0.01, "hip_flexion": 0.01, "ankle_dorsiflexion": 0.02, "knee_rotation": 1.0,
+        "hip_abduction": 0.1, "hip_rotation": 0.3, "ankle_inversion": 0.3, "toe_extension": 20.0,
+        "lumbar": 0.3, "thorax": 0.4, "neck": 0.2, "_rotation": 0.3, "side_bend": 0.6,
+        "shoulder_flexion": 0.02, "shoulder_abduction": 0.1, "shoulder_rotation": 0.1,
+        "elbow": 0.1, "wrist": 0.3, "forearm": 0.2,
+    })  # fmt: skip
     pelvis: float = 0.1
     trunk: float = 0.2
     head: float = 0.6
@@ -175,10 +166,9 @@ class PostureProblem:
     upright: bool = True
 
     def __post_init__(self) -> None:
-        contacts = tuple(self.contacts)
-        object.__setattr__(self, "contacts", contacts)
+        object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "placements", dict(self.placements))
-        for name in [contact.effector for contact in contacts] + list(self.placements):
+        for name in [contact.effector for contact in self.contacts] + list(self.placements):
             if name not in self.body.effectors:
                 valid = ", ".join(self.body.effectors)
                 raise BodyError(f"posture asks for effector {name!r}; valid: {valid}")
@@ -194,8 +184,7 @@ class PostureProblem:
         finite_number(self.clearance, "posture clearance [m]")
         finite_number(self.self_clearance, "posture self_clearance [m]")
         finite_number(self.range_margin, "posture range_margin [rad]", at_least=0.0)
-        if self.learnt_margin is not None:
-            finite_number(self.learnt_margin, "posture learnt_margin [rad]", at_least=0.0)
+        finite_number(self.learnt_margin or 0.0, "posture learnt_margin [rad]", at_least=0.0)
 
     def requirements(self) -> tuple[Requirement, ...]:
         """Terms that must be zero."""
@@ -238,14 +227,15 @@ class PostureProblem:
         """Terms that should be small, with the weight of each row."""
         weights = self.preferences
         assert self.reference is not None  # set on construction
-        wishes: list[tuple[FloatArray, Term]] = [
-            (hinge_weights(self.body, weights), ReferenceTerm(self.reference[7:]))
+        of_hinges = [
+            next((w for key, w in weights.hinges.items() if key in name), weights.hinge)
+            for name in self.body.joint_names
         ]
-        wishes += [
-            (np.full(3, weights.grasp), RotationTerm(contact.effector, contact.rotation_contact_to_world))
-            for contact in self.contacts
-            if contact.kind is ContactKind.GRASP and contact.oriented
-        ]
+        wishes: list[tuple[FloatArray, Term]] = [(np.array(of_hinges), ReferenceTerm(self.reference[7:]))]
+        for contact in self.contacts:
+            if contact.kind is ContactKind.GRASP and contact.oriented:
+                term = RotationTerm(contact.effector, contact.rotation_contact_to_world)
+                wishes.append((np.full(3, weights.grasp), term))
         for name, item in self.placements.items():
             if item.position is not None and item.position_weight is not None:
                 wishes.append((np.full(3, item.position_weight), PositionTerm(name, item.position)))
@@ -255,32 +245,10 @@ class PostureProblem:
             wishes.append((np.full(np.isfinite(self.com).sum(), self.com_weight), ComTerm(self.com)))
         if self.upright:
             names = {segment.name for segment in self.body.segments}
-            sides = ("left_upper_arm", "right_upper_arm")
             tilts = {"pelvis": weights.pelvis, "thorax": weights.trunk, "head": weights.head}
-            tilts.update(dict.fromkeys(sides, weights.arms))
+            tilts |= {"left_upper_arm": weights.arms, "right_upper_arm": weights.arms}
             wishes += [(np.full(3, w), UprightTerm(name)) for name, w in tilts.items() if name in names]
         return tuple(wishes)
-
-    def limits(self) -> LimitTerm:
-        """The hinge ranges."""
-        return LimitTerm(self.body, self.range_margin)
-
-    def clearances(self, activation: float) -> ClearanceTerm | None:
-        """The distances to keep, or None without a scene."""
-        if self.proximity is None:
-            return None
-        return ClearanceTerm(
-            self.proximity, self.clearance, self.self_clearance, activation, self.ignore - self.beside,
-            self.beside,
-        )  # fmt: skip
-
-
-def hinge_weights(body: BodyModel, preferences: Preferences) -> FloatArray:
-    """(nv - 6,) weight of each hinge: that of the first key its name contains."""
-    return np.array([
-        next((w for key, w in preferences.hinges.items() if key in name), preferences.hinge)
-        for name in body.joint_names
-    ])  # fmt: skip
 
 
 def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
@@ -300,8 +268,7 @@ def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]
 def pairs_beside(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
     """Pairs of :func:`touching_pairs` that need not overlap: the segment's shapes end before its effector.
 
-    The shank of a creature stands on its tip alone, and is no more inside what carries it than elsewhere;
-    thigh and shank of a person who kneels neither.
+    So does the shank of a creature that stands on its tip alone, and thigh and shank of one who kneels.
     """
     return frozenset(
         (segment, obstacle)

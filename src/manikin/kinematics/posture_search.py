@@ -6,10 +6,9 @@ distances ``d(q) >= 0`` and wishes ``s(q)`` each iteration solves, for the tange
     min  1/2 |s + S v|^2_W + 1/2 rho |r + R v|^2 + 1/2 rho |slack|^2
     s.t. d + D v + slack >= 0,  hinge ranges,  |v|_inf <= trust region,
 
-which always has a solution, also where the requirements have none. Steps are accepted when the sum of the
-squares falls, after a second-order correction where the requirements curve. At last the residuals that the
-wishes have left in the requirements are removed by the smallest changes, so that the requirements end up
-exact and not merely heavily weighted.
+which always has a solution. Steps are accepted when the sum of the squares falls, after a second-order
+correction where the requirements curve. At last what the wishes have left in the requirements is removed by
+the smallest changes, so that they end up exact and not merely heavily weighted.
 """
 
 from collections.abc import Iterator
@@ -24,7 +23,7 @@ from numpy.typing import ArrayLike
 from manikin.body.configuration import Configuration
 from manikin.errors import BodyError
 from manikin.kinematics.posture_problem import PostureProblem, place_over_contacts, without_one
-from manikin.kinematics.posture_terms import ClearanceTerm, Linearised
+from manikin.kinematics.posture_terms import ClearanceTerm, LimitTerm, Linearised
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.scene.distance import Pair
@@ -38,7 +37,6 @@ RESTARTS: tuple[dict[str, float], ...] = (
 )  # fmt: skip
 """Angles [rad] of hinges by the end of their names, from which a failed search is repeated:
 a squat, a crouch and a stoop."""
-
 
 NEAR = 2e-3
 """Violation [m, rad] below which the rest is done by projection onto the requirements."""
@@ -137,12 +135,11 @@ def generate_posture(
     for q, warm in _starts(problem, start, settings):
         # A cold start goes to its contacts through the obstacles first: from outside, thin
         # obstacles would trap it on their wrong side. A low one may trap it there.
-        if not warm and problem.proximity is not None:
+        through = not warm and problem.proximity is not None
+        if through:
             freely = freely or PostureSolver(replace(problem, proximity=None), settings)
             tried.append(solver.solve(freely.solve(q).q))
-            if not solver.meets(tried[-1]):
-                tried.append(solver.solve(q))
-        else:
+        if not (through and solver.meets(tried[-1])):
             tried.append(solver.solve(q))
         met = sum(solver.meets(item) for item in tried)
         if met == COMPARED or (met and warm):
@@ -163,15 +160,11 @@ class _Step(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Iterate:
-    """Everything known at one configuration.
+    """Everything known at one configuration (nq,), residuals stacked.
 
     Attributes:
-        q: (nq,).
-        requirement: Stacked residual and Jacobian of the requirements.
         parts: Slice of each requirement in the stack.
-        wish: Stacked residual and Jacobian of the wishes.
-        clearance: (k,) distances beyond the safety distances, with Jacobian.
-        pairs: Shapes of each clearance.
+        clearance: (k,) distances beyond the safety distances, of pairs of shapes.
     """
 
     q: FloatArray
@@ -183,12 +176,10 @@ class _Iterate:
 
     @property
     def error(self) -> float:
-        """Largest residual of the requirements."""
         return float(np.abs(self.requirement.residual).max(initial=0.0))
 
     @property
     def intrusion(self) -> float:
-        """Deepest intrusion into a safety distance [m]."""
         return float(max(0.0, -self.clearance.residual.min(initial=np.inf)))
 
     @property
@@ -202,13 +193,20 @@ class PostureSolver:
 
     def __init__(self, problem: PostureProblem, settings: SolverSettings) -> None:
         self.problem, self.settings = problem, settings
-        self.requirements, self._limits = problem.requirements(), problem.limits()
-        self._clearances: ClearanceTerm | None = problem.clearances(settings.activation)
+        self.requirements = problem.requirements()
+        self._limits = LimitTerm(problem.body, problem.range_margin)
+        self._clearances = None if problem.proximity is None else ClearanceTerm(
+            problem.proximity, problem.clearance, problem.self_clearance, settings.activation,
+            problem.ignore - problem.beside, problem.beside,
+        )  # fmt: skip
         wishes = problem.wishes()
         self._wishes = tuple(term for _, term in wishes)
         self._wish_weights = np.concatenate([weight for weight, _ in wishes])
         self._configuration = Configuration(problem.body, problem.reference)
         self.iterations = 0
+
+    def _moved(self, iterate: _Iterate, step: FloatArray) -> _Iterate:
+        return self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
 
     def solve(self, q: FloatArray) -> _Iterate:
         """Iterate from one start until the posture settles or nothing improves any more."""
@@ -246,7 +244,7 @@ class PostureSolver:
         return move
 
     def _move(self, iterate: _Iterate, step: FloatArray, before: float, expected: float) -> _Step:
-        candidate = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
+        candidate = self._moved(iterate, step)
         gained = before - self._merit(candidate)
         return _Step(candidate, float(np.abs(step).max()), before, gained, expected)
 
@@ -255,8 +253,7 @@ class PostureSolver:
         for _ in range(8):
             if iterate.error <= 0.01 * self.settings.tolerance and self.meets(iterate):
                 break
-            step, _ = self._step(iterate, 0.1, wishes=False)
-            moved = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
+            moved = self._moved(iterate, self._step(iterate, 0.1, wishes=False)[0])
             if moved.violation >= iterate.violation and self.meets(iterate):
                 break
             iterate = moved
@@ -264,10 +261,8 @@ class PostureSolver:
 
     def meets(self, iterate: _Iterate) -> bool:
         """Whether all requirements and safety distances are kept."""
-        return (
-            iterate.error <= self.settings.tolerance
-            and iterate.intrusion <= self.settings.clearance_tolerance
-        )
+        settings = self.settings
+        return iterate.error <= settings.tolerance and iterate.intrusion <= settings.clearance_tolerance
 
     def rank(self, iterate: _Iterate) -> tuple[bool, float]:
         """Order of preference: what meets the requirements, then the better wishes or smaller violation."""
@@ -277,11 +272,10 @@ class PostureSolver:
     def linearise(self, q: FloatArray) -> _Iterate:
         """Evaluate every term, with hinges put back that rounding took out of their ranges."""
         q = np.concatenate([q[:7], np.clip(q[7:], self._limits.lower, self._limits.upper)])
-        configuration = self._configuration.update(q)
-        nv = self.problem.body.nv
+        configuration, nv = self._configuration.update(q), self.problem.body.nv
         requirements = [term.evaluate(configuration) for term in self.requirements]
-        ends = np.cumsum([0, *(len(item.residual) for item in requirements)])
-        parts = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        ends = np.cumsum([0, *(len(item.residual) for item in requirements)]).tolist()
+        parts = tuple(slice(first, stop) for first, stop in pairwise(ends))
         wishes = [term.evaluate(configuration) for term in self._wishes]
         clearance, pairs = _stack([], nv), ()
         if self._clearances is not None:
@@ -310,19 +304,15 @@ class PostureSolver:
 
     def _step(self, iterate: _Iterate, trust: float, *, wishes: bool = True) -> tuple[FloatArray, float]:
         """Solve the quadratic program; returns the step and the merit it predicts."""
-        rho, buffer = self.settings.stiffness, self.settings.buffer
-        residual, jacobian = iterate.requirement
-        wish, wish_jacobian = iterate.wish
+        rho, buffer, nv = self.settings.stiffness, self.settings.buffer, self.problem.body.nv
+        (residual, jacobian), (wish, wish_jacobian) = iterate.requirement, iterate.wish
         weighted = self._wish_weights[:, None] * wish_jacobian
-        nv = self.problem.body.nv
-        damping = self.problem.preferences.damping
-        hessian = wish_jacobian.T @ weighted + rho * (jacobian.T @ jacobian) + damping * np.eye(nv)
+        damping = self.problem.preferences.damping * np.eye(nv)
+        hessian = wish_jacobian.T @ weighted + rho * (jacobian.T @ jacobian) + damping
         gradient = (weighted.T @ wish if wishes else 0.0) + rho * (jacobian.T @ residual)
-        lower, upper = self._bounds(iterate.q, trust)
         distance, slope = iterate.clearance
-        program = solve_qp(
-            hessian, gradient, slope, buffer - distance, None, (lower, upper), softness=1.0 / rho
-        )
+        bounds = self._bounds(iterate.q, trust)
+        program = solve_qp(hessian, gradient, slope, buffer - distance, None, bounds, softness=1.0 / rho)
         step = program.x if program.solved else np.zeros(nv)
         hard = np.sum((residual + jacobian @ step) ** 2)
         hard += np.sum(np.minimum(distance + slope @ step - buffer, 0.0) ** 2)
@@ -371,14 +361,12 @@ def _starts(
         if not settings.restarts:
             return
     ready = [place_over_contacts(problem, q) for q in _templates(problem, settings)]
-    configuration = Configuration(problem.body)
-    terms = problem.requirements()
+    configuration, terms = Configuration(problem.body), problem.requirements()
 
     def distance(q: FloatArray) -> float:
         return sum(float(np.sum(t.evaluate(configuration.update(q)).residual ** 2)) for t in terms)
 
-    for q in sorted(ready, key=distance):
-        yield q, False
+    yield from ((q, False) for q in sorted(ready, key=distance))
 
 
 def _templates(problem: PostureProblem, settings: SolverSettings) -> Iterator[FloatArray]:
@@ -401,11 +389,9 @@ def _bent(iterate: _Iterate, candidate: _Iterate, step: FloatArray) -> _Iterate:
         reached[pair] - linear if pair in reached else 0.0
         for pair, linear in zip(iterate.pairs, distance + slope @ step, strict=True)
     ]
-    return replace(
-        iterate,
-        requirement=Linearised(candidate.requirement.residual - jacobian @ step, jacobian),
-        clearance=Linearised(distance + np.array(shifts).reshape(-1), slope),
-    )
+    requirement = Linearised(candidate.requirement.residual - jacobian @ step, jacobian)
+    clearance = Linearised(distance + np.array(shifts).reshape(-1), slope)
+    return replace(iterate, requirement=requirement, clearance=clearance)
 
 
 def _stack(parts: list[Linearised], nv: int) -> Linearised:

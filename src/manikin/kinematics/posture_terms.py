@@ -1,8 +1,8 @@
 """The terms of a posture problem: residuals and Jacobians on the tangent space of the body.
 
-Each term takes a :class:`~manikin.body.configuration.Configuration` and gives a residual
-``r`` (m,) with its Jacobian ``J`` (m, nv), so that ``r(q + v) = r(q) + J v`` to first order
-for a tangent vector ``v`` of Pinocchio's ``integrate``.
+Each term takes a :class:`~manikin.body.configuration.Configuration` and gives a residual ``r`` (m,) with its
+Jacobian ``J`` (m, nv): ``r(q + v) = r(q) + J v`` to first order, ``v`` tangent as in Pinocchio's
+``integrate``.
 """
 
 from dataclasses import dataclass
@@ -23,12 +23,7 @@ UP.setflags(write=False)
 
 
 class Linearised(NamedTuple):
-    """A residual and its Jacobian.
-
-    Attributes:
-        residual: (m,).
-        jacobian: (m, nv).
-    """
+    """A residual (m,) and its Jacobian (m, nv)."""
 
     residual: FloatArray
     jacobian: FloatArray
@@ -82,8 +77,7 @@ class RotationTerm:
         error = rotation @ self.rotation.T
         # Turning the world axes is a left perturbation: log(exp(w) E) = log(E exp(E^T w)).
         derivative = pin.Jlog3(error) @ error.T
-        jacobian = derivative @ configuration.effector_jacobian(self.effector)[3:]
-        return Linearised(pin.log3(error), jacobian)
+        return Linearised(pin.log3(error), derivative @ configuration.effector_jacobian(self.effector)[3:])
 
     def describe(self, residual: FloatArray) -> str:
         """See :class:`Requirement`."""
@@ -103,8 +97,7 @@ class EdgeTerm:
         pivot: (3,) middle of the edge in the effector's frame [m].
         position: (3,) origin of the sole lying flat [m].
         rotation: (3, 3) its axes to the world's.
-        least: Smallest pitch, heel up when positive [rad].
-        most: Largest pitch [rad].
+        least, most: Bounds of the pitch, heel up when positive [rad].
         toes: Index of the toes' hinge in the velocity vector, or None where they do not carry.
         radius: By which the edge moves forward per pitch: it is round, and rolls [m/rad].
     """
@@ -121,11 +114,9 @@ class EdgeTerm:
     def evaluate(self, configuration: Configuration) -> Linearised:
         """See :class:`Term`."""
         rotation, position = configuration.effector_placement(self.effector)
-        jacobian = configuration.effector_jacobian(self.effector)
-        linear, angular = jacobian[:3], jacobian[3:]
-        arm, own = rotation @ self.pivot, rotation[:, 1]
+        linear, angular = np.split(configuration.effector_jacobian(self.effector), 2)
+        arm, along, own = rotation @ self.pivot, rotation[:, 0], rotation[:, 1]
         forward, up = self.rotation[:, 0], self.rotation[:, 2]
-        along = rotation[:, 0]
         sine, cosine = -along @ up, along @ forward
         pitch = float(np.arctan2(sine, cosine))
         beyond = min(pitch - self.least, 0.0) + max(pitch - self.most, 0.0)
@@ -173,8 +164,7 @@ class ComTerm:
 class UprightTerm:
     """A segment's vertical axis upright: ``r = z - up``, the chord of the tilt.
 
-    For small tilts it is as long as the tilt; unlike the sine it grows up to the opposite
-    direction, so that a raised arm is drawn down.
+    Unlike the sine it grows up to the opposite direction, so that a raised arm is drawn down.
     """
 
     segment: str
@@ -199,35 +189,15 @@ class ReferenceTerm:
     @cached_property
     def _jacobian(self) -> FloatArray:
         count = len(self.angles)
-        jacobian = np.hstack([np.zeros((count, 6)), np.eye(count)])
-        jacobian.setflags(write=False)
-        return jacobian
+        return np.hstack([np.zeros((count, 6)), np.eye(count)])
 
 
-@dataclass(frozen=True, eq=False)
 class LimitTerm:
-    """The hinge ranges of a body.
+    """The hinge ranges (nv - 6,) of a body, less a margin at both ends of at most a quarter of each [rad]."""
 
-    Attributes:
-        margin: Kept from both ends of each range [rad]; at most a quarter of the range.
-    """
-
-    body: BodyModel
-    margin: float = 0.0
-
-    @cached_property
-    def lower(self) -> FloatArray:
-        """(nv - 6,) smallest angles [rad]."""
-        return self.body.lower + self._margins
-
-    @cached_property
-    def upper(self) -> FloatArray:
-        """(nv - 6,) largest angles [rad]."""
-        return self.body.upper - self._margins
-
-    @property
-    def _margins(self) -> FloatArray:
-        return np.minimum(self.margin, 0.25 * (self.body.upper - self.body.lower))
+    def __init__(self, body: BodyModel, margin: float = 0.0) -> None:
+        margins = np.minimum(margin, 0.25 * (body.upper - body.lower))
+        self.body, self.lower, self.upper = body, body.lower + margins, body.upper - margins
 
     def at_limit(self, configuration: Configuration) -> tuple[str, ...]:
         """Names of the hinges within 1e-3 rad of an end of their range."""
@@ -273,8 +243,7 @@ class ClearanceTerm:
         worst = int(np.argmin(residual))
         first, second = pairs[worst]
         safety = self._safety(first, second)
-        distance = residual[worst] + safety
-        return f"'{first}' and '{second}' are {distance:.4f} m apart; required {safety:.4f} m"
+        return f"'{first}' and '{second}' are {residual[worst] + safety:.4f} m apart; required {safety:.4f} m"
 
     def _safety(self, shape: str, other: str) -> float:
         """Distance that a pair has to keep [m]."""

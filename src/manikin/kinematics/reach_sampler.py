@@ -23,20 +23,14 @@ from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.kinematics.limb_kinematics import LimbKinematics, ReachVolume, reach_volume, rigid_reach
 from manikin.numerics.spatial import FloatArray, dot, matrix, rotations
 
-SAMPLES = 600
-"""Postures of one round of sampling."""
-
-ROUNDS = 10
-"""Rounds of sampling towards the contacts at most."""
+SAMPLES, ROUNDS, OUTWARD = 600, 10, 12
+"""Postures of one round of sampling, rounds towards the contacts at most, and rounds outwards."""
 
 ENOUGH = 150
 """Postures that are enough to begin the search outwards."""
 
 ELITE = 60
 """Postures that violate least, from whose neighbourhood the next round is sampled."""
-
-OUTWARD = 12
-"""Rounds of sampling outwards."""
 
 OUTERMOST = 10
 """Outermost postures along each direction, whose differences are the steps of the next round."""
@@ -50,11 +44,8 @@ VOLUME_MARGIN = 0.02
 LEGS_APART = 0.10
 """Least distance of the shanks' middle lines [m], of a body of 1.75 m; our choice, a slim shank's breadth."""
 
-HEEL_UP = 0.9
-"""Largest pitch of a foot that stands on its toes [rad]."""
-
-TOES_UP = 0.45
-"""Largest pitch of a foot that stands on its heel [rad]."""
+HEEL_UP, TOES_UP = 0.9, 0.45
+"""Largest pitches of a foot that stands on its toes and of one that stands on its heel [rad]."""
 
 BEYOND = 3.0
 """Violation of a contact that is missed by a metre [rad]."""
@@ -65,11 +56,8 @@ _TURN_LOWER, _TURN_UPPER = np.array([-1.2, -0.4, -0.5]), np.array([1.2, 1.4, 0.5
 _SPINE_LOWER, _SPINE_UPPER = np.array([-0.38, -0.38, -0.5]), np.array([0.99, 0.38, 0.5])
 """Flexion, side bend and twist of the spine [rad]."""
 
-_THORAX_SHARE = 0.5
-"""Flexion and side bend of the thorax over those of the lumbar spine."""
-
-_LUMBAR_TWIST = 0.3
-"""Twist of the lumbar spine over that of the thorax."""
+_THORAX_SHARE, _LUMBAR_TWIST = 0.5, 0.3
+"""Flexion and side bend of the thorax over those of the lumbar spine, and twist of this over the thorax'."""
 
 _BENDS = np.array([[f, s, 0.0] for f in (-0.38, 0.0, 0.5, 0.99) for s in (-0.38, 0.0, 0.38)])
 """(12, 3) bends of a free spine [rad]."""
@@ -108,7 +96,6 @@ class ReachBody:
     """
 
     def __init__(self, body: BodyModel) -> None:
-        """Add up the masses of the parts."""
         self.body = body
         try:
             self.legs: LegKinematics | None = LegKinematics(body)
@@ -147,10 +134,7 @@ class ReachBody:
     ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
         """Axes and origins of the trunk's parts, and mass times centre of mass (n, 3) of all but the legs.
 
-        Args:
-            place: (n, 3) of the root [m].
-            root: (n, 3, 3) its axes.
-            spine: (n, 3) flexion, side bend and twist [rad].
+        Of places (n, 3) [m] and axes (n, 3, 3) of the root, and flexion, side bend, twist (n, 3) [rad].
         """
         frames, places = [root], [place]
         for number in range(1, len(self.masses)):
@@ -176,10 +160,8 @@ class ReachBody:
     @cached_property
     def bends(self) -> FloatArray:
         """(k, 3) mass times centre of mass of all but the legs, of bends of a free spine, in the root."""
-        if not self.spine:
-            return self.trunk(np.zeros((1, 3)), np.eye(3)[None], np.zeros((1, 3)))[2]
-        count = len(_BENDS)
-        return self.trunk(np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)), _BENDS)[2]
+        bends = _BENDS if self.spine else np.zeros((1, 3))
+        return self.trunk(np.zeros(bends.shape), np.tile(np.eye(3), (len(bends), 1, 1)), bends)[2]
 
     @cached_property
     def swings(self) -> FloatArray:
@@ -190,9 +172,8 @@ class ReachBody:
         for slots in self.legs.slots:
             angles[:, slots[[0, 1, 3]]] = _SWINGS
         pelvis = np.tile(np.eye(3), (count, 1, 1))
-        return self.legs_com(
-            self.legs.hips(pelvis, np.zeros((count, 3))), *self.legs.segments(pelvis, angles)
-        )
+        hips = self.legs.hips(pelvis, np.zeros((count, 3)))
+        return self.legs_com(hips, *self.legs.segments(pelvis, angles))
 
 
 def _trunk_masses(
@@ -210,23 +191,21 @@ def _trunk_masses(
             part[segment.name] = "leg"
         else:
             part[segment.name] = part[str(segment.parent)]
-    masses, coms, origins = [], [], []
+    masses, coms = [], []
     for frame in frames:
         members = [segment for segment in body.segments if part[segment.name] == frame]
-        mass = sum(segment.mass for segment in members)
-        place = sum((s.mass * state.point(s.name, s.com) for s in members), np.zeros(3)) / mass
+        masses.append(sum(segment.mass for segment in members))
+        place = sum((s.mass * state.point(s.name, s.com) for s in members), np.zeros(3)) / masses[-1]
         rotation, origin = state.segment_placement(frame)
-        masses.append(mass)
         coms.append(rotation.T @ (place - origin))
-        origins.append(body.segment(frame).origin)
-    return np.array(masses), np.array(coms), np.array(origins)
+    return np.array(masses), np.array(coms), np.array([body.segment(frame).origin for frame in frames])
 
 
 def _leg_masses(body: BodyModel) -> tuple[FloatArray, FloatArray]:
     """Masses of a left thigh, and of shank with foot and toes [kg], and their centres (2, 3) [m]."""
     thigh, shank, foot, toes = (body.segment(f"left_{n}") for n in ("thigh", "leg", "foot", "toes"))
     lower = shank.mass * shank.com + foot.mass * (foot.origin + foot.com)
-    lower = lower + toes.mass * (foot.origin + toes.origin + toes.com)
+    lower += toes.mass * (foot.origin + toes.origin + toes.com)
     mass = shank.mass + foot.mass + toes.mass
     return np.array([thigh.mass, mass]), np.array([thigh.com, lower / mass])
 
@@ -252,14 +231,7 @@ class ReachSampler:
     def __init__(
         self, parts: ReachBody, contacts: Sequence[LocalContact], normals: FloatArray, outward: int = OUTWARD
     ) -> None:
-        """Pose it.
-
-        Args:
-            parts: Of the body.
-            contacts: One for each effector.
-            normals: (m, 3) directions along which the centre of mass is sought far out.
-            outward: Rounds of sampling outwards.
-        """
+        """Contacts, one for each effector; the centre of mass is sought far out along ``normals`` (m, 3)."""
         self._parts, self._contacts, self._normals, self._outward = parts, contacts, normals, outward
         self._rng = np.random.default_rng(0)
         self._feet: list[LocalContact | None] = [None, None]
@@ -326,7 +298,7 @@ class ReachSampler:
             if contact in self._feet and contact.rotation[2, 2] > 0.7:
                 low[2] = max(low[2], contact.position[2] + 0.25 * radius)
         bends = self._parts.spine and bool(self._others)
-        spine = (_SPINE_LOWER, _SPINE_UPPER) if bends else (np.zeros(3), np.zeros(3))
+        spine = [end if bends else np.zeros(3) for end in (_SPINE_LOWER, _SPINE_UPPER)]
         tilts = {SolePart.TOES: (0.0, HEEL_UP), SolePart.HEEL: (-TOES_UP, 0.0)}
         pitches = [(0.0, 0.0) if foot is None else tilts.get(foot.part, (0.0, 0.0)) for foot in self._feet]
         lower, upper = zip(*pitches, strict=True)
@@ -419,10 +391,9 @@ class ReachSampler:
             return axes, position - axes @ own.translation
         zero = np.zeros(len(x))
         turn = rotations(zero, x[:, _PITCHES + side], zero)
-        pivot = -contact.half_length
-        if contact.part is SolePart.TOES:
-            pivot = hinge_line(self._parts.body, contact.effector) or 0.0
-        about = np.array([pivot, 0.0, 0.0])
+        on_toes = contact.part is SolePart.TOES
+        pivot = hinge_line(self._parts.body, contact.effector) if on_toes else -contact.half_length
+        about = np.array([pivot or 0.0, 0.0, 0.0])
         centre = position + (rotation @ (about - turn @ about)[..., None])[..., 0]
         axes = rotation @ turn @ own.rotation.T
         return axes, centre - axes @ own.translation

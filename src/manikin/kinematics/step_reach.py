@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,13 +31,11 @@ from manikin.numerics.spatial import FloatArray, frozen_array, rotations
 Heels = Literal["down", "standing up", "both up"]
 """Feet that may stand on their toes: none, the one that stays, or both."""
 
-HEELS: tuple[Heels, ...] = ("down", "standing up", "both up")
+HEELS: tuple[Heels, ...] = get_args(Heels)
 
 Rest = Literal["anywhere", "standing", "moved"]
 """Foot over which the centre of mass is, so that the body may rest on it alone while the other one lands or
 leaves; or anywhere."""
-
-RESTS: tuple[Rest, ...] = ("anywhere", "standing", "moved")
 
 REST_INSET = 0.035
 """Distance of a resting centre of mass from the sole's edges [m], of a body of 1.75 m; our choice."""
@@ -50,7 +48,6 @@ STATURE = 1.75
 
 TURN_LENGTH = 0.4
 """Length that counts as much as a turn by one radian among places of a foot [m/rad]."""
-
 
 FACES = 100
 """Directions in which a set of places is sampled to its end."""
@@ -75,19 +72,11 @@ class StepReach:
     def sampled(
         cls, body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere", rounds: int = 200
     ) -> "StepReach":
-        """Sample the set of a body; a second.
-
-        Args:
-            heels: Which feet may stand on their toes.
-            rest: Over which foot the centre of mass is.
-            rounds: Of sampling outwards.
-
-        Raises:
-            BodyError: If the body has no legs like those of a human.
-        """
+        """Sample the set of a body, see :meth:`of`, in some rounds of sampling outwards; a second."""
         return cls(*_StepSampler(ReachBody(body), heels, rest, rounds).polytope())
 
     @staticmethod
+    @lru_cache(maxsize=64)
     def of(body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere") -> "StepReach":
         """The set of a body, computed once; anywhere, a human of usual proportions has the shipped one.
 
@@ -99,7 +88,14 @@ class StepReach:
         Raises:
             BodyError: If the body has no legs like those of a human.
         """
-        return _step_reach_of(body, heels, rest)
+        if body.stature is None or body.sex is None or body.lengths or rest != "anywhere":
+            return StepReach.sampled(body, heels, rest)
+        scale = body.stature / STATURE
+        with np.load(FILE, allow_pickle=False) as table:
+            A, b = table[f"{body.sex}/{heels}/A"], table[f"{body.sex}/{heels}/b"]
+        # Lengths grow with the body and turns do not.
+        A = frozen_array(A.astype(np.float64) * [1.0, 1.0, 1.0, scale], "A")
+        return StepReach(A, frozen_array(scale * b.astype(np.float64), "b"))
 
     def room(self, places: ArrayLike, foot: str = "right_foot") -> FloatArray:
         """(k,) least distance of places (k, 4) of a foot to the end of the set [m]; negative outside."""
@@ -121,25 +117,8 @@ class StepReach:
         return self.room(np.column_stack([apart @ frame, turns]), foot)
 
 
-@lru_cache(maxsize=64)
-def _step_reach_of(body: BodyModel, heels: Heels, rest: Rest) -> StepReach:
-    if body.stature is None or body.sex is None or body.lengths or rest != "anywhere":
-        return StepReach.sampled(body, heels, rest)
-    scale = body.stature / STATURE
-    with np.load(FILE, allow_pickle=False) as table:
-        A, b = table[f"{body.sex}/{heels}/A"], table[f"{body.sex}/{heels}/b"]
-    # Lengths grow with the body and turns do not.
-    return StepReach(
-        frozen_array(A.astype(np.float64) * [1.0, 1.0, 1.0, scale], "A"),
-        frozen_array(scale * b.astype(np.float64), "b"),
-    )
-
-
 class _StepSampler(ReachSampler):
-    """The sampling of places of the right foot, with the left one at the origin.
-
-    The last four unknowns are the place.
-    """
+    """The sampling of places of the right foot, the last four unknowns, with the left one at the origin."""
 
     def __init__(self, parts: ReachBody, heels: Heels, rest: Rest, rounds: int) -> None:
         body, scale = parts.body, parts.scale

@@ -10,9 +10,9 @@ from manikin.body import BodyModel
 from manikin.kinematics.point_targets import PointTargets, PostureCost
 from manikin.numerics.spatial import FloatArray
 
-MOST_STEPS = 60
-LEAST_GAIN = 1e-4
-"""A step that lowers the cost by a smaller share is the last one."""
+MOST_STEPS, MOST_ROUNDS = 60, 5
+LEAST_GAIN, ROUGH = 1e-4, 1e-2
+"""A step that lowers the cost by a smaller share is the last one, and the last one of a guess."""
 
 LEAST_COST = 1e-10
 """Cost [m^2] below which nothing is left to gain."""
@@ -74,9 +74,6 @@ def _next_damping(damping: FloatArray, gained: FloatArray, promised: FloatArray)
     return np.where(gained > 0.0, kept, np.maximum(10.0 * damping, FAILED_DAMPING))
 
 
-MOST_ROUNDS = 5
-
-
 def bounded_step(
     matrix: FloatArray, right: FloatArray, damping: float, lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
@@ -127,9 +124,6 @@ APART = 1.0 / 15.0
 TOGETHER = 128
 """Most frames that are found at once."""
 
-ROUGH = 1e-2
-"""A step of a guess that lowers the cost by a smaller share is the last one."""
-
 
 def follow(
     body: BodyModel, targets: PointTargets, starts: FloatArray, rate: float | None = None
@@ -164,23 +158,21 @@ class _Following:
         self._heavy = targets.weights >= 1.0
         n = len(targets)
         self.q, self.residual = np.empty((n, body.nq)), np.empty((n, len(targets.names)))
-        self._singly(0, 1)
-        frame = 1
+        frame = 0
         while frame < n:
-            if apart == 1 or n - frame < apart:
-                frame = self._singly(frame, n)
+            if frame == 0 or apart == 1 or n - frame < apart:
+                frame = self._singly(frame)
             else:
                 frame = self._together(frame, min(frame + TOGETHER // apart * apart, n))
 
-    def _singly(self, first: int, stop: int) -> int:
-        """Search frames one by one; the first one after them."""
-        for frame in range(first, min(stop, len(self.q))):
-            before = self.q[frame - 1] if frame else self._starts[0]
-            q, cost = search(self._cost, before[None], self._wanted[frame : frame + 1], before[None])
-            self._keep(frame, q)
-            if frame:
-                self._better_start(frame, cost)
-        return min(stop, len(self.q))
+    def _singly(self, frame: int) -> int:
+        """Search one frame; the first one after it."""
+        before = self.q[frame - 1] if frame else self._starts[0]
+        q, cost = search(self._cost, before[None], self._wanted[frame : frame + 1], before[None])
+        self._keep(frame, q)
+        if frame:
+            self._better_start(frame, cost)
+        return frame + 1
 
     def _better_start(self, first: int, costs: FloatArray) -> int | None:
         """The first of the poor frames whose own start leads to a clearly better posture, which it gets."""
