@@ -62,8 +62,7 @@ def statistics(
         option("stance|lowest|highest", "From where placements are seen: stance, or CoM."),
     ] = "stance",
     by: Annotated[
-        Literal["number", "kind", "effectors"],
-        option("number|kind|effectors", "What phases have in common."),
+        Literal["number", "kind", "effectors"], option("number|kind|effectors", "What phases have in common.")
     ] = "kind",
     sex: SexOption = "male",
     out: Annotated[Path | None, option("DIR", "Write statistics.json, phases.csv and figures there.")] = None,
