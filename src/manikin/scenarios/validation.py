@@ -19,7 +19,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from manikin.errors import ScenarioError
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 
 class FrameMoves(Enum):
@@ -161,7 +161,7 @@ _Section = TypeVar("_Section", bound=Section)
 
 
 def validate(
-    model: type[_Section], data: Any, source: str, lines: Mapping[Path, str] | None = None
+    model: type[_Section], data: Any, source: str, lines: Mapping[KeyPath, str] | None = None
 ) -> _Section:
     """Check what a YAML reader returned, with the place of each key, against the section of a whole file.
 
@@ -177,14 +177,14 @@ def validate(
     raise ScenarioError(f"{place(source, path, lines or {})} {text}{more}".replace("\n", " "))
 
 
-def place(source: str, path: Path, lines: Mapping[Path, str]) -> str:
+def place(source: str, path: KeyPath, lines: Mapping[KeyPath, str]) -> str:
     """Text ``file:line: key.path`` of a key; the file and line of the nearest known parent."""
     known = next((path[:n] for n in range(len(path), -1, -1) if path[:n] in lines), None)
     where = lines[known] if known is not None else source
     return f"{where}: {path_text(path)}" if path else f"{source}:"
 
 
-def path_text(path: Path) -> str:
+def path_text(path: KeyPath) -> str:
     """Text of a key path, such as ``supports.phases[2].left_foot``."""
     text = ""
     for part in path:
@@ -192,7 +192,7 @@ def path_text(path: Path) -> str:
     return text
 
 
-def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[Path, str]:
+def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[KeyPath, str]:
     path, context, kind = _real_path(problem["loc"], data), problem.get("ctx", {}), problem["type"]
     value = "empty" if problem["input"] is None else repr(problem["input"])
     value = value if len(value) <= 60 else value[:57] + "..."
@@ -225,7 +225,7 @@ def _section_of(annotation: Any) -> Any:
     return next((result for part in get_args(annotation) if (result := _section_of(part)) is not None), None)
 
 
-def _real_path(location: tuple[str | int, ...], data: Any) -> Path:
+def _real_path(location: tuple[str | int, ...], data: Any) -> KeyPath:
     """Keep the parts of pydantic's location that are in the file; it adds names of union members."""
     path: list[str | int] = []
     for part in location:

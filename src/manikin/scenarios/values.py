@@ -30,8 +30,7 @@ from manikin.scenarios.placement import start_heading_deg, task_frame
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.sections.planning_sections import ComConstraintSection, ContactsSection
 from manikin.scenarios.sections.support_sections import ContactSection, SoleSection, SupportsSection
-from manikin.scenarios.validation import Path as KeyPath
-from manikin.scenarios.validation import place
+from manikin.scenarios.validation import KeyPath, place
 
 
 @dataclass(frozen=True, eq=False)
