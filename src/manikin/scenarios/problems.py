@@ -309,9 +309,8 @@ def _regions(
 
 
 def _height_constraints(values: ScenarioValues, *, automatic: bool) -> tuple[GeometricConstraint, ...]:
-    band, entry = values.height_band, values.constraint("overhead")
+    band, wanted = values.height_band, "automatic" if automatic else values.constraint("overhead")
     result = () if band is None else height_band(band.lower, band.upper)
-    wanted = "automatic" if automatic else None if entry is None else entry.overhead
     if wanted is None:
         return result
     names = None if wanted == "automatic" else tuple(wanted)

@@ -109,19 +109,13 @@ class ScenarioFile(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _stay(cls, data: Any) -> Any:
-        """A body that recovers from a push ends where it starts."""
-        if isinstance(data, dict) and data.get("recovery") is not None and "task" not in data:
-            return {**data, "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
-        return data
-
-    @model_validator(mode="before")
-    @classmethod
-    def _only_planned(cls, data: Any) -> Any:
-        """Plan only what cannot be executed, where the file says nothing else."""
-        if isinstance(data, dict) and "execution" not in data and _cannot_be_executed(data):
-            return {**data, "execution": "none"}
-        return data
+    def _implied(cls, data: Any) -> Any:
+        """A body that recovers from a push ends where it starts; what cannot be executed is only planned."""
+        if not isinstance(data, dict):
+            return data
+        if data.get("recovery") is not None and "task" not in data:
+            data = {**data, "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
+        return {**data, "execution": "none"} if "execution" not in data and _only_planned(data) else data
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -295,8 +289,8 @@ class ScenarioFile(Section):
             raise refuse("supports", f"do not apply to {WORDS[self.body.model]} yet; valid: leave them out")
 
 
-def _cannot_be_executed(data: dict[str, Any]) -> bool:
-    """Whether an unchecked file has a point mass, or a recorded walk."""
+def _only_planned(data: dict[str, Any]) -> bool:
+    """Whether an unchecked file has a point mass or a recorded walk, which cannot be executed."""
     body, walking = data.get("body"), data.get("walking")
     if isinstance(body, dict) and body.get("model") == "point_mass":
         return True
