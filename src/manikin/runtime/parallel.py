@@ -75,11 +75,8 @@ class _TimeIsUp(BaseException):
 def processor_time_limit(seconds: float) -> Iterator[None]:
     """Context that ends when this process has computed for so long, however busy the machine is.
 
-    A native library that computes is left first. Outside of the main thread, and where the system has no
-    such timer, there is no limit.
-
-    Raises:
-        TimeLimitError: If so many seconds of processor time are over.
+    TimeLimitError if the seconds of processor time are over. A native library that computes is left first.
+    Outside of the main thread, and where the system has no such timer, there is no limit.
     """
     if not hasattr(signal, "ITIMER_PROF") or threading.current_thread() is not threading.main_thread():
         yield

@@ -52,11 +52,7 @@ _Evaluator = Callable[[Mapping[str, Any], ModuleType], Any]
 
 
 class Expression:
-    """A parsed expression in x, y and z; ``text`` is the source, as written.
-
-    Raises:
-        ScenarioError: If it is not an arithmetic expression in x, y and z.
-    """
+    """A parsed arithmetic expression in x, y and z; ScenarioError if ``text``, its source, is none."""
 
     def __init__(self, text: str) -> None:
         self.text = text

@@ -19,13 +19,8 @@ EXTENDS = "extends"
 def read_extended(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     """Read a scenario file, laid over the one it extends, if any; the key ``extends`` is left out.
 
-    Relative mesh paths of an extended file in another folder become absolute.
-
-    Args:
-        above: Files that extend this one, the first at the front.
-
-    Raises:
-        ScenarioError: One line, if a file cannot be read, is missing or extends itself.
+    Relative mesh paths of an extended file in another folder become absolute. ``above`` are files that extend
+    this one, the first at the front. ScenarioError if a file cannot be read, is missing or extends itself.
     """
     tree = Tree(*read_yaml(path))
     if not isinstance(tree.data, Mapping) or EXTENDS not in tree.data:
@@ -65,11 +60,7 @@ def _with_absolute_meshes(data: Any, folder: Path) -> Any:
 
 
 def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
-    """Changes of each variant, in the order of the file.
-
-    Raises:
-        ScenarioError: If a variant is not a mapping or holds a key that only a file has.
-    """
+    """Changes of each variant, in order; ScenarioError if one is no mapping or has a key for files only."""
     result = tree.data.get(VARIANTS) if isinstance(tree.data, Mapping) else None
     if result is None:
         return {}
@@ -156,11 +147,7 @@ def list_scenarios() -> dict[str, str]:
 
 
 def list_variants(name_or_path: str | Path) -> dict[str, str]:
-    """Names of a scenario's variants with a one-line description each, in the file's order.
-
-    Raises:
-        ScenarioError: If the scenario cannot be read.
-    """
+    """Variants of a scenario with a one-line description each; ScenarioError if it cannot be read."""
     path, _ = find_scenario(name_or_path)
     names = variants_of(read_extended(path), str(path))
     return {variant: load_scenario(path, variant).file.description for variant in names}

@@ -49,9 +49,7 @@ def walking_supports(footprints: Footprints, scenario: Scenario) -> Scenario:
     Friction, soles and force caps are those of the scenario's supports where it has some; its supports, task,
     constraints on the centre of mass and options of the planner are replaced. The centre of mass starts and
     ends above the middle between the feet; durations are bounded by those of the walk, from below only.
-
-    Raises:
-        InputError: If the footprints begin and end at different heights.
+    InputError if the footprints begin and end at different heights.
     """
     first, last = _middle(footprints.first()), _middle(footprints.last())
     if abs(first[2] - last[2]) > _SAME_PLACE:

@@ -240,8 +240,7 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
 def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
     """Build the problem of the keyframe-based planner; None when the file asks for another one.
 
-    Raises:
-        ScenarioError: If the recording cannot be read or was made on other supports.
+    ScenarioError if the recording cannot be read or was made on other supports.
     """
     options = values.file.planning
     if options.method != "keyframes" or options.recording is None:

@@ -153,12 +153,10 @@ def refuse_repeated(names: Sequence[str], key: str, valid: str = "a unique name"
         refuse_if(name in names[:index], key.format(index), f"is {name!r} again; valid: {valid}")
 
 
-_Section = TypeVar("_Section", bound=Section)
+S = TypeVar("S", bound=Section)
 
 
-def validate(
-    model: type[_Section], data: Any, source: str, lines: Mapping[KeyPath, str] | None = None
-) -> _Section:
+def validate(model: type[S], data: Any, source: str, lines: Mapping[KeyPath, str] | None = None) -> S:
     """Check what a YAML reader returned, with the place of each key, against the section of a whole file.
 
     Raises:

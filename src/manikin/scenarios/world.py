@@ -109,9 +109,7 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
     """Build the stances of the explicit supports; feet that roll have heel and toe phases.
 
     With ``planning`` they have the smaller soles, friction and force caps that planning balances on.
-
-    Raises:
-        ScenarioError: If there are no supports, or a contact slides between phases.
+    ScenarioError if there are no supports, or a contact slides between phases.
     """
     sequence, supports = flat_sequence(values, planning=planning), values.explicit_supports()
     if supports.foot == "flat":
@@ -135,11 +133,7 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
 
 
 def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
-    """What each phase of the supports carries that is no part of the body.
-
-    Raises:
-        ScenarioError: If the load is carried in phases that the supports do not have.
-    """
+    """What each phase of the supports carries beside the body; ScenarioError if a phase does not exist."""
     load, phases = values.file.body.load, values.explicit_supports().phases
     if load is None or load.lasts:
         return [None] * len(phases)
@@ -159,11 +153,7 @@ def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
 
 
 def check_contacts(values: ScenarioValues, scene: Scene) -> None:
-    """Check that every contact of the supports lies on a surface of the scene.
-
-    Raises:
-        ScenarioError: For the first contact that is off every surface or overlaps another.
-    """
+    """Raise a ScenarioError for the first contact that is off every surface or overlaps another."""
     for number, stance in enumerate(phase.stance for phase in flat_sequence(values)):
         for first, second in combinations(stance, 2):
             if soles_overlap(first, second):

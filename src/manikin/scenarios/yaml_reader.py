@@ -58,8 +58,7 @@ for _kind, _pattern, _first in (
 def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
     """Content of a YAML document in plain values, and the place of each key and entry: ``"file.yaml:3"``.
 
-    Raises:
-        ScenarioError: If the file cannot be read, is not YAML or is empty.
+    ScenarioError if the file cannot be read, is not YAML or is empty.
     """
     data, lines = _parse(_read_text(path), str(path), "key: value lines")
     if data is None:

@@ -123,7 +123,9 @@ class SphereProximity(BodyPairs):
         height = centres @ self._normals.T - self._offsets
         height = np.where(self._two_sided, np.abs(height), height) - self._own_radii[:, None]
         spheres = np.vstack([self._fixed, centres])
-        gaps = np.hstack([height, _sphere_gaps(centres, self._own_radii, spheres, self._radii)])
+        # Coordinate by coordinate (F.1): no array of all vectors between spheres.
+        apart = np.sqrt(sum(np.subtract.outer(centres[:, i], spheres[:, i]) ** 2 for i in range(3)))
+        gaps = np.hstack([height, apart - np.add.outer(self._own_radii, self._radii)])
         least = np.minimum.reduceat(gaps, self._rows[:-1], axis=0)
         least = np.minimum.reduceat(least, self._columns[:-1], axis=1)
         return spheres, gaps, least[self._first, self._second]
@@ -145,18 +147,6 @@ class SphereProximity(BodyPairs):
             side = -1.0 if self._two_sided[target] and height < 0.0 else 1.0
             normal, on_other = -side * self._normals[target], centre - height * self._normals[target]
         return normal, centre + self._radii[own] * normal, on_other
-
-
-def _sphere_gaps(
-    centres: FloatArray, radii: FloatArray, others: FloatArray, other_radii: FloatArray
-) -> FloatArray:
-    """(k, m) distances between spheres (F.1), coordinate by coordinate: no (k, m, 3) array."""
-    squared = np.subtract.outer(centres[:, 0], others[:, 0]) ** 2
-    squared += np.subtract.outer(centres[:, 1], others[:, 1]) ** 2
-    squared += np.subtract.outer(centres[:, 2], others[:, 2]) ** 2
-    gaps = np.sqrt(squared, out=squared)
-    gaps -= np.add.outer(radii, other_radii)
-    return gaps
 
 
 def _shape_cover(geometry: coal.CollisionGeometry, count: int) -> SphereCover:

@@ -94,11 +94,7 @@ class ContactSection(Section):
         return self.kind or usual.get(effector.rpartition("_")[2], "sole")
 
     def check_for(self, effector: str, path: str = "") -> None:
-        """Refuse keys that the contact's kind does not have.
-
-        Raises:
-            PydanticCustomError: Naming the key under ``path``.
-        """
+        """Refuse keys that the contact's kind does not have, by their names under ``path``."""
         kind = self.kind_for(effector)
         for key in sorted({key for keys in _KIND_KEYS.values() for key in keys} - {*_KIND_KEYS[kind]}):
             if getattr(self, key) is not None:
