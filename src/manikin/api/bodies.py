@@ -82,13 +82,9 @@ def balance(
     """Judge a stance: how far it is from losing its balance, and what gives way first.
 
     Args:
-        stance: Contacts and caps.
-        com: (3,) centre of mass in the world [m].
+        com: (3,) centre of mass in the world [m]; InputError if this or another number is not usable.
         mass: [kg].
         acceleration: (3,) of the CoM [m/s^2].
-
-    Raises:
-        InputError: If a number is not usable.
     """
     place = frozen_array(com, "com [m]", (3,))
     return Balance(stance, place, evaluate_balance(stance, mass, place, acceleration))
@@ -96,7 +92,6 @@ def balance(
 
 SOLE = (0.28, 0.12)
 """Length and width of a sole when none are given, those of a shoe in [Qiu2012]_ 5.4.4 [m]."""
-
 FRICTION = 0.7
 """Coefficient of friction when none is given, that of a rubber sole on a clean floor."""
 
@@ -117,21 +112,15 @@ class Unnamed:
 
 
 def sole(
-    position: Sequence[float],
-    yaw: float = 0.0,
-    *,
-    length: float = SOLE[0],
-    width: float = SOLE[1],
-    friction: float = FRICTION,
-    **options: Any,
-) -> Unnamed:
+    position: Sequence[float], yaw: float = 0.0, *, length: float = SOLE[0], width: float = SOLE[1],
+    friction: float = FRICTION, **options: Any,
+) -> Unnamed:  # fmt: skip
     """Sole on the ground for :func:`stance`.
 
     Args:
         position: (2,) or (3,) middle of the sole in the world [m]; z is 0 when left out.
         yaw: Direction of the toes, counter-clockwise from x [rad].
-        length: [m].
-        width: [m].
+        length, width: [m].
         friction: Coulomb coefficient.
         options: Further ones of :func:`manikin.contact.sole`.
     """
@@ -150,23 +139,17 @@ def grasp(position: Sequence[float], max_force: float, **options: Any) -> Unname
 
 
 def stance(
-    *,
-    friction: float = FRICTION,
-    normal_force_cap: float | None = 1500.0,
-    friction_model: FrictionModel = "outer",
-    **contacts: Sequence[float] | Unnamed | Contact,
-) -> Stance:
+    *, friction: float = FRICTION, normal_force_cap: float | None = 1500.0,
+    friction_model: FrictionModel = "outer", **contacts: Sequence[float] | Unnamed | Contact,
+) -> Stance:  # fmt: skip
     """Stance from its contacts by effector: ``stance(left_foot=(0, .1), right_hand=grasp((.4, 0, 1), 100))``.
 
     Args:
         friction: Of contacts that are given as a place alone.
         normal_force_cap: Largest sum of the normal forces [N].
         friction_model: Pyramid that stands for the friction cone: ``outer``, ``inner`` or ``cone``.
-        contacts: By effector: a place (2,) or (3,) [m], which is a sole that faces x, or what
-            :func:`sole`, :func:`point` or :func:`grasp` made.
-
-    Raises:
-        ContactError: If a contact is not usable.
+        contacts: By effector: a place (2,) or (3,) [m], which is a sole that faces x, or what :func:`sole`,
+            :func:`point` or :func:`grasp` made; ContactError if it is not usable.
     """
     made = []
     for effector, given in contacts.items():
@@ -183,13 +166,9 @@ def creature(
     """Body that is no person: the built-in insect or quadruped, or a robot or animal from a URDF file.
 
     Args:
-        source: ``"insect"``, ``"quadruped"``, or the file.
+        source: ``"insect"``, ``"quadruped"``, or the file; BodyError if it or a limb is not usable.
         limbs: Limbs of the file's body by name, see :func:`manikin.body.creature_from_urdf`.
-        options: Of :func:`manikin.body.insect`, :func:`manikin.body.quadruped` or
-            :func:`manikin.body.creature_from_urdf`.
-
-    Raises:
-        BodyError: If the file or a limb is not usable.
+        options: Of that function, :func:`manikin.body.insect` or :func:`manikin.body.quadruped`.
     """
     built_in = {"insect": insect, "quadruped": quadruped}
     if str(source) in built_in:
@@ -203,11 +182,8 @@ def scene(source: str | Path | Sequence[Obstacle] = (), *, floor: float | None =
     """Scene of a scenario, or of obstacles on a floor.
 
     Args:
-        source: Name of a built-in scenario, a scenario file, or obstacles.
+        source: Name of a built-in scenario, a scenario file, or obstacles; InputError if not usable.
         floor: Height of the floor under obstacles [m]; None for none.
-
-    Raises:
-        InputError: If the scenario or an obstacle is not usable.
     """
     if isinstance(source, str | Path):
         return load_scenario(str(source)).build_scene()

@@ -96,14 +96,7 @@ class Run(Displayed):
         return tuple(FIGURES)
 
     def plot(self, figure: str = "margin") -> "Figure":
-        """Draw a figure.
-
-        Args:
-            figure: One of :attr:`figures`.
-
-        Raises:
-            InputError: If there is no such figure, or the run has no data for it.
-        """
+        """Draw one of :attr:`figures`; InputError if there is no such one, or the run has no data for it."""
         from manikin.reports.figures import FIGURES
 
         return _drawn(FIGURES, figure, self.record)
@@ -119,11 +112,7 @@ class Run(Displayed):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Requirements(Displayed):
-    """Table of what a run had to keep.
-
-    Attributes:
-        rows: One for each requirement, as in ``summary.json``.
-    """
+    """Table of what a run had to keep: one row for each requirement, as in ``summary.json``."""
 
     rows: tuple[Mapping[str, Any], ...]
 
@@ -144,11 +133,7 @@ class Requirements(Displayed):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Displayed):
-    """Two runs side by side.
-
-    Attributes:
-        result: Timing, centre of mass, margins and postures.
-    """
+    """Two runs side by side; ``result`` has their timing, centre of mass, margins and postures."""
 
     result: "RunComparison"
 
@@ -158,14 +143,11 @@ class Comparison(Displayed):
         return {"first": first, "second": second, "matched phases": str(self.result.matched_phases)}
 
     def plot(self, figure: str = "compare_timing") -> "Figure":
-        """Draw a figure of both.
+        """Draw a figure of both; InputError if there is no such one, or the runs have no data for it.
 
         Args:
             figure: ``compare_timing``, ``compare_planes``, ``compare_scene``, ``compare_margin`` or
                 ``compare_postures``.
-
-        Raises:
-            InputError: If there is no such figure, or the runs have no data for it.
         """
         from manikin.reports.figures import COMPARISONS
 
@@ -173,15 +155,12 @@ class Comparison(Displayed):
 
 
 def plan(scenario: str | Path | Scenario, **options: Any) -> Run:
-    """Plan a scenario without executing it.
+    """Plan a scenario without executing it; InputError if it is not usable.
 
     Args:
         scenario: Name of a built-in scenario, a scenario file, or a scenario.
         options: ``body``, ``variant``, ``friction``, ``overrides``, ``seed`` and ``out`` as of
             :func:`simulate`.
-
-    Raises:
-        InputError: If the scenario is not usable.
     """
     return _run(_changed(scenario, execution="none", **_job_options(options)), **options)
 
@@ -189,7 +168,7 @@ def plan(scenario: str | Path | Scenario, **options: Any) -> Run:
 def simulate(
     scenario: str | Path | Scenario | Run, *, push: Mapping[str, float] | None = None, **options: Any
 ) -> Run:
-    """Plan a scenario and execute it in the physics engine.
+    """Plan a scenario and execute it in the physics engine; InputError if it is not usable.
 
     Args:
         scenario: Name of a built-in scenario, a scenario file, a scenario, or a run of one.
@@ -197,9 +176,6 @@ def simulate(
         options: ``body``, a human whose stature, mass and sex are taken; ``variant``; ``friction`` of soles
             and points; ``overrides``, such as ``["planning.min_margin=15"]``; ``seed``; ``out``, a run
             directory that is kept.
-
-    Raises:
-        InputError: If the scenario is not usable.
     """
     source = scenario.scenario if isinstance(scenario, Run) else scenario
     sections = {} if push is None else {"push": dict(push)}
@@ -214,10 +190,7 @@ def walk(
 
     Args:
         body: Who walks; the default human when omitted.
-        max_speed: Limit of the speed over the floor [m/s].
-
-    Raises:
-        InputError: If a value is not usable.
+        max_speed: Limit of the speed over the floor [m/s]; InputError if a value is not usable.
     """
     from manikin.scenarios.planned import walk_task
 
@@ -228,7 +201,7 @@ def push(
     force: float, direction: float = 0.0, *, duration: float = 0.1, body: BodyModel | None = None,
     seed: int | None = None, out: str | Path | None = None, **recovery: Any,
 ) -> Run:  # fmt: skip
-    """Push a standing body and see whether it stays on its feet.
+    """Push a standing body and see whether it stays on its feet; InputError if a value is not usable.
 
     Args:
         force: [N].
@@ -236,9 +209,6 @@ def push(
         duration: Of the push [s].
         body: A human; the body of Kudoh when omitted.
         recovery: Keys of a scenario's ``recovery``, such as ``feet="free"`` and ``steps=1``.
-
-    Raises:
-        InputError: If a value is not usable.
     """
     from manikin.scenarios.planned import push_task
 
@@ -248,10 +218,7 @@ def push(
 
 
 def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
-    """Compare the timing, centre of mass, margins and postures of two runs.
-
-    Args:
-        first: A run, or its directory.
+    """Compare the timing, centre of mass, margins and postures of two runs, or of their directories.
 
     Raises:
         InputError: If a directory is not that of a run.
@@ -278,14 +245,9 @@ def _job_options(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _changed(
-    source: str | Path | Scenario,
-    *,
-    body: BodyModel | None = None,
-    variant: str | None = None,
-    friction: float | None = None,
-    overrides: Sequence[str] = (),
-    **sections: Any,
-) -> Scenario:
+    source: str | Path | Scenario, *, body: BodyModel | None = None, variant: str | None = None,
+    friction: float | None = None, overrides: Sequence[str] = (), **sections: Any,
+) -> Scenario:  # fmt: skip
     job = source if isinstance(source, Scenario) else load_scenario(str(source), variant)
     settings = list(overrides)
     if friction is not None:
@@ -313,12 +275,7 @@ def _run(job: Scenario, *, seed: int | None = None, out: str | Path | None = Non
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedMotion(Displayed):
-    """A recording of a person, as it was read.
-
-    Attributes:
-        recording: Markers, or joints of a skeleton.
-        source: The file.
-    """
+    """A recording of a person, markers or joints of a skeleton, as it was read from the file ``source``."""
 
     recording: Recording | MarkerRecording
     source: Path
@@ -330,21 +287,13 @@ class RecordedMotion(Displayed):
         return {"file": self.source.name, "kind": kind, "frames": str(frames), "rate": f"{rate:g} Hz"}
 
     def analyze(self, **options: Any) -> "MeasuredRecording":
-        """Measure it; options are those of :class:`manikin.analysis.AnalysisOptions`.
-
-        Raises:
-            InputError: If it is not a person's motion that can be measured.
-        """
+        """Measure it, by options of :class:`manikin.analysis.AnalysisOptions`; InputError if that fails."""
         return MeasuredRecording(measure(self.recording, AnalysisOptions(**options), self.source.stem))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeasuredRecording(Displayed):
-    """A recorded person, measured with the yardsticks of plans.
-
-    Attributes:
-        analysis: Every measure.
-    """
+    """A recorded person, measured with the yardsticks of plans; ``analysis`` has every measure."""
 
     analysis: Analysis
 
@@ -392,11 +341,8 @@ def read(path: str | Path, frames: tuple[int, int] | None = None) -> RecordedMot
     """Read a recording of a person.
 
     Args:
-        path: C3D or TRC for markers, BVH or AMC for a skeleton.
+        path: C3D or TRC for markers, BVH or AMC for a skeleton; InputError if it cannot be read.
         frames: First frame and the one after the last; None for all.
-
-    Raises:
-        InputError: If the file cannot be read.
     """
     return RecordedMotion(read_recording(path, frames), Path(path))
 
@@ -407,5 +353,4 @@ def analyze(path: str | Path, **options: Any) -> MeasuredRecording:
     Raises:
         InputError: If it cannot be read, or is not a person's motion that can be measured.
     """
-    frames = options.get("frames")
-    return read(path, frames).analyze(**options)
+    return read(path, options.get("frames")).analyze(**options)

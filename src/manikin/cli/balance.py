@@ -13,8 +13,7 @@ from manikin.cli.console import (
     flag,
     flattened,
     option,
-    print_json,
-    print_table,
+    print_report,
     stdout_kept_clean,
 )
 
@@ -29,10 +28,7 @@ def balance(
 
     with stdout_kept_clean():
         report = judge_stance_file(stance).as_dict(polytope=polytope and json)
-    if json:
-        print_json(report)
-    else:
-        print_table(flattened(report))
+    print_report(report, flattened(report), json=json)
 
 
 def contact(
@@ -73,10 +69,7 @@ def contact(
 
             write_contact_figure(body, scene, answer, figure)
     report = answer.as_dict()
-    if json:
-        print_json(report)
-    else:
-        print_table({key: value for key, value in report.items() if key != "q"})
-        if not report["found"]:
-            typer.echo(f"no contact: {report['failure']}", err=True)
+    print_report(report, {key: value for key, value in report.items() if key != "q"}, json=json)
+    if not (json or report["found"]):
+        typer.echo(f"no contact: {report['failure']}", err=True)
     return DONE if report["found"] else FAILED

@@ -18,7 +18,7 @@ from manikin.cli.console import (
     flag,
     option,
     print_json,
-    print_table,
+    print_report,
 )
 from manikin.errors import InputError
 
@@ -61,10 +61,7 @@ def benchmark(
     numbers = range(first_seed, first_seed + seeds)
     if list_families:
         descriptions = {name: family.description for name, family in FAMILIES.items()}
-        if json:
-            print_json({"families": descriptions})
-        else:
-            print_table(descriptions)
+        print_report({"families": descriptions}, descriptions, json=json)
         return DONE
     if write_scenes is not None:
         tasks.write_scenes(chosen, numbers, write_scenes)

@@ -5,9 +5,8 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
@@ -28,10 +27,7 @@ class Interruption:
 
     Both unwind the program, so that temporary files are removed.  SIGINT is listened to even
     where a shell starts background jobs with it ignored.  A native solver may swallow the
-    exception and carry on with what it has; :meth:`check` raises it again.
-
-    Attributes:
-        requested: Whether one of the signals has come.
+    exception and carry on with what it has; :meth:`check` raises it again if :attr:`requested`.
     """
 
     def __init__(self) -> None:
@@ -95,57 +91,45 @@ def directory_of(out: Path | None, name: str, *, json: bool) -> Path | None:
     return out if out is not None else None if json else Path("runs") / name
 
 
-@dataclass(frozen=True, eq=False)
-class JobOutcome:
-    """Summary and files of a job.
-
-    Attributes:
-        page: The report page, or None if nothing was written.
-        viewable: Directory of the run if it holds a motion to watch, else None.
-    """
-
-    summary: dict[str, Any]
-    page: Path | None
-    viewable: Path | None
-
-    @property
-    def status(self) -> int:
-        """Exit status: done only for a run that succeeded."""
-        return DONE if self.summary["succeeded"] else FAILED
-
-    def print(self, shown: dict[str, Any] | None = None) -> None:
-        """Print the verdict, the requirements, the values ``shown``, and last the path of the report page."""
-        for line in verdict_lines(self.summary):
-            typer.echo(line)
-        if shown:
-            print_table(shown)
-        if self.viewable is not None:
-            typer.echo(f"watch it with: manikin view {self.viewable}")
-        if self.page is not None:
-            typer.echo(f"report: {self.page}")
-
-
-def run_job(job: "Scenario", directory: Path | None, interruption: Interruption, *, draw: bool) -> JobOutcome:
-    """Run a scenario with bars on standard error.
+def run_job(
+    job: "Scenario", out: Path | None, interruption: Interruption, *, draw: bool, json: bool,
+    part: str = "", shown: Sequence[str] = (), beside: Mapping[str, Any] | None = None,
+) -> int:  # fmt: skip
+    """Run a scenario with bars on standard error, print its summary, and return the exit status.
 
     Args:
-        directory: Run directory, or None to write nothing.
+        out: Directory that was asked for.
         draw: Whether figures are drawn into the directory.
+        part: Of the summary, whose values ``shown`` are printed after the verdict and the requirements.
+        beside: Defaults of the part's values, which then stand in the JSON beside those of the summary.
     """
+    directory = directory_of(out, job.name, json=json)
     with bars(interruption) as progress:
         from manikin.pipeline import runner
 
         result = runner.run(job, out=directory, seed=job.seed, progress=progress)
         interruption.check()
-        if directory is None:
-            return JobOutcome(dict(result.summary), None, None)
-        from manikin.reports.export import write_outputs
-        from manikin.reports.pages import write_run_page
+        page = None
+        if directory is not None:
+            from manikin.reports.export import write_outputs
+            from manikin.reports.pages import write_run_page
 
-        if draw:
-            write_outputs(directory, progress)
-        page = write_run_page(directory)
-        return JobOutcome(dict(result.summary), page, directory if result.motion is not None else None)
+            if draw:
+                write_outputs(directory, progress)
+            page = write_run_page(directory)
+    summary = dict(result.summary)
+    if json:
+        print_json(summary if beside is None else {**beside, **summary[part], **summary})
+    else:
+        for line in verdict_lines(summary):
+            typer.echo(line)
+        if shown:
+            print_table({key: summary[part].get(key) for key in shown})
+        if directory is not None and result.motion is not None:
+            typer.echo(f"watch it with: manikin view {directory}")
+        if page is not None:
+            typer.echo(f"report: {page}")
+    return DONE if summary["succeeded"] else FAILED
 
 
 @contextmanager
@@ -176,13 +160,20 @@ def bars(interruption: Interruption) -> Iterator[Callable[..., None]]:
 
 
 def refuse(given: bool, option: str, because: str) -> None:
-    """Refuse an option that was given where it has no meaning.
-
-    Raises:
-        InputError: If it was given.
-    """
+    """Refuse an option, by an InputError, if it was given where it has no meaning."""
     if given:
         raise InputError(f"{option} does not go with this run: {because}; valid: leave it out")
+
+
+def refuse_given(options: Mapping[str, Any], because: str) -> None:
+    """Refuse the first option, by name, whose value is not None."""
+    for name, value in options.items():
+        refuse(value is not None, name, because)
+
+
+def given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that are not None."""
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def flattened(value: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -216,11 +207,19 @@ def _shown(value: Any) -> str:
     return "-" if value is None else str(value)
 
 
-def print_json(value: dict[str, Any]) -> None:
+def print_json(value: Mapping[str, Any]) -> None:
     """Print the one object that ``--json`` promises."""
     from manikin.runtime.files import to_json
 
     typer.echo(to_json(value))
+
+
+def print_report(report: Mapping[str, Any], shown: dict[str, Any], *, json: bool) -> None:
+    """Print a report as JSON, or what is ``shown`` of it in two columns."""
+    if json:
+        print_json(report)
+    else:
+        print_table(shown)
 
 
 def announce(url: str) -> None:

@@ -16,9 +16,11 @@ from manikin.cli.console import (
     bars,
     directory_of,
     flag,
+    given,
     option,
     print_json,
     refuse,
+    refuse_given,
     run_job,
 )
 from manikin.errors import InputError
@@ -110,8 +112,8 @@ def push(
     from manikin.scenarios.planned import push_task
     from manikin.simulation.push_force import STRONGEST
 
-    person = _given({"model": body, "stature_m": stature, "mass_kg": mass, "sex": sex})
-    recovery = _given({
+    person = given({"model": body, "stature_m": stature, "mass_kg": mass, "sex": sex})
+    recovery = given({
         "feet": feet, "support": support, "feet_apart_m": feet_apart, "steps": steps, "delay_s": delay,
         "ankle_stiffness": ankle_stiffness, "locked": list(locked or ()), "strength": strength,
         "posture_control_only": posture_control_only,
@@ -138,24 +140,13 @@ def push(
     only_maps: dict[str, Any] = {
         "--directions": directions, "--tolerance": tolerance, "--compare": compare, "--jobs": jobs,
     }  # fmt: skip
-    for name, value in only_maps.items():
-        refuse(value is not None, name, "it is for --map")
+    refuse_given(only_maps, "it is for --map")
     if force is None or direction is None:
         option = "--force" if force is None else "--direction"
         raise InputError(f"{option} is missing; valid: a number, or --map")
     finite_number(force, "--force [N]", above=0.0, at_most=STRONGEST)
-    name = f"push-{force:g}N-{direction:g}deg"
-    job = scenario(name, force, direction, {})
-    outcome = run_job(job, directory_of(out, name, json=json), context.obj, draw=figures)
-    if json:
-        print_json(outcome.summary)
-    else:
-        outcome.print({key: outcome.summary["push"][key] for key in SHOWN})
-    return outcome.status
-
-
-def _given(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value is not None}
+    job = scenario(f"push-{force:g}N-{direction:g}deg", force, direction, {})
+    return run_job(job, out, context.obj, draw=figures, json=json, part="push", shown=SHOWN)
 
 
 def _changes(text: str) -> dict[str, Any]:

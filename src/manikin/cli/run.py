@@ -16,7 +16,6 @@ from manikin.cli.console import (
     OutOption,
     SexOption,
     argument,
-    directory_of,
     option,
     print_json,
     refuse,
@@ -29,16 +28,14 @@ ALL = "all"
 RESULTS = "results.json"
 """Results of ``manikin run all --out DIR``, in DIR."""
 
+_SCENARIO = "Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them."
+_SET = "Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable."
+_MOVED = "Move the scenario's origin to X Y [m], turned [deg]."
+
 
 def run(
     context: typer.Context,
-    scenario: Annotated[
-        str,
-        argument(
-            "NAME|FILE.yaml|all",
-            "Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them.",
-        ),
-    ],
+    scenario: Annotated[str, argument("NAME|FILE.yaml|all", _SCENARIO)],
     out: OutOption = None,
     seed: Annotated[int | None, option("N", "Seed; default: the scenario's.")] = None,
     json: JsonOption = False,
@@ -50,18 +47,8 @@ def run(
     load_kg: Annotated[float | None, option("KG", "Load in the hands during the whole motion.")] = None,
     load_hand: LoadHandOption = None,
     variant: Annotated[str | None, option("V", "One of the scenario's variants; also NAME@V.")] = None,
-    overrides: Annotated[
-        list[str] | None,
-        option(
-            "KEY=VALUE",
-            "Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable.",
-            "--set",
-        ),
-    ] = None,
-    moved: Annotated[
-        tuple[float, float, float] | None,
-        option("X Y YAW_DEG", "Move the scenario's origin to X Y [m], turned [deg]."),
-    ] = None,
+    overrides: Annotated[list[str] | None, option("KEY=VALUE", _SET, "--set")] = None,
+    moved: Annotated[tuple[float, float, float] | None, option("X Y YAW_DEG", _MOVED)] = None,
     figures: FiguresOption = True,
     jobs: JobsOption = None,
 ) -> int:
@@ -83,12 +70,7 @@ def run(
         job = job.with_seed(seed)
     if moved is not None:
         job = job.moved(*moved)
-    outcome = run_job(job, directory_of(out, job.name, json=json), context.obj, draw=figures)
-    if json:
-        print_json(outcome.summary)
-    else:
-        outcome.print()
-    return outcome.status
+    return run_job(job, out, context.obj, draw=figures, json=json)
 
 
 def _run_all(

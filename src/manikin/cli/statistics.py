@@ -20,6 +20,7 @@ from manikin.cli.console import (
     option,
     print_json,
     refuse,
+    refuse_given,
 )
 from manikin.errors import InputError
 
@@ -62,8 +63,7 @@ def statistics(
         option("stance|lowest|highest", "From where placements are seen: stance, or CoM."),
     ] = "stance",
     by: Annotated[
-        Literal["number", "kind", "effectors"],
-        option("number|kind|effectors", "What phases have in common."),
+        Literal["number", "kind", "effectors"], option("number|kind|effectors", "What phases have in common.")
     ] = "kind",
     sex: SexOption = "male",
     out: Annotated[Path | None, option("DIR", "Write statistics.json, phases.csv and figures there.")] = None,
@@ -74,8 +74,7 @@ def statistics(
         options = {
             "FILE": files, "--bar": bar, "--box": box, "--limit": limit, "--phases": phases, "--start": start,
         }  # fmt: skip
-        for option, value in options.items():
-            refuse(value is not None, option, "the published motions are numbers already")
+        refuse_given(options, "the published motions are numbers already")
         return _published(out, json=json)
     if not files:
         raise InputError("no FILE is given; valid: recordings, folders or patterns, or --published")

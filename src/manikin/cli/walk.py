@@ -20,8 +20,9 @@ from manikin.cli.console import (
     flag,
     option,
     print_json,
-    print_table,
+    print_report,
     refuse,
+    refuse_given,
     run_job,
 )
 from manikin.errors import InputError
@@ -67,11 +68,8 @@ def walk(
     """Walk to a place as people do: path by optimal control, whole body from recorded walks."""
     body: dict[str, Any] = {"model": "human", "stature_m": stature, "mass_kg": mass, "sex": sex}
     if drive:
-        given: dict[str, Any] = {
-            "--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out, "--json": json or None,
-        }  # fmt: skip
-        for name, value in given.items():
-            refuse(value is not None, name, "it is for a walk to a place")
+        walked = {"--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out}
+        refuse_given(walked | {"--json": json or None}, "it is for a walk to a place")
         return _drive(body, start, scene, 8080 if port is None else port)
     refuse(port is not None, "--port", "it is for --drive")
     if to is None:
@@ -81,13 +79,10 @@ def walk(
 
     around = None if scene is None else load_scenario(scene)
     job = walk_task(to, start=start, body=body, max_speed=max_speed, weights=weights, around=around)
-    outcome = run_job(job, directory_of(out, job.name, json=json), context.obj, draw=figures)
-    block = outcome.summary["walk"]
-    if json:
-        print_json({"max_stance_slide_m": None} | block | outcome.summary)
-    else:
-        outcome.print({key: block.get(key) for key in SHOWN})
-    return outcome.status
+    return run_job(
+        job, out, context.obj, draw=figures, json=json, part="walk", shown=SHOWN,
+        beside={"max_stance_slide_m": None},
+    )  # fmt: skip
 
 
 def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> None:
@@ -191,7 +186,5 @@ def build(
         "windows_near_others": [f"{w.file} {w.first}-{w.last}" for w in built.near_others],
         "acknowledgements": list(built.library.acknowledgements),
     }
-    if json:
-        print_json(summary)
-    else:
-        print_table(summary | {"classes": ", ".join(f"{number} {kind}" for kind, number in classes.items())})
+    counts = ", ".join(f"{number} {kind}" for kind, number in classes.items())
+    print_report(summary, summary | {"classes": counts}, json=json)

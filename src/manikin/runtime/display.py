@@ -53,7 +53,6 @@ class Displayed:
         return f"{type(self).__name__}({_cut(inside, LONGEST_LINE - len(type(self).__name__))})"
 
     def _repr_html_(self) -> str:
-        """Table of the facts, as notebooks show it."""
         return html_table(type(self).__name__, self.facts())
 
 
@@ -84,31 +83,14 @@ def _short(value: Any) -> str:
 
 
 COLOURS = {
-    "recorded": "#6A51A3",
-    "shifted": "#B3A2D6",
-    "planned": "#0072B2",
-    "executed": "#D55E00",
-    "left_foot": "#009E73",
-    "right_foot": "#CC79A7",
-    "left_hand": "#56B4E9",
-    "right_hand": "#E69F00",
-    "left_knee": "#005F45",
-    "right_knee": "#8E4770",
-    "left_elbow": "#1F6FA3",
-    "right_elbow": "#9A6700",
-    "pelvis": "#6A51A3",
-    "buttocks": "#6A51A3",
-    "ink": "#222222",
-    "soft": "#8A8A8A",
-    "shade": "#EEF1F5",
-    "obstacle": "#C9CED6",
-    "trunk": "#6F7784",
-    "one support": "#0072B2",
-    "two supports": "#C0392B",
-    "more supports": "#4D4D4D",
-    "first run": "#0072B2",
-    "second run": "#D55E00",
-}
+    "recorded": "#6A51A3", "shifted": "#B3A2D6", "planned": "#0072B2", "executed": "#D55E00",
+    "left_foot": "#009E73", "right_foot": "#CC79A7", "left_hand": "#56B4E9", "right_hand": "#E69F00",
+    "left_knee": "#005F45", "right_knee": "#8E4770", "left_elbow": "#1F6FA3", "right_elbow": "#9A6700",
+    "pelvis": "#6A51A3", "buttocks": "#6A51A3",
+    "ink": "#222222", "soft": "#8A8A8A", "shade": "#EEF1F5", "obstacle": "#C9CED6", "trunk": "#6F7784",
+    "one support": "#0072B2", "two supports": "#C0392B", "more supports": "#4D4D4D",
+    "first run": "#0072B2", "second run": "#D55E00",
+}  # fmt: skip
 """Okabe and Ito's palette, which colour-blind readers can tell apart."""
 
 CYCLE = ("#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#6A51A3", "#8C564B")

@@ -42,11 +42,7 @@ class ResultDirectory:
     writer: ClassVar[str] = "manikin"
 
     def __init__(self, path: str | Path, kind: str | None = None) -> None:
-        """Create the directory, or take over that of an earlier result of the same kind.
-
-        Raises:
-            MotionFileError: If it cannot be created, or holds something else.
-        """
+        """Create the directory, or take over that of an earlier such result; else a MotionFileError."""
         self.path, self.kind = Path(path), kind or self.kind
         if self.path.exists() and not self.path.is_dir():
             raise MotionFileError(f"{self.path}: is a file; valid: a directory for the {self.kind}")
@@ -74,22 +70,13 @@ class ResultDirectory:
         return folder
 
     def write(self, name: str, content: str | Mapping[str, Any]) -> Path:
-        """Write a file atomically.
-
-        Args:
-            name: Of the file, relative to the directory; a folder in it is created.
-            content: Text, or plain values and arrays that become JSON.
-        """
+        """Write a text, or plain values and arrays as JSON, atomically; a folder in the name is created."""
         path = self.path / name
         make_directory(path.parent)
         return write_result(path, content)
 
     def read(self, name: str) -> dict[str, Any]:
-        """JSON object in a file of the directory.
-
-        Raises:
-            MotionFileError: If it is damaged.
-        """
+        """JSON object in a file of the directory; MotionFileError if it is damaged."""
         return read_json(self.path / name, f"as written by {self.writer}")
 
     def damaged(self, file: Path, advice: str = "") -> MotionFileError:
@@ -106,11 +93,7 @@ class ResultDirectory:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Context in which an error of the system becomes the message that ``path`` cannot be written.
-
-    Raises:
-        MotionFileError: If the system reports an error.
-    """
+    """Context in which an OSError becomes a MotionFileError: ``path`` cannot be written."""
     try:
         yield
     except OSError as error:
@@ -119,25 +102,14 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def write_result(path: str | Path, content: str | Mapping[str, Any]) -> Path:
-    """Write a text, or plain values as JSON, atomically.
-
-    Raises:
-        MotionFileError: If it cannot be written.
-    """
+    """Write a text, or plain values as JSON, atomically; MotionFileError if it cannot be written."""
     with writing(Path(path)):
         write_text(path, content if isinstance(content, str) else to_json(content) + "\n")
     return Path(path)
 
 
 def read_json(path: Path, valid: str = "as written by manikin") -> dict[str, Any]:
-    """JSON object in a file.
-
-    Args:
-        valid: What the file should be, for messages.
-
-    Raises:
-        MotionFileError: If it cannot be read or is not a JSON object.
-    """
+    """JSON object in a file; MotionFileError, with what is ``valid``, if it is none or cannot be read."""
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -150,11 +122,7 @@ def read_json(path: Path, valid: str = "as written by manikin") -> dict[str, Any
 
 
 def make_directory(path: Path) -> None:
-    """Create a directory, and those above it, unless it is there.
-
-    Raises:
-        MotionFileError: If it cannot be created.
-    """
+    """Create a directory, and those above it, unless it is there; MotionFileError if that fails."""
     with writing(path):
         path.mkdir(parents=True, exist_ok=True)
 
@@ -199,11 +167,7 @@ def _plain(value: Any) -> Any:
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Context that yields a temporary path; what is written there replaces ``path`` on success.
 
-    Args:
-        path: The file to be written; its folder must exist. A symbolic link is followed.
-
-    Raises:
-        OSError: If the folder cannot be written to.
+    Its folder must exist, a symbolic link is followed; OSError if the folder cannot be written to.
     """
     target = Path(path).resolve()
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
@@ -217,10 +181,6 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write ``text`` in UTF-8 with Unix line ends, atomically.
-
-    Raises:
-        OSError: If the folder cannot be written to.
-    """
+    """Write ``text`` in UTF-8 with Unix line ends, atomically; OSError as of :func:`atomic_path`."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")

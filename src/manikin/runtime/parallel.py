@@ -37,10 +37,7 @@ def side_by_side(
         name: Of the work, for the message of an error.
 
     Yields:
-        Number of an item and its result, in the order in which they are done.
-
-    Raises:
-        ManikinError: If a process ends before its time.
+        Number of an item and its result, as they are done; ManikinError if a process ends before its time.
     """
     count = min(workers, len(items))
     if count < 2:
@@ -78,14 +75,8 @@ class _TimeIsUp(BaseException):
 def processor_time_limit(seconds: float) -> Iterator[None]:
     """Context that ends when this process has computed for so long, however busy the machine is.
 
-    A native library that computes is left first. Outside of the main thread, and where the system has no
-    such timer, there is no limit.
-
-    Args:
-        seconds: Processor time [s].
-
-    Raises:
-        TimeLimitError: If the time is over.
+    TimeLimitError if the seconds of processor time are over. A native library that computes is left first.
+    Outside of the main thread, and where the system has no such timer, there is no limit.
     """
     if not hasattr(signal, "ITIMER_PROF") or threading.current_thread() is not threading.main_thread():
         yield
@@ -128,11 +119,11 @@ def _numbered(work: Callable[[T], R], number: int, item: T) -> tuple[int, R]:
 
 def _prepare(parent: int) -> None:
     """Make a new process deaf to Ctrl-C, which its parent sees to, and end it with its parent."""
+
+    def end_with_parent() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()

@@ -1,8 +1,4 @@
-"""Requirements of a result: what was measured, what is allowed, and whether it holds.
-
-One table of them is shared by certificates, executions, ``summary.json``, the screen and the
-report page.
-"""
+"""Requirements of a result: what was measured, what is allowed, and whether it holds."""
 
 import math
 from collections.abc import Iterable, Iterator

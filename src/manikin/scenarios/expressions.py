@@ -24,10 +24,8 @@ from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform
 
 MAX_LENGTH = 1000
 """Longest expression that is parsed [characters]."""
-
 MAX_DEPTH = 100
 """Deepest nesting of operations; evaluation recurses that deep."""
-
 CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 
 _NUMPY_NAMES: Mapping[str, str] = {
@@ -54,18 +52,9 @@ _Evaluator = Callable[[Mapping[str, Any], ModuleType], Any]
 
 
 class Expression:
-    """A parsed expression in x, y and z.
-
-    Attributes:
-        text: The source, as written.
-    """
+    """A parsed arithmetic expression in x, y and z; ScenarioError if ``text``, its source, is none."""
 
     def __init__(self, text: str) -> None:
-        """Parse ``text``.
-
-        Raises:
-            ScenarioError: If it is not an arithmetic expression in x, y and z.
-        """
         self.text = text
         self._evaluate = _parse(text)
 
@@ -148,10 +137,8 @@ class SupportLevel:
     """Height of the supports below the CoM, from the start's to the goal's.
 
     Attributes:
-        start: (2,) horizontal position of the CoM at the start [m].
-        goal: (2,) at the goal [m].
-        start_level: Height of the supports at the start [m].
-        goal_level: Height of the supports at the goal [m].
+        start, goal: (2,) horizontal position of the CoM [m].
+        start_level, goal_level: Height of the supports there [m].
     """
 
     start: FloatArray
@@ -160,13 +147,10 @@ class SupportLevel:
     goal_level: float
 
     def __call__(self, x: Any, y: Any) -> Any:
-        """Level at a horizontal CoM position: twice continuously differentiable.
+        """Level at a horizontal CoM position, floats, arrays or CasADi expressions [m].
 
-        The blend is the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` of the position ``u`` in
-        [0, 1] along the straight line from start to goal.
-
-        Args:
-            x: Float, array or CasADi expression [m].
+        The blend is twice continuously differentiable: the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` of the
+        position ``u`` in [0, 1] along the straight line from start to goal.
         """
         line = self.goal - self.start
         length_squared = float(line @ line)
@@ -204,14 +188,7 @@ class HeightBand:
         return self._scaled(self.upper_expression, x, y, z)
 
     def violation(self, com: FloatArray) -> FloatArray:
-        """Distance of each CoM outside the band; negative inside.
-
-        Args:
-            com: (..., 3) [m].
-
-        Returns:
-            (...) [m].
-        """
+        """(...) distance of each CoM (..., 3) outside the band; negative inside [m]."""
         x, y, z = com[..., 0], com[..., 1], com[..., 2]
         return np.maximum(self.lower(x, y, z) - z, z - self.upper(x, y, z))
 

@@ -17,17 +17,10 @@ EXTENDS = "extends"
 
 
 def read_extended(path: Path, above: tuple[Path, ...] = ()) -> Tree:
-    """Read a scenario file, laid over the one it extends, if any.
+    """Read a scenario file, laid over the one it extends, if any; the key ``extends`` is left out.
 
-    Args:
-        above: Files that extend this one, the first at the front.
-
-    Returns:
-        The content without the key ``extends``; relative mesh paths of an extended file in
-        another folder have become absolute.
-
-    Raises:
-        ScenarioError: One line, if a file cannot be read, is missing or extends itself.
+    Relative mesh paths of an extended file in another folder become absolute. ``above`` are files that extend
+    this one, the first at the front. ScenarioError if a file cannot be read, is missing or extends itself.
     """
     tree = Tree(*read_yaml(path))
     if not isinstance(tree.data, Mapping) or EXTENDS not in tree.data:
@@ -66,15 +59,8 @@ def _with_absolute_meshes(data: Any, folder: Path) -> Any:
     return changed
 
 
-_NOT_IN_A_VARIANT = ("extends", VARIANTS)
-
-
 def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
-    """Changes of each variant, in the order of the file.
-
-    Raises:
-        ScenarioError: If a variant is not a mapping or holds a key that only a file has.
-    """
+    """Changes of each variant, in order; ScenarioError if one is no mapping or has a key for files only."""
     result = tree.data.get(VARIANTS) if isinstance(tree.data, Mapping) else None
     if result is None:
         return {}
@@ -87,19 +73,16 @@ def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
             raise ScenarioError(f"{here} is a name that cannot be asked for; valid: no @, / or space")
         if not isinstance(change, Mapping):
             raise ScenarioError(f"{here} is {change!r}; valid: a mapping with what it changes")
-        for key in _NOT_IN_A_VARIANT:
+        for key in (EXTENDS, VARIANTS):
             if key in change:
                 raise ScenarioError(f"{here}.{key} is not for a variant; valid: the other keys")
     return {name: tree.under(VARIANTS, name) for name in result}
 
 
 def apply_variant(tree: Tree, variant: str, source: str) -> Tree:
-    """Lay one variant over the scenario; the variants themselves stay.
+    """Lay one variant over the scenario, whose variants stay; ScenarioError if there is none of that name.
 
     The name of the result is ``NAME@VARIANT``, unless the variant gives one.
-
-    Raises:
-        ScenarioError: If there is no such variant, in one line with the valid names.
     """
     known = variants_of(tree, source)
     if variant not in known:
@@ -117,9 +100,6 @@ def _hint(given: str, known: Mapping[str, object]) -> str:
     return f"did you mean {close[0]!r}? " if close else ""
 
 
-SUFFIXES = (".yaml", ".yml")
-
-
 def built_in() -> dict[str, Path]:
     """Files of the built-in scenarios by name, sorted."""
     folder = Path(str(resources.files("manikin.scenarios")))
@@ -127,15 +107,12 @@ def built_in() -> dict[str, Path]:
 
 
 def find_scenario(name_or_path: str | Path, folder: Path = Path()) -> tuple[Path, str | None]:
-    """Find a scenario file and the variant that its name may carry.
+    """Find a scenario file and the variant, or None, that its name carries.
 
     Args:
         name_or_path: ``"walls"``, ``"walls@trial-4"``, or the path of a YAML file, likewise with
             or without ``@`` and a variant.
         folder: Folder that a relative path starts from.
-
-    Returns:
-        The file, and the name of the variant or None.
 
     Raises:
         ScenarioError: If there is no such file, in one line with the valid names.
@@ -159,7 +136,7 @@ def _find(name_or_path: str | Path, folder: Path, known: dict[str, Path]) -> Pat
         raise ScenarioError(f"{path}: is a directory; {valid}")
     if not path.is_file():
         raise ScenarioError(f"{path}: there is no such file; {_hint(str(name_or_path), known)}{valid}")
-    if path.suffix.lower() not in SUFFIXES:
+    if path.suffix.lower() not in (".yaml", ".yml"):
         raise ScenarioError(f"{path}: is not a scenario file by its name; {valid}")
     return path
 
@@ -170,16 +147,10 @@ def list_scenarios() -> dict[str, str]:
 
 
 def list_variants(name_or_path: str | Path) -> dict[str, str]:
-    """Names of a scenario's variants with a one-line description each, in the file's order.
-
-    Raises:
-        ScenarioError: If the scenario cannot be read.
-    """
+    """Variants of a scenario with a one-line description each; ScenarioError if it cannot be read."""
     path, _ = find_scenario(name_or_path)
-    return {
-        variant: load_scenario(path, variant).file.description
-        for variant in variants_of(read_extended(path), str(path))
-    }
+    names = variants_of(read_extended(path), str(path))
+    return {variant: load_scenario(path, variant).file.description for variant in names}
 
 
 def load_scenario(

@@ -18,20 +18,15 @@ from manikin.scenarios.validation import FrameMoves, Section
 
 TASK_GRID = 9
 """Decimals of the task frame's metres and degrees; direction components have three more."""
-
 FILE_GRID = 12
 """Decimals of the metres and degrees of a scenario that is written at another place."""
 
 
 def task_frame(start: StateSection, contacts: Mapping[str, ContactSection] | None = None) -> PlanarTransform:
-    """Transform from the frame of a task to the world, ``transform_task_to_world``.
+    """Transform from the frame of a task, with contacts of its first phase if given, to the world.
 
     The origin is below the centre of mass at the start, or where the body stands there; x is the heading at
-    the start, or the mean heading of the feet.
-
-    Args:
-        start: State at the beginning.
-        contacts: Of the first phase, where supports are given.
+    the start, see :func:`start_heading_deg`.
     """
     x, y = (start.com if start.com is not None else start.at or (0.0, 0.0))[:2]
     return PlanarTransform(x, y, start_heading_deg(start, contacts))
@@ -42,10 +37,6 @@ def start_heading_deg(start: StateSection, contacts: Mapping[str, ContactSection
 
     That of the file, or else the mean of the feet of the first phase, or of its hands where no foot stands.
     Feet whose mean has no direction, as those that point apart, leave it to the first of them.
-
-    Args:
-        start: State at the beginning.
-        contacts: Of the first phase, where supports are given.
     """
     if contacts is None or start.heading_deg is not None:
         return IDENTITY.turned(start.heading_deg or 0.0)

@@ -22,51 +22,34 @@ from manikin.walking.footprints import FEET, Footprint, Footprints
 
 STATURE = 1.75
 """Stature of the body that the lengths here are for [m]."""
-
 COM_HEIGHT = 0.96
 """Centre of mass of a person who stands before and after a walk, above the floor ([Qiu2012]_ 5.4.4) [m]."""
-
 COM_BAND = (0.92, 0.97)
 """Heights of the CoM in a walk, knees neither locked nor deeply bent; our choice, as the next ones [m]."""
-
 WALKED_MAX_SUPPORT_DISTANCE = 0.985
 """Largest distance of the CoM from the middle of a sole that stands [m]."""
-
 LEAST = {1: 0.4, 2: 0.15}
 """Least durations of supports on one and two feet; a support that lasts longer in the walk lasts as long in
 the plan ([Qiu2012]_ 5.4.4). Feet that roll need about 0.26 s on both [s]."""
-
 STANDING = 0.3
 """Least duration of the first and the last support [s]."""
-
 MARGIN = 10.9
 """Margin about the CoM that the plan of a walk must keep, of a person of 1.75 m and 70 kg [N.m]."""
-
+_WEIGHTS = {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]}
 WALKED_PLANNING: Mapping[str, Any] = {
-    "degree": 4,
-    "samples": 4,
-    "zero_end_accelerations": True,
-    "weights": {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
-}
+    "degree": 4, "samples": 4, "zero_end_accelerations": True, "weights": _WEIGHTS,
+}  # fmt: skip
 """Options of the planner: phases are short, so that few samples in each are enough."""
-
 _SAME_PLACE = 0.002
 
 
 def walking_supports(footprints: Footprints, scenario: Scenario) -> Scenario:
     """A scenario in which the body walks on given footprints, from standing to standing on a level floor.
 
-    Friction, soles and force caps are those of the scenario's supports where it has some. The centre of mass
-    starts and ends above the middle between the feet; durations are bounded by those of the walk, from below
-    only.
-
-    Args:
-        footprints: Of the walk.
-        scenario: Whose body and scene they are for; its supports, task, constraints on the centre of mass and
-            options of the planner are replaced.
-
-    Raises:
-        InputError: If the footprints begin and end at different heights.
+    Friction, soles and force caps are those of the scenario's supports where it has some; its supports, task,
+    constraints on the centre of mass and options of the planner are replaced. The centre of mass starts and
+    ends above the middle between the feet; durations are bounded by those of the walk, from below only.
+    InputError if the footprints begin and end at different heights.
     """
     first, last = _middle(footprints.first()), _middle(footprints.last())
     if abs(first[2] - last[2]) > _SAME_PLACE:
@@ -95,13 +78,9 @@ def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
     The walk ends on the first stance of the supports, from which the plan continues; no stop is asked for.
     The constraints on the centre of mass stay; it starts as high as in the scenario.
 
-    Args:
-        footprints: Of a walk that ends on the feet of the scenario's first phase.
-        scenario: With supports that begin on both feet.
-
     Raises:
-        ScenarioError: If it has no supports.
-        InputError: If the walk ends elsewhere.
+        ScenarioError: If the scenario has no supports.
+        InputError: If they do not begin on both feet, or the walk ends elsewhere.
     """
     own = scenario.explicit_supports()
     stance = {contact.effector: contact for contact in flat_sequence(scenario)[0].stance}
@@ -186,24 +165,16 @@ Place = tuple[float, float, float]
 
 
 def walk_task(
-    to: Place,
-    *,
-    start: Place = (0.0, 0.0, 0.0),
-    body: Mapping[str, Any] | None = None,
-    max_speed: float | None = None,
-    weights: str | None = None,
-    around: Scenario | None = None,
-) -> Scenario:
-    """A walk to a place.
+    to: Place, *, start: Place = (0.0, 0.0, 0.0), body: Mapping[str, Any] | None = None,
+    max_speed: float | None = None, weights: str | None = None, around: Scenario | None = None,
+) -> Scenario:  # fmt: skip
+    """A walk to a place; ScenarioError if a value is out of its range.
 
     Args:
         body: Section ``body`` of the scenario; its default when omitted.
         max_speed: Limit of the speed over the floor [m/s].
         weights: Weights of the path's criterion, by name.
         around: Scenario whose obstacles stand there.
-
-    Raises:
-        ScenarioError: If a value is out of its range.
     """
     given = {"max_speed_m_s": max_speed, "weights": weights}
     ends = {"start": start, "goal": to}
@@ -232,8 +203,7 @@ def push_task(
         force: [N].
         direction: Of the force, counter-clockwise from the body's forward axis [deg].
         duration: Of the push [s].
-        body: Section ``body`` of the scenario; its default when omitted.
-        recovery: Section ``recovery``.
+        body, recovery: Sections of the scenario; their defaults when omitted.
         where: What messages call the values, by key.
 
     Raises:
@@ -245,53 +215,36 @@ def push_task(
         "name": name or f"push-{force:g}N-{direction:g}deg",
         "body": dict(body or {}),
         "recovery": {"duration_s": run_duration(duration), **(recovery or {})},
-        "push": {
-            "force_N": force, "direction_deg": direction, "duration_s": duration, "at_s": PUSH_BEGINS,
-        },
-    }  # fmt: skip
+        "push": {"force_N": force, "direction_deg": direction, "duration_s": duration, "at_s": PUSH_BEGINS},
+    }
     names = dict(where or {})
     return Scenario(validate(ScenarioFile, data, "push", names), "push", Path.cwd(), names)
 
 
 MAX_SUPPORT_DISTANCE = 1.08
 """Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
-
 ABOVE = 0.01
 """Height that the CoM of a rising body may be above that of its posture [m]; our choice."""
-
 LOWEST = 0.1
 """Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
-
 LEAD = 0.2
 """Time for which a CoM that leaves a seat at rest may go on at its velocity within its room there [s]: rising
 earlier it would ask a trunk that leans to be thrown back; our choice."""
-
 DIP = 0.001
 """Depth that the CoM of a rising body may be below those of its postures [m]; our choice."""
-
 HIGHEST = 10.0
 """Height above the lowest posture that no centre of mass reaches [m]."""
-
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
-
-PLANNING = {
-    "degree": 5,
-    "zero_end_accelerations": True,
-    "weights": {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
-}
+PLANNING: Mapping[str, Any] = {"degree": 5, "zero_end_accelerations": True, "weights": _WEIGHTS}
 """Options of the planner of a body on its feet, where the file keeps the defaults; our choice.
 
 A body that sits down keeps the defaults.
 """
-
-PLANNING_RISING = {
-    "degree": 5,
-    "min_margin": RISING_MARGIN,
-    "weights": {"margin": 0.2, "smoothness": 10.0, "duration": 5.0, "acceleration": [1.0, 1.0, 1.0]},
-}
+PLANNING_RISING: Mapping[str, Any] = {
+    "degree": 5, "min_margin": RISING_MARGIN, "weights": _WEIGHTS | {"margin": 0.2, "duration": 5.0},
+}  # fmt: skip
 """Options of the planner of a body that leaves a seat, likewise: a seated trunk cannot follow any path."""
-
 SEATED_LONGER = 1.5
 """Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
 
@@ -357,7 +310,7 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
         entry: dict[str, Any] = {"position": position, "max_force_N": contact.max_force}
         if contact.oriented:
             turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
-            entry["rpy_deg"] = [float(x) for x in turn]
+            entry["rpy_deg"] = turn.tolist()
         return entry
     entry = {"position": position, "yaw_deg": math.degrees(contact.yaw)}
     if contact.kind is ContactKind.POINT:

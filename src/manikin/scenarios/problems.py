@@ -32,10 +32,8 @@ from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 HOVERING = 0.3
 """Least height above the supports of an obstacle that is overhead [m]; a lower one is stepped over."""
-
 ONSET = 0.10
 """Distance within which the body comes down before an obstacle, for a stature of 1.75 m [m]."""
-
 NEAR = 0.45
 """Soles this close to an obstacle, seen from above, carry the body below it [m]."""
 
@@ -43,21 +41,18 @@ _REFERENCE_STATURE = 1.75
 
 
 def overhead_constraints(
-    body: BodyModel,
-    scene: Scene,
-    sequence: StanceSequence,
-    ends: tuple[FloatArray, FloatArray],
-    names: Sequence[str] | None = None,
-) -> tuple[GeometricConstraint, ...]:
+    body: BodyModel, scene: Scene, sequence: StanceSequence, ends: tuple[FloatArray, FloatArray],
+    names: Sequence[str] | None,
+) -> tuple[GeometricConstraint, ...]:  # fmt: skip
     """Bound the CoM's height below each overhead obstacle that a standing body would touch.
 
+    The body's own postures say how high its CoM may be ([Qiu2012]_ 8.2.2), the soles of the stances how high
+    the ground is and where the body faces. Planes and half-spaces have no edge and are left out.
+
     Args:
-        body: The body, whose own postures say how high its CoM may be ([Qiu2012]_ 8.2.2).
-        scene: The obstacles; planes and half-spaces have no edge and are left out.
-        sequence: The stances; their soles say how high the ground is and where the body faces.
         ends: CoM at the start and at the goal (3,) [m].
-        names: Of the obstacles to pass below; when omitted, all that hover over the way from the
-            start by the middles of the stances to the goal.
+        names: Of the obstacles to pass below; if None, all that hover over the way from the start by the
+            middles of the stances to the goal.
     """
     stances = [[c for c in phase.stance if c.kind is ContactKind.SOLE] for phase in sequence]
     soles = [contact for stance in stances for contact in stance]
@@ -67,8 +62,9 @@ def overhead_constraints(
     for obstacle in scene:
         if not isinstance(obstacle.shape, (Plane, HalfSpace)):
             passed = _passed_below(obstacle, soles, way) if names is None else obstacle.name in names
-            result.append(_constraint(body, obstacle, soles) if passed else None)
-    return tuple(constraint for constraint in result if constraint is not None)
+            if passed and (constraint := _constraint(body, obstacle, soles)) is not None:
+                result.append(constraint)
+    return tuple(result)
 
 
 def _passed_below(
@@ -138,27 +134,17 @@ SAME_PLACE = 0.01
 
 
 def load_recording(
-    path: Path,
-    sequence: StanceSequence,
-    stature: float,
-    level: SupportLevel,
-    transform_recording_to_world: PlanarTransform = IDENTITY,
-) -> RecordedCom:
+    path: Path, sequence: StanceSequence, stature: float, level: SupportLevel,
+    transform_recording_to_world: PlanarTransform,
+) -> RecordedCom:  # fmt: skip
     """Read the CoM of a motion file and lay its timing over the stances of a scenario.
 
-    The executed motion is taken, or else the planned one. Its phases are those of the file's
-    schedule, or else of its support table. For a body of another stature the heights above the
-    supports are scaled, see :mod:`manikin.scenarios.expressions`.
-
-    Args:
-        path: Run directory or motion file.
-        stature: Of the scenario's body [m].
-        level: Height of the supports below the CoM.
-        transform_recording_to_world: From the file's coordinates to the scenario's.
+    The executed motion is taken, or else the planned one. Its phases are those of the file's schedule, or
+    else of its support table. For a body of another ``stature`` [m] the heights above the supports, whose
+    ``level`` is that below the CoM, are scaled, see :mod:`manikin.scenarios.expressions`.
 
     Raises:
-        MotionFileError: If the file cannot be read.
-        InputError: If the motion was recorded on other supports, or is not usable.
+        InputError: If the file cannot be read, or the motion was recorded on other supports or is not usable.
     """
     content = read_motions(path)
     motion = next(reversed(content.motions.values()))
@@ -213,8 +199,8 @@ BEND = 0.12
 def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> CentroidalProblem:
     """Build the problem of the timing-free planner, with every height scaled to the body.
 
-    The phases at the end in which the body sits are left out: there the centre of mass is
-    not what keeps the balance ([Qiu2012]_ 7.2.2).
+    The phases at the end in which the body sits are left out: there the centre of mass is not what keeps the
+    balance ([Qiu2012]_ 7.2.2).
 
     Args:
         upright: Whether a person whose file bounds the CoM by nothing bends no more than supports and
@@ -254,8 +240,7 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
 def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
     """Build the problem of the keyframe-based planner; None when the file asks for another one.
 
-    Raises:
-        ScenarioError: If the recording cannot be read or was made on other supports.
+    ScenarioError if the recording cannot be read or was made on other supports.
     """
     options = values.file.planning
     if options.method != "keyframes" or options.recording is None:
@@ -280,12 +265,11 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
     """Faces of the boxes in which phases want the centre of mass to be when they begin."""
     planes: list[KeyPlane] = []
     for key, phase in enumerate(values.explicit_supports().phases[: values.seated_from]):
-        if phase.com_near is None:
-            continue
-        for lead in sorted({0.0, phase.com_lead_s}):
-            for axis, (middle, room) in enumerate(zip(phase.com_near, phase.com_within_m, strict=True)):
-                for sign in (1.0, -1.0):
-                    planes.append(KeyPlane(key, sign * np.eye(3)[axis], sign * middle + room, lead))
+        if phase.com_near is not None:
+            sides = zip(np.eye(3), phase.com_near, phase.com_within_m, strict=True)
+            for lead, side, sign in itertools.product(sorted({0.0, phase.com_lead_s}), sides, (1.0, -1.0)):
+                axis, middle, room = side
+                planes.append(KeyPlane(key, sign * axis, sign * middle + room, lead))
     return tuple(planes)
 
 
@@ -324,13 +308,11 @@ def _regions(
 
 
 def _height_constraints(values: ScenarioValues, *, automatic: bool) -> tuple[GeometricConstraint, ...]:
-    band, entry = values.height_band, values.constraint("overhead")
+    band, wanted = values.height_band, "automatic" if automatic else values.constraint("overhead")
     result = () if band is None else height_band(band.lower, band.upper)
-    wanted = "automatic" if automatic else None if entry is None else entry.overhead
     if wanted is None:
         return result
     names = None if wanted == "automatic" else tuple(wanted)
-    overhead = overhead_constraints(
-        build_body(values), build_scene(values), _standing(values), (values.start_com, values.goal_com), names
-    )
-    return (*result, *overhead)
+    body, scene, stances = build_body(values), build_scene(values), _standing(values)
+    ends = values.start_com, values.goal_com
+    return (*result, *overhead_constraints(body, scene, stances, ends, names))

@@ -15,27 +15,17 @@ from manikin.runtime.display import Displayed
 from manikin.scenarios.placement import FILE_GRID, TASK_GRID, moved_data
 from manikin.scenarios.problems import centroidal_problem, keyframe_problem
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.validation import validate
+from manikin.scenarios.validation import KeyPath, validate
 from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.scenarios.world import build_scene, check_contacts, stance_sequence
-from manikin.scenarios.yaml_reader import NULL_IS_A_VALUE, VARIANTS, KeyPath, Tree, parse_value
-
-RESOLVED = ("extends", VARIANTS)
-"""Keys that a scenario no longer has when it is loaded."""
+from manikin.scenarios.yaml_reader import NULL_IS_A_VALUE, VARIANTS, Tree, parse_value
 
 
 def override(tree: Tree, settings: Sequence[str]) -> Tree:
-    """Set single values.
+    """Content of a scenario, not yet checked, with single values set by ``KEY=VALUE`` in order.
 
     A key is a dotted path; an entry of a list is meant by its number from 0, an obstacle also by
     its name: ``scene.roof.position.2=0.4``.  The value is YAML; ``null`` removes the key or entry.
-
-    Args:
-        tree: Content of a scenario with its defaults; not changed.
-        settings: ``KEY=VALUE`` each, applied in order.
-
-    Returns:
-        The changed content, not yet checked.
 
     Raises:
         ScenarioError: One line, if a key leads nowhere or a value is not YAML.
@@ -52,7 +42,7 @@ def _set(tree: Tree, setting: str) -> Tree:
     if not equals or not all(parts):
         raise ScenarioError(f"--set {setting}: is not KEY=VALUE; valid: such as supports.friction=0.5")
     source = f"--set {key.strip()}"
-    if parts[0] in RESOLVED:
+    if parts[0] in ("extends", VARIANTS):  # which a loaded scenario no longer has
         raise ScenarioError(f"{source}: {parts[0]} cannot be set; valid: the keys of one scenario")
     value = parse_value(text, source)
     holder: Any = tree.data
@@ -116,33 +106,23 @@ class Scenario(Displayed, ScenarioValues):
         age: float | None = None, strength: float | None = None,
         load: Mapping[str, float | str] | None = None,
     ) -> Scenario:  # fmt: skip
-        """Return the same scenario for another body; what is None stays.
-
-        Raises:
-            ScenarioError: If a value is out of its range.
-        """
+        """The same scenario for another body, None as it is; ScenarioError if a value is out of range."""
         given = {
             "stature_m": stature_m, "mass_kg": mass_kg, "sex": sex, "age": age, "strength": strength,
             "load": load,
         }  # fmt: skip
-        return self._changed(body={k: v for k, v in given.items() if v is not None})
+        data = self._data()
+        data["body"] |= {key: value for key, value in given.items() if value is not None}
+        return self._with(data, self.lines)
 
     def with_seed(self, seed: int) -> Scenario:
-        """Return the same scenario with another seed.
-
-        Raises:
-            ScenarioError: If the seed is negative.
-        """
-        return self._changed(seed=seed)
+        """The same scenario with another seed; ScenarioError if it is negative."""
+        return self._with(self._data() | {"seed": seed}, self.lines)
 
     def with_overrides(self, settings: Sequence[str]) -> Scenario:
-        """Return the same scenario with single values set.
+        """The same scenario with single values set, ``"supports.friction=0.5"`` each.
 
-        Args:
-            settings: ``"supports.friction=0.5"`` each; see :func:`manikin.scenarios.scenario.override`.
-
-        Raises:
-            ScenarioError: One line, if a key is not known or a value is not valid.
+        See :func:`manikin.scenarios.scenario.override`; ScenarioError if a key or a value is not valid.
         """
         if not settings:
             return self
@@ -150,23 +130,21 @@ class Scenario(Displayed, ScenarioValues):
         return self._with(changed.data, changed.lines, changed.lines)
 
     def moved(self, x: float, y: float, yaw_deg: float) -> Scenario:
-        """Return the same scenario at another place in the world, with its coordinates there.
+        """The same scenario at another place in the world, with its coordinates there.
 
         Args:
-            x: Where the origin of this scenario comes to lie [m].
-            y: The same [m].
+            x, y: Where the origin of this scenario comes to lie [m].
             yaw_deg: Turn about the vertical through it, counter-clockwise [deg].
 
         Raises:
-            InputError: If a number is not finite.
-            ScenarioError: If a coordinate becomes larger than a file may hold.
+            InputError: If a number is not finite, or a coordinate becomes larger than a file may hold.
         """
         x, y = finite_number(x, "moved x [m]"), finite_number(y, "moved y [m]")
         yaw_deg = finite_number(yaw_deg, "moved yaw [deg]")
         return self._in_frame(PlanarTransform(x, y, yaw_deg), FILE_GRID)
 
     def in_task_frame(self) -> Scenario:
-        """Return the same scenario with its coordinates in the frame of its task, rounded.
+        """The same scenario with its coordinates in the frame of its task, rounded.
 
         The frame depends on the task alone (:attr:`transform_task_to_world`): a scenario and the same one
         :meth:`moved` have the same coordinates there, to the last bit.
@@ -174,34 +152,22 @@ class Scenario(Displayed, ScenarioValues):
         return self._in_frame(self.transform_task_to_world.inverse, TASK_GRID)
 
     def from_task_frame(self, transform_task_to_world: PlanarTransform) -> Scenario:
-        """Return a scenario with coordinates in the frame of a task as one in the world."""
+        """A scenario with coordinates in the frame of a task as one in the world."""
         return self._in_frame(transform_task_to_world, FILE_GRID)
 
     def replaced(self, **sections: Any) -> Scenario:
-        """Return the same scenario with whole sections replaced; None takes one out.
-
-        Raises:
-            ScenarioError: If the sections do not fit each other.
-        """
+        """The same scenario with whole sections replaced, or taken out by None; ScenarioError if unfit."""
         data = {key: value for key, value in {**self._data(), **sections}.items() if value is not None}
         if self.file.floor_height_m is None:
             data["floor_height_m"] = None
         return self._with(data, {})
 
     def check_push(self, duration: float) -> None:
-        """Check that the push begins during the motion.
-
-        Args:
-            duration: Of the planned motion [s].
-
-        Raises:
-            ScenarioError: If it begins later.
-        """
+        """Raise a ScenarioError if the push begins after a motion of that duration [s]."""
         push = self.file.push
         if push is not None and push.at_s >= duration:
-            raise self.error(
-                ("push", "at_s"), f"is {push.at_s:g}; valid: before the motion ends at {duration:.3f} s"
-            )
+            problem = f"is {push.at_s:g}; valid: before the motion ends at {duration:.3f} s"
+            raise self.error(("push", "at_s"), problem)
 
     def to_yaml(self) -> str:
         """Return the scenario with every default and override written out, ready to run again.
@@ -219,12 +185,6 @@ class Scenario(Displayed, ScenarioValues):
     def to_short_yaml(self) -> str:
         """Return the scenario as people write it: without defaults, files by the names that were given."""
         return _yaml(self.file.model_dump(mode="json", exclude_defaults=True))
-
-    def _changed(self, **changes: Any) -> Scenario:
-        data = self._data()
-        for key, change in changes.items():
-            data[key] = {**data[key], **change} if isinstance(change, dict) else change
-        return self._with(data, self.lines)
 
     def _in_frame(self, transform: PlanarTransform, decimals: int) -> Scenario:
         return self._with(moved_data(self.file, self._data(), transform, decimals), self.lines)

@@ -1,10 +1,7 @@
-"""Schema of a scenario file: its sections and the rules between them.
-
-Lengths are metres and angles degrees, as the keys say; the builders of
-:class:`~manikin.scenarios.scenario.Scenario` turn them into the library's own values.
-"""
+"""Schema of a scenario file: its sections and the rules between them; lengths are metres, angles degrees."""
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -109,19 +106,13 @@ class ScenarioFile(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _stay(cls, data: Any) -> Any:
-        """A body that recovers from a push ends where it starts."""
-        if isinstance(data, dict) and data.get("recovery") is not None and "task" not in data:
-            return {**data, "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
-        return data
-
-    @model_validator(mode="before")
-    @classmethod
-    def _only_planned(cls, data: Any) -> Any:
-        """Plan only what cannot be executed, where the file says nothing else."""
-        if isinstance(data, dict) and "execution" not in data and _cannot_be_executed(data):
-            return {**data, "execution": "none"}
-        return data
+    def _implied(cls, data: Any) -> Any:
+        """A body that recovers from a push ends where it starts; what cannot be executed is only planned."""
+        if not isinstance(data, dict):
+            return data
+        if data.get("recovery") is not None and "task" not in data:
+            data = {**data, "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
+        return {**data, "execution": "none"} if "execution" not in data and _only_planned(data) else data
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -151,20 +142,18 @@ class ScenarioFile(Section):
             count = sum(getattr(c, key) is not None for c in self.com_constraints)
             refuse_if(count > 1, "com_constraints", f"holds {key} twice; valid: at most once")
         for end in ("start", "goal") if self.supports is not None else ():
-            state, problem = getattr(self.task, end), "has no meaning beside explicit supports"
-            wanted = "[x, y, z] in metres when supports are given"
-            refuse_if(state.com is None, f"task.{end}.com", f"is missing; valid: {wanted}")
-            for key in ("at", "heading_deg", "height_m", "posture"):
-                given = getattr(state, key) is not None
-                refuse_if(given, f"task.{end}.{key}", f"{problem}; valid: only com, [x, y, z]")
+            missing = "is missing; valid: [x, y, z] in metres when supports are given"
+            refuse_if(getattr(self.task, end).com is None, f"task.{end}.com", missing)
+            problem = "has no meaning beside explicit supports; valid: only com, [x, y, z]"
+            self._refuse_given(("at", "heading_deg", "height_m", "posture"), problem, f"task.{end}.")
         return self
 
     def _inapplicable(self, key: str) -> PydanticCustomError:
         return refuse(key, f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
 
-    def _refuse_given(self, keys: Sequence[str], problem: str) -> None:
-        for key in keys:
-            refuse_if(getattr(self, key) is not None, key, problem)
+    def _refuse_given(self, keys: Sequence[str], problem: str, parent: str = "") -> None:
+        for key in (parent + key for key in keys):
+            refuse_if(attrgetter(key)(self) is not None, key, problem)
 
     def _check_execution(self) -> None:
         """Refuse an execution of what cannot be executed, and none of what is nothing else."""
@@ -192,9 +181,8 @@ class ScenarioFile(Section):
             value = getattr(self.task.start, key)
             given = value not in (None, 0.0, "standing")
             refuse_if(given, f"task.start.{key}", f"is {value}; valid in a recovery: leave it out")
-        act, steps, apart = self.task.act, recovery.steps, recovery.feet_apart_m
-        refuse_if(act is not None, "task.act", "is given beside recovery; valid: one of them")
-        floor = self.floor_height_m
+        self._refuse_given(("task.act",), "is given beside recovery; valid: one of them")
+        floor, steps, apart = self.floor_height_m, recovery.steps, recovery.feet_apart_m
         refuse_if(floor != 0.0, "floor_height_m", f"is {floor}; valid in a recovery: 0")
         held, single = recovery.feet == "held", recovery.support != "both"
         refuse_if(steps and held, "recovery.steps", f"is {steps} of held feet; valid: 0, or free feet")
@@ -255,13 +243,11 @@ class ScenarioFile(Section):
         """Refuse what cannot be refined."""
         if self.wholebody.method != "refine":
             return
+        point_mass, follow = self.body.model == "point_mass", "is refine; valid: follow for"
         rolls = self.supports is not None and self.supports.foot == "rolling"
-        for bad, what in (
-            (self.body.model == "point_mass", "a point mass, which has no joints"),
-            (rolls, "feet that roll, or flat ones"),
-            (self.task.act is not None, "a task with an act"),
-        ):
-            refuse_if(bad, "wholebody.method", f"is refine; valid: follow for {what}")
+        refuse_if(point_mass, "wholebody.method", f"{follow} a point mass, which has no joints")
+        refuse_if(rolls, "wholebody.method", f"{follow} feet that roll, or flat ones")
+        refuse_if(self.task.act is not None, "wholebody.method", f"{follow} a task with an act")
 
     def _check_planned(self) -> None:
         """Refuse what contacts cannot be planned for."""
@@ -269,12 +255,11 @@ class ScenarioFile(Section):
         refuse_if(point_mass, "supports", "is missing; valid: explicit supports for a point mass")
         holds = self.contacts is not None and self.contacts.limbs is not None
         for end in ("start", "goal"):
-            state, problem = getattr(self.task, end), "has no meaning without explicit supports"
-            for key in ("com", "velocity_m_s"):
-                given = getattr(state, key) is not None
-                refuse_if(given, f"task.{end}.{key}", f"{problem}; valid: at, heading_deg, height_m, posture")
+            problem = "has no meaning without explicit supports; valid: at, heading_deg, height_m, posture"
+            self._refuse_given(("com", "velocity_m_s"), problem, f"task.{end}.")
+            climbs = getattr(self.task, end).posture == "climbing"
             problem = "is climbing; valid: beside contacts.limbs, the limbs that hold on"
-            refuse_if(state.posture == "climbing" and not holds, f"task.{end}.posture", problem)
+            refuse_if(climbs and not holds, f"task.{end}.posture", problem)
         seated = self.task.goal.posture == "seated" and self.wholebody.method == "refine"
         problem = "is seated; valid: standing or crouched for a refined motion"
         refuse_if(seated, "task.goal.posture", problem)
@@ -295,8 +280,8 @@ class ScenarioFile(Section):
             raise refuse("supports", f"do not apply to {WORDS[self.body.model]} yet; valid: leave them out")
 
 
-def _cannot_be_executed(data: dict[str, Any]) -> bool:
-    """Whether an unchecked file has a point mass, or a recorded walk."""
+def _only_planned(data: dict[str, Any]) -> bool:
+    """Whether an unchecked file has a point mass or a recorded walk, which cannot be executed."""
     body, walking = data.get("body"), data.get("walking")
     if isinstance(body, dict) and body.get("model") == "point_mass":
         return True

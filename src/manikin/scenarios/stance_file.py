@@ -11,7 +11,7 @@ from manikin.balance import BalanceReport, evaluate_balance
 from manikin.contact import Stance, default_normal_force_cap
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.sections.planning_sections import FRICTION_MODEL_TEXT, FrictionModelName
-from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
+from manikin.scenarios.sections.support_sections import SOLE, ContactSection, SoleSection
 from manikin.scenarios.validation import (
     Positive,
     Section,
@@ -43,9 +43,7 @@ class StanceFile(Section):
     angular_momentum_rate: Vector3 = preset((0.0, 0.0, 0.0), "about the centre of mass [N.m]")
     contacts: Annotated[list[NamedContactSection], Field(min_length=1)] = required("the contacts")
     friction: Positive = preset(0.7, "Coulomb coefficient where a contact gives none")
-    sole: SoleSection = preset(
-        SoleSection(length_m=0.28, width_m=0.12), "sole size where a contact gives none"
-    )
+    sole: SoleSection = preset(SOLE, "sole size where a contact gives none")
     normal_force_cap_N: Positive | None = optional(
         "largest sum of normal forces [N] (default: 3 body weights)"
     )

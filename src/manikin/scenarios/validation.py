@@ -19,20 +19,16 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from manikin.errors import ScenarioError
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 
 class FrameMoves(Enum):
     """Change of a value with the frame of the world, as a mark in the annotation of its field."""
 
-    POINT = "point"
-    """Position in the world, x and y, or x, y and z [m]."""
-    DIRECTION = "direction"
-    """Vector in the world, such as a normal or a velocity."""
-    HEADING = "heading"
-    """Angle counter-clockwise from world x [deg]."""
-    ORIENTATION = "orientation"
-    """Fixed-axis roll, pitch and yaw in the world [deg]."""
+    POINT = "point"  # position in the world, x and y, or x, y and z [m]
+    DIRECTION = "direction"  # vector in the world, such as a normal or a velocity
+    HEADING = "heading"  # angle counter-clockwise from world x [deg]
+    ORIENTATION = "orientation"  # fixed-axis roll, pitch and yaw in the world [deg]
 
 
 class Section(BaseModel):
@@ -45,8 +41,7 @@ class Section(BaseModel):
     def _check_keys(cls, data: Any) -> Any:
         keys = cls._keys()
         if not isinstance(data, Mapping):
-            rule = f"a mapping with the key{'s' if len(keys) > 1 else ''} {', '.join(keys)}"
-            raise PydanticCustomError("section", "{rule}", {"rule": rule})
+            raise rule_error(f"a mapping with the key{'s' if len(keys) > 1 else ''} {', '.join(keys)}")
         for key in data:
             if key not in keys:
                 raise PydanticCustomError("unknown_key", "{rule}", _unknown_key(key, keys))
@@ -74,7 +69,7 @@ def _vector(length: int, meaning: str) -> BeforeValidator:
         items = value if isinstance(value, list | tuple) else ()
         numbers = [item for item in items if isinstance(item, int | float) and not isinstance(item, bool)]
         if not len(items) == len(numbers) == length:
-            raise PydanticCustomError("vector", "{rule}", {"rule": meaning})
+            raise rule_error(meaning)
         return value
 
     return BeforeValidator(check)
@@ -103,14 +98,15 @@ def _file_name(value: str) -> str:
     return value
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[
-    float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST), AfterValidator(_not_tiny)
-]
-NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST)]
-Duration = Annotated[
-    float, Field(strict=True, allow_inf_nan=False, gt=0, le=LONGEST_PHASE), AfterValidator(_not_tiny)
-]
+def bounded(**limits: Any) -> Any:
+    """Metadata of a finite number of a file that is within limits, such as ``ge`` and ``le``."""
+    return Field(strict=True, allow_inf_nan=False, **limits)
+
+
+Number = Annotated[float, bounded(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, bounded(gt=0, le=LARGEST), AfterValidator(_not_tiny)]
+NonNegative = Annotated[float, bounded(ge=0, le=LARGEST)]
+Duration = Annotated[float, bounded(gt=0, le=LONGEST_PHASE), AfterValidator(_not_tiny)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Name = Annotated[Text, AfterValidator(_file_name)]
 """A name that can also be that of a directory."""
@@ -157,12 +153,10 @@ def refuse_repeated(names: Sequence[str], key: str, valid: str = "a unique name"
         refuse_if(name in names[:index], key.format(index), f"is {name!r} again; valid: {valid}")
 
 
-_Section = TypeVar("_Section", bound=Section)
+S = TypeVar("S", bound=Section)
 
 
-def validate(
-    model: type[_Section], data: Any, source: str, lines: Mapping[Path, str] | None = None
-) -> _Section:
+def validate(model: type[S], data: Any, source: str, lines: Mapping[KeyPath, str] | None = None) -> S:
     """Check what a YAML reader returned, with the place of each key, against the section of a whole file.
 
     Raises:
@@ -177,14 +171,14 @@ def validate(
     raise ScenarioError(f"{place(source, path, lines or {})} {text}{more}".replace("\n", " "))
 
 
-def place(source: str, path: Path, lines: Mapping[Path, str]) -> str:
+def place(source: str, path: KeyPath, lines: Mapping[KeyPath, str]) -> str:
     """Text ``file:line: key.path`` of a key; the file and line of the nearest known parent."""
     known = next((path[:n] for n in range(len(path), -1, -1) if path[:n] in lines), None)
     where = lines[known] if known is not None else source
     return f"{where}: {path_text(path)}" if path else f"{source}:"
 
 
-def path_text(path: Path) -> str:
+def path_text(path: KeyPath) -> str:
     """Text of a key path, such as ``supports.phases[2].left_foot``."""
     text = ""
     for part in path:
@@ -192,7 +186,7 @@ def path_text(path: Path) -> str:
     return text
 
 
-def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[Path, str]:
+def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[KeyPath, str]:
     path, context, kind = _real_path(problem["loc"], data), problem.get("ctx", {}), problem["type"]
     value = "empty" if problem["input"] is None else repr(problem["input"])
     value = value if len(value) <= 60 else value[:57] + "..."
@@ -203,7 +197,7 @@ def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[P
     if kind == "refused":
         parts = re.findall(r"[^.\[\]]+", context["key"])  # the inverse of path_text
         return (*path, *(int(part) if part.isdigit() else part for part in parts)), context["problem"]
-    if kind in ("rule", "section", "vector"):
+    if kind == "rule":
         return path, f"is {value}; valid: {context['rule']}"
     rule = _RULES[kind].format(**context) if kind in _RULES else problem["msg"]
     return path, f"is {value}; valid: {rule}"
@@ -225,20 +219,15 @@ def _section_of(annotation: Any) -> Any:
     return next((result for part in get_args(annotation) if (result := _section_of(part)) is not None), None)
 
 
-def _real_path(location: tuple[str | int, ...], data: Any) -> Path:
+def _real_path(location: tuple[str | int, ...], data: Any) -> KeyPath:
     """Keep the parts of pydantic's location that are in the file; it adds names of union members."""
     path: list[str | int] = []
     for part in location:
-        if _holds(data, part):
+        length = len(data) if isinstance(data, list | tuple) else 0
+        if part in (data if isinstance(data, Mapping) else range(length)):
             data = data[part]
             path.append(part)
     return tuple(path)
-
-
-def _holds(data: Any, part: str | int) -> bool:
-    if isinstance(data, Mapping):
-        return part in data
-    return isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
 
 
 _RULES = {

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,10 +29,9 @@ from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, froz
 from manikin.scenarios.expressions import Expression, HeightBand, SupportLevel
 from manikin.scenarios.placement import start_heading_deg, task_frame
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.sections.planning_sections import ComConstraintSection, ContactsSection
+from manikin.scenarios.sections.planning_sections import ContactsSection
 from manikin.scenarios.sections.support_sections import ContactSection, SoleSection, SupportsSection
-from manikin.scenarios.validation import Path as KeyPath
-from manikin.scenarios.validation import place
+from manikin.scenarios.validation import KeyPath, place
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,10 +120,9 @@ class ScenarioValues:
     @property
     def height_band(self) -> HeightBand | None:
         """Bounds of the CoM's height, scaled to the body, or None."""
-        constraint = self.constraint("height_band")
-        if constraint is None or constraint.height_band is None:
+        band = self.constraint("height_band")
+        if band is None:
             return None
-        band = constraint.height_band
         frame = IDENTITY if band.frame is None else band.frame.transform_to_world()
         return HeightBand(
             Expression(band.lower), Expression(band.upper), self.support_level(), self.stature_scale, frame
@@ -132,10 +131,8 @@ class ScenarioValues:
     @property
     def max_support_distance(self) -> float | None:
         """Largest distance from the CoM to every contact, scaled to the body [m], or None."""
-        constraint = self.constraint("max_support_distance_m")
-        if constraint is None or constraint.max_support_distance_m is None:
-            return None
-        return self.stature_scale * constraint.max_support_distance_m
+        distance = self.constraint("max_support_distance_m")
+        return None if distance is None else self.stature_scale * distance
 
     @property
     def required_margin(self) -> float:
@@ -181,7 +178,7 @@ class ScenarioValues:
     @property
     def seated_from(self) -> int | None:
         """First phase of those, up to the last, in which the body sits; None when it ends on its feet."""
-        phases = [] if self.file.supports is None else self.file.supports.resolved_phases()
+        phases = self._phases
         on_feet = [number for number, held in enumerate(phases) if "buttocks" not in held]
         first = max(on_feet, default=-1) + 1
         return first if first < len(phases) else None
@@ -208,38 +205,33 @@ class ScenarioValues:
         return task_frame(self.file.task.start, self._first_contacts)
 
     @property
+    def _phases(self) -> list[dict[str, ContactSection]]:
+        return [] if self.file.supports is None else self.file.supports.resolved_phases()
+
+    @property
     def _first_contacts(self) -> dict[str, ContactSection] | None:
-        return None if self.file.supports is None else self.file.supports.resolved_phases()[0]
+        return next(iter(self._phases), None)
 
     def support_level(self) -> SupportLevel:
         """Height of the supports below the CoM, from the start to the goal."""
         start, goal = (np.array(self._com(end)[:2]) for end in ("start", "goal"))
-        last = self.start_level
-        if self.file.supports is not None:
-            last = _level(self.file.supports.resolved_phases()[-1])
-        return SupportLevel(start, goal, self.start_level, last)
+        phases, level = self._phases, self.start_level
+        return SupportLevel(start, goal, level, _level(phases[-1]) if phases else level)
 
     def explicit_supports(self) -> SupportsSection:
-        """The sequence of supports that the file lists.
-
-        Raises:
-            ScenarioError: If it lists none.
-        """
+        """The sequence of supports that the file lists; ScenarioError if it lists none."""
         if self.file.supports is None:
             raise self.error(("supports",), "is missing; valid: an explicit sequence of phases")
         return self.file.supports
 
-    def constraint(self, key: str) -> ComConstraintSection | None:
-        """The constraint on the centre of mass that has the key, or None."""
-        return next((c for c in self.file.com_constraints if getattr(c, key) is not None), None)
+    def constraint(self, key: str) -> Any:
+        """Value of the constraint on the centre of mass that has the key, or None."""
+        given = (getattr(item, key) for item in self.file.com_constraints)
+        return next((value for value in given if value is not None), None)
 
     @contextmanager
     def refusing(self, path: KeyPath) -> Iterator[None]:
-        """Context in which an error of the library becomes one of this file, with the place of the key.
-
-        Raises:
-            ScenarioError: If the library refuses a value.
-        """
+        """Context in which the library's InputError becomes a ScenarioError with the place of the key."""
         try:
             yield
         except ScenarioError:
@@ -279,10 +271,8 @@ class ScenarioValues:
                 if not math.isfinite(value):
                     raise self.error((*path, key), f"is {value} at the {end} CoM; valid: a finite height [m]")
             if low > high:
-                raise self.error(
-                    path,
-                    f"has lower {low:.4g} above upper {high:.4g} at the {end} CoM; valid: lower <= upper",
-                )
+                heights = f"has lower {low:.4g} above upper {high:.4g}"
+                raise self.error(path, f"{heights} at the {end} CoM; valid: lower <= upper")
 
 
 def _level(contacts: Mapping[str, ContactSection]) -> float:
@@ -295,20 +285,15 @@ _same_human = lru_cache(maxsize=32)(human)
 
 
 def build_body(values: ScenarioValues) -> BodyModel:
-    """Build the body; its soles have the size that the supports give.
-
-    Raises:
-        ScenarioError: If the body's data are out of range.
-    """
-    if values.file.body.model in ("insect", "quadruped", "urdf"):
+    """Build the body, its soles of the size that the supports give; ScenarioError if it is out of range."""
+    data, sole = values.file.body, values.sole
+    if data.model in ("insect", "quadruped", "urdf"):
         return _creature(values)
-    load = values.file.body.load
-    load = load if load is not None and load.lasts else None
-    if values.file.body.model == "kudoh":
+    load = data.load if data.load is not None and data.load.lasts else None
+    if data.model == "kudoh":
         return kudoh() if load is None else carrying(kudoh(), load.mass_kg, load.hand)
     if values.is_point_mass:
         return point_mass(values.mass)
-    data, sole = values.file.body, values.sole
     length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
     try:
         body = _same_human(
@@ -326,10 +311,8 @@ def _creature(values: ScenarioValues) -> BodyModel:
     """An insect, a quadruped, or the creature of a robot description."""
     data = values.file.body
     with values.refusing(("body",)):
-        if data.model == "insect":
-            return insect(data.length_m, data.mass_kg)
-        if data.model == "quadruped":
-            return quadruped(data.length_m, data.mass_kg)
+        if data.model != "urdf":
+            return (insect if data.model == "insect" else quadruped)(data.length_m, data.mass_kg)
         sole = data.sole
         return creature_from_urdf(
             values.folder / str(data.urdf),

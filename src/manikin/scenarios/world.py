@@ -44,24 +44,15 @@ from manikin.scene.obstacle import Shape
 
 
 def build_contact(
-    effector: str,
-    entry: ContactSection,
-    friction: float,
-    default_sole: SoleSection,
-    *,
-    planning: bool = False,
-    force_cap: float | None = None,
-) -> Contact:
-    """Build one contact from its section and the defaults around it.
+    effector: str, entry: ContactSection, friction: float, default_sole: SoleSection, *,
+    planning: bool = False, force_cap: float | None = None,
+) -> Contact:  # fmt: skip
+    """Build one contact from its section; ContactError if a value is out of its range.
+
+    Coulomb coefficient, sole size and cap on the normal force [N] are for where the contact gives none.
 
     Args:
-        friction: Coulomb coefficient where the contact gives none.
-        default_sole: Sole size where the contact gives none.
         planning: Let ``default_sole`` shrink a sole the contact gives itself.
-        force_cap: Cap on the normal force where the contact gives none [N].
-
-    Raises:
-        ContactError: If a value is out of its range.
     """
     kind = entry.kind_for(effector)
     if kind == "grasp":
@@ -79,34 +70,22 @@ def build_contact(
         )  # fmt: skip
     sizes = [entry.sole or default_sole, *([default_sole] if planning else [])]
     made = sole(
-        effector,
-        entry.position,
-        math.radians(entry.yaw_deg),
-        length=min(size.length_m for size in sizes),
-        width=min(size.width_m for size in sizes),
-        polygon=entry.polygon,
-        friction=friction,
-        normal=entry.normal,
-        normal_force_cap=force_cap,
-        torsion_limit=entry.torsion_limit_Nm,
-        settle=entry.settle_s or 0.0,
-    )
+        effector, entry.position, math.radians(entry.yaw_deg),
+        length=min(size.length_m for size in sizes), width=min(size.width_m for size in sizes),
+        polygon=entry.polygon, friction=friction, normal=entry.normal, normal_force_cap=force_cap,
+        torsion_limit=entry.torsion_limit_Nm, settle=entry.settle_s or 0.0,
+    )  # fmt: skip
     return made if entry.edge_radius_m is None else rolling_front(made, entry.edge_radius_m)
 
 
 PATCH_WIDTH = 0.7
 """Width of the front of a sole that has to lie on a hold, relative to the sole's."""
-
 HINGE_ROOM = 0.005
 """Distance of that part to the hinge of the toes, which would give way [m]."""
 
 
 def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
-    """Rules of the file's ``contacts`` for a body.
-
-    Args:
-        body: Its body; one without soles has no front of them.
-    """
+    """Rules of the file's ``contacts`` for its body; one without soles has no front of them."""
     options, patch, end = values.contacts, None, None
     if body.sole_length and body.sole_width and body.stature is not None:
         foot = body.effector("left_foot")
@@ -129,11 +108,8 @@ def friction_of(values: ScenarioValues) -> float:
 def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
     """Build the stances of the explicit supports; feet that roll have heel and toe phases.
 
-    Args:
-        planning: With the smaller soles, friction and force caps that planning balances on.
-
-    Raises:
-        ScenarioError: If there are no supports, or a contact slides between phases.
+    With ``planning`` they have the smaller soles, friction and force caps that planning balances on.
+    ScenarioError if there are no supports, or a contact slides between phases.
     """
     sequence, supports = flat_sequence(values, planning=planning), values.explicit_supports()
     if supports.foot != "rolling":
@@ -144,11 +120,8 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
 
 def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
     """Build the stances as the file lists them, with full soles; otherwise as :func:`stance_sequence`."""
-    supports = values.explicit_supports()
-    cap = supports.normal_force_cap_N
-    if planning:
-        cap = supports.planning_normal_force_cap_N or cap
-    model = values.contact_model
+    supports, model = values.explicit_supports(), values.contact_model
+    cap = (planning and supports.planning_normal_force_cap_N) or supports.normal_force_cap_N
     if cap is not None:
         model = replace(model, normal_force_cap=cap)
     with values.refusing(("supports", "phases")):
@@ -160,11 +133,7 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
 
 
 def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
-    """What each phase of the supports carries that is no part of the body.
-
-    Raises:
-        ScenarioError: If the load is carried in phases that the supports do not have.
-    """
+    """What each phase of the supports carries beside the body; ScenarioError if a phase does not exist."""
     load, phases = values.file.body.load, values.explicit_supports().phases
     if load is None or load.lasts:
         return [None] * len(phases)
@@ -172,10 +141,8 @@ def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
     last = len(phases) - 1 if load.until_phase is None else load.until_phase
     for key, number, least in (("from_phase", first, 0), ("until_phase", last, first)):
         if not least <= number < len(phases):
-            raise values.error(
-                ("body", "load", key),
-                f"is {number}; valid: {least} to {len(phases) - 1}, phases of the supports",
-            )
+            problem = f"is {number}; valid: {least} to {len(phases) - 1}, phases of the supports"
+            raise values.error(("body", "load", key), problem)
     body = build_body(values)
     masses = hand_masses(body, load.mass_kg, load.hand)
     ready = Configuration(body, READY.posture(body))
@@ -185,25 +152,16 @@ def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
     return [carried if first <= number <= last else None for number in range(len(phases))]
 
 
-def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float = 0.005) -> None:
-    """Check that every contact of the supports lies on a surface of the scene.
-
-    Args:
-        tolerance: Largest gap and overhang of a contact point [m].
-
-    Raises:
-        ScenarioError: For the first contact that is off every surface or overlaps another.
-    """
+def check_contacts(values: ScenarioValues, scene: Scene) -> None:
+    """Raise a ScenarioError for the first contact that is off every surface or overlaps another."""
     for number, stance in enumerate(phase.stance for phase in flat_sequence(values)):
         for first, second in combinations(stance, 2):
             if soles_overlap(first, second):
-                raise values.error(
-                    ("supports", "phases", number, second.effector),
-                    f"overlaps {first.effector}; valid: soles that lie side by side",
-                )
+                problem = f"overlaps {first.effector}; valid: soles that lie side by side"
+                raise values.error(("supports", "phases", number, second.effector), problem)
         for contact in stance:
             with values.refusing(("supports", "phases", number, contact.effector)):
-                scene.touched_obstacles(contact, tolerance)
+                scene.touched_obstacles(contact)
 
 
 def _contact(values: ScenarioValues, effector: str, entry: ContactSection, planning: bool) -> Contact:
@@ -244,14 +202,9 @@ CLIMBING = "climbing"
 
 
 def start_posture(
-    values: ScenarioValues,
-    body: BodyModel,
-    scene: Scene,
-    *,
-    at: tuple[float, float] | None = None,
-    heading_deg: float | None = None,
-    posture: str | None = None,
-) -> FloatArray:
+    values: ScenarioValues, body: BodyModel, scene: Scene, *, at: tuple[float, float] | None = None,
+    heading_deg: float | None = None, posture: str | None = None,
+) -> FloatArray:  # fmt: skip
     """(nq,) configuration at the start: a posture turned and moved to its place.
 
     A standing body is the standing posture as it is: its root at the place, or its centre of mass over
@@ -282,8 +235,8 @@ def start_posture(
         if name == CLIMBING:
             level = values.start_level if start.height_m is None else start.height_m
             return carried_to(posture_style_of(CLIMBING).posture(body), spot, yaw, level)
-        model = values.contact_model.friction
-        endpoints = Endpoints(body, scene, friction_of(values), friction_model=model)
+        friction, model = friction_of(values), values.contact_model.friction
+        endpoints = Endpoints(body, scene, friction, friction_model=model)
         result = endpoints.find(spot, yaw, Habit(name), start.height_m)
         if result.stage is None:
             raise ScenarioError(f"{values.source}: {result.failure}; valid: another place or posture")
@@ -303,11 +256,7 @@ def carried_to(q: FloatArray, at: ArrayLike, yaw: float, level: float) -> FloatA
 
 
 def build_scene(values: ScenarioValues) -> Scene:
-    """Build the obstacles and the floor.
-
-    Raises:
-        ScenarioError: If a mesh cannot be read or a shape is degenerate.
-    """
+    """Build the obstacles and the floor; ScenarioError if a mesh cannot be read or a shape is degenerate."""
     obstacles = []
     for index, entry in enumerate(values.file.scene):
         with values.refusing(("scene", index)):

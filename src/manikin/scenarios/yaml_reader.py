@@ -16,20 +16,16 @@ from typing import Any
 import yaml
 
 from manikin.errors import ScenarioError
+from manikin.scenarios.validation import KeyPath
 
 MAX_BYTES = 10_000_000
 """Largest file that is read; scenarios are a few kilobytes."""
-
 MAX_ENTRIES = 100_000
 """Most keys and list entries of a file, counted after its aliases are written out."""
-
-KeyPath = tuple[str | int, ...]
-
-_REPLACED = tuple(f":{kind}" for kind in ("int", "float", "bool", "timestamp"))
-
-
 MAX_DEPTH = 100
 """Most mappings and lists inside each other; scenarios have fewer than ten."""
+
+_REPLACED = tuple(f":{kind}" for kind in ("int", "float", "bool", "timestamp"))
 
 _FastestLoader: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -60,14 +56,9 @@ for _kind, _pattern, _first in (
 
 
 def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
-    """Read one YAML document.
+    """Content of a YAML document in plain values, and the place of each key and entry: ``"file.yaml:3"``.
 
-    Returns:
-        Its content in plain Python values, and the place of every key and list entry: the file
-        and its line from 1, such as ``"file.yaml:3"``.
-
-    Raises:
-        ScenarioError: If the file cannot be read, is not YAML or is empty.
+    ScenarioError if the file cannot be read, is not YAML or is empty.
     """
     data, lines = _parse(_read_text(path), str(path), "key: value lines")
     if data is None:
@@ -76,11 +67,7 @@ def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
 
 
 def parse_value(text: str, source: str) -> Any:
-    """Parse one YAML value, ``null`` included; ``source`` names it in messages.
-
-    Raises:
-        ScenarioError: If it is not YAML or there is nothing.
-    """
+    """Parse one YAML value, ``null`` included; ScenarioError, which names ``source``, if it is none."""
     if not text.strip():
         raise ScenarioError(f"{source}: has no value; valid: a YAML value, null removes the key")
     return _parse(text, source, "a YAML value")[0]

@@ -29,17 +29,14 @@ from manikin.scene.obstacle import (
 class CollisionPart:
     """One Coal geometry of an obstacle.
 
-    A convex mesh piece has a signed distance as exact as a primitive's. A closed piece
-    that is not convex carries ``surface`` so that depth differs from clearance; an
-    open piece is a surface without inside.
+    A convex mesh piece has a signed distance as exact as a primitive's. A closed piece that is not convex
+    carries ``surface`` so that depth differs from clearance; an open piece is a surface without inside.
 
     Attributes:
         obstacle: Name of the obstacle.
-        geometry: Coal geometry in the part's frame.
-        rotation: (3, 3) part-to-world rotation.
-        translation: (3,) [m].
-        low: (3,) lower corner in the part's frame [m], infinite where endless.
-        high: (3,) upper corner.
+        geometry: In the part's frame.
+        rotation, translation: (3, 3) part-to-world rotation; (3,) [m].
+        low, high: (3,) corners in the part's frame [m], infinite where endless.
         surface: The closed, non-convex surface, or None.
     """
 
@@ -284,9 +281,8 @@ class BallCylinderMeter:
         radial = np.array([point[0], point[1], 0.0]) / across if across > 1e-12 else np.array([1.0, 0.0, 0.0])
         axial = np.array([0.0, 0.0, 1.0 if point[2] >= 0.0 else -1.0])
         beyond_side, beyond_cap = across - self._radius, abs(point[2]) - self._half_length
-        if max(beyond_side, beyond_cap) <= 0.0:
+        if (height := max(beyond_side, beyond_cap)) <= 0.0:
             outward = radial if beyond_side >= beyond_cap else axial
-            height = max(beyond_side, beyond_cap)
             return point - height * outward, outward, height
         gap = max(beyond_side, 0.0) * radial + max(beyond_cap, 0.0) * axial
         height = float(np.linalg.norm(gap))
@@ -319,10 +315,6 @@ def direction(vector: FloatArray) -> FloatArray:
     """Unit vector (3,); up where it has no length, which leaves a usable way out."""
     length = float(np.linalg.norm(vector))
     return vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
-
-
-_SPACING = 0.02
-"""Largest spacing of the points that stand for a shape [m]."""
 
 
 class ClosedMeshMeter:
@@ -382,7 +374,7 @@ def _sample(geometry: coal.CollisionGeometry) -> tuple[FloatArray, float]:
 
 
 def _spread(length: float, most: int = 41) -> FloatArray:
-    """Odd number of points over ``[-length/2, length/2]``, the middle one first."""
-    number = int(min(most, 2 * np.ceil(length / _SPACING / 2) + 1))
+    """Odd number of points over ``[-length/2, length/2]`` [m], at most 0.02 apart, the middle one first."""
+    number = int(min(most, 2 * np.ceil(length / 0.02 / 2) + 1))
     points = np.linspace(-length / 2, length / 2, number)
     return points[np.argsort(np.abs(points), kind="stable")]

@@ -8,7 +8,7 @@ import trimesh
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray, frozen_array
-from manikin.scene.mesh import Mesh, MeshPiece, as_trimesh
+from manikin.scene.mesh import Mesh, MeshPiece
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere
 
 
@@ -16,10 +16,7 @@ from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Plane, Sha
 class SphereCover:
     """Spheres in the frame of the shape they contain ([Qiu2012]_ eq. 6.3).
 
-    Attributes:
-        centres: (k, 3) [m].
-        radii: (k,) [m].
-        overshoot: Upper bound of how far a sphere reaches beyond the shape [m].
+    They have centres (k, 3) and radii (k,) [m]; ``overshoot`` bounds how far they reach beyond the shape [m].
     """
 
     centres: FloatArray
@@ -114,27 +111,23 @@ def _mesh_cover(mesh: Mesh, count: int) -> SphereCover:
     centroids = items.mean(axis=1)
     seeds = _farthest_points(centroids, min(count, len(items)))
     label = _nearest_seed(centroids, seeds)
+    balls = [_ball(items[label == number]) for number in range(len(seeds))]
     for _ in range(8):  # Lloyd's iteration settles well before this
-        balls = [_ball(items[label == number]) for number in range(len(seeds))]
-        seeds = np.array([centre for centre, _ in balls])
-        moved = _nearest_seed(centroids, seeds)
+        moved = _nearest_seed(centroids, np.array([centre for centre, _ in balls]))
         if np.array_equal(moved, label) or len(np.unique(moved)) < len(seeds):
             break
         label = moved
-    balls = [_ball(items[label == number]) for number in range(len(seeds))]
+        balls = [_ball(items[label == number]) for number in range(len(seeds))]
     radii = np.array([radius for _, radius in balls])
     return _made(np.array([centre for centre, _ in balls]), radii, float(2 * radii.max()))
 
 
 def _items(piece: MeshPiece, mesh: Mesh, count: int) -> FloatArray:
     """(m, 8, 3) corners of convex items that together make up the piece."""
-    span = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
-    grain = float(np.linalg.norm(span)) / (4.0 * np.cbrt(count) + 8.0)
+    grain = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))) / (4.0 * np.cbrt(count) + 8.0)
     vertices, faces = trimesh.remesh.subdivide_to_size(piece.vertices, piece.faces, grain)[:2]
     corners = vertices[faces][:, [0, 1, 2, 0, 1, 2, 0, 1]]
-    if not piece.closed:
-        return corners
-    return np.concatenate([corners, _inner_cells(piece, grain)])
+    return np.concatenate([corners, _inner_cells(piece, grain)]) if piece.closed else corners
 
 
 def _inner_cells(piece: MeshPiece, grain: float) -> FloatArray:
@@ -159,10 +152,8 @@ def winding_inside(corners: FloatArray, points: FloatArray) -> np.ndarray:
     The sum of the signed solid angles is 4 pi inside and 0 outside a watertight surface.
     """
     chunk = max(1, 200_000 // len(corners))
-    return np.concatenate(
-        [_winding(corners, points[start : start + chunk]) for start in range(0, len(points), chunk)]
-        or [np.zeros(0, dtype=bool)]
-    )
+    parts = [_winding(corners, points[start : start + chunk]) for start in range(0, len(points), chunk)]
+    return np.concatenate([np.zeros(0, dtype=bool), *parts])
 
 
 def _winding(corners: FloatArray, points: FloatArray) -> np.ndarray:
@@ -179,16 +170,13 @@ def _winding(corners: FloatArray, points: FloatArray) -> np.ndarray:
 
 
 def _near_surface(piece: MeshPiece, points: FloatArray, reach: float) -> np.ndarray:
-    surface = as_trimesh(piece.vertices, piece.faces)
-    triangles = surface.triangles
     near = np.zeros(len(points), dtype=bool)
-    for triangle in triangles:
+    for triangle in piece.vertices[piece.faces]:
         low, high = triangle.min(axis=0) - reach, triangle.max(axis=0) + reach
         candidates = np.flatnonzero(np.all((points >= low) & (points <= high), axis=1) & ~near)
         if len(candidates):
-            closest = trimesh.triangles.closest_point(
-                np.broadcast_to(triangle, (len(candidates), 3, 3)), points[candidates]
-            )
+            copies = np.broadcast_to(triangle, (len(candidates), 3, 3))
+            closest = trimesh.triangles.closest_point(copies, points[candidates])
             gap = np.linalg.norm(closest - points[candidates], axis=1)
             near[candidates[gap <= reach]] = True
     return near
@@ -206,8 +194,7 @@ def _farthest_points(points: FloatArray, number: int) -> FloatArray:
 
 
 def _nearest_seed(points: FloatArray, seeds: FloatArray) -> np.ndarray:
-    squared = np.sum(seeds**2, axis=1) - 2.0 * points @ seeds.T
-    return np.argmin(squared, axis=1)
+    return np.argmin(np.sum(seeds**2, axis=1) - 2.0 * points @ seeds.T, axis=1)
 
 
 def _ball(items: FloatArray) -> tuple[FloatArray, float]:

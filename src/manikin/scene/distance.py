@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.collision import CollisionPart, Measured, Meter, collision_parts, pair_meter, part_meter
+from manikin.scene.collision import Measured, collision_parts, pair_meter, part_meter
 from manikin.scene.distance_bounds import KnownDistances, PairBounds, PlacedShapes, PlacementReader
-from manikin.scene.mesh import IntArray
 from manikin.scene.scene import Scene
 
 Pair = tuple[str, str]
@@ -23,10 +22,8 @@ NOTHING: Ignored = frozenset()
 
 STRIDE = 4
 """Samples from one broad phase to the next; between them, shapes move too little for most pairs."""
-
 SLACK = 1e-5
 """More than a measured distance may be wrong by [m]: ten times Coal's tolerance."""
-
 WINDOW = 200
 """Neighbouring samples whose lower bounds one measured distance raises."""
 
@@ -50,10 +47,9 @@ class ProximityResult:
     Attributes:
         distance: (k,) [m], negative in penetration.
         gradient: (k, nv) with respect to the configuration's tangent space.
-        pairs: (body shape, obstacle or other body shape) of each row. An obstacle of several
-            pieces may have several rows.
-        on_body: (k, 3) nearest point of the body shape in the world [m].
-        on_other: (k, 3) nearest point of the obstacle or other shape [m].
+        pairs: (body shape, obstacle or other body shape) of each row; an obstacle of several pieces may have
+            several.
+        on_body, on_other: (k, 3) nearest points of both in the world [m].
         normal: (k, 3) unit vector from the body shape to the other.
     """
 
@@ -145,31 +141,31 @@ class Proximity(BodyPairs):
     inside, and where a shape crosses them the depth is that of the worst triangle.
 
     One instance works on buffers of its own: use one per thread. Results do not depend on earlier queries.
-
-    Attributes:
-        pairs: (body shape, obstacle or other body shape) of every pair checked.
     """
 
     def __init__(self, body: BodyGeometry, scene: Scene, *, self_collision: bool = True) -> None:
-        """Prepare the pairs.
-
-        For self-collision the body has ``collision_pairs`` (of shape names or geometry indices; those of the
-        geometry when absent).
-
-        Raises:
-            SceneError: If a collision pair names no shape of the body.
-        """
+        """Prepare the pairs, those of self-collision as :func:`self_pairs` gives them."""
         super().__init__(body)
         self._reader = PlacementReader(self._geometry_data.oMg)
-        self._count = len(self._shapes.geometryObjects)
+        objects = list(self._shapes.geometryObjects)
+        self._count = len(objects)
         parts = tuple(part for obstacle in scene for part in collision_parts(obstacle))
         outer = [(shape, self._count + part) for part in range(len(parts)) for shape in range(self._count)]
         inner = self_pairs(body) if self_collision else []
         first, second = np.array(outer + inner, dtype=np.int64).reshape(-1, 2).T
         self._bounds = PairBounds(self._shapes, parts, first, second)
-        self._meters = _meters(self._shapes, parts, first, second)
-        names = [item.name for item in self._shapes.geometryObjects] + [part.obstacle for part in parts]
-        self.pairs: tuple[Pair, ...] = tuple((names[a], names[b]) for a, b in zip(first, second, strict=True))
+        self._first, self._second = first.tolist(), second.tolist()
+        geometries, both = (
+            [item.geometry for item in objects],
+            list(zip(self._first, self._second, strict=True)),
+        )
+        self._meters = [
+            pair_meter(geometries[a], geometries[b]) if b < self._count
+            else part_meter(geometries[a], parts[b - self._count])
+            for a, b in both
+        ]  # fmt: skip
+        names = [item.name for item in objects] + [part.obstacle for part in parts]
+        self.pairs: tuple[Pair, ...] = tuple((names[a], names[b]) for a, b in both)
         moves = moves_by_shape(self._model, self._shapes, len(parts))
         self._sensitivity = moves[second] - moves[first]
         self._fixed = {
@@ -177,7 +173,6 @@ class Proximity(BodyPairs):
             for number, part in enumerate(parts)
         }
         self._moving = [coal.Transform3s() for _ in range(self._count)]
-        self._first, self._second = first.tolist(), second.tolist()
 
     def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
         """Measure every pair closer than ``activation``, in the order of :attr:`pairs`.
@@ -186,13 +181,10 @@ class Proximity(BodyPairs):
         the other and the Jacobians taken at the nearest points.
 
         Args:
-            q: (nq,) configuration.
+            q: (nq,) configuration; SceneError if it is not a finite vector.
             activation: [m]; farther pairs are left out.
-            ignore: (segment, obstacle) or (segment, segment) pairs to leave out, in any
-                order; a full shape name may stand for its segment.
-
-        Raises:
-            SceneError: If ``q`` is not a finite vector of the body's size.
+            ignore: (segment, obstacle) or (segment, segment) pairs to leave out, in any order; a full shape
+                name may stand for its segment.
         """
         jacobian = self._jacobian(q)
         placements = self._placements()
@@ -211,8 +203,7 @@ class Proximity(BodyPairs):
         """Measure every close pair of (n, nq) configurations, see :meth:`evaluate_placed`.
 
         Raises:
-            SceneError: If the number of ignore sets is not n, or a sample is not a finite
-                vector of the body's size.
+            SceneError: If the number of ignore sets is not n, or a sample is not a finite vector.
         """
         return self.evaluate_placed(self.place(q_samples), activation, ignore)
 
@@ -222,8 +213,8 @@ class Proximity(BodyPairs):
     ) -> ProximitySamples:  # fmt: skip
         """Measure every close pair of many configurations whose kinematics are known.
 
-        A pair that was found far is measured again only when its shapes have moved so much
-        that it may be near; the result is the same as if it were measured at every sample.
+        A pair that was found far is measured again only when its shapes have moved so much that it may be
+        near; the result is the same as if it were measured at every sample.
 
         Args:
             placed: Shapes and Jacobians of n configurations.
@@ -255,18 +246,12 @@ class Proximity(BodyPairs):
                     vectors += normal.tolist() + on_body.tolist()
         if known is not None:
             known.keep(corners, lower)
-        return self._samples(rows, np.array(vectors).reshape(-1, 6), placed.jacobians)
-
-    def _samples(
-        self, rows: list[tuple[int, int, float]], vectors: FloatArray, jacobians: FloatArray
-    ) -> ProximitySamples:
-        """Close pairs (sample, pair, distance) with normal and nearest point (k, 6), and their gradients."""
-        sample, pair = (np.array([row[part] for row in rows], dtype=np.int64) for part in (0, 1))
-        wrench = np.hstack([vectors[:, :3], np.cross(vectors[:, 3:], vectors[:, :3])])
-        gradient = (wrench[:, None, :] @ jacobians[sample])[:, 0] * self._sensitivity[pair]
-        return ProximitySamples(
-            sample, np.array([row[2] for row in rows]), gradient, tuple(self.pairs[item] for item in pair)
-        )
+        numbers, pair = (np.array([row[part] for row in rows], dtype=np.int64) for part in (0, 1))
+        normals, points = np.array(vectors).reshape(-1, 2, 3).transpose(1, 0, 2)
+        wrench = np.hstack([normals, np.cross(points, normals)])
+        gradient = (wrench[:, None, :] @ placed.jacobians[numbers])[:, 0] * self._sensitivity[pair]
+        names = tuple(self.pairs[item] for item in pair)
+        return ProximitySamples(numbers, np.array([row[2] for row in rows]), gradient, names)
 
     def minimum(self, q: FloatArray, ignore: Ignored = NOTHING) -> Clearance:
         """Smallest signed distance of all pairs at ``q``; see :meth:`evaluate` for ``ignore``."""
@@ -316,11 +301,7 @@ class Proximity(BodyPairs):
         return best
 
     def place(self, q_samples: FloatArray) -> PlacedShapes:
-        """Shapes and Jacobians of configurations (n, nq).
-
-        Raises:
-            SceneError: If a sample is not a finite vector of the body's size.
-        """
+        """Shapes and Jacobians of configurations (n, nq); SceneError if one is not a finite vector."""
         jacobians = np.empty((len(q_samples), 6, self.nv))
         placements = np.empty((len(q_samples), self._count, 4, 4))
         for sample, q in enumerate(q_samples):
@@ -339,15 +320,14 @@ class Proximity(BodyPairs):
         return out
 
     def _lower(self, placements: FloatArray) -> FloatArray:
-        return self._bounds.lower(placements[None, :, :3, :3], placements[None, :, :3, 3])[0]
+        return self._bounds.lower(*_split(placements[None]))[0]
 
     def _considered_over(self, ignore: Ignored | Sequence[Ignored], number: int) -> NDArray[np.bool_]:
         if isinstance(ignore, (frozenset, set)):
             return np.broadcast_to(self._considered(frozenset(ignore)), (number, len(self.pairs)))
         if len(ignore) != number:
-            raise SceneError(
-                f"ignore has {len(ignore)} sets for {number} samples; valid: one set, or one each"
-            )
+            problem = f"ignore has {len(ignore)} sets for {number} samples"
+            raise SceneError(f"{problem}; valid: one set, or one each")
         return np.array([self._considered(frozenset(item)) for item in ignore])
 
     def _measure(
@@ -403,24 +383,10 @@ def considered(pairs: Sequence[Pair], ignore: Ignored) -> NDArray[np.bool_]:
     return np.array([not is_ignored(pair) for pair in pairs], dtype=bool)
 
 
-def _meters(
-    shapes: pin.GeometryModel, parts: Sequence[CollisionPart], first: IntArray, second: IntArray
-) -> list[Meter]:
-    """One measuring function per pair."""
-    geometries = [item.geometry for item in shapes.geometryObjects]
-    return [
-        pair_meter(geometries[a], geometries[b])
-        if b < len(geometries)
-        else part_meter(geometries[a], parts[b - len(geometries)])
-        for a, b in zip(first.tolist(), second.tolist(), strict=True)
-    ]
-
-
 def self_pairs(body: BodyGeometry) -> list[tuple[int, int]]:
-    """Indices of the body shapes to check against each other; see :class:`Proximity`.
+    """Indices of the body shapes to check against each other, SceneError if a pair names none of the body.
 
-    Raises:
-        SceneError: If a pair names no shape of the body.
+    They are its ``collision_pairs``, of shape names or geometry indices, or else those of the geometry.
     """
     given = getattr(body, "collision_pairs", None)
     if given is None:

@@ -63,9 +63,7 @@ _ROUNDING = 1e-6  # [m], covers the cancellation in |a|^2 + |b|^2 - 2 a.b
 class PairBounds:
     """Lower bounds of the distance of each (body shape, part or body shape) pair.
 
-    Attributes:
-        first: (pairs,) index of the body shape.
-        second: (pairs,) index of the body shape, or number of body shapes + index of the part.
+    ``first`` (pairs,) are indices of body shapes, ``second`` likewise or their number + index of the part.
     """
 
     def __init__(
@@ -92,11 +90,9 @@ class PairBounds:
         self._part_high = origins + np.array([part.high for part in parts]).reshape(-1, 3)
 
     def lower(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
-        """(n, pairs) lower bounds [m]; where not positive, they only say "may touch".
+        """(n, pairs) lower bounds [m], which only say "may touch" where not positive, of placed shapes.
 
-        Args:
-            rotations: (n, shapes, 3, 3) shape-to-world.
-            translations: (n, shapes, 3) [m].
+        Their rotations are (n, shapes, 3, 3) shape-to-world, their translations (n, shapes, 3) [m].
         """
         out = np.empty((len(rotations), len(self.first)))
         others = self._count + len(self._part_low)
@@ -130,13 +126,9 @@ class PairBounds:
     def tighten(
         self, lower: FloatArray, wanted: NDArray[np.bool_], rotations: FloatArray, translations: FloatArray
     ) -> None:
-        """Raise the bounds of pairs of capsules and balls of the body to their distances.
+        """Raise lower bounds (n, pairs) [m] of pairs of capsules and balls of the body to their distances.
 
-        Args:
-            lower: (n, pairs) lower bounds, changed in place [m].
-            wanted: (n, pairs) which of them matter.
-            rotations: (n, shapes, 3, 3) shape-to-world.
-            translations: (n, shapes, 3) [m].
+        Those ``wanted`` (n, pairs) are changed in place; placements as of :meth:`lower`.
         """
         sample, pair = np.nonzero(wanted & self._round)
         shapes = self.first[pair], self.second[pair]
@@ -153,9 +145,8 @@ class PairBounds:
     ) -> FloatArray:
         """(n,) how far the pair's shape has moved, relative to the other, since ``sample`` [m].
 
-        The distance of the pair differs from that at ``sample`` by no more. A rigid
-        displacement is largest at a corner of the box around the shape, because its
-        length is convex in the point.
+        The distance of the pair differs from that at ``sample`` by no more. A rigid displacement is largest
+        at a corner of the box around the shape, because its length is convex in the point.
         """
         shape, other = self.first[pair], self.second[pair]
         corners = self._corners[shape] @ np.swapaxes(rotations[:, shape], -1, -2)
@@ -220,11 +211,7 @@ class PlacedShapes:
 
 
 class PlacementReader:
-    """Copies some or all transforms out of a buffer of a ``pin.Data`` or ``pin.GeometryData``.
-
-    The transforms lie one after the other, so that one view of each part reads all of them at once. Their
-    owner keeps them alive.
-    """
+    """Copies some or all transforms, which lie one after the other, out of a buffer of Pinocchio's data."""
 
     def __init__(self, buffer: "pin.StdVec_SE3", chosen: Sequence[int] | None = None) -> None:
         self._items = list(buffer)  # keeps alive what the views look into
@@ -258,15 +245,15 @@ class KnownDistances:
     """
 
     def __init__(self) -> None:
-        self._corners: FloatArray | None = None
-        self._lower: FloatArray | None = None
+        self._kept: tuple[FloatArray, FloatArray] | None = None
 
     def lower(self, bounds: PairBounds, corners: FloatArray) -> FloatArray | None:
         """(n, pairs) lower bounds [m] with shapes at ``corners`` (n, shapes, 8, 3), or None."""
-        if self._corners is None or self._lower is None or len(corners) != len(self._corners):
+        if self._kept is None or len(corners) != len(self._kept[0]):
             return None
-        return self._lower - bounds.moved(self._corners, corners)
+        before, lower = self._kept
+        return lower - bounds.moved(before, corners)
 
     def keep(self, corners: FloatArray, lower: FloatArray) -> None:
         """Remember bounds (n, pairs) for shapes at ``corners``."""
-        self._corners, self._lower = corners, lower
+        self._kept = corners, lower

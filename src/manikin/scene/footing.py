@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.contact.contact import MOST_CORNERS
 from manikin.numerics.polytope import convex_polygon, fewer_corners, walls
 from manikin.numerics.spatial import FloatArray, cross
+from manikin.scene.mesh import IntArray
 from manikin.scene.surface import Surface
 
 LEAST_SHARE = 0.6
@@ -20,7 +21,6 @@ LEAST_SHARE = 0.6
 WHOLE = 1.0 - 1e-6
 """Share from which on a sole lies on its surface with all of it."""
 
-IntArray = NDArray[np.int64]
 _Clipped = tuple[NDArray[np.bool_], FloatArray, FloatArray]
 """Of each edge whether a part is inside a sole (p,), and where that begins and ends (p, 2) [m]."""
 
@@ -78,33 +78,22 @@ class Places:
 class FootingTable:
     """The surfaces of a scene, prepared for soles of one shape that are placed on them by the thousand.
 
-    How to use it in a search::
-
-        table = FootingTable(scene.surfaces_facing((0, 0, 1), steepest), footprint)
-        places = table.under(xy, yaw)  # all surfaces below or above each of (n, 2), (n,)
-        footing = table.place(places.numbers, places.positions, places.rotations)
-        footing.stands, footing.share  # of each place, to choose by
-        footing.polygon(row)  # (k, 2) of the chosen one, for the contact's points
-
-    A thousand places take about 5 ms, half of them over an edge.
+    :meth:`under` gives all places of soles on the surfaces below or above points of the ground,
+    :meth:`place` how they lie there. A thousand places take about 5 ms, half of them over an edge.
 
     The middle of the pressure is the point of the sole below the effector frame's origin, which is the middle
     of a sole: not the ankle, which is behind what carries a foot that has only its front on a tread.
+
+    Args:
+        footprint: (c, 2 or 3) corners of the convex sole in the effector's frame [m], in either sense;
+            its origin is strictly inside.
     """
 
     def __init__(self, surfaces: Sequence[Surface], footprint: ArrayLike) -> None:
-        """Prepare surfaces.
-
-        Args:
-            footprint: (c, 2 or 3) corners of the convex sole in the effector's frame [m], in either sense;
-                its origin is strictly inside.
-        """
         self.surfaces = tuple(surfaces)
         self.footprint = np.asarray(footprint, dtype=np.float64)[:, :2]
         rings = [
-            (ring, 1.0 - 2.0 * (k > 0))
-            for item in surfaces
-            for k, ring in enumerate((item.polygon, *item.holes))
+            pair for face in surfaces for pair in ((face.polygon, 1.0), *((r, -1.0) for r in face.holes))
         ]
         self._start = np.concatenate([ring for ring, _ in rings]) if rings else np.zeros((0, 3))
         self._end = np.concatenate([np.roll(ring, -1, axis=0) for ring, _ in rings]) if rings else self._start
@@ -113,10 +102,8 @@ class FootingTable:
         self._sign = np.array([sign for _, sign in rings])  # of the area inside a ring: holes are taken away
         middles = [0.5 * (ring.min(axis=0) + ring.max(axis=0)) for ring, _ in rings]
         self._middle = np.array(middles).reshape(-1, 3)
-        self._reach = np.array([
-            np.linalg.norm(ring - middle, axis=1).max()
-            for (ring, _), middle in zip(rings, middles, strict=True)
-        ])  # fmt: skip
+        around = zip(rings, middles, strict=True)
+        self._reach = np.array([np.linalg.norm(ring - at, axis=1).max() for (ring, _), at in around])
         self._sole = _Sole(self.footprint)
         self._normals = np.array([item.normal for item in surfaces]).reshape(-1, 3)
         self._offsets = np.array([item.normal @ item.polygon[0] for item in surfaces])
@@ -128,9 +115,9 @@ class FootingTable:
         """Lay soles on surfaces.
 
         Args:
-            numbers: (n,) index of the surface under each sole, among those given.
-            positions: (n, 3) origin of each effector's frame in the world, in the plane of its surface [m];
-                one that is not is taken as if it were moved there along the normal.
+            numbers: (n,) index of the surface under each sole.
+            positions: (n, 3) origin of each effector's frame in the world [m], as if moved into the plane of
+                its surface along the normal.
             rotations: (n, 3, 3) effector-to-world rotations, z along the normal of the surface.
         """
         on = np.asarray(numbers, dtype=np.int64)
@@ -172,10 +159,8 @@ class FootingTable:
         0. Rows are ordered by place, then by surface.
         """
         beside = self._low - self._sole.radius, self._high + self._sole.radius
-        meets = (
-            (xy[:, None] >= beside[0]).all(axis=2) & (xy[:, None] <= beside[1]).all(axis=2) & self._faces_up
-        )
-        rows, numbers = meets.nonzero()
+        within = ((xy[:, None] >= beside[0]) & (xy[:, None] <= beside[1])).all(axis=2)
+        rows, numbers = (within & self._faces_up).nonzero()
         normals = self._normals[numbers]
         height = (self._offsets[numbers] - np.einsum("ki,ki->k", normals[:, :2], xy[rows])) / normals[:, 2]
         across = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))])[rows]
@@ -312,6 +297,5 @@ def _around_origin(of: IntArray, points: FloatArray, rows: IntArray) -> NDArray[
     gap[last[some]] = angle[first[some]] - angle[last[some]] + 2.0 * np.pi
     inside = np.zeros(len(rows), dtype=bool)
     if some.any():
-        widest = np.maximum.reduceat(gap, first[some])
-        inside[some] = widest < np.pi - 1e-9
+        inside[some] = np.maximum.reduceat(gap, first[some]) < np.pi - 1e-9
     return inside

@@ -68,11 +68,8 @@ def _coplanar(faces: Sequence[Surface]) -> Iterator[list[int]]:
         normal, base = normals[seed], faces[seed].polygon[0]
         near = left & (normals @ normal >= PARALLEL) & (np.abs((corner - base) @ normal) <= COPLANAR)
         near[seed] = False
-        own = [
-            number
-            for number in np.flatnonzero(near).tolist()
-            if np.abs((faces[number].polygon - base) @ normal).max() <= COPLANAR
-        ]
+        close = np.flatnonzero(near).tolist()
+        own = [n for n in close if np.abs((faces[n].polygon - base) @ normal).max() <= COPLANAR]
         left[[seed, *own]] = False
         yield [seed, *own]
 
@@ -212,9 +209,8 @@ def _prism(shape: Box | Cylinder) -> tuple[FloatArray, NDArray[np.int64]]:
         angle, z = np.arange(CAP_CORNERS) * 2 * np.pi / CAP_CORNERS, shape.length / 2
         ring = shape.radius * np.column_stack([np.cos(angle), np.sin(angle)])
     count = len(ring)
-    own = np.arange(count)
+    own, after = np.arange(count), np.roll(np.arange(count), -1)
     vertices = np.concatenate([np.column_stack([ring, np.full(count, sign * z)]) for sign in (1.0, -1.0)])
-    after = np.roll(own, -1)
     pairs = ((own, after), (own + count, after + count), (own, own + count))
     return vertices, np.concatenate([np.column_stack(pair) for pair in pairs])
 
@@ -231,14 +227,13 @@ def _crossings(local: FloatArray, edges: NDArray[np.int64]) -> FloatArray:
 def _area_inside(local: FloatArray, faces: NDArray[np.int64]) -> Geometry:
     """What of the lifted plane is inside a closed body of triangles."""
     over = local[:, 2] > _ABOVE
-    crossed = faces[(over[faces].any(axis=1)) & ~(over[faces].all(axis=1))]
+    crossed = faces[over[faces].any(axis=1) & ~over[faces].all(axis=1)]
     if not len(crossed):
         return shapely.Polygon()
     edges = crossed[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     edges = edges[over[edges[:, 0]] != over[edges[:, 1]]]  # two of each triangle
     ends = _crossings(local, np.sort(edges, axis=1)).reshape(-1, 2, 2)
-    lines = shapely.union_all(shapely.linestrings(ends), grid_size=GRID)
-    return shapely.build_area(lines)
+    return shapely.build_area(shapely.union_all(shapely.linestrings(ends), grid_size=GRID))
 
 
 def _half_plane(frame: PlaneFrame, endless: FloatArray) -> Geometry:
@@ -253,6 +248,5 @@ def _half_plane(frame: PlaneFrame, endless: FloatArray) -> Geometry:
     inward = -slope / steep
     along = np.array([-inward[1], inward[0]]) * far
     edge = -inward * room / steep
-    return shapely.Polygon(
-        [edge + along, edge - along, edge - along + far * inward, edge + along + far * inward]
-    )
+    rear = far * inward
+    return shapely.Polygon([edge + along, edge - along, edge - along + rear, edge + along + rear])

@@ -56,14 +56,9 @@ class Mesh:
     dropped_faces: int
 
     def __init__(
-        self,
-        vertices: ArrayLike,
-        faces: ArrayLike,
-        source: str = "mesh",
-        *,
-        convex: Convexity = "no",
+        self, vertices: ArrayLike, faces: ArrayLike, source: str = "mesh", *, convex: Convexity = "no",
         max_faces: int = MAX_FACES,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Check and clean a mesh.
 
         Args:
@@ -101,9 +96,8 @@ class Mesh:
     @cached_property
     def pieces(self) -> "tuple[MeshPiece, ...]":
         """Connected pieces, each with its own vertices."""
-        return tuple(
-            _piece(self.vertices, self.faces[group]) for group in _connected(self.vertices, self.faces)
-        )
+        groups = _connected(self.vertices, self.faces)
+        return tuple(_piece(self.vertices, self.faces[group]) for group in groups)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,21 +118,15 @@ class MeshPiece:
 
 
 def load_mesh(
-    path: str | Path,
-    *,
-    unit: str | None = None,
-    up: str | None = None,
-    scale: float = 1.0,
+    path: str | Path, *, unit: str | None = None, up: str | None = None, scale: float = 1.0,
     convex: Convexity = "no",
-) -> Mesh:
-    """Read an STL, OBJ, PLY or DAE file into metres.
+) -> Mesh:  # fmt: skip
+    """Read an STL, OBJ, PLY or DAE file, as its extension says, into metres.
 
     Args:
-        path: File whose extension says the format.
-        unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``. When omitted, a DAE file's own unit
-            is used, and metres otherwise.
-        up: Which axis of the file points up, ``"x"``, ``"y"`` or ``"z"``; the mesh is
-            turned so that it is z. When omitted, a DAE file's own, and z otherwise.
+        unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``; when omitted, a DAE file's own, else metres.
+        up: Axis of the file that points up, ``"x"``, ``"y"`` or ``"z"``; the mesh is turned so that it is z.
+            When omitted, a DAE file's own, else z.
         scale: Further factor on every coordinate, > 0.
         convex: As for :class:`Mesh`.
 
@@ -205,9 +193,8 @@ def _checked_faces(faces: ArrayLike, vertex_count: int, source: str) -> IntArray
     if not vertex_count or not len(triangles):
         raise SceneError(f"mesh {source!r} is empty; valid: at least one triangle")
     if triangles.min() < 0 or triangles.max() >= vertex_count:
-        raise SceneError(
-            f"mesh {source!r} faces name vertex {triangles.max()}; valid: 0 to {vertex_count - 1}"
-        )
+        problem = f"mesh {source!r} faces name vertex {triangles.max()}"
+        raise SceneError(f"{problem}; valid: 0 to {vertex_count - 1}")
     return triangles
 
 
@@ -242,20 +229,15 @@ def _hulls(points: FloatArray, triangles: IntArray, convex: str, source: str) ->
     groups = _connected(points, triangles) if convex == "parts" else [np.arange(len(triangles))]
     vertices, faces, start = [], [], 0
     for group in groups:
-        hull = _hull(points[np.unique(triangles[group])], source)
+        try:
+            hull = trimesh.convex.convex_hull(points[np.unique(triangles[group])])
+        except Exception:  # Qhull raises its own error on flat input
+            problem = f"mesh {source!r} has a flat piece, which has no convex hull"
+            raise SceneError(f"{problem}; valid: convex 'no', or a solid") from None
         vertices.append(np.asarray(hull.vertices))
         faces.append(np.asarray(hull.faces, dtype=np.int64) + start)
         start += len(hull.vertices)
     return np.vstack(vertices), np.vstack(faces)
-
-
-def _hull(points: FloatArray, source: str) -> trimesh.Trimesh:
-    try:
-        return trimesh.convex.convex_hull(points)
-    except Exception:  # Qhull raises its own error on flat input
-        raise SceneError(
-            f"mesh {source!r} has a flat piece, which has no convex hull; valid: convex 'no', or a solid"
-        ) from None
 
 
 def _piece(vertices: FloatArray, faces: IntArray) -> MeshPiece:

@@ -67,27 +67,22 @@ class Capsule:
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class _Endless:
+    normal: FloatArray
+    offset: float
+
+    def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
+        kind = "plane" if isinstance(self, Plane) else "half-space"
+        object.__setattr__(self, "normal", _unit(normal, f"{kind} normal"))
+        object.__setattr__(self, "offset", finite_number(offset, f"{kind} offset [m]", error=SceneError))
+
+
+class Plane(_Endless):
     """The two-sided surface ``normal . x = offset`` [m] of a unit normal (3,), without inside."""
 
-    normal: FloatArray
-    offset: float
 
-    def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
-        object.__setattr__(self, "normal", _unit(normal, "plane normal"))
-        object.__setattr__(self, "offset", finite_number(offset, "plane offset [m]", error=SceneError))
-
-
-@dataclass(frozen=True, eq=False)
-class HalfSpace:
+class HalfSpace(_Endless):
     """Everything with ``normal . x <= offset`` [m] of a unit normal (3,): a floor, a wall, the ground."""
-
-    normal: FloatArray
-    offset: float
-
-    def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
-        object.__setattr__(self, "normal", _unit(normal, "half-space normal"))
-        object.__setattr__(self, "offset", finite_number(offset, "half-space offset [m]", error=SceneError))
 
 
 Shape = Box | Sphere | Cylinder | Capsule | Plane | HalfSpace | Mesh
@@ -149,27 +144,20 @@ class Obstacle(Displayed):
     translation: FloatArray
 
     def __init__(
-        self,
-        name: str,
-        shape: Shape,
-        rotation: ArrayLike | None = None,
+        self, name: str, shape: Shape, rotation: ArrayLike | None = None,
         translation: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
+    ) -> None:  # fmt: skip
         if not isinstance(name, str) or not name or "/" in name:
             raise SceneError(f"obstacle name is {name!r}; valid: a non-empty text without '/'")
-        if not isinstance(shape, Shape):
-            raise SceneError(
-                f"obstacle {name!r} shape is {shape!r}; valid: Box, Sphere, Cylinder, Capsule, Plane, "
-                "HalfSpace or Mesh"
-            )
         where = f"obstacle {name!r}"
-        matrix = np.eye(3) if rotation is None else rotation
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "shape", shape)
-        object.__setattr__(self, "rotation", check_rotation(matrix, f"{where} rotation", SceneError))
-        object.__setattr__(
-            self, "translation", frozen_array(translation, f"{where} translation [m]", (3,), SceneError)
-        )
+        if not isinstance(shape, Shape):
+            valid = "Box, Sphere, Cylinder, Capsule, Plane, HalfSpace or Mesh"
+            raise SceneError(f"{where} shape is {shape!r}; valid: {valid}")
+        turn = check_rotation(np.eye(3) if rotation is None else rotation, f"{where} rotation", SceneError)
+        place = frozen_array(translation, f"{where} translation [m]", (3,), SceneError)
+        values = {"name": name, "shape": shape, "rotation": turn, "translation": place}
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -188,11 +176,7 @@ class Obstacle(Displayed):
 
     @property
     def world_plane(self) -> tuple[FloatArray, float]:
-        """Unit normal and offset in the world of a plane or half-space.
-
-        Raises:
-            SceneError: If the shape is neither.
-        """
+        """Unit normal and offset in the world of a plane or half-space; SceneError of another shape."""
         if not isinstance(self.shape, (Plane, HalfSpace)):
             raise SceneError(f"obstacle {self.name!r} has no plane; valid: a Plane or HalfSpace shape")
         normal = self.rotation @ self.shape.normal

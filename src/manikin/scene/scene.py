@@ -27,20 +27,14 @@ _ALIGNED = float(np.cos(np.deg2rad(2.0)))
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene(Displayed):
-    """Obstacles with unique names, the floor being one of them.
-
-    Attributes:
-        obstacles: All obstacles; the floor, if any, comes first.
-        floor_height: Height of the floor [m], or None without one.
-    """
+    """Obstacles with unique names; the floor, of ``floor_height`` [m] unless None, comes first."""
 
     obstacles: tuple[Obstacle, ...]
     floor_height: float | None
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
-        names = [item.name for item in self.obstacles]
-        return {"obstacles": str(len(names)), "names": " ".join(names)}
+        return {"obstacles": str(len(self)), "names": " ".join(self.names)}
 
     def __init__(self, obstacles: Sequence[Obstacle] = (), floor_height: float | None = 0.0) -> None:
         for item in obstacles:
@@ -82,10 +76,7 @@ class Scene(Displayed):
 
     @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
-        """Every flat place of the scene, coplanar faces that touch joined and what is hidden left out.
-
-        See :func:`manikin.scene.merging.merged_surfaces`; in the order of the obstacles.
-        """
+        """Every flat place of the scene, see :func:`manikin.scene.merging.merged_surfaces`."""
         return merged_surfaces(self.obstacles)
 
     @cached_property
@@ -126,10 +117,7 @@ class Scene(Displayed):
 
         Each point must be within ``tolerance`` [m] of the surface, above or below it, and at most that far
         beyond its edge; normals may differ by 2 degrees. A grasp needs only a surface near its point,
-        whatever its normal; round obstacles have none, see :meth:`nearest`.
-
-        Raises:
-            ContactError: If there is none; the message says how far the nearest one is.
+        whatever its normal; round obstacles have none, see :meth:`nearest`. ContactError if there is none.
         """
         aligned = self._aligned(contact)
         points = contact.points_in_world
@@ -141,36 +129,26 @@ class Scene(Displayed):
     def contact_polygon(self, contact: Contact, tolerance: float = 0.005) -> tuple[FloatArray, float]:
         """What of a sole lies on the scene, and the share of its area that this is.
 
-        For many places use a :class:`~manikin.scene.footing.FootingTable`, which says the same.
-
-        Args:
-            contact: A sole; its points are what could touch.
-            tolerance: Largest height of its middle over the surface [m].
+        For many places use a :class:`~manikin.scene.footing.FootingTable`, which says the same. The middle of
+        the sole is at most ``tolerance`` [m] above or below its surface.
 
         Returns:
             (k, 2) corners in the contact frame [m] on the surface that has most of it, none where it cannot
             stand there; the share.
         """
-        surfaces = [
-            surface for surface in self._aligned(contact)
-            if abs(float(surface.height(contact.position[None])[0])) <= tolerance
-        ]  # fmt: skip
+        place, turn, aligned = contact.position, contact.rotation_contact_to_world, self._aligned(contact)
+        surfaces = [item for item in aligned if abs(float(item.height(place[None])[0])) <= tolerance]
         if not surfaces:
             return np.zeros((0, 2)), 0.0
-        count = len(surfaces)
-        rotations = np.broadcast_to(contact.rotation_contact_to_world, (count, 3, 3))
-        footing = FootingTable(surfaces, contact.outline).place(
-            np.arange(count), np.broadcast_to(contact.position, (count, 3)), rotations
-        )
+        rows = np.arange(len(surfaces))
+        table = FootingTable(surfaces, contact.outline)
+        footing = table.place(rows, np.tile(place, (len(rows), 1)), np.tile(turn, (len(rows), 1, 1)))
         row = int(np.argmax(footing.share))
         share = float(footing.share[row])
         return (footing.polygon(row) if footing.stands[row] else np.zeros((0, 2))), share
 
     def nearest(self, point: ArrayLike) -> tuple[str, float]:
-        """Name of the obstacle nearest to a (3,) world point, and its signed distance [m].
-
-        SceneError if the scene is empty.
-        """
+        """Nearest obstacle to a (3,) world point, and its signed distance [m]; SceneError without any."""
         if not self.obstacles:
             raise SceneError("scene is empty, so nothing is nearest; valid: at least one obstacle")
         distance, name = self._distances(point)[0]
@@ -200,9 +178,9 @@ class Scene(Displayed):
     def _distances(self, point: ArrayLike) -> list[tuple[float, str]]:
         """Signed distance [m] of a (3,) world point to each obstacle, and its name; the nearest first."""
         place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
+        meters = self._point_meters.items()
         distances = [
-            (min(meter(place, other, np.inf)[0] for meter, other in meters), name)
-            for name, meters in self._point_meters.items()
+            (min(meter(place, at, np.inf)[0] for meter, at in parts), name) for name, parts in meters
         ]
         return sorted(distances, key=lambda item: item[0])
 

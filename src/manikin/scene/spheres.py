@@ -1,6 +1,6 @@
 """Distances between spheres that contain the body and the scene ([Qiu2012]_ 6.2.2, Appendix F)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import coal
 import numpy as np
@@ -21,8 +21,7 @@ from manikin.scene.distance import (
     moves_by_shape,
     self_pairs,
 )
-from manikin.scene.mesh import IntArray
-from manikin.scene.obstacle import HalfSpace, Obstacle, Plane
+from manikin.scene.obstacle import HalfSpace, Plane
 from manikin.scene.scene import Scene
 
 BODY_SPHERES = 4
@@ -46,19 +45,12 @@ class SphereProximity(BodyPairs):
     """
 
     def __init__(
-        self,
-        body: BodyGeometry,
-        scene: Scene,
-        *,
-        self_collision: bool = True,
+        self, body: BodyGeometry, scene: Scene, *, self_collision: bool = True,
         count: int | Mapping[str, int] | None = None,
-    ) -> None:
-        """Cover the body and the scene.
+    ) -> None:  # fmt: skip
+        """Cover the body, as for :class:`manikin.scene.Proximity`, and the scene.
 
         Args:
-            body: As for :class:`manikin.scene.Proximity`.
-            scene: Obstacles.
-            self_collision: Whether to check the body against itself.
             count: Spheres of every shape and obstacle, or by name of a shape or obstacle;
                 4 per body shape and 20 per obstacle for those not named.
 
@@ -75,11 +67,20 @@ class SphereProximity(BodyPairs):
         self.obstacle_covers: dict[str, SphereCover] = {
             item.name: cover(item.shape, count=_count(count, item.name, OBSTACLE_SPHERES)) for item in solids
         }
-        self._spheres = _Spheres(list(self.body_covers.values()))
-        self._targets = _Targets(flats, solids, [self.obstacle_covers[item.name] for item in solids])
-        self._column_starts: IntArray = np.concatenate(
-            [self._targets.starts, self._targets.size + self._spheres.starts]
-        )
+        own, theirs = list(self.body_covers.values()), list(self.obstacle_covers.values())
+        # Rows are body spheres; columns one per plane or half-space, obstacle sphere, then body sphere.
+        self._rows = np.cumsum([0, *map(len, own)])
+        self._columns = np.cumsum([0, *[1] * len(flats), *map(len, theirs), *map(len, own)])
+        self._two_sided = np.array([isinstance(item.shape, Plane) for item in flats], dtype=bool)
+        planes = [item.world_plane for item in flats]
+        self._normals = np.array([normal for normal, _ in planes]).reshape(-1, 3)
+        self._offsets = np.array([offset for _, offset in planes])
+        placed = [item.to_world(spheres.centres) for item, spheres in zip(solids, theirs, strict=True)]
+        self._fixed = np.vstack([np.zeros((0, 3)), *placed])
+        self._local = np.vstack([item.centres for item in own])
+        self._owner = np.repeat(np.arange(len(own)), list(map(len, own)))
+        self._own_radii = np.concatenate([item.radii for item in own])
+        self._radii = np.concatenate([*(item.radii for item in theirs), self._own_radii])
         names = [item.name for item in objects]
         others = [item.name for item in (*flats, *solids)] + names
         columns = {item.name: column for column, item in enumerate((*flats, *solids))}
@@ -99,9 +100,9 @@ class SphereProximity(BodyPairs):
         ([Qiu2012]_ F.4), and ``J_i^T D / |D|`` for an obstacle (F.5).
         """
         jacobian = self._jacobian(q)
-        centres, gaps, least = self._gaps()
+        spheres, gaps, least = self._gaps()
         rows = np.flatnonzero((least < activation) & self._considered(ignore))
-        ends = [self._closest(int(row), centres, gaps) for row in rows]
+        ends = [self._closest(int(row), spheres, gaps) for row in rows]
         normal, on_body, on_other = (np.array([end[i] for end in ends]).reshape(-1, 3) for i in range(3))
         return self._result(rows, jacobian, least[rows], (normal, on_body, on_other))
 
@@ -116,110 +117,36 @@ class SphereProximity(BodyPairs):
         return Clearance(float(least[row]), self.pairs[row])
 
     def _gaps(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Body centres, gaps of every body sphere to every target, and the least per pair."""
-        matrices = np.array([item.homogeneous for item in self._geometry_data.oMg])
-        centres = self._spheres.placed(matrices)
-        radii = self._spheres.radii
-        gaps = np.hstack([self._targets.gaps(centres, radii), _sphere_gaps(centres, radii, centres, radii)])
-        least = np.minimum.reduceat(
-            np.minimum.reduceat(gaps, self._spheres.starts, axis=0), self._column_starts, axis=1
-        )
-        return centres, gaps, least[self._first, self._second]
-
-    def _closest(self, row: int, centres: FloatArray, gaps: FloatArray) -> tuple[FloatArray, ...]:
-        """Normal from the body sphere to the target and the nearest point on each."""
-        mine = self._spheres.block(int(self._first[row]))
-        second = int(self._second[row])
-        inner = second - len(self._targets.starts)
-        if inner < 0:
-            theirs = self._targets.block(second)
-        else:
-            own = self._spheres.block(inner)
-            theirs = slice(self._targets.size + own.start, self._targets.size + own.stop)
-        block = gaps[mine, theirs]
-        at, to = np.unravel_index(int(np.argmin(block)), block.shape)
-        sphere, target = mine.start + int(at), theirs.start + int(to)
-        centre, radius = centres[sphere], self._spheres.radii[sphere]
-        if inner < 0:
-            normal, on_other = self._targets.toward(target, centre)
-        else:
-            other = target - self._targets.size
-            normal = direction(centres[other] - centre)
-            on_other = centres[other] - self._spheres.radii[other] * normal
-        return normal, centre + radius * normal, on_other
-
-
-class _Groups:
-    """Consecutive blocks of given sizes."""
-
-    def __init__(self, sizes: Sequence[int]) -> None:
-        self._ends: IntArray = np.cumsum(np.array(sizes, dtype=np.int64))
-        self.starts: IntArray = self._ends - np.array(sizes, dtype=np.int64)
-        self.size = int(sum(sizes))
-
-    def block(self, number: int) -> slice:
-        return slice(int(self.starts[number]), int(self._ends[number]))
-
-
-class _Spheres(_Groups):
-    """The body's spheres, grouped by shape."""
-
-    def __init__(self, covers: Sequence[SphereCover]) -> None:
-        sizes = [len(item) for item in covers]
-        super().__init__(sizes)
-        self._local = np.vstack([item.centres for item in covers])
-        self._owner = np.repeat(np.arange(len(covers)), sizes)
-        self.radii = np.concatenate([item.radii for item in covers])
-
-    def placed(self, matrices: FloatArray) -> FloatArray:
-        """(k, 3) centres in the world, of (shapes, 4, 4) transforms."""
-        owner = matrices[self._owner]
-        return np.einsum("kij,kj->ki", owner[:, :3, :3], self._local) + owner[:, :3, 3]
-
-
-class _Targets(_Groups):
-    """Fixed targets: one column per plane or half-space, then one per obstacle sphere."""
-
-    def __init__(
-        self, flats: Sequence[Obstacle], solids: Sequence[Obstacle], covers: Sequence[SphereCover]
-    ) -> None:
-        super().__init__([1] * len(flats) + [len(item) for item in covers])
-        self._flat_count = len(flats)
-        self._two_sided = np.array([isinstance(item.shape, Plane) for item in flats], dtype=bool)
-        planes = [item.world_plane for item in flats]
-        self._normals = np.array([normal for normal, _ in planes]).reshape(-1, 3)
-        self._offsets = np.array([offset for _, offset in planes])
-        placed = [item.to_world(cover.centres) for item, cover in zip(solids, covers, strict=True)]
-        self._centres = np.vstack([np.zeros((0, 3)), *placed])
-        self._radii = np.concatenate([np.zeros(0), *(cover.radii for cover in covers)])
-
-    def gaps(self, centres: FloatArray, radii: FloatArray) -> FloatArray:
-        """(k, size) gaps of body spheres."""
+        """Centres of all spheres, gaps of every body sphere to every target, and the least per pair."""
+        owner = np.array([item.homogeneous for item in self._geometry_data.oMg])[self._owner]
+        centres = np.einsum("kij,kj->ki", owner[:, :3, :3], self._local) + owner[:, :3, 3]
         height = centres @ self._normals.T - self._offsets
-        height = np.where(self._two_sided, np.abs(height), height) - radii[:, None]
-        return np.hstack([height, _sphere_gaps(centres, radii, self._centres, self._radii)])
+        height = np.where(self._two_sided, np.abs(height), height) - self._own_radii[:, None]
+        spheres = np.vstack([self._fixed, centres])
+        # Coordinate by coordinate (F.1): no array of all vectors between spheres.
+        apart = np.sqrt(sum(np.subtract.outer(centres[:, i], spheres[:, i]) ** 2 for i in range(3)))
+        gaps = np.hstack([height, apart - np.add.outer(self._own_radii, self._radii)])
+        least = np.minimum.reduceat(gaps, self._rows[:-1], axis=0)
+        least = np.minimum.reduceat(least, self._columns[:-1], axis=1)
+        return spheres, gaps, least[self._first, self._second]
 
-    def toward(self, target: int, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Direction from a centre to the target, and the target's nearest point."""
-        if target >= self._flat_count:
-            sphere = target - self._flat_count
-            normal = direction(self._centres[sphere] - centre)
-            return normal, self._centres[sphere] - self._radii[sphere] * normal
-        height = float(self._normals[target] @ centre - self._offsets[target])
-        side = -1.0 if self._two_sided[target] and height < 0.0 else 1.0
-        return -side * self._normals[target], centre - height * self._normals[target]
-
-
-def _sphere_gaps(
-    centres: FloatArray, radii: FloatArray, others: FloatArray, other_radii: FloatArray
-) -> FloatArray:
-    """(k, m) distances between spheres (F.1), coordinate by coordinate: no (k, m, 3) array."""
-    squared = np.subtract.outer(centres[:, 0], others[:, 0]) ** 2
-    squared += np.subtract.outer(centres[:, 1], others[:, 1]) ** 2
-    squared += np.subtract.outer(centres[:, 2], others[:, 2]) ** 2
-    gaps = np.sqrt(squared, out=squared)
-    gaps -= np.add.outer(radii, other_radii)
-    return gaps
+    def _closest(self, row: int, spheres: FloatArray, gaps: FloatArray) -> tuple[FloatArray, ...]:
+        """Normal from the body sphere to the target and the nearest point on each."""
+        first, second = self._first[row], self._second[row]
+        rows, columns = slice(*self._rows[first : first + 2]), slice(*self._columns[second : second + 2])
+        block = gaps[rows, columns]
+        at, to = np.unravel_index(int(np.argmin(block)), block.shape)
+        target = int(columns.start + to)
+        own = len(self._fixed) + int(rows.start + at)
+        centre, sphere = spheres[own], target - len(self._offsets)
+        if sphere >= 0:
+            normal = direction(spheres[sphere] - centre)
+            on_other = spheres[sphere] - self._radii[sphere] * normal
+        else:
+            height = float(self._normals[target] @ centre - self._offsets[target])
+            side = -1.0 if self._two_sided[target] and height < 0.0 else 1.0
+            normal, on_other = -side * self._normals[target], centre - height * self._normals[target]
+        return normal, centre + self._radii[own] * normal, on_other
 
 
 def _shape_cover(geometry: coal.CollisionGeometry, count: int) -> SphereCover:

@@ -33,8 +33,7 @@ class Surface:
 
     Attributes:
         obstacles: Names of the obstacles that it belongs to; coplanar ones that touch are one surface.
-        polygon: (k, 3) corners in the world [m], counter-clockwise about the normal;
-            not necessarily convex.
+        polygon: (k, 3) corners in the world [m], counter-clockwise about the normal, perhaps not convex.
         normal: (3,) unit normal, out of the obstacle.
         holes: (h, 3) corners of each hole [m], clockwise about the normal.
     """
@@ -121,6 +120,11 @@ def _in_world(name: str, polygon: FloatArray | list[FloatArray], normal: FloatAr
     return Surface((name,), frozen_array(polygon, "polygon", (None, 3)), unit)
 
 
+def _corners(first: FloatArray, second: FloatArray) -> FloatArray:
+    """(4, 3) corners of a rectangle about the origin by its half sides."""
+    return np.array([first + second, second - first, -first - second, first - second])
+
+
 def _box_faces(obstacle: Obstacle, box: Box) -> tuple[Surface, ...]:
     half = box.size / 2
     faces = []
@@ -147,13 +151,9 @@ def _endless(obstacle: Obstacle, shape: Plane | HalfSpace) -> tuple[Surface, ...
     first = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
     first *= ENDLESS_HALF_SIZE / np.linalg.norm(first)
     second = np.cross(normal, first)
-    corners = normal * shape.offset + np.array(
-        [first + second, second - first, -first - second, first - second]
-    )
+    corners = normal * shape.offset + _corners(first, second)
     front = _surface(obstacle, corners, normal)
-    if isinstance(shape, HalfSpace):
-        return (front,)
-    return front, _surface(obstacle, corners[::-1], -normal)
+    return (front,) if isinstance(shape, HalfSpace) else (front, _surface(obstacle, corners[::-1], -normal))
 
 
 def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
@@ -188,9 +188,7 @@ GRID = 1e-9
 class PlaneFrame:
     """A plane with coordinates, in which polygons are joined and cut.
 
-    Attributes:
-        origin: (3,) in the world [m].
-        rotation: (3, 3) plane-to-world rotation, z along the normal.
+    It has an origin (3,) [m] and a plane-to-world rotation (3, 3), z along the normal.
     """
 
     origin: FloatArray
@@ -246,8 +244,7 @@ class GraspLine:
 
     Attributes:
         obstacle: Name of the obstacle.
-        start: (3,) middle of the first hand's place on the axis [m].
-        end: (3,) middle of the last one's.
+        start, end: (3,) middles of the first and the last hand's place on the axis [m].
         radius: Distance of the bar's surface from its axis, the largest one of a box [m].
         round: Whether it is round, so that a palm may lie on it from any side.
     """
@@ -293,8 +290,7 @@ def grasp_lines(
 ) -> tuple[GraspLine, ...]:
     """Pieces of all bars of a scene around which fingers have room.
 
-    Args:
-        distances: Distance [m] of a (3,) world point to each obstacle, with its name.
+    ``distances`` are those of a (3,) world point to each obstacle [m], with their names.
     """
     found: list[GraspLine] = []
     for item in obstacles:
@@ -331,8 +327,8 @@ def bar_tops(obstacles: Sequence[Obstacle]) -> tuple[Surface, ...]:
         up /= np.linalg.norm(up)
         half = float(np.sqrt(SOLE_YIELD * (2.0 * shape.radius - SOLE_YIELD)))
         along, across = 0.5 * shape.length * axis, half * np.cross(up, axis)
-        ring = np.array([along + across, across - along, -along - across, along - across])
-        polygon = frozen_array(item.translation + shape.radius * up + ring, "polygon", (4, 3))
+        ring = item.translation + shape.radius * up + _corners(along, across)
+        polygon = frozen_array(ring, "polygon", (4, 3))
         found.append(Surface((item.name,), polygon, frozen_array(up, "normal", (3,))))
     return tuple(found)
 
@@ -340,15 +336,10 @@ def bar_tops(obstacles: Sequence[Obstacle]) -> tuple[Surface, ...]:
 def palm_places(lines: Sequence[GraspLine], numbers: NDArray[np.int64], points: FloatArray) -> FloatArray:
     """(n, 3) middles of palms' grips on the axes of round bars, nearest to points over their strips [m].
 
-    Args:
-        lines: Of the scene.
-        numbers: (n,) index of each strip among those of :func:`grasp_strips`.
-        points: (n, 3) in the planes of the strips.
+    ``numbers`` (n,) are those of the strips of :func:`grasp_strips`, ``points`` (n, 3) in their planes.
     """
-    bars = [line for line in lines if line.round]
-    start, end = (
-        np.array([getattr(bar, name) for bar in bars])[numbers // _SIDES] for name in ("start", "end")
-    )
+    ends = np.array([(line.start, line.end) for line in lines if line.round])
+    start, end = ends[numbers // _SIDES].transpose(1, 0, 2)
     axis = end - start
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-12)
     length = np.linalg.norm(end - start, axis=1)
@@ -385,8 +376,6 @@ def _free(
     """Pieces between two ends around whose places nothing else is in the fingers' way."""
     count = 1 + int(np.ceil(float(np.linalg.norm(end - start)) / _SPACING))
     places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
-    free = [
-        all(away >= radius + FINGER_ROOM for away, other in distances(place) if other != name)
-        for place in places
-    ]
+    room = radius + FINGER_ROOM
+    free = [all(away >= room for away, other in distances(place) if other != name) for place in places]
     return [(places[first], places[stop - 1]) for first, stop in mask_runs(np.array(free))]

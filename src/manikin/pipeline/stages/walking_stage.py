@@ -31,7 +31,7 @@ from manikin.scenarios.sections.task_sections import (
     WalkingSection,
     WaypointSection,
 )
-from manikin.scenarios.validation import Path as KeyPath
+from manikin.scenarios.validation import KeyPath
 from manikin.scenarios.world import flat_sequence
 from manikin.walking import (
     LITERAL_ORDER,

@@ -7,15 +7,12 @@ from manikin.scenarios.families.family import Family, draw_scene
 __all__ = ["FAMILIES", "Family", "chosen_families", "draw_scene"]
 
 FAMILIES: dict[str, Family] = {
-    family.name: family
-    for family in (
-        Family(draw.__name__.replace("_", "-"), draw)
-        for draw in (
-            levels.flat, levels.around, levels.stairs, levels.thresholds, levels.bars, levels.hatches,
-            levels.platforms, levels.stones, levels.ramps, levels.gaps, levels.rubble, furniture.chairs,
-            furniture.sitting, levels.roofs, levels.blocks, furniture.buildings, levels.tunnels,
-            furniture.ladders, furniture.quadruped_stairs, furniture.quadruped_rubble,
-        )
+    (name := draw.__name__.replace("_", "-")): Family(name, draw)
+    for draw in (
+        levels.flat, levels.around, levels.stairs, levels.thresholds, levels.bars, levels.hatches,
+        levels.platforms, levels.stones, levels.ramps, levels.gaps, levels.rubble, furniture.chairs,
+        furniture.sitting, levels.roofs, levels.blocks, furniture.buildings, levels.tunnels,
+        furniture.ladders, furniture.quadruped_stairs, furniture.quadruped_rubble,
     )
 }  # fmt: skip
 """Families in the order of tables."""
@@ -24,11 +21,7 @@ ALL = "all"
 
 
 def chosen_families(text: str) -> tuple[Family, ...]:
-    """Families by their names with commas between them, or ``all``.
-
-    Raises:
-        InputError: If a name is not known.
-    """
+    """Families by their names with commas between them, or ``all``; InputError if a name is not known."""
     names = [name.strip() for name in text.split(",")]
     if names == [ALL]:
         return tuple(FAMILIES.values())

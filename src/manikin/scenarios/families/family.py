@@ -55,7 +55,7 @@ class Sketch:
         self.keys: dict[str, Any] = {}
         self.meshes: dict[str, trimesh.Trimesh] = {}
         self._scene: list[dict[str, Any]] = []
-        self._ends: dict[str, dict[str, Any]] = {}
+        self._ends = {"start": self._end(0.0, 0.0, 0.0, {})}
 
     def between(self, low: float, high: float, digits: int = 3) -> float:
         """A number of a range, evenly distributed."""
@@ -79,10 +79,7 @@ class Sketch:
     ) -> None:  # fmt: skip
         """Add a box by its extents before it is turned [m, deg].
 
-        Args:
-            yaw_deg: Turn about the vertical.
-            about: Where its axis stands; in the middle of the box when omitted.
-            tilt_deg: Roll and pitch about the middle before.
+        First by roll and pitch about its middle, then by a yaw about the vertical, there or at ``about``.
         """
         size = [round(abs(high - low), 4) for low, high in (x, y, z)]
         middle = np.array([0.5 * (low + high) for low, high in (x, y, z)])
@@ -114,7 +111,7 @@ class Sketch:
         self.add(name, mesh=file, position=position, **keys)
 
     def start(self, x: float, y: float, heading_deg: float = 0.0, **keys: Any) -> None:
-        """Set the start [m, deg]."""
+        """Set the start [m, deg], elsewhere than at the origin."""
         self._ends["start"] = self._end(x, y, heading_deg, keys)
 
     def goal(self, x: float, y: float, heading_deg: float = 0.0, **keys: Any) -> None:
@@ -125,11 +122,12 @@ class Sketch:
         """Let the way lead from goal to start, facing as before."""
         self._ends = {"start": self._ends["goal"], "goal": self._ends["start"]}
 
-    def turn_back(self) -> None:
-        """Let the way lead from goal to start, facing the other way."""
-        self.exchange()
-        for end in self._ends.values():
-            end["heading_deg"] = _angle(end["heading_deg"] + 180.0)
+    def maybe_turn_back(self) -> None:
+        """In half of the draws, let the way lead from goal to start, facing the other way."""
+        if self.coin():
+            self.exchange()
+            for end in self._ends.values():
+                end["heading_deg"] = _angle(end["heading_deg"] + 180.0)
 
     def data(self, name: str, description: str) -> dict[str, Any]:
         """Content of the scenario's file."""
@@ -173,13 +171,10 @@ def draw_scene(family: Family, seed: int, folder: Path | None = None) -> Scenari
     """Draw a scene of a family; the same for the same family and seed, whatever else was drawn.
 
     Args:
-        family: Kind of scene.
-        seed: Number of the scene.
-        folder: Where the meshes of the scene are written, if it has any; it is made where needed. Without
-            one the scenario cannot build them.
+        folder: Where the meshes of the scene are written, made where needed. Without one the scenario cannot
+            build them.
 
     Raises:
-        ScenarioError: If the scene is no valid scenario.
         MotionFileError: If a mesh cannot be written.
     """
     rng = np.random.default_rng([*family.name.encode(), seed])

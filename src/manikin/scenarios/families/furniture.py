@@ -72,7 +72,6 @@ def ladders(sketch: Sketch) -> None:
     behind = away + top * slope + 0.05
     sketch.box("wall", (behind, behind + 0.2), (-1.0, 1.0), (0.0, top))
     level = round(reached * apart, 3)
-    sketch.start(0.0, 0.0)
     # The root of who stands on a rung is 0.4 m before the ladder there.
     sketch.goal(away + (level + 0.9) * slope - 0.4, 0.0, height_m=level, posture="climbing")
     sketch.keys |= {"contacts": {"limbs": list(LIMBS)}, "wholebody": {"method": "refine"}}

@@ -15,12 +15,9 @@ def stairs(sketch: Sketch) -> None:
 
 
 def draw_stairs(sketch: Sketch, *, away: float, landing: float, before: float) -> None:
-    """Draw stairs and the way up or down.
+    """Draw stairs, ``landing`` the depth of the uppermost step, and the way up or down [m].
 
-    Args:
-        away: From the lower end of the way to the first step [m].
-        landing: Depth of the uppermost step [m].
-        before: From the upper end of the way to the landing's end [m].
+    It is ``away`` from its lower end to the first step, ``before`` from its upper one to the landing's end.
     """
     rise, tread = sketch.between(0.12, 0.20), sketch.between(0.25, 0.35)
     steps, side, slabs = sketch.whole(2, 5), 0.5 * sketch.between(0.9, 1.4), sketch.coin()
@@ -32,10 +29,8 @@ def draw_stairs(sketch: Sketch, *, away: float, landing: float, before: float) -
         below = step * rise if slabs else 0.0
         name = "landing" if last else f"step_{step + 1}"
         sketch.box(name, (near, far), (-side, side), (below, (step + 1) * rise))
-    sketch.start(0.0, 0.0)
     sketch.goal(end - before, sketch.between(-0.1, 0.1))
-    if sketch.coin():
-        sketch.turn_back()
+    sketch.maybe_turn_back()
 
 
 def platforms(sketch: Sketch) -> None:
@@ -50,8 +45,7 @@ def platforms(sketch: Sketch) -> None:
     sketch.box("platform", (away, away + deep), (-side, side), (0.0, height), yaw_deg=turn, about=about)
     sketch.start(away * (1.0 - np.cos(np.deg2rad(turn))), -away * np.sin(np.deg2rad(turn)))
     sketch.goal(away + 0.5 * deep * np.cos(np.deg2rad(turn)), 0.5 * deep * np.sin(np.deg2rad(turn)), turn)
-    if sketch.coin():
-        sketch.turn_back()
+    sketch.maybe_turn_back()
 
 
 def roofs(sketch: Sketch) -> None:
@@ -94,10 +88,8 @@ def blocks(sketch: Sketch) -> None:
         sketch.rod("rail", ((-0.2, y, z), (end, y, z)), 0.02)
         for name, x in (("front_post", -0.15), ("rear_post", end - 0.05)):
             sketch.rod(name, ((x, y, 0.0), (x, y, z - 0.02)), 0.02)
-    sketch.start(0.0, 0.0)
     sketch.goal(away + 0.5 * deep, 0.0)
-    if sketch.coin():
-        sketch.turn_back()
+    sketch.maybe_turn_back()
 
 
 def sorted_pair(one: float, other: float) -> tuple[float, float]:
@@ -123,7 +115,6 @@ def stones(sketch: Sketch) -> None:
         x += wide
     x += sketch.between(0.10, 0.35)
     sketch.box("far_bank", (x, x + 1.2), (-1.0, 1.0), (-0.5, 0.0))
-    sketch.start(0.0, 0.0)
     sketch.goal(x + 0.3, 0.0)
 
 
@@ -140,10 +131,8 @@ def ramps(sketch: Sketch) -> None:
     sketch.add("ramp", box=[long, round(2.0 * side, 4), thick], position=middle, rpy_deg=(0.0, -slope, 0.0))
     top = away + long * along[0]
     sketch.box("platform", (top, top + 1.2), (-side, side), (0.0, long * along[2]))
-    sketch.start(0.0, 0.0)
     sketch.goal(away + 0.6 * long * along[0] if sketch.whole(1, 3) == 1 else top + 0.5, 0.0)
-    if sketch.coin():
-        sketch.turn_back()
+    sketch.maybe_turn_back()
 
 
 def rubble(sketch: Sketch) -> None:
@@ -157,12 +146,7 @@ def rubble(sketch: Sketch) -> None:
 
 
 def draw_rubble(sketch: Sketch, *, away: float, beyond: float) -> None:
-    """Draw rubble and the way across.
-
-    Args:
-        away: From the start to the rubble [m].
-        beyond: From there to the goal [m].
-    """
+    """Draw rubble and the way across, which starts ``away`` from it and ends ``beyond`` it [m]."""
     long, side = sketch.between(1.2, 2.4), 0.5 * sketch.between(1.1, 1.5)
     tilt, covered, number = 6.0 if sketch.coin() else 0.0, 0.0, 0
     while covered < 0.9 * long * 2.0 * side:
@@ -179,16 +163,13 @@ def draw_rubble(sketch: Sketch, *, away: float, beyond: float) -> None:
     ends = (-0.8, away + long + beyond + 0.8)
     sketch.box("left_wall", ends, (side, side + 0.1), (0.0, 1.0))
     sketch.box("right_wall", ends, (-side - 0.1, -side), (0.0, 1.0))
-    sketch.start(0.0, 0.0)
     sketch.goal(away + long + beyond, 0.0)
 
 
 WIDE = 3.0
 """Half the width of what nobody shall walk round [m]."""
-
 TALL = 2.2
 """Height of walls [m]."""
-
 ROOM = 0.8
 """Least distance between any two boxes to walk round, and of them to start and goal [m]."""
 
@@ -199,7 +180,6 @@ def flat(sketch: Sketch) -> None:
     0.3 to 4 m away. Possible: nothing stands there.
     """
     way, direction = sketch.between(0.3, 4.0), np.deg2rad(sketch.between(-180.0, 180.0, 1))
-    sketch.start(0.0, 0.0)
     sketch.goal(way * np.cos(direction), way * np.sin(direction), sketch.between(-180.0, 180.0, 1))
 
 
@@ -230,7 +210,6 @@ def around(sketch: Sketch) -> None:
             height, turn = sketch.between(0.4, 1.8), sketch.between(-90.0, 90.0, 1)
             sketch.box(f"box_{number + 1}", along, across, (0.0, height), yaw_deg=turn)
             break
-    sketch.start(0.0, 0.0)
     sketch.goal(way, 0.0)
 
 
@@ -243,7 +222,6 @@ def thresholds(sketch: Sketch) -> None:
     height, thick, away = sketch.between(0.1, 0.4), sketch.between(0.03, 0.3), sketch.between(0.45, 0.9)
     turn = sketch.between(-20.0, 20.0, 1)
     sketch.box("threshold", (away, away + thick), (-WIDE, WIDE), (0.0, height), yaw_deg=turn)
-    sketch.start(0.0, 0.0)
     sketch.goal(away + thick + sketch.between(0.6, 1.0), sketch.between(-0.2, 0.2))
 
 
@@ -256,7 +234,6 @@ def bars(sketch: Sketch) -> None:
     deep, high, away = sketch.between(0.04, 0.6), sketch.between(0.04, 0.3), sketch.between(0.6, 1.0)
     turn = sketch.between(-20.0, 20.0, 1)
     sketch.box("bar", (away, away + deep), (-WIDE, WIDE), (low, low + high), yaw_deg=turn)
-    sketch.start(0.0, 0.0)
     sketch.goal(away + deep + sketch.between(0.6, 1.0), sketch.between(-0.3, 0.3))
 
 
@@ -288,7 +265,6 @@ def gaps(sketch: Sketch) -> None:
     x = (away, away + thick)
     sketch.box("left_wall", x, (aside + side, WIDE), (0.0, TALL))
     sketch.box("right_wall", x, (-WIDE, aside - side), (0.0, TALL))
-    sketch.start(0.0, 0.0)
     sketch.goal(away + thick + sketch.between(0.6, 1.0), sketch.between(-0.3, 0.3))
 
 
@@ -308,5 +284,4 @@ def tunnels(sketch: Sketch) -> None:
     sketch.box("left_wall", x, (side + 0.1, WIDE), (0.0, TALL))
     sketch.box("right_wall", x, (-WIDE, -side - 0.1), (0.0, TALL))
     sketch.box("wall_above", x, (-side - 0.1, side + 0.1), (high + 0.1, TALL))
-    sketch.start(0.0, 0.0)
     sketch.goal(away + long + sketch.between(0.9, 1.3), 0.0)

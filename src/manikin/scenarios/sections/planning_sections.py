@@ -16,7 +16,7 @@ from manikin.body.strength import AGE_RANGE, DEFAULT_AGE
 from manikin.contact import FrictionModel
 from manikin.errors import ScenarioError
 from manikin.scenarios.expressions import Expression
-from manikin.scenarios.sections.support_sections import SoleSection
+from manikin.scenarios.sections.support_sections import SOLE, SoleSection
 from manikin.scenarios.sections.task_sections import FrameSection
 from manikin.scenarios.validation import (
     NonNegative,
@@ -79,7 +79,7 @@ class ContactsSection(Section):
     """How contacts are planned where no supports are given."""
 
     friction: Positive = preset(0.7, "Coulomb coefficient of the soles")
-    sole: SoleSection = preset(SoleSection(length_m=0.28, width_m=0.12), "size of the soles")
+    sole: SoleSection = preset(SOLE, "size of the soles")
     stride_m: Positive = preset(0.4, "length of a step [m] of a body of 1.75 m, scaled to the actual one")
     limbs: list[Text] | None = optional(
         "names of the limbs that make contacts, hands as grasps (default: a human's feet, in "

@@ -37,6 +37,10 @@ class SoleSection(Section):
     width_m: Positive = required("across it [m]")
 
 
+SOLE = SoleSection(length_m=0.28, width_m=0.12)
+"""Sole where a file gives none."""
+
+
 class ContactSection(Section):
     """One contact; what it leaves out comes from the section around it."""
 
@@ -90,11 +94,7 @@ class ContactSection(Section):
         return self.kind or usual.get(effector.rpartition("_")[2], "sole")
 
     def check_for(self, effector: str, path: str = "") -> None:
-        """Refuse keys that the contact's kind does not have.
-
-        Raises:
-            PydanticCustomError: Naming the key under ``path``.
-        """
+        """Refuse keys that the contact's kind does not have, by their names under ``path``."""
         kind = self.kind_for(effector)
         for key in sorted({key for keys in _KIND_KEYS.values() for key in keys} - {*_KIND_KEYS[kind]}):
             if getattr(self, key) is not None:
@@ -125,7 +125,6 @@ ContactEntry = Annotated[
 ]
 """A contact, or the word ``same`` for the one of the phase before."""
 
-
 _MASSLESS = "contact of that foot of a point mass, or 'same'"
 
 
@@ -155,7 +154,6 @@ class PhaseSection(Section):
         "how far it may be from there along x, y and z of the task frame, x being the heading "
         "at the start [m]",
     )
-
     com_lead_s: NonNegative = preset(
         0.0, "time after which it would still be as near if it went on at the velocity that it has then [s]"
     )
@@ -183,7 +181,7 @@ class SupportsSection(Section):
     """An explicit sequence of supports, with the defaults of its contacts."""
 
     friction: Positive = preset(0.7, "Coulomb coefficient of soles and points")
-    sole: SoleSection = preset(SoleSection(length_m=0.28, width_m=0.12), "size of the real soles")
+    sole: SoleSection = preset(SOLE, "size of the real soles")
     planning_sole: SoleSection | None = optional(
         "smaller soles that planning balances on, for robustness (default: the real ones)"
     )
@@ -212,13 +210,10 @@ class SupportsSection(Section):
                 ours, real = getattr(self.planning_sole, key), getattr(self.sole, key)
                 problem = f"is {ours:g}; valid: at most sole.{key} = {real:g}"
                 refuse_if(ours > real, f"planning_sole.{key}", problem)
-        for key, real in (
-            ("planning_friction", "friction"),
-            ("planning_normal_force_cap_N", "normal_force_cap_N"),
-        ):
-            ours, limit = getattr(self, key), getattr(self, real)
+        for real in ("friction", "normal_force_cap_N"):
+            ours, limit = getattr(self, f"planning_{real}"), getattr(self, real)
             if ours is not None and limit is not None and ours > limit:
-                raise refuse(key, f"is {ours:g}; valid: at most {real} = {limit:g}")
+                raise refuse(f"planning_{real}", f"is {ours:g}; valid: at most {real} = {limit:g}")
         near = [phase.com_near is not None for phase in self.phases]
         problem = "is given; valid: task.start.com says where the motion begins"
         refuse_if(near[0], "phases[0].com_near", problem)

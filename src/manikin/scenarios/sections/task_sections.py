@@ -17,6 +17,7 @@ from manikin.scenarios.validation import (
     Text,
     Vector2,
     Vector3,
+    bounded,
     optional,
     preset,
     refuse,
@@ -28,11 +29,9 @@ from manikin.scenarios.validation import (
 
 LARGEST_FORCE = 5000.0
 """Largest force of a push [N], some seven body weights; the same in ``manikin.simulation.push_force``."""
-
 LARGEST_FREQUENCY = 100.0
 """Largest frequency of a sine [Hz]: ten steps of the physics for each period."""
-
-Force = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST_FORCE)]
+Force = Annotated[float, bounded(gt=0, le=LARGEST_FORCE)]
 
 
 class PushSection(Section):
@@ -145,8 +144,7 @@ class ObstacleSection(Section):
 
 LARGEST_WALKERS = 8
 """How many others may walk in a scenario."""
-
-Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=4.0)]
+Speed = Annotated[float, bounded(ge=0.1, le=4.0)]
 
 
 class StandSection(Section):
