@@ -73,12 +73,10 @@ def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | Non
     torque = motion.tau[rows, 6:]
     power = torque * motion.v[rows, 6:]
     return CumulativeEffort(
-        joint_names=body.joint_names,
-        squared_share=weight @ body.torque_share(torque) ** 2,
-        positive_work=weight @ np.maximum(power, 0.0),
-        negative_work=weight @ np.minimum(power, 0.0),
+        joint_names=body.joint_names, squared_share=weight @ body.torque_share(torque) ** 2,
+        positive_work=weight @ np.maximum(power, 0.0), negative_work=weight @ np.minimum(power, 0.0),
         duration=float(weight.sum()),
-    )
+    )  # fmt: skip
 
 
 LOADED = 0.5
@@ -148,16 +146,11 @@ def joint_strength(body: BodyModel, motion: Motion, fraction: float = LOADED) ->
     pushed = motion.tau[rows, 6:][peak, np.arange(len(peak))] >= 0.0
     weight = durations(motion.time)[rows]
     return JointStrength(
-        joint_names=body.joint_names,
-        limit=np.where(pushed, body.torque_upper, -body.torque_lower),
-        share=share,
-        peak=known.max(axis=0),
-        peak_time=motion.time[rows][peak],
-        loaded=weight @ (known > fraction) / weight.sum(),
-        fraction=fraction,
-        known=float(rows.mean()),
+        joint_names=body.joint_names, limit=np.where(pushed, body.torque_upper, -body.torque_lower),
+        share=share, peak=known.max(axis=0), peak_time=motion.time[rows][peak],
+        loaded=weight @ (known > fraction) / weight.sum(), fraction=fraction, known=float(rows.mean()),
         source=SOURCES.get(body.name, "the torque limits of the body"),
-    )
+    )  # fmt: skip
 
 
 def known_torques(motion: Motion) -> np.ndarray:
@@ -244,18 +237,14 @@ class Assessment:
         worst, share = int(score.argmax()), weight / weight.sum()
         side = max(SIDES, key=lambda name: self.sides[name][worst])
         return {
-            "max": int(score.max()),
-            "max_at_s": float(self.time[worst]),
-            "max_side": side,
+            "max": int(score.max()), "max_at_s": float(self.time[worst]), "max_side": side,
             "max_steps": {name: int(values[worst]) for name, values in vars(self.steps[side]).items()},
-            "mean": float(share @ score),
-            "left_max": int(self.sides["left"].max()),
-            "right_max": int(self.sides["right"].max()),
-            "action_level": int(levels.max()),
+            "mean": float(share @ score), "left_max": int(self.sides["left"].max()),
+            "right_max": int(self.sides["right"].max()), "action_level": int(levels.max()),
             "action": self.levels[int(levels.max())],
             "share_of_time": {str(level): float(share[levels == level].sum()) for level in self.levels},
             "static_known": self.static_known,
-        }
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -278,14 +278,11 @@ def _strength(found: JointStrength) -> dict[str, Any]:
     joints = {"limit_Nm": found.limit, "max_share": found.peak, "max_at_s": found.peak_time}
     joints["share_of_time_above"] = found.loaded
     return {
-        "max_share": float(found.peak[worst]),
-        "max_joint": found.joint_names[worst],
-        "max_at_s": float(found.peak_time[worst]),
-        "fraction": found.fraction,
-        "known_share": found.known,
+        "max_share": float(found.peak[worst]), "max_joint": found.joint_names[worst],
+        "max_at_s": float(found.peak_time[worst]), "fraction": found.fraction, "known_share": found.known,
         "limits": found.source,
         "joints": {found.joint_names[index]: _row(joints, index) for index in found.order},
-    }
+    }  # fmt: skip
 
 
 def _row(columns: Mapping[str, FloatArray], index: int) -> dict[str, float]:
@@ -297,14 +294,12 @@ def _effort(found: CumulativeEffort) -> dict[str, Any]:
     joints = {"squared_share_s": found.squared_share, "positive_work_J": found.positive_work}
     joints["negative_work_J"] = found.negative_work
     return {
-        "duration_s": found.duration,
-        "squared_share_s": float(found.squared_share.sum()),
-        "rms_share": found.mean_share,
-        "positive_work_J": float(found.positive_work.sum()),
+        "duration_s": found.duration, "squared_share_s": float(found.squared_share.sum()),
+        "rms_share": found.mean_share, "positive_work_J": float(found.positive_work.sum()),
         "negative_work_J": float(found.negative_work.sum()),
         "absolute_work_J": float(found.absolute_work.sum()),
         "joints": {name: _row(joints, index) for index, name in enumerate(found.joint_names)},
-    }
+    }  # fmt: skip
 
 
 def _margin(found: LowestMargin) -> dict[str, Any]:

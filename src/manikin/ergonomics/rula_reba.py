@@ -306,11 +306,9 @@ TABLE_C = np.array([
 """Grand score by score C of the arm (1 to 8 and more) and score D of the body (1 to 7 and more)."""
 
 ACTIONS = {
-    1: "acceptable unless held or repeated for long",
-    2: "further investigation, changes may be required",
-    3: "investigation and changes soon",
-    4: "investigation and changes immediately",
-}
+    1: "acceptable unless held or repeated for long", 2: "further investigation, changes may be required",
+    3: "investigation and changes soon", 4: "investigation and changes immediately",
+}  # fmt: skip
 """What is to be done, by action level."""
 
 

@@ -103,13 +103,9 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
 
 
 def run_jobs(
-    jobs: Sequence[Job],
-    command: Callable[[Job], list[str]],
-    *,
-    workers: int | None = None,
-    time_limit: float = TIME_LIMIT,
-    report: Callable[[dict[str, Any], int], None] | None = None,
-) -> dict[str, Any]:
+    jobs: Sequence[Job], command: Callable[[Job], list[str]], *, workers: int | None = None,
+    time_limit: float = TIME_LIMIT, report: Callable[[dict[str, Any], int], None] | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Run jobs side by side and gather their summaries.
 
     Args:

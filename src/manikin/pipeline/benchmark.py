@@ -193,13 +193,11 @@ def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
     blocks = [summary[name] or {} for name in ("wholebody", "centroidal")]
     done = found if stage == "contacts" else summary["succeeded"]
     return {
-        **reached,
-        "outcome": next((name for name in OUTCOMES if reached.get(name)), "failed"),
-        "checked": summary.get("checked"),
-        "failure": None if done else summary["failure"],
+        **reached, "outcome": next((name for name in OUTCOMES if reached.get(name)), "failed"),
+        "checked": summary.get("checked"), "failure": None if done else summary["failure"],
         "steps": contacts.get("steps"),
         "duration_s": next((block["duration_s"] for block in blocks if block.get("duration_s")), None),
-    }
+    }  # fmt: skip
 
 
 def _failure(stage: str, reason: str, where: str = "") -> dict[str, Any]:

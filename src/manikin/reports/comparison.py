@@ -33,14 +33,11 @@ def com_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTrack)
     distance = np.linalg.norm(gap, axis=1)
     worst = int(np.argmax(distance))
     return {
-        "max_distance_m": float(distance[worst]),
-        "max_at_first_s": float(times_first[worst]),
-        "max_at_second_s": float(times_second[worst]),
-        "rms_distance_m": float(np.sqrt(np.mean(distance**2))),
-        "mean_difference_m": gap.mean(axis=0).tolist(),
-        "first": com_numbers(first),
+        "max_distance_m": float(distance[worst]), "max_at_first_s": float(times_first[worst]),
+        "max_at_second_s": float(times_second[worst]), "rms_distance_m": float(np.sqrt(np.mean(distance**2))),
+        "mean_difference_m": gap.mean(axis=0).tolist(), "first": com_numbers(first),
         "second": com_numbers(second),
-    }
+    }  # fmt: skip
 
 
 def com_numbers(track: ComTrack) -> dict[str, Any]:
@@ -70,14 +67,10 @@ def margin_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTra
         )
     whole = float(first.margin.min()), float(second.margin.min())
     return {
-        "unit": first.margin_unit if comparable else None,
-        "first_unit": first.margin_unit,
-        "second_unit": second.margin_unit,
-        "min_first": whole[0],
-        "min_second": whole[1],
-        "min_difference": whole[1] - whole[0] if comparable else None,
-        "phases": phases,
-    }
+        "unit": first.margin_unit if comparable else None, "first_unit": first.margin_unit,
+        "second_unit": second.margin_unit, "min_first": whole[0], "min_second": whole[1],
+        "min_difference": whole[1] - whole[0] if comparable else None, "phases": phases,
+    }  # fmt: skip
 
 
 def _least(track: ComTrack, phase: PhaseTime | None) -> float | None:
@@ -212,17 +205,13 @@ class RunComparison(Displayed):
             }
 
         return {
-            "first": _run_block(self.first, self.names[0]),
-            "second": _run_block(self.second, self.names[1]),
-            "matched_phases": self.matched_phases,
-            "timing": [row.as_dict() for row in self.rows] or None,
-            "duration_difference_s": _difference(*self.durations),
-            "com": by_stage(com_difference),
-            "margins": by_stage(margin_difference),
-            "postures_of": self.postures_of,
+            "first": _run_block(self.first, self.names[0]), "second": _run_block(self.second, self.names[1]),
+            "matched_phases": self.matched_phases, "timing": [row.as_dict() for row in self.rows] or None,
+            "duration_difference_s": _difference(*self.durations), "com": by_stage(com_difference),
+            "margins": by_stage(margin_difference), "postures_of": self.postures_of,
             "postures": [asdict(posture) for posture in self.postures] or None,
             "unmatched": list(self.unmatched),
-        }
+        }  # fmt: skip
 
 
 def compare_runs(first: RunRecord, second: RunRecord) -> RunComparison:
@@ -286,14 +275,10 @@ def _missing_phases(first: RunRecord, second: RunRecord, rows: tuple[TimingRow, 
 
 def _run_block(record: RunRecord, name: str) -> dict[str, Any]:
     return {
-        "run": name,
-        "scenario": record.scenario,
-        "succeeded": bool(record.summary.get("succeeded", False)),
-        "failure": record.summary.get("failure"),
-        "duration_s": _duration(record),
-        "mass_kg": record.mass,
+        "run": name, "scenario": record.scenario, "succeeded": bool(record.summary.get("succeeded", False)),
+        "failure": record.summary.get("failure"), "duration_s": _duration(record), "mass_kg": record.mass,
         "stature_m": None if record.body is None else record.body.stature,
-    }
+    }  # fmt: skip
 
 
 def _duration(record: RunRecord) -> float | None:

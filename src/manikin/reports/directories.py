@@ -177,11 +177,9 @@ def write_statistics(
 
 
 def clip_figures(
-    clips: Sequence[RecordedClip],
-    found: Mapping[str, GroupStatistics],
-    settings: StatisticsSettings,
+    clips: Sequence[RecordedClip], found: Mapping[str, GroupStatistics], settings: StatisticsSettings,
     by: By = "kind",
-) -> dict[str, Figure]:
+) -> dict[str, Figure]:  # fmt: skip
     """All figures of recorded motions that have content, by name."""
     height = None if settings.overhead is None else settings.overhead.height
     placed = [clip for clip in clips if clip.name not in found[clip.group].unplaced]

@@ -49,21 +49,15 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
         com, unit = body, " N.m"
     walls = [block.get("wall_s") for block in (run["centroidal"] or {}, body, executed)]
     return (
-        str(run["scenario"]).partition("@")[0],
-        run["variant"] or NOTHING,
-        number(com.get("duration_s"), 2),
-        number(com.get("min_margin"), 1, unit),
-        number(com.get("feasibility_radius"), 1),
-        number(body.get("min_clearance_m"), 1, scale=1000.0),
-        number(executed.get("min_margin"), 1),
+        str(run["scenario"]).partition("@")[0], run["variant"] or NOTHING, number(com.get("duration_s"), 2),
+        number(com.get("min_margin"), 1, unit), number(com.get("feasibility_radius"), 1),
+        number(body.get("min_clearance_m"), 1, scale=1000.0), number(executed.get("min_margin"), 1),
         number(executed.get("min_force_at_com_N"), 0),
         number(executed.get("min_zmp_distance_m"), 0, scale=1000.0),
-        number(executed.get("com_rms_error_m"), 2, scale=1000.0),
-        _YES_OR_NO[executed.get("fell")],
+        number(executed.get("com_rms_error_m"), 2, scale=1000.0), _YES_OR_NO[executed.get("fell")],
         " + ".join(number(wall, 1) for wall in walls if wall is not None) or NOTHING,
-        *(_YES_OR_NO[run[key]] for key in ("planned", "proved")),
-        result(run),
-    )
+        *(_YES_OR_NO[run[key]] for key in ("planned", "proved")), result(run),
+    )  # fmt: skip
 
 
 def result(run: Mapping[str, Any]) -> str:

@@ -17,12 +17,9 @@ __all__ = ["serve", "serve_contacts", "serve_drive"]
 
 
 def serve(
-    content: MotionFile,
-    port: int = 8080,
-    announce: Callable[[str], None] | None = None,
-    *,
+    content: MotionFile, port: int = 8080, announce: Callable[[str], None] | None = None, *,
     others: Mapping[str, MotionFile] | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Show a motion file in the browser until Ctrl-C, on this computer only.
 
     This and the other pages raise :class:`~manikin.errors.InputError` if the port is taken.
@@ -51,11 +48,9 @@ def serve_contacts(
 
 
 def serve_drive(
-    controller: WalkController,
-    scene: Scene | None = None,
-    port: int = 8080,
+    controller: WalkController, scene: Scene | None = None, port: int = 8080,
     announce: Callable[[str], None] | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Let the user steer a walker with keys and sliders, in real time, until Ctrl-C.
 
     Args:

@@ -51,15 +51,11 @@ class Key:
 
 
 KEYS = (
-    Key("arrowup", "Faster", (0.2, 0.0, 0.0)),
-    Key("arrowdown", "Slower", (-0.2, 0.0, 0.0)),
-    Key("arrowleft", "Turn left", (0.0, 0.0, 0.25)),
-    Key("arrowright", "Turn right", (0.0, 0.0, -0.25)),
-    Key("A", "Sideways to the left", (0.0, 0.1, 0.0)),
-    Key("D", "Sideways to the right", (0.0, -0.1, 0.0)),
-    Key("S", "Straight on", (0.0, 0.0, 0.0)),
-    Key("space", "Stop", None),
-)
+    Key("arrowup", "Faster", (0.2, 0.0, 0.0)), Key("arrowdown", "Slower", (-0.2, 0.0, 0.0)),
+    Key("arrowleft", "Turn left", (0.0, 0.0, 0.25)), Key("arrowright", "Turn right", (0.0, 0.0, -0.25)),
+    Key("A", "Sideways to the left", (0.0, 0.1, 0.0)), Key("D", "Sideways to the right", (0.0, -0.1, 0.0)),
+    Key("S", "Straight on", (0.0, 0.0, 0.0)), Key("space", "Stop", None),
+)  # fmt: skip
 """Keys of the page; each press changes the directive once more."""
 
 LOWEST, HIGHEST = np.array([-0.8, -0.8, -2.0]), np.array([3.0, 0.8, 2.0])

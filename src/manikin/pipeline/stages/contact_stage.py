@@ -263,16 +263,12 @@ class _LimbSearch(_ContactSearch):
         if self._on_rungs:
             plain = replace(plain, retreats=RETREATS)
         return replace(
-            plain,
-            stride=STRIDE * self._reach,
-            lets_go=self._body.stature is not None and not self._climbs,
-            lift=plain.lift * safe,
-            swing_duration=plain.swing_duration * pace,
-            swing_speed=plain.swing_speed * pace,
-            shift_duration=plain.shift_duration * pace,
+            plain, stride=STRIDE * self._reach, lets_go=self._body.stature is not None and not self._climbs,
+            lift=plain.lift * safe, swing_duration=plain.swing_duration * pace,
+            swing_speed=plain.swing_speed * pace, shift_duration=plain.shift_duration * pace,
             hinge_pace=plain.hinge_pace / pace,
             goal_distance=NEAR_GOAL if self._climbs or self._hangs else plain.goal_distance * safe,
-        )
+        )  # fmt: skip
 
     def _starts(self, goal: FloatArray) -> Iterator[Endpoint]:
         """Postures at the start, the best first, or the reason why there is none."""

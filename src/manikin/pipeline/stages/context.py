@@ -42,12 +42,10 @@ def motion_in_world(motion: Motion, transform_task_to_world: PlanarTransform) ->
         return motion
     forces = motion.contact_force.reshape(*motion.contact_force.shape[:-1], 2, 3)
     return replace(
-        motion,
-        q=transform.poses(motion.q),
-        com=transform.points(motion.com),
+        motion, q=transform.poses(motion.q), com=transform.points(motion.com),
         angular_momentum=transform.directions(motion.angular_momentum),
         contact_force=transform.directions(forces).reshape(motion.contact_force.shape),
-    )
+    )  # fmt: skip
 
 
 def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: PlanarTransform) -> ContactSchedule:
@@ -328,11 +326,9 @@ class Report:
         transform = self.transform
         content = MotionFile(
             None if planned is None else motion_in_world(planned, transform),
-            None if executed is None else motion_in_world(executed, transform),
-            self._context.body,
-            self._context.scene_in_world,
-            schedule_in_world(schedule, transform),
-        )
+            None if executed is None else motion_in_world(executed, transform), self._context.body,
+            self._context.scene_in_world, schedule_in_world(schedule, transform),
+        )  # fmt: skip
         write_motions(self._directory.path / file, content)
 
     def close(self) -> dict[str, Any]:

@@ -235,11 +235,9 @@ def execute_motion(
     if (push := summary["push"]) is not None:
         push["direction_deg"] = report.transform.turned(push["direction_deg"])
     block = {
-        "required": True,
-        "failure": None if failure is None else asdict(failure),
-        **summary,
+        "required": True, "failure": None if failure is None else asdict(failure), **summary,
         **context.passage(result.schedule or planned.schedule, result.motion).summary(),
-    }
+    }  # fmt: skip
     report.finish("execution", block)
     report.proved = failure is None
     if failure is not None:

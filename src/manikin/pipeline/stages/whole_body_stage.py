@@ -203,18 +203,15 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "added_key_frames_s": sorted(result.added_times) if recorded else None,
         "duration_s": None if trajectory is None else trajectory.duration,
         "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
-        "min_margin": result.d_min,
-        "margin_unit": result.problem.margin_unit,
+        "min_margin": result.d_min, "margin_unit": result.problem.margin_unit,
         "friction": None if trajectory is None else _friction(trajectory),
         "limiting_phase": result.limiting_phase,
         "limiting_contact": None if result.limiting is None else result.limiting.description,
         "min_force_at_com_N": least_force_at_com(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
-        "feasibility_radius": result.feasibility_radius,
-        "replans": 0,
-        "key_postures": None,
+        "feasibility_radius": result.feasibility_radius, "replans": 0, "key_postures": None,
         "wall_s": result.wall_time,
-    }
+    }  # fmt: skip
 
 
 def least_force_at_com(result: CentroidalResult) -> float | None:

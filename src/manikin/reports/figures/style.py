@@ -39,15 +39,9 @@ class Labels:
         self._taken: list[Bbox] = []
 
     def write(
-        self,
-        text: str,
-        place: tuple[float, float],
-        offset: tuple[float, float] = (0.0, 0.0),
-        *,
-        size: float = 7.5,
-        ha: str = "left",
-        **style: Any,
-    ) -> bool:
+        self, text: str, place: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0), *,
+        size: float = 7.5, ha: str = "left", **style: Any,
+    ) -> bool:  # fmt: skip
         """Write a text unless it would cover another one.
 
         Args:

@@ -252,15 +252,9 @@ class Timeline:
 
 
 def timeline(
-    record: RunRecord,
-    size: tuple[float, float],
-    title: str,
-    panels: int,
-    columns: int = 1,
-    *,
-    strip: float = 0.1,
-    **margins: Any,
-) -> Timeline:
+    record: RunRecord, size: tuple[float, float], title: str, panels: int, columns: int = 1, *,
+    strip: float = 0.1, **margins: Any,
+) -> Timeline:  # fmt: skip
     """Make the figure and its grid; the strips and panels are drawn when asked for.
 
     Args:
