@@ -27,12 +27,7 @@ LEFT_OUT = ("requirements", "failure", "verdict", "planned", "proved", "succeede
 
 
 def render(template: str, **values: Any) -> str:
-    """Fill in a page; every text in it is escaped.
-
-    Args:
-        template: Name of a page in ``templates``, such as ``"run"``.
-        values: What the template uses.
-    """
+    """Fill in a page of ``templates``, such as ``"run"``, with values; every text in it is escaped."""
     return _environment().get_template(f"{template}.html.jinja").render(**values)
 
 
@@ -85,8 +80,8 @@ def write_run_page(directory: str | Path) -> Path:
 def run_page(folder: Path, summary: Mapping[str, Any]) -> str:
     """HTML of a run in a folder: verdict, requirements, figures and all numbers."""
     files = {file.stem: file for file in sorted((folder / FIGURES).glob("*.png"))}
-    names = [*(name for name in FIRST if name in files), *(name for name in files if name not in FIRST)]
-    pictures = {readable(name): files[name].read_bytes() for name in names}
+    names = dict.fromkeys([*FIRST, *files])
+    pictures = {readable(name): files[name].read_bytes() for name in names if name in files}
     values = dict(_flat({key: value for key, value in summary.items() if key not in LEFT_OUT}))
     return render("run", summary=summary, verdict=verdict_line(summary), pictures=pictures, values=values)
 
