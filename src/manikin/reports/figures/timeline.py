@@ -53,17 +53,15 @@ def timing_figure(record: RunRecord) -> Figure:
         left=label_room(record.effectors), top=0.7, between=0.6 + 0.13 * most, height_ratios=[2.2, rows],
     )  # fmt: skip
     _draw_durations(figure.add_subplot(grid[0]), schedule)
-    axes = figure.add_subplot(grid[1])
-    end = end_of(record)
+    axes, end = figure.add_subplot(grid[1]), end_of(record)
     draw_phases(axes, phases, end)
     colours = colours_of(record.effectors)
     for row, name in enumerate(record.effectors):
-        bars = _bars(schedule, name, end)
+        bars = _bars(phases, name, end)
         axes.broken_barh(bars, (row + 0.12, 0.40), facecolors=colours[name], alpha=0.9)
         if executed is not None and name in executed.contact_names:
-            axes.broken_barh(
-                _loaded(executed, name), (row + 0.56, 0.26), facecolors=COLOURS["ink"], alpha=0.75
-            )
+            bars = _loaded(executed, name)
+            axes.broken_barh(bars, (row + 0.56, 0.26), facecolors=COLOURS["ink"], alpha=0.75)
     axes.set_yticks(np.arange(len(record.effectors)) + 0.5, [readable(n) for n in record.effectors])
     axes.set_ylim(len(record.effectors), 0.0)
     title = "planned supports (wide bars) and loaded contacts of the execution (narrow bars)"
@@ -95,13 +93,13 @@ def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
 
 
 def _keys(schedule: ContactSchedule) -> list[Patch | Line2D]:
-    keys = support_keys(len(phase.stance) for phase in schedule.sequence)
-    shortest = Patch(facecolor=COLOURS["soft"], hatch="///", edgecolor="white", label="as short as allowed")
-    ink = COLOURS["ink"]
-    bounds = [Line2D([], [], color=ink, linewidth=1.2, label="shortest allowed")]
+    look: dict[str, Any] = {"color": COLOURS["ink"], "linewidth": 1.2}
+    keys: list[Patch | Line2D] = [*support_keys(len(phase.stance) for phase in schedule.sequence)]
+    keys.append(Patch(facecolor=COLOURS["soft"], hatch="///", edgecolor="white", label="as short as allowed"))
+    keys.append(Line2D([], [], **look, label="shortest allowed"))
     if any(phase.max_duration is not None for phase in schedule.sequence):
-        bounds.append(Line2D([], [], color=ink, linewidth=1.2, linestyle="dotted", label="longest allowed"))
-    return [*keys, shortest, *bounds]
+        keys.append(Line2D([], [], **look, linestyle="dotted", label="longest allowed"))
+    return keys
 
 
 def _width(schedule: ContactSchedule) -> float:
@@ -111,13 +109,9 @@ def _width(schedule: ContactSchedule) -> float:
     return max(11.0, label_room(effectors) + len(schedule.sequence) * item)
 
 
-def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float, float]]:
-    stops = np.append(schedule.instants[1:-1], end)
-    return [
-        (float(start), float(stop - start))
-        for start, stop, phase in zip(schedule.instants[:-1], stops, schedule.sequence, strict=True)
-        if name in phase.stance
-    ]
+def _bars(phases: PhaseTable, name: str, end: float) -> list[tuple[float, float]]:
+    """Start and length of each phase in which an effector is in contact."""
+    return [(start, stop - start) for start, stop, on in _spans(phases, end) if name in on]
 
 
 def _loaded(motion: Motion, name: str) -> list[tuple[float, float]]:
@@ -148,12 +142,12 @@ def margin_figure(record: RunRecord) -> Figure:
     size = 13.5, 4.8 + 2.6 * (len(panels) - 1)
     drawing = timeline(record, size, "Stability margin", len(panels), strip=0.075, between=0.15)
     drawing.strip()
-    for row, (unit, top) in enumerate(panels):
-        axes = drawing.panel(row + 1)
-        shown = {name: curve for name, curve in curves.items() if curve.margin_unit == unit}
-        _draw_curves(axes, shown, phases, top)
-        zoomed = "" if top is None else ", lower part"
-        drawing.label(axes, f"margin{zoomed} [{unit}]")
+    for row, (unit, top) in enumerate(panels, 1):
+        axes = drawing.panel(row)
+        _draw_curves(
+            axes, {n: curve for n, curve in curves.items() if curve.margin_unit == unit}, phases, top
+        )
+        drawing.label(axes, f"margin{'' if top is None else ', lower part'} [{unit}]")
     legend_in_title(drawing.figure, *drawing.figure.axes[1 : 1 + len(units)])
     return drawing.figure
 
@@ -167,11 +161,10 @@ def phase_minima(curve: ComTrack, phases: PhaseTable) -> list[int]:
 
 def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | None:
     """Upper end of the zoomed panel, or None when one panel shows everything well."""
-    peaks = [
-        float(curve.margin[phases.phase_at(curve.time) == phase].max(initial=-np.inf))
-        for curve in curves.values()
-        for phase in range(len(phases))
-    ]
+    peaks = []
+    for curve in curves.values():
+        inside = phases.phase_at(curve.time)
+        peaks += [float(curve.margin[inside == n].max(initial=-np.inf)) for n in range(len(phases))]
     lowest = min((peak for peak in peaks if peak > 0.0), default=0.0)
     return ZOOM * lowest if lowest > 0.0 and max(peaks) > ZOOM_FROM * lowest else None
 
@@ -205,15 +198,11 @@ def _mark_minima(
         if top is not None and margin > top:
             continue
         axes.plot(time, margin, "o", markersize=3.5, color=COLOURS[name], zorder=5)
-        inwards = "left" if time < first else "right" if time > last else "center"
-        labels.write(
-            f"{margin:.0f}", (time, margin), offset, size=7, ha=inwards, color=COLOURS[name], zorder=6
-        )
+        look = {"ha": "left" if time < first else "right" if time > last else "center", "zorder": 6}
+        labels.write(f"{margin:.0f}", (time, margin), offset, size=7, color=COLOURS[name], **look)
     index = int(np.argmin(curve.margin))
-    axes.plot(
-        curve.time[index], curve.margin[index], "o", markersize=9, markerfacecolor="none",
-        markeredgecolor=COLOURS[name], markeredgewidth=1.4, zorder=6,
-    )  # fmt: skip
+    ring = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4, "zorder": 6}
+    axes.plot(curve.time[index], curve.margin[index], "o", markeredgecolor=COLOURS[name], **ring)
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,10 +247,8 @@ def timeline(
     """Make the figure and its grid; the strips and panels are drawn when asked for.
 
     Args:
-        record: With phases.
         size: Width and height of the figure [inch].
         panels: Rows of panels below the strip.
-        columns: Of strips and panels.
         strip: Height of the strip for each effector, relative to that of a panel.
         margins: Of :func:`manikin.reports.figures.style.new_grid`.
     """
@@ -287,7 +274,7 @@ def _draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
     effectors = list(dict.fromkeys(name for supports in phases.supports for name in supports))
     colours = colours_of(effectors)
     for row, effector in enumerate(effectors):
-        bars = [(start, stop - start) for start, stop, on in _spans(phases, end) if effector in on]
+        bars = _bars(phases, effector, end)
         axes.broken_barh(bars, (row + 0.15, 0.7), facecolors=colours[effector], alpha=0.85)
     axes.set_yticks(np.arange(len(effectors)) + 0.5, [readable(name) for name in effectors], fontsize=8)
     axes.set_ylim(len(effectors) + 0.05, 0.0)
@@ -306,9 +293,9 @@ def _draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
 
 def _spans(phases: PhaseTable, end: float) -> list[tuple[float, float, tuple[str, ...]]]:
     """Start, end and supports of each phase; the last one lasts until ``end``."""
-    stops = [*(float(t) for t in phases.instants[1:-1]), max(end, float(phases.instants[-1]))]
-    starts = [float(t) for t in phases.instants[:-1]]
-    return list(zip(starts, stops, phases.supports, strict=True))
+    instants = [float(instant) for instant in phases.instants]
+    stops = [*instants[1:-1], max(end, instants[-1])]
+    return list(zip(instants[:-1], stops, phases.supports, strict=True))
 
 
 LEVEL_COLOURS = ("#DDEBDD", "#EFF3D2", "#FBEBC3", "#F6D2BB", "#EDB4B1")
@@ -347,11 +334,9 @@ def ergonomics_figure(found: Ergonomics, title: str = "Ergonomics") -> Figure:
 
 def _draw_scores(axes: Axes, one: Assessment, ends: Sequence[int], colours: Sequence[str]) -> None:
     """Both sides as steps over the bands of the action levels."""
-    beginnings = (1, *(end + 1 for end in ends[:-1]))
-    for first, last, colour in zip(beginnings, ends, colours, strict=True):
-        axes.axhspan(first - 0.5, last + 0.5, color=colour, linewidth=0, zorder=0)
-    styles = {"left": ("#0072B2", 0.06), "right": ("#D55E00", -0.06)}
-    for side, (colour, aside) in styles.items():
+    for before, last, colour in zip((0, *ends), ends, colours, strict=False):
+        axes.axhspan(before + 0.5, last + 0.5, color=colour, linewidth=0, zorder=0)
+    for side, colour, aside in (("left", "#0072B2", 0.06), ("right", "#D55E00", -0.06)):
         axes.step(one.time, one.sides[side] + aside, where="mid", color=colour, linewidth=1.3, label=side)
     dress(axes, f"{one.method} score")
     axes.grid(visible=False)
@@ -363,10 +348,9 @@ def _draw_scores(axes: Axes, one: Assessment, ends: Sequence[int], colours: Sequ
 
 
 def _draw_shares(axes: Axes, found: Ergonomics, strength: JointStrength) -> None:
-    for number, index in enumerate(strength.order[:SHOWN_JOINTS]):
-        name = readable(strength.joint_names[index])
-        label = f"{name} ({strength.peak[index]:.0%})"
-        axes.plot(found.time, strength.share[:, index], color=CYCLE[number], linewidth=1.1, label=label)
+    for index, colour in zip(strength.order[:SHOWN_JOINTS], CYCLE, strict=False):
+        label = f"{readable(strength.joint_names[index])} ({strength.peak[index]:.0%})"
+        axes.plot(found.time, strength.share[:, index], color=colour, linewidth=1.1, label=label)
     axes.axhline(1.0, color=COLOURS["ink"], linewidth=0.8)
     axes.axhline(strength.fraction, color=COLOURS["soft"], linewidth=0.8, linestyle=(0, (4, 3)))
     dress(axes, "torque per strength")
