@@ -103,7 +103,6 @@ class LowestPoints:
     """Lowest centres of mass of one group of motions.
 
     Attributes:
-        group: Its name.
         com: Lowest heights of the centre of mass above the floor, of each motion or passage [m].
         overhead: Height of what was passed; None where nothing was or it is not known [m].
         rooms: From the highest part of the body to it; empty where not known [m].
@@ -157,7 +156,7 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
         name_groups(axes, [item.group for item in shown])
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.grid(False, axis="x")
-    if not any(item.overhead is not None for item in shown):
+    if all(item.overhead is None for item in shown):
         right.annotate("nothing overhead is known", (0.5, 0.5), xycoords="axes fraction", ha="center",
                        fontsize=9, color=COLOURS["soft"])  # fmt: skip
     return figure
@@ -185,10 +184,10 @@ def com_distances_figure(
             :func:`~manikin.recordings.statistics.phases.published_distances`.
     """
     known = published or {}
-    result = [(clip, item) for clip in clips for item in support_distances(clip)]
-    effectors = need(sorted({*known, *(item.effector for _, item in result)}), "a support")
+    result = [(clip, support_distances(clip)) for clip in clips]
+    used = {item.effector for _, distances in result for item in distances}
+    effectors = need(sorted({*known, *used}), "a support")
     colours = group_colours(clip.group for clip in clips)
-    groups = list(colours)
     figure, grid = new_grid(
         9.6, 1.2 + 2.6 * len(effectors), "Centre of mass to its supports", len(effectors), 2,
         width_ratios=[3.0, 1.0], top=1.0, between=0.85, across=0.5,
@@ -196,17 +195,16 @@ def com_distances_figure(
     for row, effector in enumerate(effectors):
         axes = figure.add_subplot(grid[row, 0])
         most = figure.add_subplot(grid[row, 1], sharey=axes)
-        for clip, item in result:
-            if item.effector == effector:
+        largest: dict[str, list[float]] = {group: [] for group in colours}
+        for clip, distances in result:
+            own = [item for item in distances if item.effector == effector]
+            for item in own:
                 axes.plot(item.time - item.time[0], item.distance, color=colours[clip.group], linewidth=1.0,
                           alpha=0.8)  # fmt: skip
-        for number, group in enumerate(groups):
-            largest: dict[int, float] = {}
-            for clip, item in result:
-                if clip.group == group and item.effector == effector:
-                    most_yet = largest.get(id(clip), 0.0)
-                    largest[id(clip)] = max(most_yet, float(item.distance.max()))
-            most.plot([number] * len(largest), [*largest.values()], "o", color=colours[group], markersize=4)
+            if own:
+                largest[clip.group].append(max(float(item.distance.max()) for item in own))
+        for number, (group, values) in enumerate(largest.items()):
+            most.plot([number] * len(values), values, "o", color=colours[group], markersize=4)
         if effector in known:
             spread = known[effector]
             most.axhspan(spread.smallest, spread.largest, color=COLOURS["shade"], zorder=0)
@@ -215,7 +213,7 @@ def com_distances_figure(
             panel.axhline(limit, color=COLOURS["ink"], linewidth=1.0, linestyle=(0, (5, 3)))
         dress(axes, "distance [m]", "time from touch-down, or from the beginning [s]", readable(effector))
         dress(most, title="largest of each motion")
-        name_groups(most, groups)
+        name_groups(most, list(colours))
         most.tick_params(labelleft=False)
     keys = [Line2D([], [], color=colour, label=group) for group, colour in colours.items()]
     keys.append(Line2D([], [], color=COLOURS["ink"], linestyle=(0, (5, 3)), label=f"limit, {limit:g} m"))
@@ -240,8 +238,9 @@ def com_paths_figure(
     motions = list(need(list(clips), "a recorded motion"))
     if len(motions) != len(origins):
         raise FigureError(f"{len(origins)} origins of {len(motions)} motions; valid: one for each")
+    heights = [1.25, 1.0]
     figure, grid = new_grid(
-        9.6, 7.4, "Ways of the centre of mass", 2, 1, height_ratios=[1.25, 1.0], top=0.8, between=0.7
+        9.6, 7.4, "Ways of the centre of mass", 2, 1, height_ratios=heights, top=0.8, between=0.7
     )
     side, above = (figure.add_subplot(grid[row]) for row in range(2))
     colours = group_colours(clip.group for clip in motions)
@@ -297,10 +296,8 @@ LEAST_SPAN = 4e-3
 def com_figure(record: RunRecord) -> Figure:
     """Draw the CoM along each axis, planned and executed ([Qiu2012]_ Fig. 5.12, 5.22, 6.9, 7.8, 7.14)."""
     tracks = need(record.tracks, "a motion of the centre of mass")
-    shown = timeline(
-        record, (14.0, 7.0), "Centre of mass", 3, len(QUANTITIES), strip=0.14, top=0.75, between=0.22,
-        across=0.75,
-    )  # fmt: skip
+    margins = {"strip": 0.14, "top": 0.75, "between": 0.22, "across": 0.75}
+    shown = timeline(record, (14.0, 7.0), "Centre of mass", 3, len(QUANTITIES), **margins)
     for column, (quantity, unit) in enumerate(QUANTITIES):
         shown.strip(column, quantity.capitalize(), named=column == 0)
         for row, axis in enumerate("xyz"):

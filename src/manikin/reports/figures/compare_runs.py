@@ -110,20 +110,16 @@ def compare_postures_figure(comparison: RunComparison) -> Figure:
         between=0.35, left=0.85,
     )  # fmt: skip
     offsets = [pitch * column for column in range(len(postures))]
-    for row, (name, run, colour) in enumerate(
-        zip(comparison.names, comparison.runs, RUN_COLOURS, strict=True)
-    ):
-        axes = figure.add_subplot(grid[row, 0])
+    for row, (name, run) in enumerate(zip(comparison.names, comparison.runs, strict=True)):
+        axes, motion, colour = figure.add_subplot(grid[row, 0]), run.motions[which], RUN_COLOURS[row]
         for offset, posture in zip(offsets, postures, strict=True):
             time = posture.second_s if row else posture.first_s
-            motion = run.motions[which]
             sample = int(np.argmin(np.abs(motion.time - time)))
             draw_moment(axes, run, motion, sample, view.moved(offset, 0.0), (low, high))
             middle = offset + (left + right) / 2
             note(axes, f"{time:.2f} s", (middle, high[2]), fontsize=8.5, color=colour)
             if row:
-                worst = posture.largest[:2]
-                text = "\n".join(f"{readable(j.joint)} {j.difference_deg:+.1f}°" for j in worst)
+                text = "\n".join(f"{readable(j.joint)} {j.difference_deg:+.1f}°" for j in posture.largest[:2])
                 note(axes, text, (middle, low[2]), -44, va="bottom", fontsize=6.5, color="#5A5F69")
         dress(axes, f"{name}\n{view.labels[1]}", "")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
@@ -142,11 +138,10 @@ def compare_timing_figure(comparison: RunComparison) -> Figure:
     """
     rows = need(comparison.rows, "phases of both runs")
     most = max(len(row.supports) for row in rows)
-    longest = max(len(name) for name in comparison.names)
+    left = max(0.7, 0.2 + 0.08 * max(map(len, comparison.names)))
     figure, grid = new_grid(
         max(11.0, 1.1 * len(rows)), 5.6 + 0.13 * most, "Timing of two runs", 2, 1, top=0.75,
-        bottom=0.2 + 0.14 * most, between=0.75, left=max(0.7, 0.2 + 0.08 * longest),
-        height_ratios=[1.0, 1.3],
+        bottom=0.2 + 0.14 * most, between=0.75, left=left, height_ratios=[1.0, 1.3],
     )  # fmt: skip
     _draw_bars(figure.add_subplot(grid[0]), comparison)
     _draw_durations(figure.add_subplot(grid[1]), rows, comparison.names)
@@ -165,9 +160,8 @@ def _draw_bars(axes: Axes, comparison: RunComparison) -> None:
             axes.text((phase.start_s + phase.end_s) / 2, level, f"{phase.phase}", ha="center", va="center",
                       fontsize=8, color="white", fontweight="bold")  # fmt: skip
             ends.append(phase.end_s)
-        if row.first is not None and row.second is not None:
-            for name in ("start_s", "end_s"):
-                instants = getattr(row.first, name), getattr(row.second, name)
+        if (one := row.first) is not None and (other := row.second) is not None:
+            for instants in ((one.start_s, other.start_s), (one.end_s, other.end_s)):
                 axes.plot(instants, [0.74, 0.26], color=COLOURS["soft"], linewidth=0.8)
     axes.set_ylim(-0.4, 1.4)
     axes.set_xlim(0.0, 1.01 * max(ends))
@@ -224,7 +218,7 @@ def compare_scene_figure(comparison: RunComparison) -> Figure:
     figure = new_figure(9.5, 8.0, "Centres of mass of two runs")
     axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
     seen = [track.position for track in tracks.values()]
-    corners = draw_scene(axes, first.scene) if first.scene is not None else np.zeros((0, 3))
+    corners = draw_scene(axes, first.scene)
     if first.schedule is not None:
         seen.append(draw_soles(axes, first.schedule))
     for name, track in tracks.items():
@@ -237,10 +231,8 @@ def compare_scene_figure(comparison: RunComparison) -> Figure:
 
 def _tracks(comparison: RunComparison) -> dict[str, ComTrack]:
     """The planned CoM of each run."""
-    result = {}
-    for name, run in zip(comparison.names, comparison.runs, strict=True):
-        result[name] = next(iter(need(run.tracks, "a centre of mass of both runs").values()))
-    return result
+    tracks = [need(run.tracks, "a centre of mass of both runs") for run in comparison.runs]
+    return {name: next(iter(of.values())) for name, of in zip(comparison.names, tracks, strict=True)}
 
 
 def _styles(comparison: RunComparison) -> dict[str, dict[str, Any]]:

@@ -157,7 +157,7 @@ def scene_figure(record: RunRecord) -> Figure:
     figure = new_figure(9.5, 8.0, f"Motion in the scene ({name})")
     axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
     seen = [track.position]
-    corners = draw_scene(axes, record.scene) if record.scene is not None else np.zeros((0, 3))
+    corners = draw_scene(axes, record.scene)
     if record.schedule is not None:
         seen.append(draw_soles(axes, record.schedule))
     figure_of = None if record.body is None or record.body.is_point_mass else record.body
@@ -240,10 +240,10 @@ def _sticks(body: BodyModel) -> list[tuple[str, str]]:
     return sticks + [(effector.segment, f"effector/{effector.name}") for effector in free]
 
 
-def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
+def draw_scene(axes: Axes3D, scene: Scene | None) -> FloatArray:
     """Draw every finite obstacle; return the corners of their bounds."""
     corners = [np.zeros((0, 3))]
-    for obstacle in finite_obstacles(scene):
+    for obstacle in [] if scene is None else finite_obstacles(scene):
         if isinstance(obstacle.shape, Box):
             faces = obstacle.to_world(BOX_CORNERS * obstacle.shape.size / 2)[_QUADS]
         else:
