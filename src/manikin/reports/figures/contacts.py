@@ -19,16 +19,7 @@ from manikin.body.segments import segment_triangles
 from manikin.contact import Contact, ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.figures.style import dress, legend_in_title, need, new_figure, new_grid
-from manikin.reports.figures.views import (
-    View,
-    best_view,
-    distinct_contacts,
-    draw_contact,
-    draw_obstacles,
-    finite_obstacles,
-    panel_ticks,
-)
+from manikin.reports.figures import style, views
 from manikin.runtime.display import COLOURS, colours_of, readable
 from manikin.scene import Scene
 
@@ -71,10 +62,10 @@ def contact_choice_figure(
         azimuth_deg: Direction of the eye about the vertical [deg].
         columns: Panels in a row; all when omitted.
     """
-    need(panels, "a panel", "at least one body")
+    style.need(panels, "a panel", "at least one body")
     wide = columns or len(panels)
     rows = -(-len(panels) // wide)
-    figure = new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
+    figure = style.new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
     low, high = _box(body, panels)
     if any(panel.task is not None for panel in panels):
         high[2] += TASK
@@ -147,7 +138,7 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Sequence[str]) -> list[S
 def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
     """Finite obstacles, those of them that are between two corners (3,) of a box [m]."""
     result = []
-    for obstacle in finite_obstacles(scene, low, high):
+    for obstacle in views.finite_obstacles(scene, low, high):
         mesh = obstacle.to_trimesh()
         finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
         triangles = np.asarray(finer[0])[np.asarray(finer[1])]
@@ -202,12 +193,12 @@ def contacts_figure(record: RunRecord) -> Figure:
     Held contacts are filled; dashed ones have been left or are made in the next phase. The
     view is from above, or along the walls when the contacts are on walls.
     """
-    schedule = need(record.schedule, "a contact schedule")
-    need(len(schedule.sequence) <= MOST, f"at most {MOST} phases")
-    view = best_view(schedule)
+    schedule = style.need(record.schedule, "a contact schedule")
+    style.need(len(schedule.sequence) <= MOST, f"at most {MOST} phases")
+    view = views.best_view(schedule)
     track = next(iter(record.tracks.values()), None)
     count = len(schedule.sequence)
-    points = [c.points_in_world for c in distinct_contacts(schedule)]
+    points = [c.points_in_world for c in views.distinct_contacts(schedule)]
     seen = np.vstack(points + ([] if track is None else [track.position]))
     low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
     width, height = view(high - low)
@@ -217,7 +208,7 @@ def contacts_figure(record: RunRecord) -> Figure:
     most = max(COLUMNS if count != 7 else 4, int(WIDEST / (pitch[0] * scale)))
     rows = -(-count // most)
     columns = min(count, most) if most <= COLUMNS else -(-count // rows)
-    figure, grid = new_grid(
+    figure, grid = style.new_grid(
         columns * pitch[0] * scale + 0.8, rows * pitch[1] * scale + 1.15,
         f"Contacts of each phase, {view.words}", 1, 1, top=0.75,
     )  # fmt: skip
@@ -233,16 +224,16 @@ def contacts_figure(record: RunRecord) -> Figure:
         title = f"{number}: {start:.2f}–{end:.2f} s"
         axes.annotate(title, (left, top), (0, 3), textcoords="offset points", fontsize=8.5)
         if record.scene is not None:
-            draw_obstacles(axes, record.scene, place, low, high)
+            views.draw_obstacles(axes, record.scene, place, low, high)
         _draw_phase(axes, schedule, number, place, track)
     (left, bottom), (right, top) = view(low), view(high)
     horizontal, vertical = view.labels
-    dress(axes, f"{vertical}, each panel", f"{horizontal}, each panel")
+    style.dress(axes, f"{vertical}, each panel", f"{horizontal}, each panel")
     axes.grid(False)
     for side in ("left", "bottom"):
         axes.spines[side].set_visible(False)
-    axes.set_xticks(*panel_ticks(left, right, rights))
-    axes.set_yticks(*panel_ticks(bottom, top, ups))
+    axes.set_xticks(*views.panel_ticks(left, right, rights))
+    axes.set_yticks(*views.panel_ticks(bottom, top, ups))
     axes.set(xlim=(left, right + rights[-1]), ylim=(bottom + ups[-1], top + 0.25 * width / panel))
     axes.set_aspect("equal", adjustable="box", anchor="W")
     for name, colour in colours_of(schedule.sequence.effectors).items():
@@ -251,12 +242,12 @@ def contacts_figure(record: RunRecord) -> Figure:
         Line2D([], [], color=COLOURS["ink"], linewidth=2.0, label="centre of mass"),
         Patch(fill=False, linestyle="--", label="dashed or pale: left, or made next"),
     ]
-    legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))
+    style.legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))
     return figure
 
 
 def _draw_phase(
-    axes: Axes, schedule: ContactSchedule, number: int, view: View, track: ComTrack | None
+    axes: Axes, schedule: ContactSchedule, number: int, view: views.View, track: ComTrack | None
 ) -> None:
     stance = schedule.sequence[number].stance
     colours = colours_of(schedule.sequence.effectors)
@@ -264,9 +255,9 @@ def _draw_phase(
         if 0 <= near < len(schedule.sequence):
             for contact in schedule.sequence[near].stance:
                 if not any(contact.same_place(other) for other in stance):
-                    draw_contact(axes, contact, view, colours[contact.effector], held=False)
+                    views.draw_contact(axes, contact, view, colours[contact.effector], held=False)
     for contact in stance:
-        draw_contact(axes, contact, view, colours[contact.effector])
+        views.draw_contact(axes, contact, view, colours[contact.effector])
     if track is not None:
         start, end = schedule.instants[number : number + 2]
         path = view(track.at(np.linspace(start, end, 40)))
