@@ -168,10 +168,8 @@ def durations(time: FloatArray, counted: NDArray[np.bool_] | bool = True) -> Flo
 
 LONG = 60.0
 """A posture held for longer than this is static [s] ([McAtamney1993]_, [Hignett2000]_)."""
-
 STILL = np.deg2rad(10.0)
 """A posture is held as long as no angle leaves a band of this width [rad]; ours."""
-
 RATE = 5.0
 """Rate at which postures are compared [Hz]."""
 

@@ -13,16 +13,12 @@ from manikin.motion.motion import com_velocity, effector_positions
 from manikin.numerics.spatial import GRAVITY, FloatArray
 
 Flags = NDArray[np.bool_]
-
 EVEN = 0.3
 """A leg that carries at least this share of what both carry bears its part; ours."""
-
 NEAR_FLOOR = 0.05
 """In a motion without contacts a sole this little above the lower one is on the ground [m]; ours."""
-
 WALKING_SPEED = 0.4
 """Horizontal speed of the centre of mass from which a person walks [m/s]; ours."""
-
 ARM_WEIGHT = 0.025
 """Share of the body's weight, half that of an arm, from which on a hand's support carries the arm; ours."""
 

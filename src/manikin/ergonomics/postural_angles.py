@@ -25,7 +25,6 @@ from manikin.numerics.spatial import FloatArray, dot
 
 SIDEWAYS = np.deg2rad(45.0)
 """An upper arm lifted further sideways than this has no angle in the sagittal plane worth the name; ours."""
-
 UPRIGHT = np.deg2rad(10.0)
 """Lean of the trunk up to which a neck is taken for upright; ours."""
 

@@ -35,7 +35,6 @@ from manikin.runtime.files import csv_text
 
 FRICTION = 0.8
 """Coefficient of friction of contacts that are known by the motion alone."""
-
 AGREES = 0.5
 """Difference up to which a margin counts as reproduced [N.m]."""
 

@@ -23,7 +23,6 @@ from manikin.scenarios import Scenario, list_scenarios, list_variants, load_scen
 
 TIME_LIMIT = 1800.0
 """Wall time after which a run is ended [s]."""
-
 _EXPLAINED = 3
 """Exit status of a run that ended in an explained failure."""
 

@@ -41,18 +41,13 @@ from manikin.verification import PlannedContacts, check_contact_plan
 BENCHMARK = "benchmark.json"
 SCENES = "scenes"
 TASKS = "tasks"
-
 TIME_LIMIT = 600.0
 """Processor time after which a task is ended [s]."""
-
 OUTCOMES = ("proved", "planned", "contacts", "failed")
 """How far a task came, the farthest first."""
-
 StageName = Literal["contacts", "all"]
-
 SIZES = ("stature_m", "mass_kg", "sex")
 """Keys of a body that an entry tells."""
-
 _AFTER = {"planned": ("execution",), "contacts": ("centroidal", "wholebody", "execution", "check")}
 """Stages in which a task that is ended has come so far already."""
 

@@ -100,16 +100,12 @@ def _tenths(value: float) -> int:
 
 POSTURES = 7
 """Postures drawn, each above its instant: in the middle of as many equal parts of the time."""
-
 LARGEST = 115.0
 """Scale of the postures where there is room [px/m]."""
-
 WIDTH, LEFT, RIGHT = 1120.0, 105.0, 15.0
 ROW, BAND, GAP = 20.0, 92.0, 42.0
 """Heights of a row of supports, of a band of curves, and between bands [px]."""
-
 GRID = "#E3E3E3"
-
 Curves = Mapping[str, tuple[FloatArray, str]]
 
 

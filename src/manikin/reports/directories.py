@@ -56,7 +56,6 @@ from manikin.walking.words import (
 
 MAP = "map.json"
 TABLE = "map.csv"
-
 RESULTS = ("impulse_Ns", "beyond_Ns", "trials", "bound_Ns")
 """Keys of a map that are found or computed; all others say what was asked."""
 
@@ -217,7 +216,6 @@ WORDS = "words.json"
 SLICES = "slices"
 SHOWN_SLICES = (340, 150)
 """Headings of the slices that are drawn if they are there, those of [Truong2010]_ Fig. 3.6 [deg]."""
-
 _ARRAYS = ("turns", "shapes", "lengths", "costs")
 _REACHED = 1e-6
 """Largest distance of a path's end from its goal [m]; a changed byte exceeds it."""

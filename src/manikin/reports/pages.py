@@ -21,7 +21,6 @@ from manikin.scenarios.families import FAMILIES
 
 FIRST = ("scene", "postures", "margin", "com", "contacts")
 """Figures that come first, in this order; the others follow by name."""
-
 LEFT_OUT = ("requirements", "failure", "verdict", "planned", "proved", "succeeded")
 """Keys of the summary that the page says in other words."""
 

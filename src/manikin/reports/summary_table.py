@@ -8,13 +8,10 @@ HEADER = (
     "force at the CoM", "ZMP to the edge", "CoM rms", "fell", "wall", "planned", "proved", "result",
 )  # fmt: skip
 """Columns of the table."""
-
 UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "N", "mm", "mm", "", "s + s + s", "", "", "")
 """Units of the columns; the planned margin brings its own."""
-
 NOTHING = "-"
 """Stands for a value that a run does not have."""
-
 _YES_OR_NO = {True: "yes", False: "no", None: NOTHING}
 
 

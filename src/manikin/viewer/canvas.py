@@ -76,13 +76,10 @@ COLOURS = {
     "recorded": (106, 81, 163), "planned": (0, 114, 178), "executed": (213, 94, 0), "left": (0, 158, 115),
     "right": (204, 121, 167), "trunk": (150, 156, 166), "obstacle": (186, 192, 202), "force": (230, 159, 0),
 }  # fmt: skip
-
 VIEW = np.array([-1.7, -1.9, 0.5])
 """Position of a new visitor's camera relative to what it looks at [m]."""
-
 WHOLE = 2.0
 """Size of what that camera sees as a whole, without a body [m]."""
-
 ABOVE = 0.35
 """Height of a name above the origin of the head [m]."""
 

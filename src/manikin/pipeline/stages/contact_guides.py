@@ -41,7 +41,6 @@ class RootGuide:
 
 SINKS = tuple(0.065 * np.arange(11))
 """Depths by which the root at an end of a guide may sink [m]; our choice."""
-
 GUIDE_PLACES = 200
 """Places by which the contact planner knows a guide."""
 

@@ -169,25 +169,18 @@ class _FootSearch(_ContactSearch):
 
 STANDING_HEIGHT = 0.92
 """Height of the root of a standing person of 1.75 m, the unit in which bodies are compared [m]."""
-
 SMALLEST = 0.3
 """Least factor on distances that are kept for safety, however small the body."""
-
 STRIDE = 0.4
 """Stride of a creature as a share of the reach of its limbs; our choice."""
-
 AROUND_LIMBS = 1.3
 """Room around start and goal in which the root is led, in heights of a standing root."""
-
 STEEPEST = float(np.deg2rad(50.0))
 """Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
-
 LEAN = 0.35
 """Largest lean of the root in any direction [rad]; our choice."""
-
 RETREATS = (0.25, 0.45)
 """Distances from a climber's best place before its holds at which it is tried as well, by the reach."""
-
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 

@@ -166,19 +166,14 @@ def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
 
 
 STAGE = "walk"
-
 PATH_EVERY = 5
 """Instants of a route for each one that is kept."""
-
 CLOCK = 0.01
 """Step of the common clock on which distances of walkers are measured [s]."""
-
 ROOM_TOLERANCE = 1e-3
 """The path keeps its room at the instants of its optimisation; between them it may miss this much [m]."""
-
 STANCE_SLIDE = 1e-3
 """A foot on the ground moves by at most this, as a planned support does [m]."""
-
 OBJECTIVES = {
     "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
     "recorded": RECORDED_WALKS, "recorded-turns": RECORDED_TURNS,

@@ -37,7 +37,6 @@ from manikin.planning.whole_body.point_mass_motion import point_mass_forces, poi
 
 KEY_ROOM = 0.5
 """Share of the fit's distance from the ends of the joint ranges that key postures keep."""
-
 KEY_TOLERANCES = (1.0e-3, 2.0e-4)
 """Tolerances of key postures [m]: as exact as the finished motion has to be; and more, where no motion is
 found although each posture was just within reach."""

@@ -277,7 +277,6 @@ def _seen(clip: RecordedClip, origin: Origin, places: FloatArray) -> FloatArray:
 
 
 QUANTITIES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s²"))
-
 LEAST_SPAN = 4e-3
 """Height of a panel at the least, in its unit."""
 

@@ -25,10 +25,8 @@ from manikin.simulation.push_map import told_apart
 
 PLAN_HEIGHT = 5.1
 """Height of the view from above [inch]."""
-
 DISTANCE_WIDTH = 7.4
 """Width of the panel over time [inch]."""
-
 EDGE = "#AEB4BE"
 """Colour of support polygons."""
 
@@ -126,10 +124,8 @@ def _frame_distance(axes: Axes, paths: list[ZmpPath]) -> None:
 
 OVERHEAD = 1.0
 """An obstacle that begins above this height [m] is something to walk under."""
-
 NARROW = 0.75
 """A way this much narrower than long has its legend beside it."""
-
 LEVEL = 0.3
 """Contacts whose normal has a smaller vertical part are on a wall."""
 
@@ -207,12 +203,9 @@ def _draw_obstacles(axes: Axes, scene: Scene) -> None:
 
 SOLES = 0.3
 """Part of the radius that the soles reach to."""
-
 CURVES = ("#0072B2", "#D55E00", *CYCLE)
 """Colours of the maps."""
-
 MARKERS = "osD^vP*X"
-
 BOUND = "bound without a step"
 
 

@@ -16,7 +16,6 @@ from manikin.runtime.display import COLOURS, colours_of, readable
 
 SHARE = 0.5
 """Share of the places inside an ellipse, for a normal distribution."""
-
 FEWEST = 3
 """Places of which an ellipse is drawn: two make a line."""
 
@@ -69,7 +68,6 @@ def _draw(axes: Axes, found: Sequence[SupportPlacement], colours: Mapping[str, s
 
 WIDTH = 0.8
 """Width of all bars of one phase over the distance between phases."""
-
 BEYOND = 2.5
 """Height of the axes per largest mean, beyond which whiskers are cut off."""
 

@@ -23,7 +23,6 @@ from manikin.scene import Box, Scene
 
 MOST = 9
 """Largest number of key instants drawn; of more some are left out, evenly."""
-
 GAP = 0.12
 """Gap between two panels [m]."""
 
@@ -143,7 +142,6 @@ def _frame(record: RunRecord, com: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 MOST_TICKS = 9
 """Ticks of the longest axis; the others have fewer."""
-
 _QUADS = np.array([(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)])
 """Faces of a box by the numbers of its corners."""
 

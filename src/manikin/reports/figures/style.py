@@ -20,7 +20,6 @@ from manikin.runtime.display import COLOURS, readable
 
 _WIDTH = 0.64
 """Width of a character over the size of its font, of the widest digits."""
-
 _HEIGHT = 1.1
 """Height of a line over the size of its font."""
 
@@ -69,7 +68,6 @@ COLOURS_OF_GROUPS = (
     "#6A51A3", "#D55E00", "#56B4E9", "#B59B00", "#8C564B", "#4D4D4D", "#E7298A", "#66A61E",
 )  # fmt: skip
 """Colours of groups, none of them that of a foot; they are repeated for more groups."""
-
 FITTING = 6.0
 """Characters of tick labels that stand side by side on an inch."""
 
@@ -103,7 +101,6 @@ STYLES: dict[str, dict[str, Any]] = {
     "executed": {"color": COLOURS["executed"], "linewidth": 0.9, "zorder": 4},
 }
 DPI = 150
-
 T = TypeVar("T")
 
 

@@ -22,7 +22,6 @@ from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
 
 AT_LIMIT = 1e-3
 """A duration this close to its bound is at it [s]."""
-
 _NAME_SIZE = 6.5
 """Font of the names below the bars [points]."""
 
@@ -109,7 +108,6 @@ def _loaded(motion: Motion, name: str) -> list[tuple[float, float]]:
 POINT_MASS = "planned point mass"
 ZOOM_FROM = 5.0
 """A second panel shows the lower part when some phase peaks this many times higher than another."""
-
 ZOOM = 2.5
 """Height of that panel over the smallest peak of a phase."""
 
@@ -286,16 +284,13 @@ def _spans(phases: PhaseTable, end: float) -> list[tuple[float, float, tuple[str
 
 LEVEL_COLOURS = ("#DDEBDD", "#EFF3D2", "#FBEBC3", "#F6D2BB", "#EDB4B1")
 """Colours of the action levels, the least urgent first; RULA's four levels begin at the second."""
-
 LEVELS = {
     "RULA": ("acceptable", "investigate", "change soon", "change now"),
     "REBA": ("negligible", "low", "medium", "high", "very high"),
 }
 """Action levels, in a word."""
-
 SHOWN_JOINTS = 5
 """Joints whose shares are drawn, those with the largest peaks."""
-
 _RULA_ENDS, _REBA_ENDS = (2, 4, 6, 7), (1, 3, 7, 10, 15)
 
 

@@ -33,10 +33,8 @@ from manikin.walking.words import STRAIGHT, THESIS_WORDS, EqualPaths, WordPath, 
 
 EVERY = 0.5
 """Time between the shoulders drawn along a way [s]."""
-
 SECONDS = 1.0
 """Time between the instants written beside a way, where several people walk [s]."""
-
 BESIDE = 0.7
 """Room shown beside the ways [m]."""
 
@@ -162,7 +160,6 @@ def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figur
 
 
 KINDS = {"holonomic": COLOURS["executed"], "nonholonomic": COLOURS["planned"]}
-
 _PANEL = 3.4
 """Width of a panel [inch]."""
 
@@ -222,7 +219,6 @@ WORD_COLOURS = {
     "DIDID": "#8C564B", "ID": "#009E73", "DI": "#CC79A7", STRAIGHT: "#222222",
 }  # fmt: skip
 """Blue begins with I, orange with D; two arcs are green and pink."""
-
 _OTHER = "#8A8A8A"
 
 
