@@ -9,23 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from manikin.body import BodyModel
+from manikin.ergonomics import rula_reba
 from manikin.ergonomics.body_parts import SIDES, Bearing, bearing_of
 from manikin.ergonomics.postural_angles import PosturalAngles, postural_angles
-from manikin.ergonomics.rula_reba import (
-    ACTIONS,
-    COUPLINGS,
-    RISKS,
-    Circumstances,
-    Scores,
-    reba_action_level,
-    reba_load,
-    reba_score,
-    reba_steps,
-    rula_action_level,
-    rula_force,
-    rula_score,
-    rula_steps,
-)
+from manikin.ergonomics.rula_reba import Circumstances, Scores
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
 
@@ -271,25 +258,26 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
     arms_held = {side: held(motion.time, angles.arm(side)) for side in SIDES}
     known = body_held is not None
     given_static = np.asarray(circumstances.static)
-    in_rula, in_reba = rula_steps(angles, bearing, circumstances), reba_steps(angles, bearing, circumstances)
-    rula, reba = {}, {}
+    judged = angles, bearing, circumstances
+    in_rula, in_reba = rula_reba.rula_steps(*judged), rula_reba.reba_steps(*judged)
+    load, rula, reba = (circumstances.load_kg, circumstances.load_pattern), {}, {}
     for side in SIDES:
         trunk, arm = (given_static if x is None else x for x in (body_held, arms_held[side]))
-        rula[side] = rula_score(
+        rula[side] = rula_reba.rula_score(
             in_rula[side],
             muscle_arm=arm | circumstances.repeated,
             muscle_body=trunk | circumstances.repeated,
-            force=rula_force(circumstances.load_kg, circumstances.load_pattern),
+            force=rula_reba.rula_force(*load),
         )
-        reba[side] = reba_score(
+        reba[side] = rula_reba.reba_score(
             in_reba[side],
-            load=reba_load(circumstances.load_kg, circumstances.load_pattern),
-            coupling=COUPLINGS.index(circumstances.coupling),
+            load=rula_reba.reba_load(*load),
+            coupling=rula_reba.COUPLINGS.index(circumstances.coupling),
             activity=(trunk | arm).astype(int) + circumstances.repeated + circumstances.rapid,
         )
     time = motion.time
     return PosturalAssessment(
         angles, bearing,
-        Assessment("RULA", time, rula, in_rula, ACTIONS, rula_action_level, known),
-        Assessment("REBA", time, reba, in_reba, RISKS, reba_action_level, known),
+        Assessment("RULA", time, rula, in_rula, rula_reba.ACTIONS, rula_reba.rula_action_level, known),
+        Assessment("REBA", time, reba, in_reba, rula_reba.RISKS, rula_reba.reba_action_level, known),
     )  # fmt: skip

@@ -13,16 +13,8 @@ from manikin.contact import ContactKind, ContactSchedule, FrictionModel
 from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, StageFailure, place
-from manikin.planning.push_pull import (
-    Act,
-    ActKind,
-    BracedForces,
-    PlannedAct,
-    largest_force,
-    measure_act,
-    plan_act,
-    share_force,
-)
+from manikin.planning import push_pull
+from manikin.planning.push_pull import Act, ActKind, BracedForces, PlannedAct
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.simulation import Execution, Push, execute, push_on_the_way
@@ -140,8 +132,8 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
         return planned
     q, contacts = planned.motion.q[-1], list(planned.schedule.sequence[-1].stance)
     rub = context.scenario.explicit_supports().friction, context.scenario.contact_model.friction
-    largest = largest_force(context.body, q, contacts, act, *rub)
-    forces = share_force(context.body, q, contacts, act, *rub)
+    largest = push_pull.largest_force(context.body, q, contacts, act, *rub)
+    forces = push_pull.share_force(context.body, q, contacts, act, *rub)
     used = _used_friction(planned, forces, context.scenario.contact_model.friction)
     report.finish("act", _summary(act, largest, forces) | {"friction": used})
     if forces is not None:
@@ -155,7 +147,7 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
         report.planned = False
         report.fail("wholebody", reason, planned.end, act.obstacle)
         return planned
-    acting = plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
+    acting = push_pull.plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
     report.keep_motions(acting.schedule, acting.motion)
     return PlannedMotion(acting.schedule, acting.motion, acting)
 
@@ -168,7 +160,7 @@ def measured_act_failure(
     if act is None or acting is None:
         return None
     friction = context.scenario.explicit_supports().friction
-    result = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
+    result = push_pull.measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
     if result is None:
         reason = "the motion did not come to its act"
         return StageFailure("execution", reason, acting.timing.end, act.obstacle)

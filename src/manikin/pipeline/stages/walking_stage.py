@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from manikin import walking
 from manikin.balance import wrench_polytopes
 from manikin.balance.motion_forces import full_motion
 from manikin.contact import Contact, ContactSchedule, default_normal_force_cap, sole
@@ -33,24 +34,7 @@ from manikin.scenarios.sections.task_sections import (
 )
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.world import flat_sequence
-from manikin.walking import (
-    LITERAL_ORDER,
-    PROSE_ORDER,
-    RECORDED_TURNS,
-    RECORDED_WALKS,
-    Footprints,
-    StepRule,
-    Walk,
-    Walker,
-    WalkObstacle,
-    WalkRoute,
-    Waypoint,
-    floor_plan,
-    place_footprints,
-    walk_along,
-    walked_footprints,
-    walking_route,
-)
+from manikin.walking import Walk, WalkRoute, Waypoint
 from manikin.walking.footprints import FEET
 from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_path import TOLERANCE
@@ -116,20 +100,20 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
         report.finish(STAGE, path_block(plan))
         return None
     path, bare = plan.route.legs[0], scenario.replaced(walking=None)
-    rule = StepRule().scaled(context.body.stature or 1.75)
+    rule = walking.StepRule().scaled(context.body.stature or 1.75)
     height = context.scene.floor_height or 0.0
     with scenario.refusing(("walking",)):
         if stance is not None:
             (left, _), (right, _) = (stance[foot] for foot in FEET)
             rule = replace(rule, standing_width=float(np.hypot(*(left - right)[:2])))
-            choices = [place_footprints(path, rule, first=first, height=height) for first in FEET]
+            choices = [walking.place_footprints(path, rule, first=first, height=height) for first in FEET]
             footprints = _ending_for(scenario, choices)
             walked = walk_before(footprints, bare)
         else:
-            footprints = place_footprints(path, rule, height=height)
+            footprints = walking.place_footprints(path, rule, height=height)
             if _section(scenario).footprints == "library":  # where the feet of the library's walk stand
-                walk = walk_along(path, context.body, height=height)
-                footprints = walked_footprints(walk, rule, height=height)
+                walk = walking.walk_along(path, context.body, height=height)
+                footprints = walking.walked_footprints(walk, rule, height=height)
             walked = walking_supports(footprints, bare)
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
     report.keep_scenario(walked)
@@ -157,7 +141,7 @@ def _first_stance(scenario: Scenario) -> dict[str, tuple[FloatArray, float]]:
     return {foot: (held[foot].position, held[foot].yaw) for foot in FEET}
 
 
-def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
+def _ending_for(scenario: Scenario, choices: list[walking.Footprints]) -> walking.Footprints:
     """Walk whose last step is that of the foot that stays in the next phase; the shorter of two."""
     phases = scenario.explicit_supports().resolved_phases()
     stays = [foot for foot in FEET if len(phases) > 1 and phases[1].get(foot) == phases[0][foot]]
@@ -175,8 +159,8 @@ ROOM_TOLERANCE = 1e-3
 STANCE_SLIDE = 1e-3
 """A foot on the ground moves by at most this, as a planned support does [m]."""
 OBJECTIVES = {
-    "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
-    "recorded": RECORDED_WALKS, "recorded-turns": RECORDED_TURNS,
+    "prose": walking.PROSE_ORDER, "literal": walking.LITERAL_ORDER,
+    "recorded": walking.RECORDED_WALKS, "recorded-turns": walking.RECORDED_TURNS,
 }  # fmt: skip
 
 
@@ -193,7 +177,7 @@ class PlannedWalks:
 
     route: WalkRoute
     others: dict[str, WalkRoute]
-    obstacles: tuple[WalkObstacle, ...]
+    obstacles: tuple[walking.WalkObstacle, ...]
     wall_s: float
 
 
@@ -212,7 +196,7 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         report.finish(STAGE, block)
         return None
     began = clock.perf_counter()
-    walk = walk_along(plan.route, context.body, height=height)
+    walk = walking.walk_along(plan.route, context.body, height=height)
     block |= {
         "steps": int(np.sum(np.diff(walk.support.astype(np.int64), axis=0) == 1)),
         "max_stance_slide_m": float(walk.slides.max(initial=0.0)),
@@ -231,7 +215,7 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
     report.planned = True
     report.keep_motions(schedule, motion)
     for number, (name, route) in enumerate(plan.others.items()):
-        schedule, other = walked_motion(walk_along(route, context.body, height=height), height)
+        schedule, other = walked_motion(walking.walk_along(route, context.body, height=height), height)
         report.keep_motions(schedule, other, file=other_motion(name))
         report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
     report.progress(STAGE, 1.0)
@@ -252,15 +236,15 @@ def plan_walks(
     """
     scenario, section = context.scenario, _section(context.scenario)
     with scenario.refusing(("scene",)):
-        standing = floor_plan(context.scene, context.body.stature or 2.0)
-    objective, radius = OBJECTIVES[section.weights], Walker().width / 2
+        standing = walking.floor_plan(context.scene, context.body.stature or 2.0)
+    objective, radius = OBJECTIVES[section.weights], walking.Walker().width / 2
     obstacles, others = list(standing), {}
 
     def route_of(
         key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, stops: list[Waypoint]
     ) -> WalkRoute:
         with scenario.refusing(key):
-            return walking_route(
+            return walking.walking_route(
                 begin, stops, objective, obstacles=obstacles, room=section.room_m,
                 max_speed=who.max_speed_m_s, wait=who.wait_s,
             )  # fmt: skip
@@ -341,7 +325,7 @@ def _closest(route: WalkRoute, other: WalkRoute) -> dict[str, float]:
 
 def _room(plan: PlannedWalks) -> float | None:
     """Least distance of the walker's discs from anything [m], measured densely; None where nothing is."""
-    room = clearance(plan.obstacles, Walker(), plan.route.place, plan.route.time)
+    room = clearance(plan.obstacles, walking.Walker(), plan.route.place, plan.route.time)
     return float(room.min()) if room.size else None
 
 
