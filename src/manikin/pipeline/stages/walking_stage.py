@@ -45,15 +45,11 @@ FRICTION = 0.8
 
 
 def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
-    """Supports of a walk in time, and its motion with what the ground has to do for it.
+    """Supports of a walk in time, and its motion with what the ground, at a height [m], has to do for it.
 
     The motion is that of recorded people, carried over to another body, so that its margin may be negative
     and its torques may leave a rest on the pelvis: both say how far this body is from walking like that.
     Velocities are low-passed as those of recordings are, since accelerations follow from them.
-
-    Args:
-        walk: Of a body along a path.
-        height: Of the floor [m].
     """
     schedule, motion = walked_schedule(walk, height), walk.motion
     polytopes = wrench_polytopes([phase.stance for phase in schedule.sequence])
@@ -72,11 +68,9 @@ def walked_schedule(walk: Walk, height: float) -> ContactSchedule:
     contacts: dict[tuple[int, int], Contact] = {}
     for foot, name in enumerate(walk.feet):
         for item in walked_supports(walk, foot):
-            made = sole(
-                name, (item.x, item.y, height), item.yaw, length=body.sole_length, width=body.sole_width,
-                friction=FRICTION,
-            )  # fmt: skip
-            contacts |= {(foot, row): made for row in range(item.first, item.stop)}
+            size = {"length": body.sole_length, "width": body.sole_width}
+            made = sole(name, (item.x, item.y, height), item.yaw, **size, friction=FRICTION)
+            contacts |= dict.fromkeys(((foot, row) for row in range(item.first, item.stop)), made)
     cap = default_normal_force_cap(body.mass)
     return schedule_of_support(walk.time, walk.support, lambda *touching: contacts[touching], cap)
 
@@ -166,11 +160,9 @@ OBJECTIVES = {
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalks:
-    """Routes of all walkers of a scenario.
+    """Routes of the body and, by name, of the others who walk in a scenario.
 
     Attributes:
-        route: Of the scenario's body.
-        others: Of the others, by name.
         obstacles: What stands there, and the others.
         wall_s: Time in which the body's own route was found [s].
     """
@@ -205,19 +197,16 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         "motion_wall_ms": 1e3 * (clock.perf_counter() - began),
     }
     schedule, motion = walked_motion(walk, height)
-    block |= {
-        "min_margin": float(motion.margin.min()),
-        "margin_unit": motion.margin_unit,
-        "balanced_share": float(np.mean(motion.margin >= 0.0)),
-    }
-    report.finish(STAGE, block)
+    balanced = float(np.mean(motion.margin >= 0.0))
+    block |= {"min_margin": float(motion.margin.min()), "margin_unit": motion.margin_unit}
+    report.finish(STAGE, block | {"balanced_share": balanced})
     report.require(STAGE, _requirements(context, plan, walk))
     report.planned = True
     report.keep_motions(schedule, motion)
-    for number, (name, route) in enumerate(plan.others.items()):
-        schedule, other = walked_motion(walking.walk_along(route, context.body, height=height), height)
-        report.keep_motions(schedule, other, file=other_motion(name))
-        report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
+    for number, (name, route) in enumerate(plan.others.items(), 1):
+        walked = walked_motion(walking.walk_along(route, context.body, height=height), height)
+        report.keep_motions(*walked, file=other_motion(name))
+        report.progress(STAGE, 0.6 + 0.4 * number / len(plan.others))
     report.progress(STAGE, 1.0)
     return motion
 
@@ -228,8 +217,7 @@ def plan_walks(
     """Find a route for every walker, each around those before.
 
     Args:
-        start: (3,) x, y [m], heading [rad] of the body at the beginning; that of the task if omitted.
-        goal: (3,) The same at the end.
+        start, goal: (3,) x, y [m], heading [rad] of the body at both ends; those of the task if omitted.
 
     Raises:
         ScenarioError: If a route is impossible: no floor, a start in an obstacle, a useless waypoint.
@@ -296,23 +284,17 @@ def _waypoint(section: WaypointSection) -> Waypoint:
 def path_block(plan: PlannedWalks) -> dict[str, Any]:
     """Block of the summary about the route itself."""
     route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
-    return {
-        "duration_s": route.duration,
-        "path_length_m": route.length,
-        "cost": route.cost,
-        "max_forward_mps": float(forward),
-        "max_left_mps": float(left),
-        "segments": [
-            {"kind": item.kind, "start_s": item.start, "end_s": item.end}
-            for item in route.segments().segments
-        ],
-        "min_room_m": _room(plan),
-        "others": {
-            name: {"duration_s": other.duration, "path_length_m": other.length} | _closest(route, other)
-            for name, other in plan.others.items()
-        },
-        "path_wall_ms": 1e3 * plan.wall_s,
+    parts = route.segments().segments
+    others = {
+        name: {"duration_s": other.duration, "path_length_m": other.length} | _closest(route, other)
+        for name, other in plan.others.items()
     }
+    return {
+        "duration_s": route.duration, "path_length_m": route.length, "cost": route.cost,
+        "max_forward_mps": float(forward), "max_left_mps": float(left),
+        "segments": [{"kind": item.kind, "start_s": item.start, "end_s": item.end} for item in parts],
+        "min_room_m": _room(plan), "others": others, "path_wall_ms": 1e3 * plan.wall_s,
+    }  # fmt: skip
 
 
 def _closest(route: WalkRoute, other: WalkRoute) -> dict[str, float]:
