@@ -28,10 +28,9 @@ def recover_from_push(context: RunContext, report: Report) -> simulation.Recover
     section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
     task, settings = _task(scenario, section, body), _settings(scenario, section)
+    timing, frequency = (push.at_s, push.duration_s), push.frequency_hz or 0.0
     with scenario.refusing(("push",)):
-        item = simulation.push_near_com(
-            body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
-        )
+        item = simulation.push_near_com(body, force, *timing, frequency=frequency, q=task.q)
     task = replace(task, pushes=(item,))
     result = simulation.recover(
         body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
@@ -53,11 +52,9 @@ def push_trials(scenario: Scenario) -> simulation.PushTrials:
     Raises:
         ScenarioError: If there is nothing to recover from.
     """
-    section, push = _sections(scenario)
-    body = scenario.build_body()
-    return simulation.PushTrials(
-        body, _task(scenario, section, body), _settings(scenario, section), push.duration_s, push.at_s
-    )
+    (section, push), body = _sections(scenario), scenario.build_body()
+    task, settings = _task(scenario, section, body), _settings(scenario, section)
+    return simulation.PushTrials(body, task, settings, push.duration_s, push.at_s)
 
 
 def push_map_searches(
