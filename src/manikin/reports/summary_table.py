@@ -60,13 +60,13 @@ def result(run: Mapping[str, Any]) -> str:
 
 def verdict_line(summary: Mapping[str, Any]) -> str:
     """Verdict of a run with its scenario, and for a failure the reason first."""
-    failure, verdict = summary["failure"], summary["verdict"]
+    failure = summary["failure"]
     if failure is None:
         words = {
             "proved": "executed in the physics engine, every requirement kept",
             "planned": "not executed, every requirement of the plan kept",
         }
-        return f"{verdict}: {summary['scenario']}, {words[verdict]}"
+        return f"{summary['verdict']}: {summary['scenario']}, {words[summary['verdict']]}"
     after = ", after a plan that kept every requirement" if summary["planned"] else ""
     return f"failed: {failure['reason']} ({summary['scenario']}, {failure['stage']}{after})"
 
