@@ -98,10 +98,10 @@ class WalkViewer(Page):
 
     def press(self, key: Key) -> None:
         """Change the directive as a key does."""
-        kept = (
-            (0.0, 0.0, 0.0) if key.change is None else (1.0, 1.0, 1.0) if any(key.change) else (1.0, 0.0, 0.0)
-        )
-        self.steer(self.directive * kept + (key.change or 0.0))
+        if key.change is None:
+            self.steer(np.zeros(3))
+        else:
+            self.steer(self.directive + key.change if any(key.change) else self.directive * [1.0, 0.0, 0.0])
 
     def steer(self, directive: FloatArray) -> None:
         """Set the directive (3,), see :attr:`directive`, held within the limits of the page."""
