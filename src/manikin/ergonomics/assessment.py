@@ -42,9 +42,8 @@ class CumulativeEffort:
     @property
     def mean_share(self) -> float:
         """Root of the mean square of torque per strength, over all joints and the time."""
-        if self.duration == 0.0:
-            return 0.0
-        return float(np.sqrt(self.squared_share.mean() / self.duration))
+        known = self.duration != 0.0
+        return float(np.sqrt(self.squared_share.mean() / self.duration)) if known else 0.0
 
 
 def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | None:
@@ -264,20 +263,17 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
     for side in SIDES:
         trunk, arm = (given_static if x is None else x for x in (body_held, arms_held[side]))
         rula[side] = rula_reba.rula_score(
-            in_rula[side],
-            muscle_arm=arm | circumstances.repeated,
-            muscle_body=trunk | circumstances.repeated,
-            force=rula_reba.rula_force(*load),
-        )
+            in_rula[side], muscle_arm=arm | circumstances.repeated,
+            muscle_body=trunk | circumstances.repeated, force=rula_reba.rula_force(*load),
+        )  # fmt: skip
         reba[side] = rula_reba.reba_score(
-            in_reba[side],
-            load=rula_reba.reba_load(*load),
+            in_reba[side], load=rula_reba.reba_load(*load),
             coupling=rula_reba.COUPLINGS.index(circumstances.coupling),
             activity=(trunk | arm).astype(int) + circumstances.repeated + circumstances.rapid,
-        )
-    time = motion.time
+        )  # fmt: skip
+    rula_levels, reba_levels = rula_reba.rula_action_level, rula_reba.reba_action_level
     return PosturalAssessment(
         angles, bearing,
-        Assessment("RULA", time, rula, in_rula, rula_reba.ACTIONS, rula_reba.rula_action_level, known),
-        Assessment("REBA", time, reba, in_reba, rula_reba.RISKS, rula_reba.reba_action_level, known),
+        Assessment("RULA", motion.time, rula, in_rula, rula_reba.ACTIONS, rula_levels, known),
+        Assessment("REBA", motion.time, reba, in_reba, rula_reba.RISKS, reba_levels, known),
     )  # fmt: skip

@@ -139,21 +139,19 @@ def footprint_figure(record: RunRecord) -> Figure:
     figure = style.new_figure(8.6, 8.2, "Footprints, zero moment point and centre of mass from above")
     axes = figure.add_subplot()
     colours = colours_of(contact.effector for contact in contacts)
-    for number, contact in enumerate(contacts):
-        _draw_contact(axes, contact, number + 1, colours[contact.effector])
-    seen = [next(iter(tracks.values())).position[:, :2], *(c.points_in_world[:, :2] for c in contacts)]
+    for number, contact in enumerate(contacts, 1):
+        _draw_contact(axes, contact, number, colours[contact.effector])
+    com = next(iter(tracks.values())).position
+    everything = np.vstack([com[:, :2], *(contact.points_in_world[:, :2] for contact in contacts)])
     for name, track in tracks.items():
         if name in record.zmp:
-            point = record.zmp[name].point
-            axes.plot(point[:, 0], point[:, 1], label=f"ZMP, {name}", **style.STYLES[name])
+            axes.plot(*record.zmp[name].point[:, :2].T, label=f"ZMP, {name}", **style.STYLES[name])
         dotted = {**style.STYLES[name], "linestyle": (0, (1.2, 1.6)), "linewidth": 1.6}
         axes.plot(*track.position[:, :2].T, label=f"centre of mass, {name}", **dotted)
-    com = next(iter(tracks.values())).position
     for point, text, marker in ((com[0], "start", "o"), (com[-1], "goal", "D")):
         axes.plot(point[0], point[1], marker, color=COLOURS["ink"], markersize=5, zorder=7)
         look = {"fontsize": 8, "color": COLOURS["ink"], "zorder": 8, "path_effects": [style.white_edge()]}
         axes.annotate(text, point[:2], (7, 4), textcoords="offset points", **look)
-    everything = np.vstack(seen)
     low, high = everything.min(axis=0) - 0.18, everything.max(axis=0) + 0.18
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     if record.scene is not None:

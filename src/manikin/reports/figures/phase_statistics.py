@@ -44,10 +44,9 @@ def placements_figure(groups: Mapping[str, Sequence[SupportPlacement]]) -> Figur
         axes.set_aspect("equal", adjustable="box", anchor="W")
         axes.plot(0.0, 0.0, "+", color=COLOURS["ink"], markersize=10, zorder=2)
         _draw(axes, result, colours)
-    style.legend_in_title(figure, handles=[
-        Line2D([], [], marker="o", linestyle="", color=colour, label=readable(effector))
-        for effector, colour in colours.items()
-    ])  # fmt: skip
+    look = {"marker": "o", "linestyle": ""}
+    keys = [Line2D([], [], color=colour, label=readable(name), **look) for name, colour in colours.items()]
+    style.legend_in_title(figure, handles=keys)
     return figure
 
 
@@ -75,12 +74,9 @@ BEYOND = 2.5
 def phase_durations_figure(sequences: Sequence[PhaseSequence], by: By = "number") -> Figure:
     """Draw the phases of each motion as a bar, and means by group ([Qiu2012]_ Fig. 3.11).
 
-    Phases cut off by the recording are pale and do not count in the means. Whiskers reach from the
-    least to the largest; the number of phases stands at the bottom.
-
-    Args:
-        sequences: Recorded or published motions.
-        by: What phases have in common that are averaged; ``number`` for motions that begin alike.
+    Phases cut off by the recording are pale and do not count in the means, which are of phases with the same
+    ``by``, such as ``number`` for motions that begin alike. Whiskers reach from the least to the largest; the
+    number of phases stands at the bottom.
     """
     motions = style.need([item for item in sequences if item.phases], "a motion with phases")
     groups = by_group(motions)
@@ -101,9 +97,8 @@ def _draw_motions(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]]) -> N
         for item in members:
             begin = item.phases[0].start
             for phase, kind, whole in zip(item.phases, item.kinds, item.whole, strict=True):
-                flies = kind == FLIGHT
-                colour = COLOURS["right_hand"] if flies else style.support_colour(len(phase.effectors))
-                kinds[kind] = colour
+                colour = style.support_colour(len(phase.effectors))
+                kinds[kind] = colour = COLOURS["right_hand"] if kind == FLIGHT else colour
                 axes.barh(level, phase.duration, left=phase.start - begin, height=0.75, color=colour,
                           alpha=0.85 if whole else 0.3, edgecolor="white", linewidth=0.6)  # fmt: skip
             ticks[level] = item.name
@@ -140,10 +135,9 @@ def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By
     axes.set_xticks(range(len(names)), [name.replace("+", "\n").replace("_", " ") for name in names])
     axes.grid(False, axis="x")
     axes.set_xlim(-0.6, len(names) - 0.4)
-    spreads = [spread for each in result.values() for spread in each.values()]
-    if spreads:
-        highest = max(spread.largest for spread in spreads)
-        axes.set_ylim(0.0, min(1.06 * highest, BEYOND * max(spread.mean for spread in spreads)))
+    if spreads := [spread for each in result.values() for spread in each.values()]:
+        highest, mean = max(item.largest for item in spreads), max(item.mean for item in spreads)
+        axes.set_ylim(0.0, min(1.06 * highest, BEYOND * mean))
     style.legend_above(axes, style.group_keys(colours), most=7)
 
 
