@@ -57,9 +57,8 @@ def bearing_of(body: BodyModel, motion: Motion) -> Bearing:
     feet = ("left_foot", "right_foot")
     places = effector_positions(body, motion, feet)
     left_foot, right_foot = (places[name] for name in feet)
-    on, load = (
-        np.column_stack(part) for part in zip(*(_contact(motion, name) for name in feet), strict=True)
-    )
+    marked = (_contact(motion, name) for name in feet)
+    on, load = (np.column_stack(part) for part in zip(*marked, strict=True))
     if not known:
         height = np.column_stack([left_foot[:, 2], right_foot[:, 2]])
         on = height <= height.min(axis=1, keepdims=True) + NEAR_FLOOR

@@ -186,9 +186,8 @@ def overview_of(entries: Sequence[AnalysisEntry], wall: float) -> dict[str, Any]
     """Content of ``analyses.json``: all summaries, and what was refused; ``wall`` is the time of all [s]."""
     measured = [entry.summary for entry in entries if entry.summary is not None]
     duration = sum(summary["duration_s"] for summary in measured)
-    refused = [
-        {"file": str(item.job.path), "reason": item.refusal} for item in entries if item.summary is None
-    ]
+    left_out = [entry for entry in entries if entry.summary is None]
+    refused = [{"file": str(entry.job.path), "reason": entry.refusal} for entry in left_out]
     return {
         "files": measured, "refused": refused, "duration_s": duration, "wall_s": wall,
         "realtime_factor": duration / wall,

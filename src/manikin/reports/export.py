@@ -140,9 +140,8 @@ def _frame_time(motion: Motion) -> float:
         return 0.01
     steps = np.diff(motion.time)
     if np.ptp(steps) > 1e-6:
-        raise MotionFileError(
-            f"motion is sampled every {steps.min():.6g} to {steps.max():.6g} s; valid: one rate (resample it)"
-        )
+        every = f"{steps.min():.6g} to {steps.max():.6g} s"
+        raise MotionFileError(f"motion is sampled every {every}; valid: one rate (resample it)")
     return float(motion.duration / len(steps))
 
 

@@ -96,9 +96,8 @@ def analysis_page(
         pictures: PNG files of the plan by what they show.
     """
     missing = [f"{part}: {reason}" for part, reason in summary["ergonomics"]["missing"].items()]
-    return render(
-        "analysis", name=analysis.name, summary=summary, sheet=sheet, pictures=pictures, missing=missing
-    )
+    shown = {"name": analysis.name, "sheet": sheet, "pictures": pictures, "missing": missing}
+    return render("analysis", summary=summary, **shown)
 
 
 def write_benchmark_page(directory: Path, result: Mapping[str, Any]) -> Path:

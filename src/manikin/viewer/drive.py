@@ -262,10 +262,8 @@ class ContactViewer(Page):
         )
         self.gizmo.on_update(lambda _: self.move(self.gizmo.position, self.gizmo.wxyz))
         self._task = scene.add_arrows("/task", _arrow(np.zeros(3), np.ones(3)), np.zeros(3, dtype=np.uint8))
-        names = [limb.name for limb in self.live.body.limbs]
-        self._normals = {
-            name: add_arrow(self.server, f"/contacts/{name}", side_colour(name)) for name in names
-        }
+        sides = {limb.name: side_colour(limb.name) for limb in self.live.body.limbs}
+        self._normals = {name: add_arrow(self.server, f"/contacts/{name}", sides[name]) for name in sides}
 
     def _build_controls(self) -> None:
         gui, names = self.server.gui, [limb.name for limb in self.live.body.limbs]

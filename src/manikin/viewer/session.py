@@ -54,9 +54,8 @@ class ViewerSession(Page):
             raise InputError("motion file holds no body; valid: a motion file written by 'manikin run'")
         for name, other in (others or {}).items():
             if other.body is None or not other.motions:
-                raise InputError(
-                    f"motion of {name} holds no body or no motion; valid: as 'manikin run' wrote it"
-                )
+                problem = f"motion of {name} holds no body or no motion"
+                raise InputError(f"{problem}; valid: as 'manikin run' wrote it")
         self.content, self._body = content, content.body
         self.chosen = list(content.motions)[-1]
         self.beside = "recorded" if content.recorded is not None and self.chosen != "recorded" else NOTHING
@@ -178,9 +177,8 @@ class ViewerSession(Page):
         self._shapes = BodyShapes(self.server, self._body)  # the centre of mass and its path are inside
         self._second = BodyShapes(self.server, self._body, 0.45, "/beside")
         self._aside = BESIDE * _across(self.motion.com)
-        self._names = [
-            scene.add_label(f"/names/{which}", which, anchor="bottom-center") for which in ("shown", "beside")
-        ]
+        places = ("shown", "beside")
+        self._names = [scene.add_label(f"/names/{of}", of, anchor="bottom-center") for of in places]
         self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
         names = dict.fromkeys(name for item in self.content.motions.values() for name in item.contact_names)
         self._arrows = {name: add_arrow(self.server, f"/forces/{name}", COLOURS["force"]) for name in names}
@@ -251,9 +249,7 @@ class ViewerSession(Page):
         motions = self.content.motions.values()
         start, end = min(motion.time[0] for motion in motions), max(motion.time[-1] for motion in motions)
         self._plot_time, outside = np.linspace(start, end, PLOT_POINTS), {"left": np.nan, "right": np.nan}
-        self._plot_margins = [
-            np.interp(self._plot_time, item.time, item.margin, **outside) for item in motions
-        ]
+        self._plot_margins = [np.interp(self._plot_time, of.time, of.margin, **outside) for of in motions]
         known = np.concatenate([motion.margin for motion in motions])
         known = known[np.isfinite(known)]
         low, high = float(known.min(initial=0.0)), float(known.max(initial=1.0))

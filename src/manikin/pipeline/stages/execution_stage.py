@@ -82,13 +82,11 @@ class ExecutionRequirements:
 def _kept_standing(execution: Execution) -> list[Requirement]:
     """Requirements of every execution: no fall, no unplanned touch."""
     touches, first = execution.counted_touches, next(iter(execution.counted_touches), None)
-    begun, where = (None, "") if first is None else (first.time, f"{first.segment} on {first.other}")
+    begun = (None, "") if first is None else (first.time, f"{first.segment} on {first.other}")
     fallen = execution.failure_time_s if execution.fell else None
     return [
         Requirement("fell", "falls", "", float(execution.fell), "<=", 0.0, fallen),
-        Requirement(
-            "unplanned_touches", "unplanned touches", "", float(len(touches)), "<=", 0.0, begun, where
-        ),
+        Requirement("unplanned_touches", "unplanned touches", "", float(len(touches)), "<=", 0.0, *begun),
     ]
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 
 from manikin import simulation
@@ -32,9 +33,8 @@ def recover_from_push(context: RunContext, report: Report) -> simulation.Recover
     with scenario.refusing(("push",)):
         item = simulation.push_near_com(body, force, *timing, frequency=frequency, q=task.q)
     task = replace(task, pushes=(item,))
-    result = simulation.recover(
-        body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
-    )
+    progress = partial(report.progress, STAGE)
+    result = simulation.recover(body, task, settings, scene=context.scene, progress=progress)
     report.finish(STAGE, result.summary() | _bound(body, task, settings, result))
     report.require(STAGE, result.requirements)
     report.planned, report.proved = None, result.recovered
@@ -92,9 +92,8 @@ def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
 
 def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> simulation.RecoveryTask:
     """The stance, without a push."""
-    task = simulation.RecoveryTask(
-        (), simulation.Feet(section.feet), section.duration_s, friction=section.friction, steps=section.steps
-    )
+    feet, options = simulation.Feet(section.feet), {"friction": section.friction, "steps": section.steps}
+    task = simulation.RecoveryTask((), feet, section.duration_s, **options)
     if section.support == "both":
         if section.feet_apart_m is None:
             return task

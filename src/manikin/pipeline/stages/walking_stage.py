@@ -129,9 +129,8 @@ def _first_stance(scenario: Scenario) -> dict[str, tuple[FloatArray, float]]:
     held = {contact.effector: contact for contact in flat_sequence(scenario)[0].stance}
     missing = [foot for foot in FEET if foot not in held]
     if missing:
-        raise scenario.error(
-            ("supports", "phases", 0), f"has no {missing[0]}; valid for a walk to it: both feet"
-        )
+        lacks = f"has no {missing[0]}; valid for a walk to it: both feet"
+        raise scenario.error(("supports", "phases", 0), lacks)
     return {foot: (held[foot].position, held[foot].yaw) for foot in FEET}
 
 

@@ -227,10 +227,8 @@ def com_paths_figure(
     motions = list(style.need(list(clips), "a recorded motion"))
     if len(motions) != len(origins):
         raise FigureError(f"{len(origins)} origins of {len(motions)} motions; valid: one for each")
-    heights = [1.25, 1.0]
-    figure, grid = style.new_grid(
-        9.6, 7.4, "Ways of the centre of mass", 2, 1, height_ratios=heights, top=0.8, between=0.7
-    )
+    margins, title = {"top": 0.8, "between": 0.7}, "Ways of the centre of mass"
+    figure, grid = style.new_grid(9.6, 7.4, title, 2, 1, height_ratios=[1.25, 1.0], **margins)
     side, above = (figure.add_subplot(grid[row]) for row in range(2))
     colours = style.group_colours(clip.group for clip in motions)
     for clip, origin in zip(motions, origins, strict=True):

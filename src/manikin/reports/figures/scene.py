@@ -164,9 +164,8 @@ def scene_figure(record: RunRecord) -> Figure:
     axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
     if record.phases is not None:
         places = track.at(record.phases.instants)
-        axes.scatter(
-            *places.T, s=18, color=COLOURS["ink"], zorder=9, depthshade=False, label="at the key instants"
-        )
+        look = {"color": COLOURS["ink"], "zorder": 9, "label": "at the key instants"}
+        axes.scatter(*places.T, s=18, depthshade=False, **look)
     frame(axes, np.vstack(seen), corners)
     axes.view_init(14.0, -62.0)
     if figure_of is not None and motion is not None:
@@ -245,10 +244,8 @@ def draw_scene(axes: Axes3D, scene: Scene | None) -> FloatArray:
         else:
             faces = np.asarray(obstacle.to_trimesh().triangles)
         low, high = obstacle.bounds
-        solid = Poly3DCollection(
-            faces, facecolor=COLOURS["obstacle"], edgecolor="#8D94A0", linewidths=0.6, alpha=0.25, zorder=2
-        )
-        axes.add_collection3d(solid)
+        look = {"facecolor": COLOURS["obstacle"], "edgecolor": "#8D94A0", "alpha": 0.25, "zorder": 2}
+        axes.add_collection3d(Poly3DCollection(faces, linewidths=0.6, **look))
         axes.text(high[0], low[1], high[2], f" {obstacle.name}", fontsize=8, color="#666C77", zorder=3)
         corners.append(np.array([low, high]))
     return np.vstack(corners)

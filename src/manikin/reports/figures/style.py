@@ -189,10 +189,9 @@ def need(value: T | None, what: str, of: str = "a run") -> T:
 
 def end_of(record: RunRecord) -> float:
     """Last instant that a motion or a phase reaches [s]."""
-    ends = [track.time for track in record.tracks.values()]
-    return max(
-        float(time[-1]) for time in [*ends, *([] if record.phases is None else [record.phases.instants])]
-    )
+    times = [track.time for track in record.tracks.values()]
+    times += [] if record.phases is None else [record.phases.instants]
+    return max(float(time[-1]) for time in times)
 
 
 def span_at_least(axes: Axes, least: float) -> None:

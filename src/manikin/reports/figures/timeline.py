@@ -128,9 +128,8 @@ def margin_figure(record: RunRecord) -> Figure:
     drawing.strip()
     for row, (unit, top) in enumerate(panels, 1):
         axes = drawing.panel(row)
-        _draw_curves(
-            axes, {n: curve for n, curve in curves.items() if curve.margin_unit == unit}, phases, top
-        )
+        shown = {name: curve for name, curve in curves.items() if curve.margin_unit == unit}
+        _draw_curves(axes, shown, phases, top)
         drawing.label(axes, f"margin{'' if top is None else ', lower part'} [{unit}]")
     style.legend_in_title(drawing.figure, *drawing.figure.axes[1 : 1 + len(units)])
     return drawing.figure

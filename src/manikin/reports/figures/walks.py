@@ -133,9 +133,8 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
         axes.plot(0.0, 0.0, "^", color=COLOURS["ink"], markersize=7)
         dress(axes, "ahead [m]" if number == 0 else "", "to the right [m]", f"{name}: {zone.radius:.2f} m")
         axes.set(xlim=(-far, far), ylim=(-0.15, far), aspect="equal")
-    figure.legend(
-        *figure.axes[0].get_legend_handles_labels(), loc="lower center", ncols=4, fontsize=8.5, frameon=False
-    )
+    keys = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*keys, loc="lower center", ncols=4, fontsize=8.5, frameon=False)
     return figure
 
 
