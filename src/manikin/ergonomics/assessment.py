@@ -9,23 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from manikin.body import BodyModel
+from manikin.ergonomics import rula_reba
 from manikin.ergonomics.body_parts import SIDES, Bearing, bearing_of
 from manikin.ergonomics.postural_angles import PosturalAngles, postural_angles
-from manikin.ergonomics.rula_reba import (
-    ACTIONS,
-    COUPLINGS,
-    RISKS,
-    Circumstances,
-    Scores,
-    reba_action_level,
-    reba_load,
-    reba_score,
-    reba_steps,
-    rula_action_level,
-    rula_force,
-    rula_score,
-    rula_steps,
-)
+from manikin.ergonomics.rula_reba import Circumstances, Scores
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
 
@@ -55,9 +42,8 @@ class CumulativeEffort:
     @property
     def mean_share(self) -> float:
         """Root of the mean square of torque per strength, over all joints and the time."""
-        if self.duration == 0.0:
-            return 0.0
-        return float(np.sqrt(self.squared_share.mean() / self.duration))
+        known = self.duration != 0.0
+        return float(np.sqrt(self.squared_share.mean() / self.duration)) if known else 0.0
 
 
 def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | None:
@@ -73,12 +59,10 @@ def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | Non
     torque = motion.tau[rows, 6:]
     power = torque * motion.v[rows, 6:]
     return CumulativeEffort(
-        joint_names=body.joint_names,
-        squared_share=weight @ body.torque_share(torque) ** 2,
-        positive_work=weight @ np.maximum(power, 0.0),
-        negative_work=weight @ np.minimum(power, 0.0),
+        joint_names=body.joint_names, squared_share=weight @ body.torque_share(torque) ** 2,
+        positive_work=weight @ np.maximum(power, 0.0), negative_work=weight @ np.minimum(power, 0.0),
         duration=float(weight.sum()),
-    )
+    )  # fmt: skip
 
 
 LOADED = 0.5
@@ -148,16 +132,11 @@ def joint_strength(body: BodyModel, motion: Motion, fraction: float = LOADED) ->
     pushed = motion.tau[rows, 6:][peak, np.arange(len(peak))] >= 0.0
     weight = durations(motion.time)[rows]
     return JointStrength(
-        joint_names=body.joint_names,
-        limit=np.where(pushed, body.torque_upper, -body.torque_lower),
-        share=share,
-        peak=known.max(axis=0),
-        peak_time=motion.time[rows][peak],
-        loaded=weight @ (known > fraction) / weight.sum(),
-        fraction=fraction,
-        known=float(rows.mean()),
+        joint_names=body.joint_names, limit=np.where(pushed, body.torque_upper, -body.torque_lower),
+        share=share, peak=known.max(axis=0), peak_time=motion.time[rows][peak],
+        loaded=weight @ (known > fraction) / weight.sum(), fraction=fraction, known=float(rows.mean()),
         source=SOURCES.get(body.name, "the torque limits of the body"),
-    )
+    )  # fmt: skip
 
 
 def known_torques(motion: Motion) -> np.ndarray:
@@ -175,10 +154,8 @@ def durations(time: FloatArray, counted: NDArray[np.bool_] | bool = True) -> Flo
 
 LONG = 60.0
 """A posture held for longer than this is static [s] ([McAtamney1993]_, [Hignett2000]_)."""
-
 STILL = np.deg2rad(10.0)
 """A posture is held as long as no angle leaves a band of this width [rad]; ours."""
-
 RATE = 5.0
 """Rate at which postures are compared [Hz]."""
 
@@ -244,18 +221,14 @@ class Assessment:
         worst, share = int(score.argmax()), weight / weight.sum()
         side = max(SIDES, key=lambda name: self.sides[name][worst])
         return {
-            "max": int(score.max()),
-            "max_at_s": float(self.time[worst]),
-            "max_side": side,
+            "max": int(score.max()), "max_at_s": float(self.time[worst]), "max_side": side,
             "max_steps": {name: int(values[worst]) for name, values in vars(self.steps[side]).items()},
-            "mean": float(share @ score),
-            "left_max": int(self.sides["left"].max()),
-            "right_max": int(self.sides["right"].max()),
-            "action_level": int(levels.max()),
+            "mean": float(share @ score), "left_max": int(self.sides["left"].max()),
+            "right_max": int(self.sides["right"].max()), "action_level": int(levels.max()),
             "action": self.levels[int(levels.max())],
             "share_of_time": {str(level): float(share[levels == level].sum()) for level in self.levels},
             "static_known": self.static_known,
-        }
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,25 +257,23 @@ def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None 
     arms_held = {side: held(motion.time, angles.arm(side)) for side in SIDES}
     known = body_held is not None
     given_static = np.asarray(circumstances.static)
-    in_rula, in_reba = rula_steps(angles, bearing, circumstances), reba_steps(angles, bearing, circumstances)
-    rula, reba = {}, {}
+    judged = angles, bearing, circumstances
+    in_rula, in_reba = rula_reba.rula_steps(*judged), rula_reba.reba_steps(*judged)
+    load, rula, reba = (circumstances.load_kg, circumstances.load_pattern), {}, {}
     for side in SIDES:
         trunk, arm = (given_static if x is None else x for x in (body_held, arms_held[side]))
-        rula[side] = rula_score(
-            in_rula[side],
-            muscle_arm=arm | circumstances.repeated,
-            muscle_body=trunk | circumstances.repeated,
-            force=rula_force(circumstances.load_kg, circumstances.load_pattern),
-        )
-        reba[side] = reba_score(
-            in_reba[side],
-            load=reba_load(circumstances.load_kg, circumstances.load_pattern),
-            coupling=COUPLINGS.index(circumstances.coupling),
+        rula[side] = rula_reba.rula_score(
+            in_rula[side], muscle_arm=arm | circumstances.repeated,
+            muscle_body=trunk | circumstances.repeated, force=rula_reba.rula_force(*load),
+        )  # fmt: skip
+        reba[side] = rula_reba.reba_score(
+            in_reba[side], load=rula_reba.reba_load(*load),
+            coupling=rula_reba.COUPLINGS.index(circumstances.coupling),
             activity=(trunk | arm).astype(int) + circumstances.repeated + circumstances.rapid,
-        )
-    time = motion.time
+        )  # fmt: skip
+    rula_levels, reba_levels = rula_reba.rula_action_level, rula_reba.reba_action_level
     return PosturalAssessment(
         angles, bearing,
-        Assessment("RULA", time, rula, in_rula, ACTIONS, rula_action_level, known),
-        Assessment("REBA", time, reba, in_reba, RISKS, reba_action_level, known),
+        Assessment("RULA", motion.time, rula, in_rula, rula_reba.ACTIONS, rula_levels, known),
+        Assessment("REBA", motion.time, reba, in_reba, rula_reba.RISKS, reba_levels, known),
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +14,12 @@ from manikin.motion.motion import com_velocity, effector_positions
 from manikin.numerics.spatial import GRAVITY, FloatArray
 
 Flags = NDArray[np.bool_]
-
 EVEN = 0.3
 """A leg that carries at least this share of what both carry bears its part; ours."""
-
 NEAR_FLOOR = 0.05
 """In a motion without contacts a sole this little above the lower one is on the ground [m]; ours."""
-
 WALKING_SPEED = 0.4
 """Horizontal speed of the centre of mass from which a person walks [m/s]; ours."""
-
 ARM_WEIGHT = 0.025
 """Share of the body's weight, half that of an arm, from which on a hand's support carries the arm; ours."""
 
@@ -59,13 +56,13 @@ def bearing_of(body: BodyModel, motion: Motion) -> Bearing:
     known = bool(motion.contact_names) and bool(np.any(motion.support))
     feet = ("left_foot", "right_foot")
     places = effector_positions(body, motion, feet)
-    height = np.column_stack([places[name][:, 2] for name in feet])
-    marked = [_contact(motion, name) for name in feet]
+    left_foot, right_foot = (places[name] for name in feet)
+    marked = (_contact(motion, name) for name in feet)
     on, load = (np.column_stack(part) for part in zip(*marked, strict=True))
     if not known:
+        height = np.column_stack([left_foot[:, 2], right_foot[:, 2]])
         on = height <= height.min(axis=1, keepdims=True) + NEAR_FLOOR
     total = load.sum(axis=1)
-    left_foot, right_foot = (places[name] for name in feet)
     way = (left_foot - right_foot)[:, :2]
     # Share of the way from the right foot to the left one that the centre of mass has gone.
     gone = np.einsum("ni,ni->n", (motion.com - right_foot)[:, :2], way)
@@ -119,29 +116,24 @@ def parts_of(body: BodyModel) -> Parts:
     Raises:
         BodyError: If it has not two arms and two legs of three segments each, and a head.
     """
-    limbs = {}
-    for name in (f"{side}_{limb}" for limb in ("arm", "leg") for side in SIDES):
-        segments = limb_named(body, name).segments
+    limbs: dict[str, dict[str, tuple[str, str, str]]] = {"arm": {}, "leg": {}}
+    for kind, side in product(limbs, SIDES):
+        segments = limb_named(body, name := f"{side}_{kind}").segments
         if len(segments) != 3:
             raise BodyError(f"limb {name!r} has {len(segments)} segments; valid: 3, as a human's")
-        limbs[name] = (segments[0], segments[1], segments[2])
-    carriers = {body.segment(limbs[f"{side}_arm"][0]).parent for side in SIDES}
+        limbs[kind][side] = (segments[0], segments[1], segments[2])
+    carriers = {body.segment(limbs["arm"][side][0]).parent for side in SIDES}
     trunk = _chain(body, carriers.pop() or "")
     head = _chain(body, body.effector("head").segment)
     if carriers or head[: len(trunk)] != trunk or len(head) == len(trunk):
         raise BodyError(f"body {body.name!r} has no trunk with both arms and a neck; valid: a human")
-    arms, legs = ({side: limbs[f"{side}_{kind}"] for side in SIDES} for kind in ("arm", "leg"))
-    return Parts(trunk, head[len(trunk) :], arms, legs)
+    return Parts(trunk, head[len(trunk) :], limbs["arm"], limbs["leg"])
 
 
 def _chain(body: BodyModel, name: str) -> tuple[str, ...]:
     """Segments from the root to one of them."""
-    chain: list[str] = []
-    following: str | None = name
-    while following is not None:
-        chain.insert(0, following)
-        following = body.segment(following).parent
-    return tuple(chain)
+    parent = body.segment(name).parent
+    return (name,) if parent is None else (*_chain(body, parent), name)
 
 
 def twist_about_z(rotation: FloatArray) -> FloatArray:

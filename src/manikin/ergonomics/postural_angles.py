@@ -25,7 +25,6 @@ from manikin.numerics.spatial import FloatArray, dot
 
 SIDEWAYS = np.deg2rad(45.0)
 """An upper arm lifted further sideways than this has no angle in the sagittal plane worth the name; ours."""
-
 UPRIGHT = np.deg2rad(10.0)
 """Lean of the trunk up to which a neck is taken for upright; ours."""
 
@@ -135,15 +134,12 @@ def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -
     forward, aside = _bend(_upright_axes(at.turns[pelvis]), at.places[neck])
     looks = at.turned(head, chest)
     return PosturalAngles(
-        trunk_flexion=forward,
-        trunk_side_bend=aside,
-        trunk_twist=twist_about_z(at.turned(chest, pelvis)),
+        trunk_flexion=forward, trunk_side_bend=aside, trunk_twist=twist_about_z(at.turned(chest, pelvis)),
         neck_flexion=np.arctan2(looks[:, 0, 2], looks[:, 2, 2]) - neck_upright,
-        neck_side_bend=_arcsin(looks[:, 1, 2]),
-        neck_twist=twist_about_z(looks),
+        neck_side_bend=_arcsin(looks[:, 1, 2]), neck_twist=twist_about_z(looks),
         arms={side: _arm(at, parts.arms[side], chest, side) for side in SIDES},
         knees={side: _tilt(at.turned(shank, thigh)) for side, (thigh, shank, _) in parts.legs.items()},
-    )
+    )  # fmt: skip
 
 
 def upright_neck(body: BodyModel, q: FloatArray) -> float | None:
@@ -195,17 +191,12 @@ def _arm(at: _Frames, arm: tuple[str, str, str], chest: str, side: str) -> ArmAn
     in_hand = wrist[:, 2, :]  # the forearm's long axis, free of a turn about it
     turn = twist_about_z(in_upper_arm) + np.arctan2(-wrist[:, 0, 1], wrist[:, 1, 1])
     return ArmAngles(
-        flexion=np.arctan2(upper[:, 0], -upper[:, 2]),
-        abduction=outward * _arcsin(upper[:, 1]),
-        elevation=_tilt(at.turned(arm[0], chest)),
-        from_vertical=_tilt(at.turns[arm[0]]),
-        elbow=_tilt(in_upper_arm),
-        outward=outward * _arcsin(fore[:, 1]),
-        aside=outward * dot(at.turns[chest][:, :, 1], away),
-        wrist_flexion=-outward * _arcsin(in_hand[:, 1]),
-        wrist_deviation=np.arctan2(in_hand[:, 0], in_hand[:, 2]),
-        wrist_twist=-outward * turn,
-    )
+        flexion=np.arctan2(upper[:, 0], -upper[:, 2]), abduction=outward * _arcsin(upper[:, 1]),
+        elevation=_tilt(at.turned(arm[0], chest)), from_vertical=_tilt(at.turns[arm[0]]),
+        elbow=_tilt(in_upper_arm), outward=outward * _arcsin(fore[:, 1]),
+        aside=outward * dot(at.turns[chest][:, :, 1], away), wrist_flexion=-outward * _arcsin(in_hand[:, 1]),
+        wrist_deviation=np.arctan2(in_hand[:, 0], in_hand[:, 2]), wrist_twist=-outward * turn,
+    )  # fmt: skip
 
 
 def _arcsin(value: FloatArray) -> FloatArray:

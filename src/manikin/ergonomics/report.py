@@ -35,7 +35,6 @@ from manikin.runtime.files import csv_text
 
 FRICTION = 0.8
 """Coefficient of friction of contacts that are known by the motion alone."""
-
 AGREES = 0.5
 """Difference up to which a margin counts as reproduced [N.m]."""
 
@@ -45,14 +44,12 @@ class LowestMargin:
     """Smallest margin of a motion.
 
     Attributes:
-        value: In ``unit``.
-        unit: ``"N.m"``, or ``"N"`` of a point mass planned in the force space.
+        value: In ``unit``: ``"N.m"``, or ``"N"`` of a point mass planned in the force space.
         time: When [s].
         supports: Effectors in contact then.
         limiting: Nearest face of the wrench polytope then, in words; None with its reason in ``unknown``.
         again: Margin that the stance gives, to compare with ``value`` [N.m]; None without a stance.
         stance: ``"planned contacts"`` or ``"effectors in contact"``: from what the stance was rebuilt.
-        unknown: Why there is no limiting contact.
     """
 
     value: float
@@ -171,8 +168,6 @@ class Ergonomics(Displayed):
     Attributes:
         time: (n,) [s].
         circumstances: Given by the observer.
-        posture: Angles, RULA and REBA.
-        margin: Smallest margin and its limiting contact.
         margin_series: (n,) margin of the motion, NaN where it is not known.
         missing: Reason by part: ``"posture"``, ``"strength"``, ``"effort"``, ``"margin"``.
         untold: Segments that the recording does not observe; they were scored as in standing.
@@ -275,17 +270,16 @@ def ergonomics_of(
 
 def _strength(found: JointStrength) -> dict[str, Any]:
     worst = found.order[0]
-    joints = {"limit_Nm": found.limit, "max_share": found.peak, "max_at_s": found.peak_time}
-    joints["share_of_time_above"] = found.loaded
+    joints = {
+        "limit_Nm": found.limit, "max_share": found.peak, "max_at_s": found.peak_time,
+        "share_of_time_above": found.loaded,
+    }  # fmt: skip
     return {
-        "max_share": float(found.peak[worst]),
-        "max_joint": found.joint_names[worst],
-        "max_at_s": float(found.peak_time[worst]),
-        "fraction": found.fraction,
-        "known_share": found.known,
+        "max_share": float(found.peak[worst]), "max_joint": found.joint_names[worst],
+        "max_at_s": float(found.peak_time[worst]), "fraction": found.fraction, "known_share": found.known,
         "limits": found.source,
         "joints": {found.joint_names[index]: _row(joints, index) for index in found.order},
-    }
+    }  # fmt: skip
 
 
 def _row(columns: Mapping[str, FloatArray], index: int) -> dict[str, float]:
@@ -297,14 +291,12 @@ def _effort(found: CumulativeEffort) -> dict[str, Any]:
     joints = {"squared_share_s": found.squared_share, "positive_work_J": found.positive_work}
     joints["negative_work_J"] = found.negative_work
     return {
-        "duration_s": found.duration,
-        "squared_share_s": float(found.squared_share.sum()),
-        "rms_share": found.mean_share,
-        "positive_work_J": float(found.positive_work.sum()),
+        "duration_s": found.duration, "squared_share_s": float(found.squared_share.sum()),
+        "rms_share": found.mean_share, "positive_work_J": float(found.positive_work.sum()),
         "negative_work_J": float(found.negative_work.sum()),
         "absolute_work_J": float(found.absolute_work.sum()),
         "joints": {name: _row(joints, index) for index, name in enumerate(found.joint_names)},
-    }
+    }  # fmt: skip
 
 
 def _margin(found: LowestMargin) -> dict[str, Any]:

@@ -48,19 +48,14 @@ def checked(score: ArrayLike, least: int, largest: int, name: str) -> Scores:
 
 NEUTRAL = 5.0
 """Up to this trunk and neck are upright [deg]."""
-
 TURNED = 10.0
 """Beyond this trunk and neck are twisted or bent to the side, and a wrist is deviated [deg]."""
-
 ABDUCTED = 20.0
 """Beyond this an upper arm is abducted [deg]; a hanging arm stands off by up to 15."""
-
 WRIST_NEUTRAL, WRIST_BENT = 5.0, 15.0
 """Up to this a wrist is neither flexed nor extended; beyond the second, published, strongly so [deg]."""
-
 WRIST_AT_END = 60.0
 """Beyond this a forearm is turned to near the end of its range [deg], which is 80 deg to either side."""
-
 OUTWARD, BENT_ELBOW = 30.0, 30.0
 """A bent forearm that points further out than this works out to the side of the body; arms that are less bent
 than the second hang, and point where the upper arm does [deg]."""
@@ -184,7 +179,6 @@ REBA_TABLE_C = np.array([
 
 RISKS = {0: "negligible", 1: "low", 2: "medium", 3: "high", 4: "very high"}
 """Risk by action level."""
-
 _LEVEL_BEGINS = (2, 4, 8, 11)
 _SLIGHT, _KNEE, _DEEP_KNEE, _HANGING = 20.0, 30.0, 60.0, 20.0
 
@@ -306,11 +300,9 @@ TABLE_C = np.array([
 """Grand score by score C of the arm (1 to 8 and more) and score D of the body (1 to 7 and more)."""
 
 ACTIONS = {
-    1: "acceptable unless held or repeated for long",
-    2: "further investigation, changes may be required",
-    3: "investigation and changes soon",
-    4: "investigation and changes immediately",
-}
+    1: "acceptable unless held or repeated for long", 2: "further investigation, changes may be required",
+    3: "investigation and changes soon", 4: "investigation and changes immediately",
+}  # fmt: skip
 """What is to be done, by action level."""
 
 

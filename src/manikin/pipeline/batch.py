@@ -23,7 +23,6 @@ from manikin.scenarios import Scenario, list_scenarios, list_variants, load_scen
 
 TIME_LIMIT = 1800.0
 """Wall time after which a run is ended [s]."""
-
 _EXPLAINED = 3
 """Exit status of a run that ended in an explained failure."""
 
@@ -37,7 +36,7 @@ class Job:
         variant: Name of one of its variants, or None.
         expected: ``"success"`` or ``"failure"``, see the key ``expect`` of a scenario.
         stage: Stage that is expected to fail, or None for any.
-        because: Why a failure is expected; empty if the scenario does not say.
+        because: Why; empty if the scenario does not say.
     """
 
     scenario: str
@@ -94,26 +93,18 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
     Raises:
         ScenarioError: If one of the files is not valid.
     """
-    return tuple(
-        Job.of(name, variant, load_scenario(name, variant))
-        for name in list_scenarios()
-        for variant in (None, *list_variants(name))
-        if load_scenario(name, variant).file.body.model == "human" or not statures
-    )
+    pairs = [(name, variant) for name in list_scenarios() for variant in (None, *list_variants(name))]
+    loaded = [(*pair, load_scenario(*pair)) for pair in pairs]
+    return tuple(Job.of(*of) for of in loaded if not statures or of[-1].file.body.model == "human")
 
 
 def run_jobs(
-    jobs: Sequence[Job],
-    command: Callable[[Job], list[str]],
-    *,
-    workers: int | None = None,
-    time_limit: float = TIME_LIMIT,
-    report: Callable[[dict[str, Any], int], None] | None = None,
-) -> dict[str, Any]:
+    jobs: Sequence[Job], command: Callable[[Job], list[str]], *, workers: int | None = None,
+    time_limit: float = TIME_LIMIT, report: Callable[[dict[str, Any], int], None] | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Run jobs side by side and gather their summaries.
 
     Args:
-        jobs: What to run.
         command: Process of a job; it prints the run's summary as JSON on standard output.
         workers: Runs at a time; one per usable core when omitted.
         time_limit: Wall time after which a run is ended [s].
@@ -184,9 +175,10 @@ def _completed(
             ending = late if status is None else f"ended with status {status}"
             summary = _broken_off(job, f"the run {ending}", errors, seconds)
         right_stage = job.stage in (None, (summary["failure"] or {}).get("stage"))
-        wanted = {"expected": job.expected, "expected_because": job.because or None}
-        right = {"as_expected": ended == job.expected and right_stage}
-        return summary | {"variant": job.variant} | wanted | right
+        return summary | {
+            "variant": job.variant, "expected": job.expected, "expected_because": job.because or None,
+            "as_expected": ended == job.expected and right_stage,
+        }  # fmt: skip
 
     with ThreadPoolExecutor(workers) as pool:
         futures = {pool.submit(run, job): index for index, job in enumerate(jobs)}

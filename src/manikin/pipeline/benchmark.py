@@ -41,29 +41,22 @@ from manikin.verification import PlannedContacts, check_contact_plan
 BENCHMARK = "benchmark.json"
 SCENES = "scenes"
 TASKS = "tasks"
-
 TIME_LIMIT = 600.0
 """Processor time after which a task is ended [s]."""
-
 OUTCOMES = ("proved", "planned", "contacts", "failed")
 """How far a task came, the farthest first."""
-
 StageName = Literal["contacts", "all"]
-
 SIZES = ("stature_m", "mass_kg", "sex")
 """Keys of a body that an entry tells."""
-
 _AFTER = {"planned": ("execution",), "contacts": ("centroidal", "wholebody", "execution", "check")}
 """Stages in which a task that is ended has come so far already."""
 
 
 @dataclass(frozen=True)
 class BenchmarkTask:
-    """One scene and what is done with it.
+    """One scene of a family, by its seed, and what is done with it.
 
     Attributes:
-        family: Name of the family.
-        seed: Number of the scene.
         stage: ``"contacts"``, or ``"all"`` for a whole run.
         time_limit: Processor time after which it is ended [s].
         folder: Where the meshes of the scene are.
@@ -153,9 +146,10 @@ def _contacts(scenario: Scenario, stages: _StageClock) -> dict[str, Any]:
     report = Report(context, None, stages, clock.perf_counter())
     planned = plan_contacts(context, report)
     stages("check", 0.0)
-    plan = None if planned is None else planned.plan
-    given = None if plan is None else plan_in_world(plan, context.transform_task_to_world)
-    return report.close() | {"checked": None if given is None else checked_contacts(scenario, given)}
+    checked = None
+    if planned is not None and planned.plan is not None:
+        checked = checked_contacts(scenario, plan_in_world(planned.plan, report.transform))
+    return report.close() | {"checked": checked}
 
 
 def _whole(scenario: Scenario, stages: _StageClock) -> dict[str, Any]:
@@ -179,10 +173,8 @@ def checked_contacts(scenario: Scenario, plan: PlannedContacts | Path) -> dict[s
         result = check_contact_plan(scenario, plan)
     except ManikinError as error:
         return {"certified": False, "verdict": f"refused: {error}", "broken": [], "room_m": None}
-    return {
-        "certified": result.held, "verdict": result.verdict, "broken": sorted(result.requirements.broken),
-        "room_m": result.room,
-    }  # fmt: skip
+    broken = sorted(result.requirements.broken)
+    return {"certified": result.held, "verdict": result.verdict, "broken": broken, "room_m": result.room}
 
 
 def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
@@ -193,13 +185,11 @@ def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
     blocks = [summary[name] or {} for name in ("wholebody", "centroidal")]
     done = found if stage == "contacts" else summary["succeeded"]
     return {
-        **reached,
-        "outcome": next((name for name in OUTCOMES if reached.get(name)), "failed"),
-        "checked": summary.get("checked"),
-        "failure": None if done else summary["failure"],
+        **reached, "outcome": next((name for name in OUTCOMES if reached.get(name)), "failed"),
+        "checked": summary.get("checked"), "failure": None if done else summary["failure"],
         "steps": contacts.get("steps"),
         "duration_s": next((block["duration_s"] for block in blocks if block.get("duration_s")), None),
-    }
+    }  # fmt: skip
 
 
 def _failure(stage: str, reason: str, where: str = "") -> dict[str, Any]:
@@ -221,8 +211,7 @@ class BenchmarkDirectory(ResultDirectory):
             scene = digest(draw_scene(FAMILIES[task.family], task.seed))
         except ManikinError:
             scene = None
-        same = (entry.get("stage"), entry.get("scene")) == (task.stage, scene)
-        return entry if same else None
+        return entry if (entry.get("stage"), entry.get("scene")) == (task.stage, scene) else None
 
     def keep(self, entry: Mapping[str, Any]) -> None:
         """Write the entry of a task."""
@@ -237,8 +226,6 @@ def run_benchmark(
     """Do the tasks of families times seeds, those that are not done yet, and count them.
 
     Args:
-        families: Kinds of scenes.
-        seeds: Numbers of the scenes of each.
         stage: ``"contacts"`` for contacts alone, ``"all"`` for whole runs.
         path: Directory to keep everything in, or to go on with; nothing is kept when omitted.
         jobs: Processes; one per usable core when omitted.
@@ -279,7 +266,7 @@ def run_benchmark(
                 if report is not None:
                     report(entry, len(entries), len(tasks))
     ordered = [entries[task.name] for task in tasks]
-    result = {**asked, "complete": True, **counted(ordered), "tasks": ordered}
+    result = asked | {"complete": True, **counted(ordered), "tasks": ordered}
     result["wall_s"] = clock.perf_counter() - began
     if directory is not None:
         directory.write(BENCHMARK, result)
@@ -318,19 +305,17 @@ def _counts(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     moved = [entry for entry in entries if entry["duration_s"] and entry["planned"]]
     verdicts = [entry["checked"]["certified"] for entry in entries if entry["checked"] is not None]
     failures = [entry["failure"]["stage"] for entry in entries if entry["failure"] is not None]
+    ratios = [entry["processor_s"]["total"] / entry["duration_s"] for entry in moved]
+    percentiles = {"median": 50.0, "p95": 95.0, "largest": 100.0}
     return {
         "tasks": len(entries),
         **{key: sum(bool(entry[key]) for entry in entries) for key in ("contacts", "planned", "proved")},
         "checked": sum(map(bool, verdicts)) if verdicts else None,
-        "contacts_s": {
-            "median": _share(found, 50.0), "p95": _share(found, 95.0), "largest": _share(found, 100.0),
-        },
+        "contacts_s": {name: _share(found, percent) for name, percent in percentiles.items()},
         "duration_s": _share([entry["duration_s"] for entry in moved], 50.0),
-        "computing_over_motion": _share(
-            [entry["processor_s"]["total"] / entry["duration_s"] for entry in moved], 50.0
-        ),
+        "computing_over_motion": _share(ratios, 50.0),
         "failures": {stage: failures.count(stage) for stage in sorted(set(failures))},
-    }  # fmt: skip
+    }
 
 
 def _share(values: Sequence[float], percent: float) -> float | None:

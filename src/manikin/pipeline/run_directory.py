@@ -50,11 +50,8 @@ class ComTrack:
 
     Attributes:
         time: (n,) not decreasing [s].
-        position: (n, 3) [m].
-        velocity: (n, 3) [m/s].
-        acceleration: (n, 3) [m/s^2].
-        margin: (n,) in :attr:`margin_unit`.
-        margin_unit: ``"N.m"``, or ``"N"`` when the margin is a force at the CoM.
+        position, velocity, acceleration: (n, 3) [m, m/s, m/s^2].
+        margin: (n,) in ``margin_unit``: ``"N.m"``, or ``"N"`` when it is a force at the CoM.
     """
 
     time: FloatArray
@@ -84,7 +81,6 @@ class RunRecord(Displayed):
     Attributes:
         label: What to call the run in figures.
         content: Motions, body, scene and schedule with the real soles.
-        summary: As written by the run.
         mass: Of the body [kg].
         plan: The CoM as planned for a point mass, its margin with the planning soles.
         walks: (n, 4) instants [s], x, y [m] and headings [rad] of ways over the floor, by who walks.
@@ -169,10 +165,7 @@ class RunRecord(Displayed):
 
 
 def read_run(directory: str | Path) -> RunRecord:
-    """Read a run directory, also of a run that stopped early.
-
-    Args:
-        directory: Written by ``manikin run``.
+    """Read a run directory written by ``manikin run``, also of a run that stopped early.
 
     Raises:
         InputError: If it is missing, is not a run directory, or one of its files is damaged.
@@ -288,9 +281,8 @@ class RunDirectory(ResultDirectory):
         """
         super().__init__(path)
         # The summary goes first: without it the directory is known to be incomplete.
-        self.remove(
-            SUMMARY, CONTACT_PLAN, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS
-        )
+        old = SUMMARY, CONTACT_PLAN, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS
+        self.remove(*old)
 
 
 def read_summary(path: str | Path) -> dict[str, Any]:

@@ -73,9 +73,8 @@ def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequen
     if not isinstance(scenario, Scenario):
         return load_scenario(str(scenario), variant, overrides)
     if variant is not None:
-        raise ScenarioError(
-            f"variant {variant!r} is given beside a scenario that is already loaded; valid: its name or file"
-        )
+        beside = "is given beside a scenario that is already loaded"
+        raise ScenarioError(f"variant {variant!r} {beside}; valid: its name or file")
     return scenario.with_overrides(overrides)
 
 

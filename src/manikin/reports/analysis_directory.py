@@ -49,8 +49,7 @@ def analyze_files(
     Raises:
         ManikinError: If a process ends before its time.
     """
-    # Longest first, so that all processes end together.
-    ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)
+    ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)  # so that all processes end together
     for _, entry in side_by_side(partial(_analyze_one, options=options), ordered, workers, "analysis"):
         yield entry
 
@@ -74,19 +73,15 @@ def directories_for(paths: Sequence[Path], out: Path) -> list[Path]:
     whole = [path.resolve() for path in paths]
     shared = Path(commonpath([path.parent for path in whole]))
     stems = [path.with_suffix("") for path in whole]
-    return [
-        out / (path if stems.count(stem) > 1 else stem).relative_to(shared)
-        for path, stem in zip(whole, stems, strict=True)
-    ]
+    names = (path if stems.count(stem) > 1 else stem for path, stem in zip(whole, stems, strict=True))
+    return [out / name.relative_to(shared) for name in names]
 
 
 def compare_with_recording(found: Replan) -> RunComparison:
     """Compare plan and recording as two runs: timing, centre of mass and margins; the recording comes first.
 
-    Margins of both are those of a point mass: with the recorded acceleration, and as planned.
-
-    Args:
-        found: A plan; of one that failed there is only the recording.
+    Margins of both are those of a point mass: with the recorded acceleration, and as planned. Of a plan that
+    failed there is only the recording.
     """
     content = MotionFile(body=found.body, scene=found.scene, schedule=found.recording.schedule)
     mass, plan, trajectory = found.body.mass, None, found.com.trajectory
@@ -103,9 +98,8 @@ def _recorded_track(found: Replan) -> ComTrack:
     velocity = np.gradient(com, time, axis=0, edge_order=2)
     acceleration = np.gradient(velocity, time, axis=0, edge_order=2)
     wrench = pseudo_wrench(found.body.mass, com, acceleration)
-    stances = [phase.stance for phase in schedule.sequence]
-    known = found.com.polytopes
-    margins = motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=known)
+    stances, phases = [phase.stance for phase in schedule.sequence], schedule.phase_at(time)
+    margins = motion_margin(stances, phases, wrench, com, polytopes=found.com.polytopes)
     return ComTrack(time, com, velocity, acceleration, margins.margin)
 
 
@@ -164,12 +158,11 @@ def summary_of(analysis: Analysis, plan: Replan | None = None) -> dict[str, Any]
 def write_analysis(
     analysis: Analysis, directory: Path, *, draw: bool = True, plan: Replan | None = None
 ) -> None:
-    """Write the files of one recording; the summary comes last.
+    """Write the files of one recording, and of it re-planned; the summary comes last.
 
     Args:
         directory: Created if it is not there.
         draw: Whether the report has its figures.
-        plan: The recording re-planned.
 
     Raises:
         MotionFileError: If they cannot be written.
@@ -190,27 +183,19 @@ def write_analysis(
 
 
 def overview_of(entries: Sequence[AnalysisEntry], wall: float) -> dict[str, Any]:
-    """Content of ``analyses.json``: all summaries, and what was refused.
-
-    Args:
-        wall: Time that all of them took together [s].
-    """
+    """Content of ``analyses.json``: all summaries, and what was refused; ``wall`` is the time of all [s]."""
     measured = [entry.summary for entry in entries if entry.summary is not None]
     duration = sum(summary["duration_s"] for summary in measured)
-    refused = [entry for entry in entries if entry.summary is None]
+    left_out = [entry for entry in entries if entry.summary is None]
+    refused = [{"file": str(entry.job.path), "reason": entry.refusal} for entry in left_out]
     return {
-        "files": measured,
-        "refused": [{"file": str(entry.job.path), "reason": entry.refusal} for entry in refused],
-        "duration_s": duration, "wall_s": wall, "realtime_factor": duration / wall,
+        "files": measured, "refused": refused, "duration_s": duration, "wall_s": wall,
+        "realtime_factor": duration / wall,
     }  # fmt: skip
 
 
 def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], directory: Path) -> None:
-    """Write the table of several recordings as a page, as CSV and as JSON.
-
-    Args:
-        overview: Of :func:`overview_of`.
-        directory: Where the directories of the recordings are.
+    """Write :func:`overview_of` recordings as a page, as CSV and as JSON, beside their directories.
 
     Raises:
         MotionFileError: If they cannot be written.

@@ -46,13 +46,9 @@ class SvgDrawing:
     def text(
         self, x: float, y: float, *parts: tuple[str, str], size: float = 12.0, anchor: str = "start"
     ) -> None:
-        """Words in a row on the line y, each with its colour.
+        """Words in a row on the line y, each with its colour, in letters of a size [px].
 
-        Args:
-            x: Of the ``anchor``.
-            parts: Words and colours.
-            size: Of the letters [px].
-            anchor: ``"start"``, ``"middle"`` or ``"end"`` of the row.
+        The ``anchor`` at x is the ``"start"``, ``"middle"`` or ``"end"`` of the row.
         """
         spans = "".join(f'<tspan fill="{colour}">{escape(words)}</tspan>' for words, colour in parts)
         self._parts.append(
@@ -100,16 +96,12 @@ def _tenths(value: float) -> int:
 
 POSTURES = 7
 """Postures drawn, each above its instant: in the middle of as many equal parts of the time."""
-
 LARGEST = 115.0
 """Scale of the postures where there is room [px/m]."""
-
 WIDTH, LEFT, RIGHT = 1120.0, 105.0, 15.0
 ROW, BAND, GAP = 20.0, 92.0, 42.0
 """Heights of a row of supports, of a band of curves, and between bands [px]."""
-
 GRID = "#E3E3E3"
-
 Curves = Mapping[str, tuple[FloatArray, str]]
 
 
@@ -125,19 +117,16 @@ class _Band:
 
 def recording_sheet(analysis: Analysis, words: str) -> str:
     """SVG element of what was measured of a recording over time; ``words`` are its alternative text."""
-    figures = _Postures(analysis)
-    names, bands = analysis.motion.contact_names, _bands(analysis)
+    figures, bands = _Postures(analysis), _bands(analysis)
     rows = figures.height + 40.0
-    height = rows + ROW * len(names) + len(bands) * (GAP + BAND) + 42.0
-    sheet = SvgDrawing(WIDTH, height)
+    top = rows + ROW * len(analysis.motion.contact_names)
+    sheet = SvgDrawing(WIDTH, top + len(bands) * (GAP + BAND) + 42.0)
     clock = _Clock(float(analysis.time[0]), float(analysis.time[-1]))
     figures.draw(sheet, clock)
     _supports(sheet, clock, analysis, rows)
-    top = rows + ROW * len(names)
-    x = clock(analysis.time)
     for band in bands:
         top += GAP + BAND
-        _draw(sheet, x, band, top)
+        _draw(sheet, clock(analysis.time), band, top)
     clock.draw(sheet, top + 6.0)
     return sheet.svg(words)
 
@@ -187,12 +176,9 @@ def _bands(analysis: Analysis) -> list[_Band]:
         _scaled("margin [N.m]", margins, 0.0, 0.01),
         _scaled("height of the centre of mass [m]", {"": (analysis.com_height, ours)}),
     ]
-    posture = analysis.ergonomics.posture
-    if posture is not None:
-        scores = {
-            item.method: (item.score.astype(np.float64), COLOURS[colour])
-            for item, colour in ((posture.rula, "planned"), (posture.reba, "executed"))
-        }
+    if (posture := analysis.ergonomics.posture) is not None:
+        methods = (posture.rula, COLOURS["planned"]), (posture.reba, COLOURS["executed"])
+        scores = {item.method: (item.score.astype(np.float64), colour) for item, colour in methods}
         bands.append(_Band("scores", scores, 0.0, 15.0))
     return bands
 
@@ -233,8 +219,7 @@ def _supports(sheet: SvgDrawing, clock: _Clock, analysis: Analysis, top: float) 
         for item in analysis.supports.of(name):
             first, last = clock(np.array([item.start, item.end]))
             sheet.bar(first, level + 2.0, last - first, ROW - 4.0, colours[name])
-        words = (readable(name), COLOURS["ink"])
-        sheet.text(LEFT - 8.0, level + 0.5 * ROW + 4.0, words, anchor="end")
+        sheet.text(LEFT - 8.0, level + 0.5 * ROW + 4.0, (readable(name), COLOURS["ink"]), anchor="end")
 
 
 class _Postures:
@@ -247,14 +232,12 @@ class _Postures:
         self._instants = analysis.time[frames]
         self._colours = list(map(side_colour, _drawn(analysis.body)))
         self._bones = np.array([_bones(analysis.body, q) for q in turned])
-        self._bones[..., 1] -= min(analysis.supports.surfaces, default=0.0)
-        widest = float(np.ptp(self._bones[..., 0], axis=(1, 2)).max()) + 0.15
+        ahead, up = np.moveaxis(self._bones, -1, 0)  # views
+        up -= min(analysis.supports.surfaces, default=0.0)
         room = (WIDTH - LEFT - RIGHT) / max(len(frames), 4)
-        self._scale = min(LARGEST, room / widest)
-        ahead = self._bones[..., 0]
+        self._scale = min(LARGEST, room / (float(np.ptp(ahead, axis=(1, 2)).max()) + 0.15))
         ahead -= 0.5 * (ahead.min(axis=(1, 2), keepdims=True) + ahead.max(axis=(1, 2), keepdims=True))
-        self._top = max(float(self._bones[..., 1].max()), 0.5)
-        self._below = max(-float(self._bones[..., 1].min()), 0.0)
+        self._top, self._below = max(float(up.max()), 0.5), max(-float(up.min()), 0.0)
         self.height = self._scale * (self._top + self._below) + 20.0
 
     def draw(self, sheet: SvgDrawing, clock: _Clock) -> None:
@@ -262,8 +245,7 @@ class _Postures:
         sheet.strokes([_level(floor)], COLOURS["soft"], 1.0)
         places = np.stack([clock(self._instants), np.full(len(self._instants), floor)], axis=1)
         bones = places[:, None, None] + self._scale * self._bones * (1.0, -1.0)
-        left, trunk, right = (side_colour(name) for name in ("left", "trunk", "right"))
-        for colour in (left, trunk, right):  # seen from the right, whose limbs are the nearest
+        for colour in map(side_colour, ("left", "trunk", "right")):  # seen from the right, the nearest limbs
             chosen = [number for number, item in enumerate(self._colours) if item == colour]
             sheet.strokes([line for lines in bones[:, chosen] for line in lines], colour, 5.0)
         for instant, (place, _) in zip(self._instants, places, strict=True):

@@ -33,14 +33,11 @@ def com_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTrack)
     distance = np.linalg.norm(gap, axis=1)
     worst = int(np.argmax(distance))
     return {
-        "max_distance_m": float(distance[worst]),
-        "max_at_first_s": float(times_first[worst]),
-        "max_at_second_s": float(times_second[worst]),
-        "rms_distance_m": float(np.sqrt(np.mean(distance**2))),
-        "mean_difference_m": gap.mean(axis=0).tolist(),
-        "first": com_numbers(first),
+        "max_distance_m": float(distance[worst]), "max_at_first_s": float(times_first[worst]),
+        "max_at_second_s": float(times_second[worst]), "rms_distance_m": float(np.sqrt(np.mean(distance**2))),
+        "mean_difference_m": gap.mean(axis=0).tolist(), "first": com_numbers(first),
         "second": com_numbers(second),
-    }
+    }  # fmt: skip
 
 
 def com_numbers(track: ComTrack) -> dict[str, Any]:
@@ -64,20 +61,15 @@ def margin_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTra
     comparable = first.margin_unit == second.margin_unit
     phases = []
     for row in rows:
-        least = _least(first, row.first), _least(second, row.second)
-        phases.append(
-            {"first": least[0], "second": least[1], "difference": _difference(*least) if comparable else None}
-        )
-    whole = float(first.margin.min()), float(second.margin.min())
+        one, other = _least(first, row.first), _least(second, row.second)
+        gap = _difference(one, other) if comparable else None
+        phases.append({"first": one, "second": other, "difference": gap})
+    one, other = float(first.margin.min()), float(second.margin.min())
     return {
-        "unit": first.margin_unit if comparable else None,
-        "first_unit": first.margin_unit,
-        "second_unit": second.margin_unit,
-        "min_first": whole[0],
-        "min_second": whole[1],
-        "min_difference": whole[1] - whole[0] if comparable else None,
-        "phases": phases,
-    }
+        "unit": first.margin_unit if comparable else None, "first_unit": first.margin_unit,
+        "second_unit": second.margin_unit, "min_first": one, "min_second": other,
+        "min_difference": other - one if comparable else None, "phases": phases,
+    }  # fmt: skip
 
 
 def _least(track: ComTrack, phase: PhaseTime | None) -> float | None:
@@ -110,8 +102,7 @@ class PostureDifference:
     """Two postures at matching key instants.
 
     Attributes:
-        first_s: Key instant of the first run [s].
-        second_s: Key instant of the second run [s].
+        first_s, second_s: Key instant of each run [s].
         rms_deg: Root mean square over all common joints [deg].
         largest: The joints that differ most, the largest first.
     """
@@ -138,9 +129,8 @@ def posture_differences(
 ) -> tuple[PostureDifference, ...]:
     """Compare the angles of the joints that both bodies have, at every matching key instant."""
     common = [name for name in first.joint_names if name in second.joint_names]
-    instants = key_instants(rows) if common else []
     postures = []
-    for times in instants:
+    for times in key_instants(rows) if common else []:
         a, b = (_angles(*item, common) for item in zip((first, second), times, strict=True))
         order = np.argsort(-np.abs(b - a), kind="stable")[:LARGEST]
         largest = [JointDifference(common[i], float(a[i]), float(b[i]), float(b[i] - a[i])) for i in order]
@@ -202,27 +192,20 @@ class RunComparison(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON of ``manikin compare``."""
-        shared = shared_tracks(*self.runs)
+        shared, keys = shared_tracks(*self.runs), {stage: stage.replace(" ", "_") for stage in STAGES}
 
         def by_stage(difference: Callable[..., Any]) -> dict[str, Any]:
-            keys = {stage: stage.replace(" ", "_") for stage in STAGES}
-            return {
-                key: difference(self.rows, *shared[stage]) if stage in shared else None
-                for stage, key in keys.items()
-            }
+            known = {keys[stage]: difference(self.rows, *tracks) for stage, tracks in shared.items()}
+            return dict.fromkeys(keys.values()) | known
 
         return {
-            "first": _run_block(self.first, self.names[0]),
-            "second": _run_block(self.second, self.names[1]),
-            "matched_phases": self.matched_phases,
-            "timing": [row.as_dict() for row in self.rows] or None,
-            "duration_difference_s": _difference(*self.durations),
-            "com": by_stage(com_difference),
-            "margins": by_stage(margin_difference),
-            "postures_of": self.postures_of,
+            "first": _run_block(self.first, self.names[0]), "second": _run_block(self.second, self.names[1]),
+            "matched_phases": self.matched_phases, "timing": [row.as_dict() for row in self.rows] or None,
+            "duration_difference_s": _difference(*self.durations), "com": by_stage(com_difference),
+            "margins": by_stage(margin_difference), "postures_of": self.postures_of,
             "postures": [asdict(posture) for posture in self.postures] or None,
             "unmatched": list(self.unmatched),
-        }
+        }  # fmt: skip
 
 
 def compare_runs(first: RunRecord, second: RunRecord) -> RunComparison:
@@ -258,15 +241,13 @@ def _missing_stages(first: RunRecord, second: RunRecord) -> list[str]:
     for place, record, other in (("first", first, second), ("second", second, first)):
         failure = record.summary.get("failure")
         why = f" (it failed in {failure['stage']}: {failure['reason']})" if failure else ""
-        for stage in STAGES:
-            if stage in tracks_of(other) and stage not in tracks_of(record):
-                lines.append(f"the {place} run has no {_words(stage)}{why}")
+        missing = [stage for stage in STAGES if stage in tracks_of(other) and stage not in tracks_of(record)]
+        lines += [f"the {place} run has no {_words(stage)}{why}" for stage in missing]
     if not tracks_of(first) and not tracks_of(second):
         lines.append("neither run has a centre of mass")
-    shared = shared_tracks(first, second)
-    for stage, (item, two) in shared.items():
-        if item.margin_unit != two.margin_unit:
-            lines.append(f"margins of the {_words(stage)} are in {item.margin_unit} and in {two.margin_unit}")
+    for stage, (one, two) in shared_tracks(first, second).items():
+        if one.margin_unit != two.margin_unit:
+            lines.append(f"margins of the {_words(stage)} are in {one.margin_unit} and in {two.margin_unit}")
     return lines
 
 
@@ -286,14 +267,10 @@ def _missing_phases(first: RunRecord, second: RunRecord, rows: tuple[TimingRow, 
 
 def _run_block(record: RunRecord, name: str) -> dict[str, Any]:
     return {
-        "run": name,
-        "scenario": record.scenario,
-        "succeeded": bool(record.summary.get("succeeded", False)),
-        "failure": record.summary.get("failure"),
-        "duration_s": _duration(record),
-        "mass_kg": record.mass,
+        "run": name, "scenario": record.scenario, "succeeded": bool(record.summary.get("succeeded", False)),
+        "failure": record.summary.get("failure"), "duration_s": _duration(record), "mass_kg": record.mass,
         "stature_m": None if record.body is None else record.body.stature,
-    }
+    }  # fmt: skip
 
 
 def _duration(record: RunRecord) -> float | None:

@@ -33,11 +33,8 @@ def report_console() -> Console:
 
 
 def _timing_table(comparison: RunComparison) -> Table:
-    first, second = comparison.names
-    instants = ("start", "end", "duration")
-    table = _table(
-        "Timing [s]", "supports", f"{first} phase", *instants, f"{second} phase", *instants, "difference"
-    )
+    first, second = ((f"{name} phase", "start", "end", "duration") for name in comparison.names)
+    table = _table("Timing [s]", "supports", *first, *second, "difference")
     for row in comparison.rows:
         held = ", ".join(map(readable, row.supports)) or "flight"
         gap = _number(row.duration_difference_s, "+z.3f")
@@ -54,14 +51,10 @@ def _com_table(comparison: RunComparison) -> Table:
     headings = "stage", "RMS distance", "largest", "at [s]", "mean difference x", "y", "z"
     table = _table("Centre of mass at equal shares of the matched phases [m]", *headings)
     for stage, tracks in shared_tracks(*comparison.runs).items():
-        result = com_difference(comparison.rows, *tracks)
-        if result is None:
-            continue
-        table.add_row(
-            stage, f"{result['rms_distance_m']:.4f}", f"{result['max_distance_m']:.4f}",
-            f"{result['max_at_first_s']:.2f} / {result['max_at_second_s']:.2f}",
-            *(f"{value:+z.4f}" for value in result["mean_difference_m"]),
-        )  # fmt: skip
+        if (result := com_difference(comparison.rows, *tracks)) is not None:
+            when = f"{result['max_at_first_s']:.2f} / {result['max_at_second_s']:.2f}"
+            distances = f"{result['rms_distance_m']:.4f}", f"{result['max_distance_m']:.4f}", when
+            table.add_row(stage, *distances, *(f"{value:+z.4f}" for value in result["mean_difference_m"]))
     return table
 
 
@@ -80,9 +73,8 @@ def _margin_table(comparison: RunComparison) -> Table:
         one, other = ("-" if phase is None else str(phase.phase) for phase in (row.first, row.second))
         table.add_row(one if one == other else f"{one} / {other}", *cells)
     table.add_section()
-    table.add_row(
-        "whole motion", *(_pair(m["min_first"], m["min_second"], m["min_difference"]) for m in result)
-    )
+    least = (_pair(item["min_first"], item["min_second"], item["min_difference"]) for item in result)
+    table.add_row("whole motion", *least)
     return table
 
 
@@ -98,9 +90,8 @@ def _posture_table(comparison: RunComparison) -> Table:
     for posture in comparison.postures:
         joints = [joint for joint in posture.largest[:3] if joint.difference_deg != 0.0]
         text = ", ".join(f"{readable(j.joint)} {j.difference_deg:+z.1f}" for j in joints)
-        table.add_row(
-            f"{posture.first_s:.2f}", f"{posture.second_s:.2f}", f"{posture.rms_deg:.2f}", text or "none"
-        )
+        numbers = posture.first_s, posture.second_s, posture.rms_deg
+        table.add_row(*(f"{number:.2f}" for number in numbers), text or "none")
     return table
 
 

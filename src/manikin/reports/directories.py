@@ -1,7 +1,7 @@
 """Result directories of push maps, statistics of recordings and partitions into words.
 
-Directions of a map and slices of a partition are kept as soon as they are known, so that an
-interrupted search can be continued.
+Directions of a map and slices of a partition are kept as soon as they are known, so that an interrupted
+search can be continued. Figures without content are left out.
 
 ::
 
@@ -16,8 +16,6 @@ interrupted search can be continued.
     DIR/words.json             what is asked, what is known of it: counts and shares by word, residuals
     DIR/slices/150.npz         paths of the slice of 150 deg: turns, shapes, lengths, costs
     DIR/figures/*.png          drawn from the slices
-
-Figures without content are left out.
 """
 
 import json
@@ -40,19 +38,8 @@ from manikin.recordings.statistics.phases import (
     published_heights,
     published_phases,
 )
-from manikin.reports.figures import (
-    LowestPoints,
-    com_distances_figure,
-    com_heights_figure,
-    com_paths_figure,
-    equal_paths_figure,
-    phase_durations_figure,
-    placements_figure,
-    published_lowest,
-    push_map_figure,
-    save_figure,
-    words_figure,
-)
+from manikin.reports import figures
+from manikin.reports.figures import save_figure
 from manikin.runtime import __version__
 from manikin.runtime.files import ResultDirectory, atomic_path, csv_text, to_json, writing
 from manikin.simulation import PushMap, PushTrials
@@ -69,7 +56,6 @@ from manikin.walking.words import (
 
 MAP = "map.json"
 TABLE = "map.csv"
-
 RESULTS = ("impulse_Ns", "beyond_Ns", "trials", "bound_Ns")
 """Keys of a map that are found or computed; all others say what was asked."""
 
@@ -116,7 +102,7 @@ class MapDirectory(ResultDirectory):
         Raises:
             FigureError: If no impulse was held.
         """
-        save_figure(push_map_figure(self.maps, trials.soles()), self.figures / "push_map.png")
+        save_figure(figures.push_map_figure(self.maps, trials.soles()), self.figures / "push_map.png")
 
     def _continued(self, data: Mapping[str, Any]) -> tuple[PushMap, ...]:
         """Maps of an earlier run, which must be about the same."""
@@ -124,8 +110,8 @@ class MapDirectory(ResultDirectory):
         for key in dict.fromkeys((*asked, *kept)):
             if asked.get(key) != kept.get(key):
                 known, now = (json.dumps(values.get(key)) for values in (kept, asked))
-                what = "other maps are compared there" if key == "compared" else (
-                    f"{key} is {known} there and {now} now")  # fmt: skip
+                what = f"{key} is {known} there and {now} now"
+                what = "other maps are compared there" if key == "compared" else what
                 raise InputError(f"{self.path / MAP}: {what}; valid: the same settings, or another directory")
         rest = {key: value for key, value in data.items() if key not in ("manikin", "complete", "compared")}
         try:
@@ -161,7 +147,7 @@ HEAD = ("group", "motion", "phase", "effectors", "start_s", "end_s", "duration_s
 
 def write_statistics(
     directory: str | Path, content: Mapping[str, Any], sequences: Sequence[PhaseSequence],
-    figures: Mapping[str, Figure],
+    pictures: Mapping[str, Figure],
 ) -> list[Path]:  # fmt: skip
     """Write what was measured, and return the files; others in the directory are left alone.
 
@@ -170,46 +156,49 @@ def write_statistics(
     """
     folder = ResultDirectory(directory, "statistics")
     files = [folder.write(STATISTICS, content), folder.write(PHASES, phase_table(sequences))]
-    for name, figure in figures.items():
+    for name, figure in pictures.items():
         files.append(folder.figures / f"{name}.png")
         save_figure(figure, files[-1])
     return files
 
 
 def clip_figures(
-    clips: Sequence[RecordedClip],
-    found: Mapping[str, GroupStatistics],
-    settings: StatisticsSettings,
+    clips: Sequence[RecordedClip], found: Mapping[str, GroupStatistics], settings: StatisticsSettings,
     by: By = "kind",
-) -> dict[str, Figure]:
+) -> dict[str, Figure]:  # fmt: skip
     """All figures of recorded motions that have content, by name."""
     height = None if settings.overhead is None else settings.overhead.height
     placed = [clip for clip in clips if clip.name not in found[clip.group].unplaced]
     standing = [clip.standing_com for clip in clips if clip.standing_com is not None]
     stood = sum(standing) / len(standing) if standing else None
-    lowest = [LowestPoints.of(item, height) for item in found.values()]
-    published, origins = published_distances(), [settings.origin_of(clip) for clip in placed]
+    phases, origins = (
+        [settings.phases_of(clip) for clip in clips],
+        [settings.origin_of(clip) for clip in placed],
+    )
+    places = {group: item.placements for group, item in found.items()}
+    lowest = [figures.LowestPoints.of(item, height) for item in found.values()]
+    known = published_distances()
     drawn = {
-        "phase_durations": lambda: phase_durations_figure([settings.phases_of(clip) for clip in clips], by),
-        "placements": lambda: placements_figure({group: item.placements for group, item in found.items()}),
-        "com_paths": lambda: com_paths_figure(placed, origins, overhead=height),
-        "com_heights": lambda: com_heights_figure(lowest, stood),
-        "com_distances": lambda: com_distances_figure(clips, limit=settings.limit, published=published),
+        "phase_durations": lambda: figures.phase_durations_figure(phases, by),
+        "placements": lambda: figures.placements_figure(places),
+        "com_paths": lambda: figures.com_paths_figure(placed, origins, overhead=height),
+        "com_heights": lambda: figures.com_heights_figure(lowest, stood),
+        "com_distances": lambda: figures.com_distances_figure(clips, limit=settings.limit, published=known),
     }
-    figures = {}
+    result = {}
     for name, draw in drawn.items():
         with suppress(FigureError):  # nothing to show
-            figures[name] = draw()
-    return figures
+            result[name] = draw()
+    return result
 
 
 def published_figures() -> dict[str, Figure]:
     """Figures of the published motions, by name; those of the means quoted in the thesis."""
     quoted = [item for item in published_phases("left_foot") if not item.group.endswith("C3")]
     return {
-        "phase_durations": phase_durations_figure(quoted),
-        "com_heights": com_heights_figure(published_lowest(), published_heights().standing),
-        "com_distances": com_distances_figure([], published=published_distances()),
+        "phase_durations": figures.phase_durations_figure(quoted),
+        "com_heights": figures.com_heights_figure(figures.published_lowest(), published_heights().standing),
+        "com_distances": figures.com_distances_figure([], published=published_distances()),
     }
 
 
@@ -227,7 +216,6 @@ WORDS = "words.json"
 SLICES = "slices"
 SHOWN_SLICES = (340, 150)
 """Headings of the slices that are drawn if they are there, those of [Truong2010]_ Fig. 3.6 [deg]."""
-
 _ARRAYS = ("turns", "shapes", "lengths", "costs")
 _REACHED = 1e-6
 """Largest distance of a path's end from its goal [m]; a changed byte exceeds it."""
@@ -236,26 +224,20 @@ _REACHED = 1e-6
 def partition_as_dict(
     grid: WordGrid, headings: Sequence[int], slices: Mapping[int, WordSlice]
 ) -> dict[str, Any]:
-    """Content of ``words.json``.
-
-    Args:
-        headings: Of the slices that are asked for [deg].
-        slices: Those that are known, by their heading [deg].
-    """
+    """Content of ``words.json``: ``headings`` that are asked for, and slices known by theirs [deg]."""
     known = [slices[heading] for heading in headings if heading in slices]
-    counts = count_words(known)
-    missed = [item.residuals() for item in known]
+    counts, missed = count_words(known), [item.residuals() for item in known]
     names = {"position": "position_m", "heading": "heading_rad", "curvature": "curvature_per_m",
              "adjoint": "adjoint", "hamiltonian": "hamiltonian"}  # fmt: skip
+    largest = {
+        key: max((float(getattr(item, name).max()) for item in missed), default=None)
+        for name, key in names.items()
+    }
     return {
         "manikin": __version__, "complete": len(known) == len(headings), "grid": grid.as_dict(),
         "headings_deg": list(headings), "problems": len(headings) * int(np.prod(grid.shape)),
         "solved": sum(counts.values()), "counts": counts, "shares": shares(counts),
-        "others": [word for word in counts if word not in THESIS_WORDS],
-        "max_residuals": {
-            key: max((float(getattr(item, name).max()) for item in missed), default=None)
-            for name, key in names.items()
-        },
+        "others": [word for word in counts if word not in THESIS_WORDS], "max_residuals": largest,
         "slices": {str(round(item.heading_deg)): count_words([item]) for item in known},
     }  # fmt: skip
 
@@ -278,20 +260,16 @@ class WordsDirectory(ResultDirectory):
             InputError: If it holds a partition of another grid.
         """
         super().__init__(path)
-        self.grid = grid
-        if (self.path / WORDS).exists():
+        self.grid, file = grid, self.path / WORDS
+        if file.exists():
             known = self.read(WORDS).get("grid")
             if known is None:
-                raise self.damaged(self.path / WORDS)
+                raise self.damaged(file)
             if known != json.loads(to_json(grid.as_dict())):
-                raise InputError(
-                    f"{self.path / WORDS}: is of another grid, {json.dumps(known)}; "
-                    "valid: the same, or another directory"
-                )
-        files = {heading: self._file(heading) for heading in HEADINGS}
-        self.slices = {
-            heading: self._slice(file, heading) for heading, file in files.items() if file.exists()
-        }
+                valid = "valid: the same, or another directory"
+                raise InputError(f"{file}: is of another grid, {json.dumps(known)}; {valid}")
+        kept = [heading for heading in HEADINGS if self._file(heading).exists()]
+        self.slices = {heading: self._slice(self._file(heading), heading) for heading in kept}
 
     def begin(self, headings: Sequence[int]) -> None:
         """Say which slices are asked for, before any is solved."""
@@ -315,16 +293,14 @@ class WordsDirectory(ResultDirectory):
     def draw(self, headings: Sequence[int]) -> None:
         """Draw slices, and two paths of equal cost on a border of theirs if they have one.
 
-        Args:
-            headings: Of the slices that are asked for [deg]; drawn are those of :data:`SHOWN_SLICES`, else
-                the first two.
+        Drawn are those of :data:`SHOWN_SLICES` among the ``headings`` asked for [deg], else the first two.
         """
         chosen = [heading for heading in SHOWN_SLICES if heading in headings] or list(headings[:2])
         slices = [self.slices[heading] for heading in chosen]
-        save_figure(words_figure(slices), self.figures / "words.png")
+        save_figure(figures.words_figure(slices), self.figures / "words.png")
         borders = [(item, jumps[0]) for item in slices if (jumps := item.jumps())]
         if pairs := [equal_paths(*(item.path(*place) for place in border)) for item, border in borders]:
-            save_figure(equal_paths_figure(pairs), self.figures / "equal_paths.png")
+            save_figure(figures.equal_paths_figure(pairs), self.figures / "equal_paths.png")
 
     def _file(self, heading: int) -> Path:
         return self.folder(SLICES) / f"{heading:03d}.npz"
@@ -346,17 +322,13 @@ def solve_partition(
     headings: Sequence[int], grid: WordGrid, path: Path | None, *, jobs: int, draw: bool,
     progress: Callable[[str, float, str], None],
 ) -> dict[str, Any]:  # fmt: skip
-    """Solve the slices of a partition that are not known yet, keep each as soon as it is, and draw them.
+    """Solve the slices of a partition that are not known yet, keep and draw them; return the summary.
 
     Args:
         headings: Of the slices [deg].
         path: Directory of the partition, or None to keep nothing.
         jobs: Processes.
-        draw: Whether the figures are drawn.
         progress: Told the stage, the share that is done and a remark after each slice.
-
-    Returns:
-        The summary.
     """
     directory = None if path is None else WordsDirectory(path, grid)
     known = {} if directory is None else directory.slices

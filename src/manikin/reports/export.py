@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,8 +35,6 @@ from manikin.scene import Scene
 if TYPE_CHECKING:
     from manikin.motion.file import MotionFile
 
-_AXES = ("x", "y", "z")
-
 
 def to_csv(motion: Motion) -> str:
     """Text of a CSV file: time, pelvis, hinge angles, CoM, margin, supports, contact forces.
@@ -45,30 +42,27 @@ def to_csv(motion: Motion) -> str:
     Numbers have 9 significant digits; the separator is a comma, the decimal sign a point.
     """
     columns: dict[str, np.ndarray] = {"time [s]": motion.time}
-    for index, axis in enumerate(_AXES):
-        columns[f"pelvis_{axis} [m]"] = motion.q[:, index]
-    for index, axis in enumerate(("x", "y", "z", "w")):
-        columns[f"pelvis_quaternion_{axis} [-]"] = motion.q[:, 3 + index]
-    for index, name in enumerate(motion.joint_names):
-        columns[f"{name} [rad]"] = motion.q[:, 7 + index]
-    for index, axis in enumerate(_AXES):
-        columns[f"com_{axis} [m]"] = motion.com[:, index]
-    columns["margin [N.m]"] = motion.margin
+    columns |= _columns("pelvis_", "xyz", " [m]", motion.q[:, :3])
+    columns |= _columns("pelvis_quaternion_", "xyzw", " [-]", motion.q[:, 3:7])
+    columns |= _columns("", motion.joint_names, " [rad]", motion.q[:, 7:])
+    columns |= _columns("com_", "xyz", " [m]", motion.com) | {"margin [N.m]": motion.margin}
     for number, name in enumerate(motion.contact_names):
         columns[f"{name}_support [-]"] = motion.support[:, number]
-        for index, axis in enumerate(_AXES):
-            columns[f"{name}_force_{axis} [N]"] = motion.contact_force[:, number, index]
-        for index, axis in enumerate(_AXES):
-            columns[f"{name}_moment_{axis} [N.m]"] = motion.contact_force[:, number, 3 + index]
+        columns |= _columns(f"{name}_force_", "xyz", " [N]", motion.contact_force[:, number, :3])
+        columns |= _columns(f"{name}_moment_", "xyz", " [N.m]", motion.contact_force[:, number, 3:])
     return columns_csv(columns, 9)
+
+
+def _columns(before: str, names: Sequence[str], unit: str, values: FloatArray) -> dict[str, np.ndarray]:
+    """Columns (n,) of values (n, k) by their whole names."""
+    return {f"{before}{name}{unit}": column for name, column in zip(names, values.T, strict=True)}
 
 
 def resample(motion: Motion, rate: float | None) -> Motion:
     """Return the motion at a constant rate, from its first instant on.
 
-    Positions and rates are interpolated linearly, the pelvis' quaternion along the great
-    arc, supports by the sample before.  At instants that the motion has, its own samples
-    are returned exactly.
+    Positions and rates are interpolated linearly, the pelvis' quaternion along the great arc, supports by the
+    sample before. At instants that the motion has, its own samples are returned exactly.
 
     Args:
         rate: Samples per second [Hz], or None to leave it as it is.
@@ -118,22 +112,6 @@ CENTIMETRES = 100.0
 _ROOT_ORDER = "YXZ"  # yaw, pitch, roll: the singularity is a pelvis that looks straight up or down
 
 
-@dataclass(frozen=True, eq=False)
-class _BvhJoint:
-    """Channels of one segment.
-
-    Attributes:
-        order: Rotation axes of its three channels, such as ``"XZY"``.
-        columns: Index among the hinges of each channel's angle, or None without one.
-        signs: +1 or -1 for a hinge about the negative axis.
-    """
-
-    segment: Segment
-    order: str
-    columns: tuple[int | None, ...] | None
-    signs: tuple[float, ...]
-
-
 def to_bvh(body: BodyModel, motion: Motion) -> str:
     """Text of a BVH file.
 
@@ -146,14 +124,13 @@ def to_bvh(body: BodyModel, motion: Motion) -> str:
     """
     if motion.joint_names != body.joint_names:
         raise MotionFileError("motion has other joints than the body; valid: the body's own motion")
-    joints = _joints(body)
     text = StringIO()
     text.write("HIERARCHY\n")
-    order = _write_joint(text, body.segments[0], joints, 0)
+    order = _write_joint(text, body.segments[0], body, 0)
     text.write(f"MOTION\nFrames: {len(motion.time)}\nFrame Time: {_frame_time(motion):.9g}\n")
     position = CENTIMETRES * motion.q[:, :3] @ TO_BVH.T
     rotation = TO_BVH @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix() @ TO_BVH.T
-    turns = (_angles(joints[segment.name], body, motion) for segment in order[1:])
+    turns = (_angles(segment, body, motion) for segment in order[1:])
     np.savetxt(text, np.hstack([position, _euler(rotation, _ROOT_ORDER), *turns]), fmt="%.7f")
     return text.getvalue()
 
@@ -163,47 +140,39 @@ def _frame_time(motion: Motion) -> float:
         return 0.01
     steps = np.diff(motion.time)
     if np.ptp(steps) > 1e-6:
-        raise MotionFileError(
-            f"motion is sampled every {steps.min():.6g} to {steps.max():.6g} s; valid: one rate (resample it)"
-        )
+        every = f"{steps.min():.6g} to {steps.max():.6g} s"
+        raise MotionFileError(f"motion is sampled every {every}; valid: one rate (resample it)")
     return float(motion.duration / len(steps))
 
 
-def _joints(body: BodyModel) -> dict[str, _BvhJoint]:
-    joints, column = {}, 0
-    for segment in body.segments:
-        joints[segment.name] = _joint(segment, column)
-        column += len(segment.hinges)
-    return joints
+def _channels(segment: Segment) -> tuple[str, list[float]]:
+    """Rotation axes of a segment's three channels, such as ``"XZY"``, and the signs of its hinges about them.
 
-
-def _joint(segment: Segment, first_column: int) -> _BvhJoint:
+    No signs where axes are oblique or repeated, which cannot be channels: the whole rotation is split then.
+    """
     order, signs = "", []
     for hinge in segment.hinges:
         axis = TO_BVH @ hinge.axis
         nearest = int(np.argmax(np.abs(axis)))
         if not np.isclose(abs(axis[nearest]), 1.0, rtol=0.0, atol=1e-12) or "XYZ"[nearest] in order:
-            # Oblique or repeated axes cannot be channels; the whole rotation is split instead.
-            return _BvhJoint(segment, "ZXY", None, (1.0, 1.0, 1.0))
+            return "ZXY", []
         order += "XYZ"[nearest]
         signs.append(float(np.sign(axis[nearest])))
-    missing = [axis for axis in "ZXY" if axis not in order]
-    columns = tuple(range(first_column, first_column + len(signs))) + (None,) * len(missing)
-    return _BvhJoint(segment, order + "".join(missing), columns, (*signs, *(1.0 for _ in missing)))
+    return order + "".join(axis for axis in "ZXY" if axis not in order), signs + [1.0] * (3 - len(signs))
 
 
-def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _BvhJoint], depth: int) -> list[Segment]:
+def _write_joint(text: StringIO, segment: Segment, body: BodyModel, depth: int) -> list[Segment]:
     """Write a segment and what hangs on it, and return them in the order of the file."""
     indent, inner = "\t" * depth, "\t" * (depth + 1)
     root = segment.parent is None
-    order = _ROOT_ORDER if root else joints[segment.name].order
+    order = _ROOT_ORDER if root else _channels(segment)[0]
     channels = [*(f"{axis}position" for axis in "XYZ" if root), *(f"{axis}rotation" for axis in order)]
     offset = np.zeros(3) if root else CENTIMETRES * (TO_BVH @ segment.origin)
     text.write(f"{indent}{'ROOT' if root else 'JOINT'} {segment.name}\n{indent}{{\n")
     text.write(f"{inner}OFFSET {_numbers(offset)}\n{inner}CHANNELS {len(channels)} {' '.join(channels)}\n")
     order = [segment]
-    for child in (joint.segment for joint in joints.values() if joint.segment.parent == segment.name):
-        order += _write_joint(text, child, joints, depth + 1)
+    for child in (item for item in body.segments if item.parent == segment.name):
+        order += _write_joint(text, child, body, depth + 1)
     if len(order) == 1:
         end = CENTIMETRES * (TO_BVH @ end_of(segment))
         text.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_numbers(end)}\n{inner}}}\n")
@@ -211,21 +180,21 @@ def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _BvhJoint],
     return order
 
 
-def _numbers(values: Sequence[float] | FloatArray) -> str:
+def _numbers(values: FloatArray) -> str:
     return " ".join(f"{value:.7f}" for value in values)
 
 
-def _angles(joint: _BvhJoint, body: BodyModel, motion: Motion) -> FloatArray:
+def _angles(segment: Segment, body: BodyModel, motion: Motion) -> FloatArray:
     """(n, 3) channel values of a segment [deg]."""
-    hinges = motion.q[:, 7:]
-    if joint.columns is not None:
-        values = [np.zeros(len(hinges)) if c is None else hinges[:, c] for c in joint.columns]
-        return np.degrees(np.column_stack(values) * joint.signs)
-    rotation = np.broadcast_to(np.eye(3), (len(hinges), 3, 3))
-    for hinge in joint.segment.hinges:
-        angle = hinges[:, body.joint_index(hinge.name)]
+    order, signs = _channels(segment)
+    angles = [motion.q[:, 7 + body.joint_index(hinge.name)] for hinge in segment.hinges]
+    if signs:
+        angles += [np.zeros(len(motion.time))] * (3 - len(angles))
+        return np.degrees(np.column_stack(angles) * signs)
+    rotation = np.broadcast_to(np.eye(3), (len(motion.time), 3, 3))
+    for hinge, angle in zip(segment.hinges, angles, strict=True):
         rotation = rotation @ Rotation.from_rotvec(angle[:, None] * hinge.axis).as_matrix()
-    return _euler(TO_BVH @ rotation @ TO_BVH.T, joint.order)
+    return _euler(TO_BVH @ rotation @ TO_BVH.T, order)
 
 
 def _euler(rotation: FloatArray, order: str) -> FloatArray:
@@ -248,7 +217,7 @@ def pick_motion(content: MotionFile, which: str | None = None) -> Motion:
     Raises:
         InputError: If the file does not hold it.
     """
-    name = which if which is not None else list(content.motions)[-1]
+    name = list(content.motions)[-1] if which is None else which
     if name not in content.motions:
         raise InputError(f"motion is {name!r}; valid here: {', '.join(content.motions)}")
     return content.motions[name]
@@ -258,18 +227,14 @@ def export_motion(
     content: MotionFile, source: str | Path, format_name: str, *, out: str | Path | None = None,
     which: str | None = None, rate: float | None = None,
 ) -> Path:  # fmt: skip
-    """Write a motion in another format, atomically.
+    """Write a motion in another format, atomically, and return the file.
 
     Args:
-        content: What the motion file holds.
         source: The run directory or motion file it came from.
         format_name: One of :data:`FORMATS`.
         out: File to write; ``motion.FORMAT`` beside the motion file when omitted.
         which: ``"planned"`` or ``"executed"``; see :func:`pick_motion`.
         rate: Samples per second [Hz]; 100 for BVH and every sample for CSV when omitted.
-
-    Returns:
-        The file written.
 
     Raises:
         InputError: If the format, the motion or the rate is not available.
@@ -293,10 +258,9 @@ COMPARISON = "comparison.json"
 def write_outputs(
     directory: str | Path, progress: Callable[[str, float], object] = lambda _stage, _share: None
 ) -> list[Path]:
-    """Draw the figures and write the BVH file of a run directory; a point mass has no skeleton for BVH.
+    """Draw the figures and write the BVH file of a finished run; a point mass has no skeleton for BVH.
 
     Args:
-        directory: The directory of a finished run, successful or not.
         progress: Told the stage ``"figures"`` and the share that is done.
 
     Returns:

@@ -21,18 +21,12 @@ from manikin.scenarios.families import FAMILIES
 
 FIRST = ("scene", "postures", "margin", "com", "contacts")
 """Figures that come first, in this order; the others follow by name."""
-
 LEFT_OUT = ("requirements", "failure", "verdict", "planned", "proved", "succeeded")
 """Keys of the summary that the page says in other words."""
 
 
 def render(template: str, **values: Any) -> str:
-    """Fill in a page; every text in it is escaped.
-
-    Args:
-        template: Name of a page in ``templates``, such as ``"run"``.
-        values: What the template uses.
-    """
+    """Fill in a page of ``templates``, such as ``"run"``, with values; every text in it is escaped."""
     return _environment().get_template(f"{template}.html.jinja").render(**values)
 
 
@@ -85,8 +79,8 @@ def write_run_page(directory: str | Path) -> Path:
 def run_page(folder: Path, summary: Mapping[str, Any]) -> str:
     """HTML of a run in a folder: verdict, requirements, figures and all numbers."""
     files = {file.stem: file for file in sorted((folder / FIGURES).glob("*.png"))}
-    names = [*(name for name in FIRST if name in files), *(name for name in files if name not in FIRST)]
-    pictures = {readable(name): files[name].read_bytes() for name in names}
+    names = dict.fromkeys([*FIRST, *files])
+    pictures = {readable(name): files[name].read_bytes() for name in names if name in files}
     values = dict(_flat({key: value for key, value in summary.items() if key not in LEFT_OUT}))
     return render("run", summary=summary, verdict=verdict_line(summary), pictures=pictures, values=values)
 
@@ -102,9 +96,8 @@ def analysis_page(
         pictures: PNG files of the plan by what they show.
     """
     missing = [f"{part}: {reason}" for part, reason in summary["ergonomics"]["missing"].items()]
-    return render(
-        "analysis", name=analysis.name, summary=summary, sheet=sheet, pictures=pictures, missing=missing
-    )
+    shown = {"name": analysis.name, "sheet": sheet, "pictures": pictures, "missing": missing}
+    return render("analysis", summary=summary, **shown)
 
 
 def write_benchmark_page(directory: Path, result: Mapping[str, Any]) -> Path:

@@ -8,16 +8,10 @@ HEADER = (
     "force at the CoM", "ZMP to the edge", "CoM rms", "fell", "wall", "planned", "proved", "result",
 )  # fmt: skip
 """Columns of the table."""
-
 UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "N", "mm", "mm", "", "s + s + s", "", "", "")
 """Units of the columns; the planned margin brings its own."""
-
 NOTHING = "-"
 """Stands for a value that a run does not have."""
-
-STAGES = ("centroidal", "wholebody", "execution")
-"""Stages whose numbers the table shows."""
-
 _YES_OR_NO = {True: "yes", False: "no", None: NOTHING}
 
 
@@ -34,36 +28,26 @@ def text_table(report: Mapping[str, Any]) -> str:
 def columns(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> str:
     """Rows in columns of equal width, some of them by their numbers aligned to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = []
-    for row in rows:
-        cells = enumerate(zip(row, widths, strict=True))
-        sides = (f"{cell:{'>' if k in right else '<'}{width}}" for k, (cell, width) in cells)
-        lines.append("  ".join(sides).rstrip())
-    return "\n".join(lines)
+    forms = [f"{'>' if number in right else '<'}{width}" for number, width in enumerate(widths)]
+    return "\n".join("  ".join(map(format, row, forms)).rstrip() for row in rows)
 
 
 def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
-    com, body, executed = (run[stage] or {} for stage in STAGES)
+    com, body, executed = (run[stage] or {} for stage in ("centroidal", "wholebody", "execution"))
     unit = f" {com.get('margin_unit', '')}"
     if not com:  # a motion that was refined without a planned centre of mass
         com, unit = body, " N.m"
     walls = [block.get("wall_s") for block in (run["centroidal"] or {}, body, executed)]
     return (
-        str(run["scenario"]).partition("@")[0],
-        run["variant"] or NOTHING,
-        number(com.get("duration_s"), 2),
-        number(com.get("min_margin"), 1, unit),
-        number(com.get("feasibility_radius"), 1),
-        number(body.get("min_clearance_m"), 1, scale=1000.0),
-        number(executed.get("min_margin"), 1),
+        str(run["scenario"]).partition("@")[0], run["variant"] or NOTHING, number(com.get("duration_s"), 2),
+        number(com.get("min_margin"), 1, unit), number(com.get("feasibility_radius"), 1),
+        number(body.get("min_clearance_m"), 1, scale=1000.0), number(executed.get("min_margin"), 1),
         number(executed.get("min_force_at_com_N"), 0),
         number(executed.get("min_zmp_distance_m"), 0, scale=1000.0),
-        number(executed.get("com_rms_error_m"), 2, scale=1000.0),
-        _YES_OR_NO[executed.get("fell")],
+        number(executed.get("com_rms_error_m"), 2, scale=1000.0), _YES_OR_NO[executed.get("fell")],
         " + ".join(number(wall, 1) for wall in walls if wall is not None) or NOTHING,
-        *(_YES_OR_NO[run[key]] for key in ("planned", "proved")),
-        result(run),
-    )
+        *(_YES_OR_NO[run[key]] for key in ("planned", "proved")), result(run),
+    )  # fmt: skip
 
 
 def result(run: Mapping[str, Any]) -> str:
@@ -88,10 +72,9 @@ def verdict_line(summary: Mapping[str, Any]) -> str:
 
 
 HEADINGS = {
-    "contacts": "planned contacts",
-    "walk": "planned walk", "centroidal": "planned centre of mass", "wholebody": "planned whole body",
-    "act": "planned act", "execution": "executed in the physics engine", "act execution": "executed act",
-    "push": "executed in the physics engine",
+    "contacts": "planned contacts", "walk": "planned walk", "centroidal": "planned centre of mass",
+    "wholebody": "planned whole body", "act": "planned act", "act execution": "executed act",
+    "execution": "executed in the physics engine", "push": "executed in the physics engine",
 }  # fmt: skip
 """Headings of the requirements of each stage."""
 
@@ -99,11 +82,9 @@ YES_OR_NO = {"fell": ("no", "yes"), "at_rest": ("no", "yes")}
 """Words of 0 and 1 for requirements that are no quantity."""
 
 
-def verdict_lines(summary: Mapping[str, Any]) -> Iterator[str]:
+def verdict_lines(summary: Mapping[str, Any]) -> list[str]:
     """Verdict of a run in one line, then every requirement; broken ones are marked."""
-    yield verdict_line(summary)
-    yield about_line(summary)
-    yield from requirement_lines(summary["requirements"])
+    return [verdict_line(summary), about_line(summary), *requirement_lines(summary["requirements"])]
 
 
 def requirement_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -166,12 +147,11 @@ def family_rows(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """One row of texts for each family under :data:`FAMILY_HEADER`, all of them together last."""
     whole, rows = result["stage"] == "all", []
     for name, counts in [*result["families"].items(), ("all", result["total"])]:
-        seconds, failures = counts["contacts_s"], counts["failures"].items()
         found = (number(counts[key], 0) for key in ("tasks", "contacts", "checked"))
         ended = (number(counts[key] if whole else None, 0) for key in ("planned", "proved"))
-        times = (number(seconds[key], 2) for key in ("median", "p95"))
+        times = (number(counts["contacts_s"][key], 2) for key in ("median", "p95"))
         motions = (number(counts[key], 1) for key in ("duration_s", "computing_over_motion"))
-        failed = ", ".join(f"{stage} {count}" for stage, count in failures) or NOTHING
+        failed = ", ".join(f"{stage} {count}" for stage, count in counts["failures"].items()) or NOTHING
         rows.append((name, *found, *ended, *times, *motions, failed))
     return rows
 

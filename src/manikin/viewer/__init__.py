@@ -17,15 +17,10 @@ __all__ = ["serve", "serve_contacts", "serve_drive"]
 
 
 def serve(
-    content: MotionFile,
-    port: int = 8080,
-    announce: Callable[[str], None] | None = None,
-    *,
+    content: MotionFile, port: int = 8080, announce: Callable[[str], None] | None = None, *,
     others: Mapping[str, MotionFile] | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Show a motion file in the browser until Ctrl-C, on this computer only.
-
-    This and the other pages raise :class:`~manikin.errors.InputError` if the port is taken.
 
     Args:
         content: At least one motion, and the body.
@@ -34,7 +29,7 @@ def serve(
         others: Motions of others who are there, by name.
 
     Raises:
-        InputError: If the file holds no body.
+        InputError: If the file holds no body, or, as of the other pages, the port is taken.
     """
     from manikin.viewer.session import ViewerSession
 
@@ -51,16 +46,10 @@ def serve_contacts(
 
 
 def serve_drive(
-    controller: WalkController,
-    scene: Scene | None = None,
-    port: int = 8080,
+    controller: WalkController, scene: Scene | None = None, port: int = 8080,
     announce: Callable[[str], None] | None = None,
-) -> None:
-    """Let the user steer a walker with keys and sliders, in real time, until Ctrl-C.
-
-    Args:
-        scene: Drawn around the walker, but not seen by it.
-    """
+) -> None:  # fmt: skip
+    """Let the user steer a walker with keys and sliders until Ctrl-C; it does not see the scene around it."""
     from manikin.viewer.drive import WalkViewer
 
     _run(WalkViewer(controller, scene, port), announce)

@@ -6,6 +6,7 @@ import time as clock
 from abc import ABC, abstractmethod
 from contextlib import redirect_stdout
 from io import StringIO
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -22,11 +23,7 @@ HOST = "127.0.0.1"
 
 
 class Page(ABC):
-    """Serves one page until it is closed.
-
-    Attributes:
-        server: The viser server.
-    """
+    """Serves one page until it is closed, by the viser server ``server``."""
 
     def __init__(self, port: int, frame_rate: float) -> None:
         """Start the server, which makes at most ``frame_rate`` pictures per second.
@@ -64,6 +61,11 @@ class Page(ABC):
         finally:
             self.close()
 
+    def _draw_lines(self, path: str, lines: FloatArray, colour: tuple[int, int, int], width: float) -> None:
+        """Draw lines (n, 2, 3) in a colour, so many pixels wide, as the node ``path`` of the page."""
+        look: dict[str, Any] = {"thickness": width, "thickness_units": "screen"}
+        self.server.scene.add_line_segments(path, lines, np.array(colour), **look)
+
     def close(self) -> None:
         """Stop the server; a second call does nothing."""
         if not self._closed.is_set():
@@ -73,22 +75,13 @@ class Page(ABC):
 
 
 COLOURS = {
-    "recorded": (106, 81, 163),
-    "planned": (0, 114, 178),
-    "executed": (213, 94, 0),
-    "left": (0, 158, 115),
-    "right": (204, 121, 167),
-    "trunk": (150, 156, 166),
-    "obstacle": (186, 192, 202),
-    "force": (230, 159, 0),
-}
-
+    "recorded": (106, 81, 163), "planned": (0, 114, 178), "executed": (213, 94, 0), "left": (0, 158, 115),
+    "right": (204, 121, 167), "trunk": (150, 156, 166), "obstacle": (186, 192, 202), "force": (230, 159, 0),
+}  # fmt: skip
 VIEW = np.array([-1.7, -1.9, 0.5])
 """Position of a new visitor's camera relative to what it looks at [m]."""
-
 WHOLE = 2.0
 """Size of what that camera sees as a whole, without a body [m]."""
-
 ABOVE = 0.35
 """Height of a name above the origin of the head [m]."""
 
@@ -120,11 +113,9 @@ def add_arrow(server: viser.ViserServer, name: str, colour: tuple[int, int, int]
 
 
 def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) -> None:
-    """Let new visitors look at a point from behind its right, from a person's height or above.
+    """Let new visitors look at a point (3,) [m] from behind its right, from a person's height or above.
 
-    Args:
-        middle: (3,) the point [m].
-        size: Of what is to be seen, a body aside: from farther away the larger it is [m].
+    They are farther away the larger what is to be seen is, a body aside, by its ``size`` [m].
     """
     camera = server.initial_camera
     camera.look_at, camera.up = middle, (0.0, 0.0, 1.0)
@@ -143,17 +134,14 @@ class BodyShapes:
         self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7, root: str = "/body"
     ) -> None:
         """Draw the body, called ``root`` on the page, with an opacity in [0, 1]."""
-        self._body = body
-        self.data = body.pinocchio.createData()
+        self._body, self.data = body, body.pinocchio.createData()
         self.frames: dict[str, viser.FrameHandle] = {}
         self._meshes: list[viser.MeshHandle] = []
         for segment in body.segments:
-            triangles = segment_triangles(segment)
-            if triangles is None:
+            if (triangles := segment_triangles(segment)) is None:
                 continue
-            name = f"{root}/{segment.name}"
+            name, colour = f"{root}/{segment.name}", side_colour(segment.name)
             self.frames[segment.name] = server.scene.add_frame(name, show_axes=False)
-            colour = side_colour(segment.name)
             mesh = server.scene.add_mesh_simple(f"{name}/shape", *triangles, color=colour, opacity=opacity)
             self._meshes.append(mesh)
 

@@ -32,11 +32,9 @@ TRAIL = 600
 
 @dataclass(frozen=True)
 class Key:
-    """Effect of one key on the directive.
+    """Effect of one key, by the page's name of it, on the directive.
 
     Attributes:
-        hotkey: The page's name of the key.
-        label: What it is for.
         change: Of forward, left [m/s] and angular velocity [rad/s]; zeros to go straight on, None to stop.
     """
 
@@ -51,15 +49,11 @@ class Key:
 
 
 KEYS = (
-    Key("arrowup", "Faster", (0.2, 0.0, 0.0)),
-    Key("arrowdown", "Slower", (-0.2, 0.0, 0.0)),
-    Key("arrowleft", "Turn left", (0.0, 0.0, 0.25)),
-    Key("arrowright", "Turn right", (0.0, 0.0, -0.25)),
-    Key("A", "Sideways to the left", (0.0, 0.1, 0.0)),
-    Key("D", "Sideways to the right", (0.0, -0.1, 0.0)),
-    Key("S", "Straight on", (0.0, 0.0, 0.0)),
-    Key("space", "Stop", None),
-)
+    Key("arrowup", "Faster", (0.2, 0.0, 0.0)), Key("arrowdown", "Slower", (-0.2, 0.0, 0.0)),
+    Key("arrowleft", "Turn left", (0.0, 0.0, 0.25)), Key("arrowright", "Turn right", (0.0, 0.0, -0.25)),
+    Key("A", "Sideways to the left", (0.0, 0.1, 0.0)), Key("D", "Sideways to the right", (0.0, -0.1, 0.0)),
+    Key("S", "Straight on", (0.0, 0.0, 0.0)), Key("space", "Stop", None),
+)  # fmt: skip
 """Keys of the page; each press changes the directive once more."""
 
 LOWEST, HIGHEST = np.array([-0.8, -0.8, -2.0]), np.array([3.0, 0.8, 2.0])
@@ -106,17 +100,11 @@ class WalkViewer(Page):
         """Change the directive as a key does."""
         if key.change is None:
             self.steer(np.zeros(3))
-        elif not any(key.change):
-            self.steer(self.directive * [1.0, 0.0, 0.0])
         else:
-            self.steer(self.directive + key.change)
+            self.steer(self.directive + key.change if any(key.change) else self.directive * [1.0, 0.0, 0.0])
 
     def steer(self, directive: FloatArray) -> None:
-        """Set the directive, held within the limits of the page.
-
-        Args:
-            directive: (3,) forward, left [m/s], angular velocity [rad/s].
-        """
+        """Set the directive (3,), see :attr:`directive`, held within the limits of the page."""
         with self._lock:
             # Presses add up to tenths; what is left of them by rounding is no direction.
             held = np.round(np.clip(directive, LOWEST, HIGHEST), 6)
@@ -177,10 +165,7 @@ class WalkViewer(Page):
             self._shapes.place(frame.q + self._raised)
             if len(self._trail) > 1:
                 path = np.array(self._trail)
-                self.server.scene.add_line_segments(
-                    "/trail", np.stack([path[:-1], path[1:]], axis=1), np.array(COLOURS["planned"]),
-                    thickness=2.0, thickness_units="screen",
-                )  # fmt: skip
+                self._draw_lines("/trail", np.stack([path[:-1], path[1:]], axis=1), COLOURS["planned"], 2.0)
         if moved and self._follow.value:
             middle = self._middle
             for client in self.server.get_clients().values():
@@ -204,11 +189,10 @@ TASK = 0.6
 class ContactViewer(Page):
     """Serves one body in its scene; every change goes through its methods.
 
-    Callbacks of the page only note what is wanted; :meth:`update` makes the newest of it, so that a
-    fast hand never waits for old poses.
+    Callbacks of the page only note what is wanted; :meth:`update` makes the newest of it, so that a fast hand
+    never waits for old poses.
 
     Attributes:
-        live: The body, the task and what follows.
         latest: The last answer shown.
         updates: Number of answers so far.
     """
@@ -262,11 +246,10 @@ class ContactViewer(Page):
             return None
         with self._lock:
             self._wanted.clear()
-            answer = self.live.answer()
-            self._show(answer)
-            self.latest = answer
+            self.latest = self.live.answer()
+            self._show(self.latest)
             self.updates += 1
-            return answer
+            return self.latest
 
     def advance(self, seconds: float) -> None:  # noqa: ARG002
         """Show the newest contacts, if anything has changed."""
@@ -279,20 +262,14 @@ class ContactViewer(Page):
         )
         self.gizmo.on_update(lambda _: self.move(self.gizmo.position, self.gizmo.wxyz))
         self._task = scene.add_arrows("/task", _arrow(np.zeros(3), np.ones(3)), np.zeros(3, dtype=np.uint8))
-        self._normals = {
-            limb.name: add_arrow(self.server, f"/contacts/{limb.name}", side_colour(limb.name))
-            for limb in self.live.body.limbs
-        }
+        sides = {limb.name: side_colour(limb.name) for limb in self.live.body.limbs}
+        self._normals = {name: add_arrow(self.server, f"/contacts/{name}", sides[name]) for name in sides}
 
     def _build_controls(self) -> None:
         gui, names = self.server.gui, [limb.name for limb in self.live.body.limbs]
         with gui.add_folder("Task"):
-            self.azimuth = gui.add_slider(
-                "azimuth [deg]", min=-180.0, max=180.0, step=1.0, initial_value=self.live.azimuth_deg
-            )
-            self.elevation = gui.add_slider(
-                "elevation [deg]", min=-90.0, max=90.0, step=1.0, initial_value=self.live.elevation_deg
-            )
+            self.azimuth = gui.add_slider("azimuth [deg]", -180.0, 180.0, 1.0, self.live.azimuth_deg)
+            self.elevation = gui.add_slider("elevation [deg]", -90.0, 90.0, 1.0, self.live.elevation_deg)
             self.role = gui.add_dropdown("limbs move", tuple(Role), initial_value=self.live.role.value)
             self.pulling = gui.add_checkbox("hold on and pull", initial_value=self.live.pulling)
         with gui.add_folder("Contacts"):

@@ -32,8 +32,7 @@ class ViewerSession(Page):
     """Serves one motion file; every change of state goes through its methods.
 
     Attributes:
-        chosen: Name of the motion shown.
-        beside: Name of the motion shown beside it, or ``"nothing"``.
+        chosen, beside: Names of the motion shown, and of that beside it or ``"nothing"``.
         time: Instant shown [s].
         playing: Whether time runs.
         speed: Seconds of motion per second.
@@ -55,20 +54,16 @@ class ViewerSession(Page):
             raise InputError("motion file holds no body; valid: a motion file written by 'manikin run'")
         for name, other in (others or {}).items():
             if other.body is None or not other.motions:
-                raise InputError(
-                    f"motion of {name} holds no body or no motion; valid: as 'manikin run' wrote it"
-                )
-        self.content = content
+                problem = f"motion of {name} holds no body or no motion"
+                raise InputError(f"{problem}; valid: as 'manikin run' wrote it")
+        self.content, self._body = content, content.body
         self.chosen = list(content.motions)[-1]
         self.beside = "recorded" if content.recorded is not None and self.chosen != "recorded" else NOTHING
-        self.playing = False
-        self.speed = 1.0
-        self._body = content.body
+        self.playing, self.speed = False, 1.0
         self._feet: dict[str, FloatArray] = {}
         if content.body.is_point_mass:
-            self._feet = effector_positions(
-                content.body, self.motion, self.motion.contact_names, content.schedule
-            )
+            names = self.motion.contact_names
+            self._feet = effector_positions(content.body, self.motion, names, content.schedule)
         super().__init__(port, FRAME_RATE)
         self.time = float(self.motion.time[0])
         self._build_scene()
@@ -119,10 +114,7 @@ class ViewerSession(Page):
             raise InputError(f"motion is {name!r}; valid here: {', '.join(valid)}")
 
     def put_beside(self, name: str) -> None:
-        """Show a motion of the file beside the chosen one, at the same instant.
-
-        Args:
-            name: Of the motion; ``"nothing"`` for none.
+        """Show a motion of the file, or ``"nothing"``, beside the chosen one, at the same instant.
 
         Raises:
             InputError: If the file does not hold it.
@@ -160,29 +152,23 @@ class ViewerSession(Page):
     # --- what stands still ---------------------------------------------------------------
 
     def _build_scene(self) -> None:
-        scene = self.server.scene
         add_scene(self.server, self.content.scene)
         for name, motion in self.content.motions.items():
             path = motion.com[:: max(1, len(motion.com) // MOST_PLACES)]
-            segments = np.stack([path[:-1], path[1:]], axis=1)
-            scene.add_line_segments(
-                f"/com/{name}", segments, np.array(COLOURS[name]), thickness=3.0, thickness_units="screen"
-            )
+            self._draw_lines(f"/com/{name}", np.stack([path[:-1], path[1:]], axis=1), COLOURS[name], 3.0)
         self._draw_contacts()
         path = self.motion.com
         look_at(self.server, path.mean(axis=0), float(np.linalg.norm(np.ptp(path, axis=0))))
 
     def _draw_contacts(self) -> None:
         """Outline of every sole of the schedule."""
-        if self.content.schedule is None:
-            return
-        for number, phase in enumerate(self.content.schedule.sequence):
+        schedule = self.content.schedule
+        for number, phase in enumerate([] if schedule is None else schedule.sequence):
             for contact in phase.stance:
-                corners = contact.points_in_world + 0.002 * contact.normal
-                if len(corners) < 3:
-                    continue
-                edges = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-                self._draw_lines(f"/contacts/{number}_{contact.effector}", edges, contact.effector, 2.0)
+                corners, name = contact.points_in_world + 0.002 * contact.normal, contact.effector
+                if len(corners) >= 3:
+                    edges = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+                    self._draw_lines(f"/contacts/{number}_{name}", edges, side_colour(name), 2.0)
 
     # --- what moves ----------------------------------------------------------------------
 
@@ -191,13 +177,10 @@ class ViewerSession(Page):
         self._shapes = BodyShapes(self.server, self._body)  # the centre of mass and its path are inside
         self._second = BodyShapes(self.server, self._body, 0.45, "/beside")
         self._aside = BESIDE * _across(self.motion.com)
-        self._names = [
-            scene.add_label(f"/names/{which}", which, anchor="bottom-center") for which in ("shown", "beside")
-        ]
+        places = ("shown", "beside")
+        self._names = [scene.add_label(f"/names/{of}", of, anchor="bottom-center") for of in places]
         self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
-        names = dict.fromkeys(
-            name for motion in self.content.motions.values() for name in motion.contact_names
-        )
+        names = dict.fromkeys(name for item in self.content.motions.values() for name in item.contact_names)
         self._arrows = {name: add_arrow(self.server, f"/forces/{name}", COLOURS["force"]) for name in names}
 
     def _sample(self, motion: Motion) -> int:
@@ -223,11 +206,11 @@ class ViewerSession(Page):
         for number, name in enumerate(motion.contact_names):
             force = motion.contact_force[index, number, :3]
             drawn = bool(np.linalg.norm(force) >= SMALLEST_FORCE) and self._forces.value
+            if drawn and name in self._feet:
+                start = self._feet[name][index]
+            elif drawn:
+                start = self._shapes.data.oMf[self._body.effector_frame(name)].translation
             if drawn:
-                if name in self._feet:
-                    start = self._feet[name][index]
-                else:
-                    start = self._shapes.data.oMf[self._body.effector_frame(name)].translation
                 self._arrows[name].points = np.array([[start, start + METRES_PER_NEWTON * force]])
             self._arrows[name].visible = drawn
 
@@ -236,14 +219,7 @@ class ViewerSession(Page):
         for name, places in self._feet.items():
             on = bool(motion.support[index, motion.contact_names.index(name)])
             leg = np.array([[motion.com[index], places[index]]])
-            self._draw_lines(f"/legs/{name}", leg, name, 6.0 if on else 2.0)
-
-    def _draw_lines(self, path: str, lines: FloatArray, effector: str, thickness: float) -> None:
-        """Draw lines (n, 2, 3) in the colour of an effector's side."""
-        colour = np.array(side_colour(effector))
-        self.server.scene.add_line_segments(
-            path, lines, colour, thickness=thickness, thickness_units="screen"
-        )
+            self._draw_lines(f"/legs/{name}", leg, side_colour(name), 6.0 if on else 2.0)
 
     # --- controls ------------------------------------------------------------------------
 
@@ -272,18 +248,15 @@ class ViewerSession(Page):
     def _build_plot(self) -> None:
         motions = self.content.motions.values()
         start, end = min(motion.time[0] for motion in motions), max(motion.time[-1] for motion in motions)
-        self._plot_time = np.linspace(start, end, PLOT_POINTS)
-        self._plot_margins = [
-            np.interp(self._plot_time, motion.time, motion.margin, left=np.nan, right=np.nan)
-            for motion in motions
-        ]
+        self._plot_time, outside = np.linspace(start, end, PLOT_POINTS), {"left": np.nan, "right": np.nan}
+        self._plot_margins = [np.interp(self._plot_time, of.time, of.margin, **outside) for of in motions]
         known = np.concatenate([motion.margin for motion in motions])
         known = known[np.isfinite(known)]
         low, high = float(known.min(initial=0.0)), float(known.max(initial=1.0))
         self._plot_range = (low - 0.05 * (high - low), high + 0.05 * (high - low))
+        colours = {name: f"rgb{COLOURS[name]}" for name in self.content.motions}
         series: list[Any] = [uplot.Series(label="time [s]")]
-        for name in self.content.motions:
-            series.append(uplot.Series(label=name, stroke=f"rgb{COLOURS[name]}", width=1.5))
+        series += [uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in colours.items()]
         series.append(uplot.Series(label="now", stroke="#555555", width=1.0, points={"show": False}))
         margins = uplot.Scale(auto=False, range=self._plot_range)
         self._plot = self.server.gui.add_uplot(

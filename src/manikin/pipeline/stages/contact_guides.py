@@ -41,28 +41,23 @@ class RootGuide:
 
 SINKS = tuple(0.065 * np.arange(11))
 """Depths by which the root at an end of a guide may sink [m]; our choice."""
-
 GUIDE_PLACES = 200
 """Places by which the contact planner knows a guide."""
 
 
 def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) -> RootGuide:
-    """Find a guide between two poses of the root, where the straight way is not free.
+    """Find a guide between two poses (2, 7) of the root, where the straight way is not free.
 
-    Args:
-        world: Scene, abstraction of the body, region and condition of the way.
-        ends: (2, 7) poses at start and goal; a body may bend where the guide's stiff trunk has to sink, so
-            that the nearest below that fits is taken.
+    A body may bend where the guide's stiff trunk has to sink: the nearest pose below that fits is taken.
     """
-    began = clock.perf_counter()
-    checker = world.checker()
+    began, checker = clock.perf_counter(), world.checker()
     fits = [_sunk(pose, checker) for pose in ends]
     ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
     if any(fit is None for fit in fits) or LocalPlanner(checker, tuple(ends)).straight(*ends):
         return RootGuide(None, 0, clock.perf_counter() - began)
     result = plan_guide(world, GuideTask(*ends), rng)
-    path = result.path
-    places = None if path is None else path.poses(np.linspace(0.0, 1.0, GUIDE_PLACES))[:, :3]
+    shares = np.linspace(0.0, 1.0, GUIDE_PLACES)
+    places = None if result.path is None else result.path.poses(shares)[:, :3]
     return RootGuide(places, result.samples, clock.perf_counter() - began)
 
 
@@ -74,14 +69,13 @@ def _sunk(pose: FloatArray, checker: ReachabilityChecker) -> FloatArray | None:
 
 @dataclass(frozen=True, eq=False)
 class ContactSearch:
-    """Supports for a scenario, or the reason why there are none.
+    """Supports for a scenario, or the reason in one line why there are none.
 
     Attributes:
         scenario: The scenario with supports; None without a plan, and where a file cannot list such contacts.
         plan: The contacts with their postures, or None.
         guide: (n, 3) places of the root on a guide; None where the straight way is free [m].
         summary: The ``contacts`` block of the run's summary.
-        failure: None, or the reason in one line.
         where: Stage of the search that failed.
         again: Searches on for a plan without the step of a phase, which failed for a reason; None where the
             search cannot.
@@ -125,11 +119,11 @@ class SearchTally:
     def found(self, plan: ContactPlan) -> ContactSearch:
         """A search that found contacts."""
         self.summary.update(steps=plan.steps, phases=len(plan.stages))
-        return ContactSearch(None, plan, self.guide, self._done())
+        return self._ended(plan)
 
     def failed(self, reason: str, where: str) -> ContactSearch:
         """A search that found none."""
-        return ContactSearch(None, None, self.guide, self._done(), reason, where)
+        return self._ended(None, reason, where)
 
     def count_guide(self, guide: RootGuide) -> None:
         """Take what a guide cost, and its length."""
@@ -140,5 +134,6 @@ class SearchTally:
             steps = np.linalg.norm(np.diff(guide.places, axis=0), axis=1)
             self.summary["guide_length_m"] = float(steps.sum())
 
-    def _done(self) -> dict[str, Any]:
-        return self.summary | {"wall_s": clock.perf_counter() - self._began}
+    def _ended(self, plan: ContactPlan | None, *why: str) -> ContactSearch:
+        summary = self.summary | {"wall_s": clock.perf_counter() - self._began}
+        return ContactSearch(None, plan, self.guide, summary, *why)

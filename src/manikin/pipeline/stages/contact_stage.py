@@ -14,37 +14,11 @@ from manikin.body import BodyModel, Limb, limb_named
 from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
 from manikin.numerics.spatial import FloatArray
-from manikin.pipeline.stages.contact_guides import ContactSearch, RootGuide, SearchTally, guide_root, stage_at
+from manikin.pipeline.stages.contact_guides import ContactSearch, SearchTally, guide_root, stage_at
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.execution_stage import act_of
-from manikin.planning.contacts import (
-    ContactPlan,
-    CrawlSearch,
-    Endpoint,
-    Endpoints,
-    Extension,
-    LimbHolds,
-    LimbSearch,
-    LimbSettings,
-    PostureFinder,
-    PostureFinderSettings,
-    Stage,
-    WalkSearch,
-    WalkSettings,
-    heading_of,
-    limb_holds,
-    sample_limbs,
-    starts_on_limbs,
-    take_seat,
-)
-from manikin.planning.guide import (
-    Condition,
-    GuideWorld,
-    LimbRule,
-    SamplingRegion,
-    UsableSurface,
-    abstraction_of,
-)
+from manikin.planning import contacts, guide
+from manikin.planning.contacts import ContactPlan, Endpoint, Endpoints, Extension, Stage, WalkSearch
 from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios import Scenario
@@ -61,7 +35,7 @@ class _ContactSearch:
         self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
         self._natural = scenario.contacts.ranges == "learnt"
-        self._search: WalkSearch | LimbSearch | None = None
+        self._search: WalkSearch | contacts.LimbSearch | None = None
 
     def _again(self, phase: int, reason: str) -> ContactSearch:
         """Another plan, without the change of contact of a phase of the last one."""
@@ -70,9 +44,8 @@ class _ContactSearch:
         return self._result(self._search.run())
 
     def _result(self, found: Extension) -> ContactSearch:
-        self._tally.summary["attempts"] += 1
-        self._tally.summary["postures"] = found.searches
-        self._tally.summary["backtracks"] = found.backtracks
+        summary = self._tally.summary
+        summary.update(attempts=summary["attempts"] + 1, postures=found.searches, backtracks=found.backtracks)
         if found.plan is None:
             return self._tally.failed(found.failure or "", "contacts")
         whole = self._completed(found.plan)
@@ -84,9 +57,9 @@ class _ContactSearch:
         """The plan with what ends it, or why it cannot; the scenario with supports that a file can list."""
         return plan, None
 
-    def _asked(self) -> PostureFinderSettings:
+    def _asked(self) -> contacts.PostureFinderSettings:
         model = self._scenario.contact_model.friction
-        return PostureFinderSettings(natural=self._natural, friction_model=model)
+        return contacts.PostureFinderSettings(natural=self._natural, friction_model=model)
 
     def _endpoints(self, reference: FloatArray | None = None) -> Endpoints:
         return Endpoints(
@@ -127,7 +100,7 @@ class _FootSearch(_ContactSearch):
 
     def _crawl(self, walk: WalkSearch, start: Stage, goal: Stage) -> Extension:
         """The way on hands and knees below what is too low to walk under."""
-        return CrawlSearch(
+        return contacts.CrawlSearch(
             walk.poser, self._places, start, goal, self._scenario.contacts.friction,
             lambda first, last: self._searched(first, last).run(), walk.settings,
         ).run()  # fmt: skip
@@ -135,25 +108,25 @@ class _FootSearch(_ContactSearch):
     def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
         whole = plan
         if self._seat is not None:
-            whole = take_seat(self._poser(), plan, self._seat)
+            whole = contacts.take_seat(self._poser(), plan, self._seat)
         elif self._brace is not None:
             whole = with_hands(self._body, plan, self._brace)
         return whole if isinstance(whole, str) else (whole, with_supports(self._scenario, whole))
 
     def _searched(self, start: Stage, goal: Stage) -> WalkSearch:
         options = self._scenario.contacts
-        settings = WalkSettings(stride=options.stride_m, grasp_force=options.grasp_force_N)
+        settings = contacts.WalkSettings(stride=options.stride_m, grasp_force=options.grasp_force_N)
         return WalkSearch(self._poser(), start, goal, options.friction, settings)
 
-    def _poser(self) -> PostureFinder:
-        return PostureFinder(self._body, self._scene, self._reference, self._asked())
+    def _poser(self) -> contacts.PostureFinder:
+        return contacts.PostureFinder(self._body, self._scene, self._reference, self._asked())
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""
         act = act_of(self._scenario)
         if act is None:
             return stage_at(self._places, self._scenario, "goal")
-        samples = sample_limbs(self._body, self._rng, natural=self._natural)
+        samples = contacts.sample_limbs(self._body, self._rng, natural=self._natural)
         friction, model = self._scenario.contacts.friction, self._scenario.contact_model.friction
         result = find_braced_posture(
             self._body, self._scene, samples, act, start.com[:2],
@@ -169,25 +142,18 @@ class _FootSearch(_ContactSearch):
 
 STANDING_HEIGHT = 0.92
 """Height of the root of a standing person of 1.75 m, the unit in which bodies are compared [m]."""
-
 SMALLEST = 0.3
 """Least factor on distances that are kept for safety, however small the body."""
-
 STRIDE = 0.4
 """Stride of a creature as a share of the reach of its limbs; our choice."""
-
 AROUND_LIMBS = 1.3
 """Room around start and goal in which the root is led, in heights of a standing root."""
-
 STEEPEST = float(np.deg2rad(50.0))
 """Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
-
 LEAN = 0.35
 """Largest lean of the root in any direction [rad]; our choice."""
-
 RETREATS = (0.25, 0.45)
 """Distances from a climber's best place before its holds at which it is tried as well, by the reach."""
-
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
@@ -204,8 +170,8 @@ class _LimbSearch(_ContactSearch):
         safe = max(self._size, SMALLEST)
         style = None if body.stature is None else posture_style_of(scenario.file.manner)
         self._reference = np.array(body.standing_posture() if style is None else style.posture(body))
-        self._poser = PostureFinder(body, scene, self._reference, self._asked().scaled(safe))
-        self._samples = samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
+        self._poser = contacts.PostureFinder(body, scene, self._reference, self._asked().scaled(safe))
+        self._samples = samples = contacts.sample_limbs(body, np.random.default_rng(0), natural=self._natural)
         ends = [limb for limb in self._limbs if not is_further(body, limb)] or self._limbs
         self._reach = float(np.mean([samples[limb.name].hull[1] for limb in ends]))
 
@@ -225,21 +191,16 @@ class _LimbSearch(_ContactSearch):
                     return result
         return result or self._tally.failed("no start", "start")
 
-    def _holds(self, start: FloatArray, goal: FloatArray) -> list[LimbHolds]:
-        return limb_holds(
+    def _holds(self, start: FloatArray, goal: FloatArray) -> list[contacts.LimbHolds]:
+        return contacts.limb_holds(
             self._body, self._scene, self._limbs, self._kinds, contact_rules(self._scenario, self._body),
             self._reference, self._samples, np.array([start, goal]), self._reach,
         )  # fmt: skip
 
-    def _searched(self, start: Stage, goal: FloatArray, *, guided: bool) -> LimbSearch:
-        def lead() -> FloatArray | None:
-            guide = self._guide(start.q[:7], goal)
-            self._tally.count_guide(guide)
-            return guide.places
-
+    def _searched(self, start: Stage, goal: FloatArray, *, guided: bool) -> contacts.LimbSearch:
         holds = self._holds(start.q[:7], goal)
-        led = lead if guided else None
-        return LimbSearch(self._poser, holds, start, goal, self._reach, self._settings(), led)
+        led = (lambda: self._guided(start.q[:7], goal)) if guided else None
+        return contacts.LimbSearch(self._poser, holds, start, goal, self._reach, self._settings(), led)
 
     @property
     def _climbs(self) -> bool:
@@ -255,24 +216,20 @@ class _LimbSearch(_ContactSearch):
         """Whether whole soles of a person carry, or what of them is on rungs; not their front alone."""
         return self._body.stature is not None and self._scenario.contacts.forefoot_m is None
 
-    def _settings(self) -> LimbSettings:
+    def _settings(self) -> contacts.LimbSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
-        plain, pace, safe = LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
+        plain, pace, safe = contacts.LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
         if self._body.stature is not None:
             plain = replace(plain, turns=False, around=1.5, beyond=0.1, comfort=10.0, sway=0.3)
         if self._on_rungs:
             plain = replace(plain, retreats=RETREATS)
         return replace(
-            plain,
-            stride=STRIDE * self._reach,
-            lets_go=self._body.stature is not None and not self._climbs,
-            lift=plain.lift * safe,
-            swing_duration=plain.swing_duration * pace,
-            swing_speed=plain.swing_speed * pace,
-            shift_duration=plain.shift_duration * pace,
+            plain, stride=STRIDE * self._reach, lets_go=self._body.stature is not None and not self._climbs,
+            lift=plain.lift * safe, swing_duration=plain.swing_duration * pace,
+            swing_speed=plain.swing_speed * pace, shift_duration=plain.shift_duration * pace,
             hinge_pace=plain.hinge_pace / pace,
             goal_distance=NEAR_GOAL if self._climbs or self._hangs else plain.goal_distance * safe,
-        )
+        )  # fmt: skip
 
     def _starts(self, goal: FloatArray) -> Iterator[Endpoint]:
         """Postures at the start, the best first, or the reason why there is none."""
@@ -283,7 +240,7 @@ class _LimbSearch(_ContactSearch):
             return
         q = self._standing(state)
         holds = self._holds(q[:7], goal)
-        for result in starts_on_limbs(self._poser, holds, q, self._settings().shift_duration):
+        for result in contacts.starts_on_limbs(self._poser, holds, q, self._settings().shift_duration):
             where = f"the start: no posture at {np.array(state.at).round(3).tolist()} m: "
             yield result if result.stage is not None else Endpoint(None, f"{where}{result.failure}")
 
@@ -309,29 +266,33 @@ class _LimbSearch(_ContactSearch):
         ]
         return min(levels, default=self._scenario.start_level)
 
-    def _guide(self, start: FloatArray, goal: FloatArray) -> RootGuide:
-        ends = np.array([start, goal])
-        abstraction = abstraction_of(self._body, [self._samples[limb.name].reach for limb in self._limbs])
-        world = GuideWorld(self._scene, abstraction, self._region(ends), self._condition())
-        return guide_root(world, ends, self._rng)
+    def _guided(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
+        """(n, 3) places of the root on a guide between two poses, where one is needed [m]."""
+        ends, reaches = np.array([start, goal]), [self._samples[limb.name].reach for limb in self._limbs]
+        abstraction = guide.abstraction_of(self._body, reaches)
+        world = guide.GuideWorld(self._scene, abstraction, self._region(ends), self._condition())
+        found = guide_root(world, ends, self._rng)
+        self._tally.count_guide(found)
+        return found.places
 
-    def _region(self, ends: FloatArray) -> SamplingRegion:
+    def _region(self, ends: FloatArray) -> guide.SamplingRegion:
         """Box around start and goal; headings between theirs, and a little beyond."""
         room = AROUND_LIMBS * STANDING_HEIGHT * self._size
-        headings = np.unwrap([heading_of(pose) for pose in ends])
+        headings = np.unwrap([contacts.heading_of(pose) for pose in ends])
         yaw, lean = (headings.min() - LEAN, headings.max() + LEAN), (-LEAN, LEAN)
         low, high = ends[:, :3].min(axis=0) - room, ends[:, :3].max(axis=0) + room
-        return SamplingRegion(low, high, yaw=yaw, pitch=lean, roll=lean)
+        return guide.SamplingRegion(low, high, yaw=yaw, pitch=lean, roll=lean)
 
-    def _condition(self) -> Condition:
+    def _condition(self) -> guide.Condition:
         """Limbs that cannot hold on reach something to stand on: all but two of more than four of them."""
         bearing = [
             limb.name for limb in self._limbs
             if self._kinds[limb.name] is not ContactKind.GRASP and not is_further(self._body, limb)
         ]  # fmt: skip
         least = len(bearing) if len(bearing) <= 4 else len(bearing) - 2
-        rule = LimbRule(tuple(bearing) if least == len(bearing) else (), least)
-        return Condition((rule,), dict.fromkeys(bearing, UsableSurface((0.0, 0.0, 1.0), STEEPEST)))
+        rule = guide.LimbRule(tuple(bearing) if least == len(bearing) else (), least)
+        surface = guide.UsableSurface((0.0, 0.0, 1.0), STEEPEST)
+        return guide.Condition((rule,), dict.fromkeys(bearing, surface))
 
 
 def _kind(body: BodyModel, limb: Limb) -> ContactKind:

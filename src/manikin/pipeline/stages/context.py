@@ -6,7 +6,7 @@ where they leave, in :class:`Report` and :class:`RunResult`.
 
 import re
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -35,28 +35,24 @@ _PLACE = re.compile(r"\[(-?\d[\d.e+-]*(?:, -?\d[\d.e+-]*){1,2})\]")
 """A position as the stages write it into their reasons: two or three numbers in brackets."""
 
 
-def motion_in_world(motion: Motion, transform_task_to_world: PlanarTransform) -> Motion:
-    """A motion with its root, centre of mass, momentum and contact forces in the world."""
+def motion_in_world(motion: Motion | None, transform_task_to_world: PlanarTransform) -> Motion | None:
+    """A motion with its root, centre of mass, momentum and contact forces in the world; None of none."""
     transform = transform_task_to_world
-    if transform.is_identity:
+    if motion is None or transform.is_identity:
         return motion
     forces = motion.contact_force.reshape(*motion.contact_force.shape[:-1], 2, 3)
     return replace(
-        motion,
-        q=transform.poses(motion.q),
-        com=transform.points(motion.com),
+        motion, q=transform.poses(motion.q), com=transform.points(motion.com),
         angular_momentum=transform.directions(motion.angular_momentum),
         contact_force=transform.directions(forces).reshape(motion.contact_force.shape),
-    )
+    )  # fmt: skip
 
 
 def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: PlanarTransform) -> ContactSchedule:
     """Contacts in time, where they are in the world."""
     if transform_task_to_world.is_identity:
         return schedule
-    # A contact that several phases hold stays one.
-    contacts = {id(contact): contact for phase in schedule.sequence for contact in phase.stance}
-    moved = {key: contact_in_world(item, transform_task_to_world) for key, item in contacts.items()}
+    moved = _in_world((phase.stance for phase in schedule.sequence), transform_task_to_world)
     phases = []
     for phase in schedule.sequence:
         stance = Stance([moved[id(contact)] for contact in phase.stance], model=phase.stance.model)
@@ -67,14 +63,14 @@ def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: Planar
     return ContactSchedule(StanceSequence(phases), schedule.instants)
 
 
-def contact_in_world(contact: Contact, transform_task_to_world: PlanarTransform) -> Contact:
-    """A contact at its place in the world."""
-    rotation = transform_task_to_world.rotations(contact.rotation_contact_to_world)
-    return replace(
-        contact,
-        position=frozen_array(transform_task_to_world.points(contact.position), "contact position"),
-        rotation_contact_to_world=frozen_array(rotation, "contact rotation"),
-    )
+def _in_world(stances: Iterable[Iterable[Contact]], transform: PlanarTransform) -> dict[int, Contact]:
+    """Contacts in the world by the identity of each, so that one which several stances hold stays one."""
+    moved = {}
+    for contact in {id(contact): contact for stance in stances for contact in stance}.values():
+        position = frozen_array(transform.points(contact.position), "contact position")
+        turned = frozen_array(transform.rotations(contact.rotation_contact_to_world), "contact rotation")
+        moved[id(contact)] = replace(contact, position=position, rotation_contact_to_world=turned)
+    return moved
 
 
 def trajectory_in_world(
@@ -96,8 +92,7 @@ def trajectory_in_world(
 def plan_in_world(plan: ContactPlan, transform_task_to_world: PlanarTransform) -> PlannedContacts:
     """A contact plan as other programs and the check read it, in the world."""
     transform = transform_task_to_world
-    contacts = {id(contact): contact for stage in plan.stages for contact in stage.contacts.values()}
-    moved = {key: contact_in_world(contact, transform) for key, contact in contacts.items()}
+    moved = _in_world((stage.contacts.values() for stage in plan.stages), transform)
     stages = [
         PlannedStage(
             {name: moved[id(contact)] for name, contact in stage.contacts.items()},
@@ -110,11 +105,7 @@ def plan_in_world(plan: ContactPlan, transform_task_to_world: PlanarTransform) -
 
 
 def reason_in_world(reason: str, transform_task_to_world: PlanarTransform) -> str:
-    """A reason in one line with the positions in it in the world.
-
-    Positions are what the stages write as two or three numbers in brackets, ``[1.2, 0.5]``; they keep their
-    number of digits.
-    """
+    """A reason in one line with the positions in it, ``[1.2, 0.5]``, in the world; they keep their digits."""
     if transform_task_to_world.is_identity:
         return reason
 
@@ -156,11 +147,7 @@ class RunContext:
 
     @classmethod
     def of(cls, scenario: Scenario, settings: WholeBodySettings | None = None) -> "RunContext":
-        """Build what a scenario describes, in the frame of its task.
-
-        Args:
-            scenario: In the world, with supports or without.
-            settings: Options of the whole-body stage; the defaults in the scenario's manner when omitted.
+        """Build what a scenario describes in the world, with supports or without, in the frame of its task.
 
         Raises:
             ScenarioError: If the body, the scene or the supports cannot be built.
@@ -205,11 +192,10 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class StageFailure:
-    """Reason why a run ended without success.
+    """Reason in one line why a run ended without success.
 
     Attributes:
         stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"``, ``"execution"`` or ``"push"``.
-        reason: In one line.
         time_s: When in the motion [s].
         where: Phase, contact, limb or pair.
     """
@@ -235,9 +221,7 @@ class Report:
     def __init__(
         self, context: RunContext, out: str | Path | None, progress: Progress | None, began: float
     ) -> None:
-        """Open the run directory ``out``; nothing is written when None.
-
-        ``began`` is the reading of ``time.perf_counter`` when the run began [s].
+        """Open the run directory ``out``, or none, for a run that ``began`` by ``time.perf_counter`` [s].
 
         Raises:
             MotionFileError: If the directory cannot be made, or holds something that is not a run.
@@ -257,10 +241,8 @@ class Report:
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "verdict": "failed", "planned": False, "proved": False, "succeeded": False, "failure": None,
-            "requirements": [],
-            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
-            "push": None, "walk": None,
-            "wall_s": 0.0,
+            "requirements": [], "contacts": None, "centroidal": None, "wholebody": None, "act": None,
+            "execution": None, "push": None, "walk": None, "wall_s": 0.0,
         }  # fmt: skip
 
     @property
@@ -274,13 +256,7 @@ class Report:
         return None if self._directory is None else self._directory.path
 
     def fail(self, stage: str, reason: str, time: float = 0.0, where: str = "") -> None:
-        """Say why the run is no success.
-
-        Args:
-            reason: In one line; positions in it, in the frame of the task, are moved to the world.
-            time: When in the motion [s].
-            where: Phase, contact, limb or pair.
-        """
+        """Say why the run is no success; positions in the reason, in the task's frame, move to the world."""
         self.failure = StageFailure(stage, reason_in_world(reason, self.transform), float(time), where)
 
     def try_again(self, phase: int | None = None) -> None:
@@ -314,9 +290,8 @@ class Report:
     def keep_contact_plan(self, plan: ContactPlan) -> None:
         """Keep a contact plan of the task frame as a contact-plan file, in the world."""
         if self._directory is not None:
-            context = self._context
-            content = plan_in_world(plan, self.transform).to_dict(context.body, context.given)
-            self._directory.write(CONTACT_PLAN, content)
+            known = plan_in_world(plan, self.transform)
+            self._directory.write(CONTACT_PLAN, known.to_dict(self._context.body, self._context.given))
 
     def keep_motions(
         self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None,
@@ -327,12 +302,9 @@ class Report:
             return
         transform = self.transform
         content = MotionFile(
-            None if planned is None else motion_in_world(planned, transform),
-            None if executed is None else motion_in_world(executed, transform),
-            self._context.body,
-            self._context.scene_in_world,
-            schedule_in_world(schedule, transform),
-        )
+            motion_in_world(planned, transform), motion_in_world(executed, transform), self._context.body,
+            self._context.scene_in_world, schedule_in_world(schedule, transform),
+        )  # fmt: skip
         write_motions(self._directory.path / file, content)
 
     def close(self) -> dict[str, Any]:
@@ -340,14 +312,12 @@ class Report:
         self.judge()
         failure, required = self.failure, self._context.scenario.execution_required
         word = "failed" if failure is not None else "proved" if required else "planned"
+        rows = [row.as_dict(stage) for stage, table in self._tables.items() for row in table]
         self.summary |= {
             "verdict": word, "planned": self.planned, "proved": self.proved, "succeeded": failure is None,
-            "failure": None if failure is None else asdict(failure),
-            "requirements": [
-                row.as_dict(stage) for stage, table in self._tables.items() for row in table
-            ],
+            "failure": None if failure is None else asdict(failure), "requirements": rows,
+            "wall_s": clock.perf_counter() - self._began,
         }  # fmt: skip
-        self.summary["wall_s"] = clock.perf_counter() - self._began
         if self._directory is not None:
             self._directory.write(SUMMARY, self.summary)
         return self.summary
@@ -410,12 +380,9 @@ class RunResult:
         if recovery is not None:
             executed = recovery.trace.motion
         planned = planned if wholebody is None else wholebody.motion
-        planned, executed = (
-            None if motion is None else motion_in_world(motion, report.transform)
-            for motion in (planned, executed)
-        )
+        motions = (motion_in_world(motion, report.transform) for motion in (planned, executed))
         stages = centroidal, wholebody, execution, report.path, recovery
-        return cls(report.close(), planned, executed, *stages, report.transform)
+        return cls(report.close(), *motions, *stages, report.transform)
 
     @property
     def succeeded(self) -> bool:

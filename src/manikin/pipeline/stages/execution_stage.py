@@ -13,16 +13,8 @@ from manikin.contact import ContactKind, ContactSchedule, FrictionModel
 from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, StageFailure, place
-from manikin.planning.push_pull import (
-    Act,
-    ActKind,
-    BracedForces,
-    PlannedAct,
-    largest_force,
-    measure_act,
-    plan_act,
-    share_force,
-)
+from manikin.planning import push_pull
+from manikin.planning.push_pull import Act, ActKind, BracedForces, PlannedAct
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.simulation import Execution, Push, execute, push_on_the_way
@@ -49,35 +41,29 @@ class ExecutionRequirements:
     padding_compression: float = 0.01
 
     def table(self, execution: Execution, seated: bool = False) -> RequirementTable:
-        """Every requirement with its measured value.
+        """Every requirement with its measured value, of a motion that may end ``seated``.
 
         Where what was measured does not say when, the time is that of the least margin. A body that was
         pushed is out of balance and off its plan for a while; it has to be back on it at the end.
-
-        Args:
-            execution: What happened.
-            seated: Whether the motion ends on a seat.
         """
         rest = self._followed(execution, seated) if execution.push is None else self._returned(execution)
         return requirement_table([*_kept_standing(execution), *rest])
 
     def _followed(self, execution: Execution, seated: bool) -> list[Requirement | None]:
         """Requirements of a body that nothing disturbs."""
-        deepest = self.padding_compression if seated else self.penetration
-        thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
-        pressed = execution.max_padding_compression_m > 0.0
+        deepest, motion = self.padding_compression if seated else self.penetration, execution.motion
+        thinnest, pressed = float(motion.time[np.argmin(motion.margin)]), execution.max_padding_compression_m
         return [
-            Requirement("min_margin", "executed margin", execution.motion.margin_unit, execution.min_margin,
-                        ">", self.margin, thinnest),
+            Requirement("min_margin", "executed margin", motion.margin_unit, execution.min_margin, ">",
+                        self.margin, thinnest),
             Requirement("com_rms_error_m", "RMS error of the centre of mass", "m",
                         execution.com_rms_error_m, "<=", self.com_rms_error, thinnest),
             Requirement("max_foot_error_m", "error", "m", execution.max_foot_error_m, "<=", self.foot_error,
                         execution.worst_effector_time_s, execution.worst_effector),
             Requirement("max_penetration_m", "penetration", "m", execution.max_penetration_m, "<=", deepest,
                         thinnest),
-            Requirement("max_padding_compression_m", "compression of padding", "m",
-                        execution.max_padding_compression_m, "<=", self.padding_compression, thinnest)
-            if pressed else None,
+            Requirement("max_padding_compression_m", "compression of padding", "m", pressed, "<=",
+                        self.padding_compression, thinnest) if pressed > 0.0 else None,
         ]  # fmt: skip
 
     def _returned(self, execution: Execution) -> list[Requirement | None]:
@@ -95,15 +81,13 @@ class ExecutionRequirements:
 
 def _kept_standing(execution: Execution) -> list[Requirement]:
     """Requirements of every execution: no fall, no unplanned touch."""
-    touches = execution.counted_touches
-    first = touches[0] if touches else None
+    touches, first = execution.counted_touches, next(iter(execution.counted_touches), None)
+    begun = (None, "") if first is None else (first.time, f"{first.segment} on {first.other}")
+    fallen = execution.failure_time_s if execution.fell else None
     return [
-        Requirement("fell", "falls", "", float(execution.fell), "<=", 0.0,
-                    execution.failure_time_s if execution.fell else None),
-        Requirement("unplanned_touches", "unplanned touches", "", float(len(touches)), "<=", 0.0,
-                    None if first is None else first.time,
-                    "" if first is None else f"{first.segment} on {first.other}"),
-    ]  # fmt: skip
+        Requirement("fell", "falls", "", float(execution.fell), "<=", 0.0, fallen),
+        Requirement("unplanned_touches", "unplanned touches", "", float(len(touches)), "<=", 0.0, *begun),
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,22 +124,21 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
         return planned
     q, contacts = planned.motion.q[-1], list(planned.schedule.sequence[-1].stance)
     rub = context.scenario.explicit_supports().friction, context.scenario.contact_model.friction
-    largest = largest_force(context.body, q, contacts, act, *rub)
-    forces = share_force(context.body, q, contacts, act, *rub)
+    largest = push_pull.largest_force(context.body, q, contacts, act, *rub)
+    forces = push_pull.share_force(context.body, q, contacts, act, *rub)
     used = _used_friction(planned, forces, context.scenario.contact_model.friction)
     report.finish("act", _summary(act, largest, forces) | {"friction": used})
     if forces is not None:
-        report.require("act", RequirementTable((
-            Requirement("max_torque_share", "share of a torque limit in the act", "", forces.torque_share,
-                        "<=", 1.0, planned.end, forces.tightest),
-        )))  # fmt: skip
+        row = Requirement("max_torque_share", "share of a torque limit in the act", "", forces.torque_share,
+                          "<=", 1.0, planned.end, forces.tightest)  # fmt: skip
+        report.require("act", RequirementTable((row,)))
     if forces is None or forces.torque_share > 1.0:
         weak = "friction and balance allow" if forces is None else f"{forces.tightest} allows"
         reason = f"the last posture cannot {act.kind} with {act.force:g} N: {weak} less"
         report.planned = False
         report.fail("wholebody", reason, planned.end, act.obstacle)
         return planned
-    acting = plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
+    acting = push_pull.plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
     report.keep_motions(acting.schedule, acting.motion)
     return PlannedMotion(acting.schedule, acting.motion, acting)
 
@@ -168,7 +151,7 @@ def measured_act_failure(
     if act is None or acting is None:
         return None
     friction = context.scenario.explicit_supports().friction
-    result = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
+    result = push_pull.measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
     if result is None:
         reason = "the motion did not come to its act"
         return StageFailure("execution", reason, acting.timing.end, act.obstacle)
@@ -216,10 +199,9 @@ def execute_motion(
     """
     scenario, act = context.scenario, planned.act
     # The share of the friction that planning keeps to, where it has its own, holds in control too.
-    settings = ControlSettings(
-        supports=SupportSettings(friction_share=scenario.friction_share),
-        returning=None if scenario.file.push is None else ReturnSettings(),
-    )
+    supports = SupportSettings(friction_share=scenario.friction_share)
+    returning = None if scenario.file.push is None else ReturnSettings()
+    settings = ControlSettings(supports=supports, returning=returning)
     result = execute(
         context.body, context.scene, planned.motion, planned.schedule,
         pushes=_pushes(scenario, planned.motion), padded=context.padded, settings=settings,
@@ -235,11 +217,9 @@ def execute_motion(
     if (push := summary["push"]) is not None:
         push["direction_deg"] = report.transform.turned(push["direction_deg"])
     block = {
-        "required": True,
-        "failure": None if failure is None else asdict(failure),
-        **summary,
+        "required": True, "failure": None if failure is None else asdict(failure), **summary,
         **context.passage(result.schedule or planned.schedule, result.motion).summary(),
-    }
+    }  # fmt: skip
     report.finish("execution", block)
     report.proved = failure is None
     if failure is not None:
@@ -268,8 +248,5 @@ def _pushes(scenario: Scenario, motion: Motion) -> tuple[Push, ...]:
     if push is None:
         return ()
     scenario.check_push(float(motion.time[-1]))
-    return (
-        push_on_the_way(
-            motion, push.force_N, push.direction_deg, push.at_s, push.duration_s, push.frequency_hz or 0.0
-        ),
-    )
+    timing = push.at_s, push.duration_s, push.frequency_hz or 0.0
+    return (push_on_the_way(motion, push.force_N, push.direction_deg, *timing),)

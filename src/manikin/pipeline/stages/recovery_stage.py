@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 
+from manikin import simulation
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
 from manikin.control.recovery import RecoverySettings
@@ -13,24 +15,11 @@ from manikin.numerics.spatial import rotation_from_yaw
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections.task_sections import PushSection, RecoverySection
-from manikin.simulation import (
-    DirectionSearch,
-    Feet,
-    PushMap,
-    PushTrials,
-    Recovery,
-    RecoveryTask,
-    equal_directions,
-    feet_apart_posture,
-    one_foot_posture,
-    push_near_com,
-    recover,
-)
 
 STAGE = "push"
 
 
-def recover_from_push(context: RunContext, report: Report) -> Recovery:
+def recover_from_push(context: RunContext, report: Report) -> simulation.Recovery:
     """Push the body of a scenario with a ``recovery`` section and measure what becomes of it.
 
     Raises:
@@ -40,14 +29,12 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
     task, settings = _task(scenario, section, body), _settings(scenario, section)
+    timing, frequency = (push.at_s, push.duration_s), push.frequency_hz or 0.0
     with scenario.refusing(("push",)):
-        item = push_near_com(
-            body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
-        )
+        item = simulation.push_near_com(body, force, *timing, frequency=frequency, q=task.q)
     task = replace(task, pushes=(item,))
-    result = recover(
-        body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
-    )
+    progress = partial(report.progress, STAGE)
+    result = simulation.recover(body, task, settings, scene=context.scene, progress=progress)
     report.finish(STAGE, result.summary() | _bound(body, task, settings, result))
     report.require(STAGE, result.requirements)
     report.planned, report.proved = None, result.recovered
@@ -57,7 +44,7 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     return result
 
 
-def push_trials(scenario: Scenario) -> PushTrials:
+def push_trials(scenario: Scenario) -> simulation.PushTrials:
     """The body and stance of a scenario with a ``recovery`` section, to be pushed from any direction.
 
     Of its push only the duration and the beginning are taken over; the ground is level and empty.
@@ -65,16 +52,14 @@ def push_trials(scenario: Scenario) -> PushTrials:
     Raises:
         ScenarioError: If there is nothing to recover from.
     """
-    section, push = _sections(scenario)
-    body = scenario.build_body()
-    return PushTrials(
-        body, _task(scenario, section, body), _settings(scenario, section), push.duration_s, push.at_s
-    )
+    (section, push), body = _sections(scenario), scenario.build_body()
+    task, settings = _task(scenario, section, body), _settings(scenario, section)
+    return simulation.PushTrials(body, task, settings, push.duration_s, push.at_s)
 
 
 def push_map_searches(
     scenarios: Sequence[Scenario], directions: int, tolerance: float
-) -> list[tuple[PushMap, list[DirectionSearch]]]:
+) -> list[tuple[simulation.PushMap, list[simulation.DirectionSearch]]]:
     """Empty maps of the largest impulses held, each with the searches of its directions.
 
     Args:
@@ -85,7 +70,7 @@ def push_map_searches(
     Raises:
         InputError: If a number is not usable.
     """
-    angles = equal_directions(directions)
+    angles = simulation.equal_directions(directions)
     maps = []
     for scenario in scenarios:
         trials, (section, push) = push_trials(scenario), _sections(scenario)
@@ -94,8 +79,8 @@ def push_map_searches(
             **section.model_dump(mode="json", exclude={"duration_s"}),
             "duration_s": push.duration_s, "tolerance_Ns": tolerance,
         }  # fmt: skip
-        searches = [DirectionSearch(trials, angle, tolerance) for angle in angles]
-        maps.append((PushMap.empty(conditions, angles, trials.bound(angles)), searches))
+        searches = [simulation.DirectionSearch(trials, angle, tolerance) for angle in angles]
+        maps.append((simulation.PushMap.empty(conditions, angles, trials.bound(angles)), searches))
     return maps
 
 
@@ -105,19 +90,18 @@ def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
     return scenario.file.recovery, scenario.file.push
 
 
-def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> RecoveryTask:
+def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> simulation.RecoveryTask:
     """The stance, without a push."""
-    task = RecoveryTask(
-        (), Feet(section.feet), section.duration_s, friction=section.friction, steps=section.steps
-    )
+    feet, options = simulation.Feet(section.feet), {"friction": section.friction, "steps": section.steps}
+    task = simulation.RecoveryTask((), feet, section.duration_s, **options)
     if section.support == "both":
         if section.feet_apart_m is None:
             return task
         with scenario.refusing(("recovery", "feet_apart_m")):
-            return replace(task, q=feet_apart_posture(body, section.feet_apart_m))
+            return replace(task, q=simulation.feet_apart_posture(body, section.feet_apart_m))
     foot = f"{section.support}_foot"
     with scenario.refusing(("recovery", "support")):
-        return replace(task, q=one_foot_posture(body, foot), support=(foot,))
+        return replace(task, q=simulation.one_foot_posture(body, foot), support=(foot,))
 
 
 def _settings(scenario: Scenario, section: RecoverySection) -> RecoverySettings:
@@ -130,17 +114,17 @@ def _settings(scenario: Scenario, section: RecoverySection) -> RecoverySettings:
 
 
 def _bound(
-    body: BodyModel, task: RecoveryTask, settings: RecoverySettings, found: Recovery
+    body: BodyModel, task: simulation.RecoveryTask, settings: RecoverySettings, found: simulation.Recovery
 ) -> dict[str, float | None]:
     """Upper bound of the impulse that free feet hold without a step, for one push that is no sine."""
     if len(task.pushes) != 1 or task.pushes[0].frequency > 0.0:
         return {"bound_Ns": None}
     direction = math.degrees(math.atan2(found.direction[1], found.direction[0]))
-    bound = PushTrials(body, task, settings, task.pushes[0].duration).bound([direction])
+    bound = simulation.PushTrials(body, task, settings, task.pushes[0].duration).bound([direction])
     return {"bound_Ns": None if bound is None else bound[0]}
 
 
-def _schedule(found: Recovery) -> ContactSchedule:
+def _schedule(found: simulation.Recovery) -> ContactSchedule:
     """The feet that carried, in time."""
     time, standings = found.trace.motion.time, found.trace.standings
     phases, instants, first = [], [float(time[0])], 0

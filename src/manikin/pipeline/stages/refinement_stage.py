@@ -18,7 +18,6 @@ def refine_contacts(
 
     Args:
         report: Takes the ``wholebody`` block.
-        schedule: Contacts in time.
         time: (n,) key times [s].
         q: (n, nq) postures at them.
     """
@@ -27,14 +26,11 @@ def refine_contacts(
     options = context.scenario.file.wholebody
     schedule = ContactSchedule(schedule.sequence, schedule.instants / options.pace)
     path = with_mid_flights(body, scene, schedule, KeyPath(time / options.pace, q), padded)
-    settings = RefineSettings(
-        scales=RefineScales.of(body),
-        contact_variables=options.contact_variables,
-        speed_share=options.speed_share,
-    )
+    kept = {"contact_variables": options.contact_variables, "speed_share": options.speed_share}
     result = refine_motion(
-        body, scene, path.time, path.q, schedule, settings=settings,
-        padded=padded, progress=lambda share: report.progress("wholebody", share),
+        body, scene, path.time, path.q, schedule, padded=padded,
+        settings=RefineSettings(scales=RefineScales.of(body), **kept),
+        progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     block = refined_summary(result) | {"seed_matters": context.plan is not None}
     report_whole_body(context, report, result.schedule, result, block)
@@ -43,36 +39,23 @@ def refine_contacts(
 
 def refined_summary(result: RefineResult) -> dict[str, Any]:
     """Return the ``wholebody`` block of the summary of a refined motion."""
-    certificate = result.certificate
+    certificate, before, after = result.certificate, result.before, result.after
+    variables = (value for phase in result.variables for value in phase.values())
+    refinement = {
+        "min_contact_slack": result.contact_slack,
+        "max_physics_violation_N": certificate.value("max_physics_violation"),
+        "physics_violation_falls": _fall(before.physics_violation, after.physics_violation),
+        "squared_accelerations_fall": _fall(before.squared_accelerations, after.squared_accelerations),
+        "before": before.as_dict(), "smoothed": result.smoothed.as_dict(), "after": after.as_dict(),
+        "least_contact_variable": min(variables, default=None),
+        "released_contacts": [{"phase": phase, "effector": name} for phase, name in result.released],
+        "stretch": result.stretch, "iterations": result.iterations,
+    }  # fmt: skip
     return {
-        "method": "refine",
-        "duration_s": result.after.duration_s,
-        **certificate_summary(certificate),
-        "max_meeting_error_m": None,
-        "max_com_error_m": None,
-        "max_scuff_m": certificate.value("max_penetration_m"),
-        "impacts": [],
-        "min_margin": certificate.value("min_margin"),
-        "swings": None,
-        "refinement": {
-            "min_contact_slack": result.contact_slack,
-            "max_physics_violation_N": certificate.value("max_physics_violation"),
-            "physics_violation_falls": _fall(
-                result.before.physics_violation, result.after.physics_violation
-            ),
-            "squared_accelerations_fall": _fall(
-                result.before.squared_accelerations, result.after.squared_accelerations
-            ),
-            "before": result.before.as_dict(),
-            "smoothed": result.smoothed.as_dict(),
-            "after": result.after.as_dict(),
-            "least_contact_variable": min(
-                (value for phase in result.variables for value in phase.values()), default=None
-            ),
-            "released_contacts": [{"phase": phase, "effector": name} for phase, name in result.released],
-            "stretch": result.stretch,
-            "iterations": result.iterations,
-        },
+        "method": "refine", "duration_s": after.duration_s, **certificate_summary(certificate),
+        "max_meeting_error_m": None, "max_com_error_m": None,
+        "max_scuff_m": certificate.value("max_penetration_m"), "impacts": [],
+        "min_margin": certificate.value("min_margin"), "swings": None, "refinement": refinement,
         "wall_s": result.wall_time,
     }  # fmt: skip
 

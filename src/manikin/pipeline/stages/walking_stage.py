@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from manikin import walking
 from manikin.balance import wrench_polytopes
 from manikin.balance.motion_forces import full_motion
 from manikin.contact import Contact, ContactSchedule, default_normal_force_cap, sole
@@ -33,24 +34,7 @@ from manikin.scenarios.sections.task_sections import (
 )
 from manikin.scenarios.validation import KeyPath
 from manikin.scenarios.world import flat_sequence
-from manikin.walking import (
-    LITERAL_ORDER,
-    PROSE_ORDER,
-    RECORDED_TURNS,
-    RECORDED_WALKS,
-    Footprints,
-    StepRule,
-    Walk,
-    Walker,
-    WalkObstacle,
-    WalkRoute,
-    Waypoint,
-    floor_plan,
-    place_footprints,
-    walk_along,
-    walked_footprints,
-    walking_route,
-)
+from manikin.walking import Walk, WalkRoute, Waypoint
 from manikin.walking.footprints import FEET
 from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_path import TOLERANCE
@@ -61,15 +45,11 @@ FRICTION = 0.8
 
 
 def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
-    """Supports of a walk in time, and its motion with what the ground has to do for it.
+    """Supports of a walk in time, and its motion with what the ground, at a height [m], has to do for it.
 
     The motion is that of recorded people, carried over to another body, so that its margin may be negative
     and its torques may leave a rest on the pelvis: both say how far this body is from walking like that.
     Velocities are low-passed as those of recordings are, since accelerations follow from them.
-
-    Args:
-        walk: Of a body along a path.
-        height: Of the floor [m].
     """
     schedule, motion = walked_schedule(walk, height), walk.motion
     polytopes = wrench_polytopes([phase.stance for phase in schedule.sequence])
@@ -88,11 +68,9 @@ def walked_schedule(walk: Walk, height: float) -> ContactSchedule:
     contacts: dict[tuple[int, int], Contact] = {}
     for foot, name in enumerate(walk.feet):
         for item in walked_supports(walk, foot):
-            made = sole(
-                name, (item.x, item.y, height), item.yaw, length=body.sole_length, width=body.sole_width,
-                friction=FRICTION,
-            )  # fmt: skip
-            contacts |= {(foot, row): made for row in range(item.first, item.stop)}
+            size = {"length": body.sole_length, "width": body.sole_width}
+            made = sole(name, (item.x, item.y, height), item.yaw, **size, friction=FRICTION)
+            contacts |= dict.fromkeys(((foot, row) for row in range(item.first, item.stop)), made)
     cap = default_normal_force_cap(body.mass)
     return schedule_of_support(walk.time, walk.support, lambda *touching: contacts[touching], cap)
 
@@ -116,20 +94,20 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
         report.finish(STAGE, path_block(plan))
         return None
     path, bare = plan.route.legs[0], scenario.replaced(walking=None)
-    rule = StepRule().scaled(context.body.stature or 1.75)
+    rule = walking.StepRule().scaled(context.body.stature or 1.75)
     height = context.scene.floor_height or 0.0
     with scenario.refusing(("walking",)):
         if stance is not None:
             (left, _), (right, _) = (stance[foot] for foot in FEET)
             rule = replace(rule, standing_width=float(np.hypot(*(left - right)[:2])))
-            choices = [place_footprints(path, rule, first=first, height=height) for first in FEET]
+            choices = [walking.place_footprints(path, rule, first=first, height=height) for first in FEET]
             footprints = _ending_for(scenario, choices)
             walked = walk_before(footprints, bare)
         else:
-            footprints = place_footprints(path, rule, height=height)
+            footprints = walking.place_footprints(path, rule, height=height)
             if _section(scenario).footprints == "library":  # where the feet of the library's walk stand
-                walk = walk_along(path, context.body, height=height)
-                footprints = walked_footprints(walk, rule, height=height)
+                walk = walking.walk_along(path, context.body, height=height)
+                footprints = walking.walked_footprints(walk, rule, height=height)
             walked = walking_supports(footprints, bare)
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
     report.keep_scenario(walked)
@@ -151,13 +129,12 @@ def _first_stance(scenario: Scenario) -> dict[str, tuple[FloatArray, float]]:
     held = {contact.effector: contact for contact in flat_sequence(scenario)[0].stance}
     missing = [foot for foot in FEET if foot not in held]
     if missing:
-        raise scenario.error(
-            ("supports", "phases", 0), f"has no {missing[0]}; valid for a walk to it: both feet"
-        )
+        lacks = f"has no {missing[0]}; valid for a walk to it: both feet"
+        raise scenario.error(("supports", "phases", 0), lacks)
     return {foot: (held[foot].position, held[foot].yaw) for foot in FEET}
 
 
-def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
+def _ending_for(scenario: Scenario, choices: list[walking.Footprints]) -> walking.Footprints:
     """Walk whose last step is that of the foot that stays in the next phase; the shorter of two."""
     phases = scenario.explicit_supports().resolved_phases()
     stays = [foot for foot in FEET if len(phases) > 1 and phases[1].get(foot) == phases[0][foot]]
@@ -166,39 +143,32 @@ def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
 
 
 STAGE = "walk"
-
 PATH_EVERY = 5
 """Instants of a route for each one that is kept."""
-
 CLOCK = 0.01
 """Step of the common clock on which distances of walkers are measured [s]."""
-
 ROOM_TOLERANCE = 1e-3
 """The path keeps its room at the instants of its optimisation; between them it may miss this much [m]."""
-
 STANCE_SLIDE = 1e-3
 """A foot on the ground moves by at most this, as a planned support does [m]."""
-
 OBJECTIVES = {
-    "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
-    "recorded": RECORDED_WALKS, "recorded-turns": RECORDED_TURNS,
+    "prose": walking.PROSE_ORDER, "literal": walking.LITERAL_ORDER,
+    "recorded": walking.RECORDED_WALKS, "recorded-turns": walking.RECORDED_TURNS,
 }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalks:
-    """Routes of all walkers of a scenario.
+    """Routes of the body and, by name, of the others who walk in a scenario.
 
     Attributes:
-        route: Of the scenario's body.
-        others: Of the others, by name.
         obstacles: What stands there, and the others.
         wall_s: Time in which the body's own route was found [s].
     """
 
     route: WalkRoute
     others: dict[str, WalkRoute]
-    obstacles: tuple[WalkObstacle, ...]
+    obstacles: tuple[walking.WalkObstacle, ...]
     wall_s: float
 
 
@@ -217,7 +187,7 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         report.finish(STAGE, block)
         return None
     began = clock.perf_counter()
-    walk = walk_along(plan.route, context.body, height=height)
+    walk = walking.walk_along(plan.route, context.body, height=height)
     block |= {
         "steps": int(np.sum(np.diff(walk.support.astype(np.int64), axis=0) == 1)),
         "max_stance_slide_m": float(walk.slides.max(initial=0.0)),
@@ -226,19 +196,16 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         "motion_wall_ms": 1e3 * (clock.perf_counter() - began),
     }
     schedule, motion = walked_motion(walk, height)
-    block |= {
-        "min_margin": float(motion.margin.min()),
-        "margin_unit": motion.margin_unit,
-        "balanced_share": float(np.mean(motion.margin >= 0.0)),
-    }
-    report.finish(STAGE, block)
+    balanced = float(np.mean(motion.margin >= 0.0))
+    block |= {"min_margin": float(motion.margin.min()), "margin_unit": motion.margin_unit}
+    report.finish(STAGE, block | {"balanced_share": balanced})
     report.require(STAGE, _requirements(context, plan, walk))
     report.planned = True
     report.keep_motions(schedule, motion)
-    for number, (name, route) in enumerate(plan.others.items()):
-        schedule, other = walked_motion(walk_along(route, context.body, height=height), height)
-        report.keep_motions(schedule, other, file=other_motion(name))
-        report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
+    for number, (name, route) in enumerate(plan.others.items(), 1):
+        walked = walked_motion(walking.walk_along(route, context.body, height=height), height)
+        report.keep_motions(*walked, file=other_motion(name))
+        report.progress(STAGE, 0.6 + 0.4 * number / len(plan.others))
     report.progress(STAGE, 1.0)
     return motion
 
@@ -249,23 +216,22 @@ def plan_walks(
     """Find a route for every walker, each around those before.
 
     Args:
-        start: (3,) x, y [m], heading [rad] of the body at the beginning; that of the task if omitted.
-        goal: (3,) The same at the end.
+        start, goal: (3,) x, y [m], heading [rad] of the body at both ends; those of the task if omitted.
 
     Raises:
         ScenarioError: If a route is impossible: no floor, a start in an obstacle, a useless waypoint.
     """
     scenario, section = context.scenario, _section(context.scenario)
     with scenario.refusing(("scene",)):
-        standing = floor_plan(context.scene, context.body.stature or 2.0)
-    objective, radius = OBJECTIVES[section.weights], Walker().width / 2
+        standing = walking.floor_plan(context.scene, context.body.stature or 2.0)
+    objective, radius = OBJECTIVES[section.weights], walking.Walker().width / 2
     obstacles, others = list(standing), {}
 
     def route_of(
         key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, stops: list[Waypoint]
     ) -> WalkRoute:
         with scenario.refusing(key):
-            return walking_route(
+            return walking.walking_route(
                 begin, stops, objective, obstacles=obstacles, room=section.room_m,
                 max_speed=who.max_speed_m_s, wait=who.wait_s,
             )  # fmt: skip
@@ -317,23 +283,17 @@ def _waypoint(section: WaypointSection) -> Waypoint:
 def path_block(plan: PlannedWalks) -> dict[str, Any]:
     """Block of the summary about the route itself."""
     route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
-    return {
-        "duration_s": route.duration,
-        "path_length_m": route.length,
-        "cost": route.cost,
-        "max_forward_mps": float(forward),
-        "max_left_mps": float(left),
-        "segments": [
-            {"kind": item.kind, "start_s": item.start, "end_s": item.end}
-            for item in route.segments().segments
-        ],
-        "min_room_m": _room(plan),
-        "others": {
-            name: {"duration_s": other.duration, "path_length_m": other.length} | _closest(route, other)
-            for name, other in plan.others.items()
-        },
-        "path_wall_ms": 1e3 * plan.wall_s,
+    parts = route.segments().segments
+    others = {
+        name: {"duration_s": other.duration, "path_length_m": other.length} | _closest(route, other)
+        for name, other in plan.others.items()
     }
+    return {
+        "duration_s": route.duration, "path_length_m": route.length, "cost": route.cost,
+        "max_forward_mps": float(forward), "max_left_mps": float(left),
+        "segments": [{"kind": item.kind, "start_s": item.start, "end_s": item.end} for item in parts],
+        "min_room_m": _room(plan), "others": others, "path_wall_ms": 1e3 * plan.wall_s,
+    }  # fmt: skip
 
 
 def _closest(route: WalkRoute, other: WalkRoute) -> dict[str, float]:
@@ -346,7 +306,7 @@ def _closest(route: WalkRoute, other: WalkRoute) -> dict[str, float]:
 
 def _room(plan: PlannedWalks) -> float | None:
     """Least distance of the walker's discs from anything [m], measured densely; None where nothing is."""
-    room = clearance(plan.obstacles, Walker(), plan.route.place, plan.route.time)
+    room = clearance(plan.obstacles, walking.Walker(), plan.route.place, plan.route.time)
     return float(room.min()) if room.size else None
 
 

@@ -37,7 +37,6 @@ from manikin.planning.whole_body.point_mass_motion import point_mass_forces, poi
 
 KEY_ROOM = 0.5
 """Share of the fit's distance from the ends of the joint ranges that key postures keep."""
-
 KEY_TOLERANCES = (1.0e-3, 2.0e-4)
 """Tolerances of key postures [m]: as exact as the finished motion has to be; and more, where no motion is
 found although each posture was just within reach."""
@@ -74,8 +73,7 @@ def with_stricter_key_postures(
 
     Args:
         report: Has the failure of the whole body, which is forgotten where there is another plan.
-        planned: The first plan.
-        before: What was found for it.
+        before: What was found for the first plan.
     """
     if planned.trajectory is None:
         return None
@@ -89,9 +87,7 @@ def with_stricter_key_postures(
 
 
 def _tested(context: RunContext, report: Report, planned: CentroidalResult, tolerance: float) -> Eligibility:
-    """The plan, or another one where a key posture fails."""
-    # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
-    # if they can.
+    """The plan, or another one where a key posture fails; with the fit's room in the ranges if possible."""
     result = _eligible(context, report, planned, KEY_ROOM * context.settings.fit.joint_buffer, tolerance)
     if result.failure is not None or (result.trajectory is None and result.replans > 0):
         report.failure = None  # of a seated part that did not fit another plan
@@ -135,24 +131,19 @@ def _on_real_supports(
 
 
 def _in_world(found: KeyPostures, report: Report) -> KeyPostures:
-    transform = report.transform
-    postures = [
-        replace(
-            item, com=transform.points(item.com), q=transform.poses(item.q),
-            reason=None if item.reason is None else reason_in_world(item.reason, transform),
-        )
-        for item in found.postures
-    ]  # fmt: skip
+    transform, postures = report.transform, []
+    for item in found.postures:
+        reason = None if item.reason is None else reason_in_world(item.reason, transform)
+        com, q = transform.points(item.com), transform.poses(item.q)
+        postures.append(replace(item, com=com, q=q, reason=reason))
     return replace(found, postures=tuple(postures))
 
 
 def _reported(report: Report, found: Eligibility) -> KeyedPlan:
     """Report a plan that was tested, and return it with its trajectory if it can be done."""
     postures = None if found.postures is None else _in_world(found.postures, report)
-    block = centroidal_summary(found.centroidal) | {
-        "replans": found.replans,
-        "key_postures": None if postures is None else postures.summary(),
-    }
+    block = centroidal_summary(found.centroidal) | {"replans": found.replans}
+    block["key_postures"] = None if postures is None else postures.summary()
     report_centre_of_mass(report, found.centroidal, block)
     if postures is not None:
         report.keep("key_postures", postures.to_dict())
@@ -197,8 +188,7 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
         if result.failure is not None and context.scenario.keeps_upright:  # the task may need a deeper bend
             result = plan_com(context.scenario.build_centroidal_problem(upright=False))
     report_centre_of_mass(report, result, centroidal_summary(result))
-    if result.failure is not None:
-        failure = result.failure
+    if (failure := result.failure) is not None:
         where = place(failure.phase, failure.where)
         report.fail("centroidal", failure.reason, failure.time or 0.0, where)
     report.progress("centroidal", 1.0)
@@ -217,8 +207,7 @@ def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[
 
 def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
     """Return the ``centroidal`` block of the summary."""
-    trajectory = result.trajectory
-    recorded = isinstance(result, KeyframeResult)
+    trajectory, recorded = result.trajectory, isinstance(result, KeyframeResult)
     parts = {contact.part for phase in result.problem.sequence for contact in phase.stance}
     return {
         "method": "keyframes" if recorded else "timing-free",
@@ -226,18 +215,15 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "added_key_frames_s": sorted(result.added_times) if recorded else None,
         "duration_s": None if trajectory is None else trajectory.duration,
         "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
-        "min_margin": result.d_min,
-        "margin_unit": result.problem.margin_unit,
+        "min_margin": result.d_min, "margin_unit": result.problem.margin_unit,
         "friction": None if trajectory is None else _friction(trajectory),
         "limiting_phase": result.limiting_phase,
         "limiting_contact": None if result.limiting is None else result.limiting.description,
         "min_force_at_com_N": least_force_at_com(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
-        "feasibility_radius": result.feasibility_radius,
-        "replans": 0,
-        "key_postures": None,
+        "feasibility_radius": result.feasibility_radius, "replans": 0, "key_postures": None,
         "wall_s": result.wall_time,
-    }
+    }  # fmt: skip
 
 
 def least_force_at_com(result: CentroidalResult) -> float | None:
@@ -245,14 +231,10 @@ def least_force_at_com(result: CentroidalResult) -> float | None:
     trajectory = result.trajectory
     if trajectory is None:
         return None
-    times = phase_times(trajectory)
-    phases = np.repeat(np.arange(len(times)), [len(instants) for instants in times])
-    instants = np.concatenate(times)
-    found = motion_margin(
-        [phase.stance for phase in trajectory.schedule.sequence], phases,
-        trajectory.pseudo_wrench(instants), trajectory.position(instants), polytopes=result.polytopes,
-    )  # fmt: skip
-    return found.min_force
+    times, stances = phase_times(trajectory), [phase.stance for phase in trajectory.schedule.sequence]
+    phases, instants = np.repeat(np.arange(len(times)), [*map(len, times)]), np.concatenate(times)
+    wrench, com = trajectory.pseudo_wrench(instants), trajectory.position(instants)
+    return motion_margin(stances, phases, wrench, com, polytopes=result.polytopes).min_force
 
 
 FORCE_STEP = 0.02
@@ -289,16 +271,15 @@ def report_whole_body(
     block: dict[str, Any],
 ) -> None:  # fmt: skip
     """Take a motion of all joints into the report; ``block`` is what its method says of it."""
-    passage = context.passage(schedule, result.motion).summary()
-    friction = friction_use(
-        schedule, result.motion.time, result.motion.contact_names, result.motion.contact_force
-    )
+    motion = result.motion
+    passage = context.passage(schedule, motion).summary()
+    friction = friction_use(schedule, motion.time, motion.contact_names, motion.contact_force)
     report.finish("wholebody", block | passage | {"friction": friction.summary()})
     report.require("wholebody", result.requirements)
     report.planned = result.succeeded
     if result.failure is not None:
         report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
-    report.keep_motions(schedule, result.motion)
+    report.keep_motions(schedule, motion)
 
 
 def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | None:
@@ -317,24 +298,22 @@ def certificate_summary(certificate: MotionCertificate) -> dict[str, Any]:
         "max_support_error_m", "min_clearance_m", "max_joint_limit_violation_rad", "max_velocity_share",
         "max_torque_share",
     )  # fmt: skip
+    torque = certificate["max_torque_share"]
     return {key: certificate.value(key) for key in same} | {
-        "closest_pair": list(certificate.closest_pair),
-        "max_torque_joint": certificate["max_torque_share"].where,
-        "max_torque_at_s": certificate["max_torque_share"].time_s,
-        "min_force_at_com_N": certificate.min_force_at_com_N,
+        "closest_pair": list(certificate.closest_pair), "max_torque_joint": torque.where,
+        "max_torque_at_s": torque.time_s, "min_force_at_com_N": certificate.min_force_at_com_N,
         "min_zmp_distance_m": certificate.min_zmp_distance_m,
-    }
+    }  # fmt: skip
 
 
 def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
     """Return the ``wholebody`` block of the summary."""
     certificate = result.certificate
     return {
-        "method": "follow",
-        **certificate_summary(certificate),
+        "method": "follow", **certificate_summary(certificate),
         **{key: certificate.value(key) for key in ("max_meeting_error_m", "max_com_error_m", "max_scuff_m")},
         "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
         "wall_s": result.wall_time,
-    }
+    }  # fmt: skip

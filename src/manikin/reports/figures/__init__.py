@@ -62,30 +62,19 @@ __all__ = [
 
 
 FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
-    "com": com_figure,
-    "margin": margin_figure,
-    "footprints": footprint_figure,
-    "walk_paths": walk_paths_figure,
-    "zmp": zmp_figure,
-    "planes": planes_figure,
-    "contacts": contacts_figure,
-    "timing": timing_figure,
-    "scene": scene_figure,
-    "postures": postures_figure,
-    "flights": flights_figure,
-    "effectors": effectors_figure,
-    "tracking": tracking_figure,
-}
+    "com": com_figure, "margin": margin_figure, "footprints": footprint_figure,
+    "walk_paths": walk_paths_figure, "zmp": zmp_figure, "planes": planes_figure, "contacts": contacts_figure,
+    "timing": timing_figure, "scene": scene_figure, "postures": postures_figure, "flights": flights_figure,
+    "effectors": effectors_figure, "tracking": tracking_figure,
+}  # fmt: skip
 """Every figure of a run by the name of its file."""
 
 
 COMPARISONS: dict[str, Callable[[RunComparison], Figure]] = {
-    "compare_timing": compare_timing_figure,
-    "compare_planes": compare_planes_figure,
-    "compare_scene": compare_scene_figure,
-    "compare_margin": compare_margin_figure,
+    "compare_timing": compare_timing_figure, "compare_planes": compare_planes_figure,
+    "compare_scene": compare_scene_figure, "compare_margin": compare_margin_figure,
     "compare_postures": compare_postures_figure,
-}
+}  # fmt: skip
 """Every figure of two runs by the name of its file."""
 
 

@@ -18,19 +18,7 @@ from manikin.recordings.statistics.clip_statistics import GroupStatistics
 from manikin.recordings.statistics.clips import RecordedClip
 from manikin.recordings.statistics.passages import LIMIT, Origin, support_distances
 from manikin.recordings.statistics.phases import published_heights
-from manikin.reports.figures.style import (
-    STYLES,
-    Labels,
-    dress,
-    group_colours,
-    legend_below_title,
-    legend_in_title,
-    name_groups,
-    need,
-    new_grid,
-    note,
-    span_at_least,
-)
+from manikin.reports.figures import style
 from manikin.reports.figures.timeline import timeline
 from manikin.reports.figures.views import VIEWS, View, distinct_contacts, draw_contact, draw_obstacles
 from manikin.runtime.display import COLOURS, colours_of, readable
@@ -38,8 +26,8 @@ from manikin.runtime.display import COLOURS, colours_of, readable
 
 def planes_figure(record: RunRecord) -> Figure:
     """Draw the CoM's path with supports and obstacles on xy, xz and yz ([Qiu2012]_ Fig. 5.16, 7.8, 7.18)."""
-    tracks = need(record.tracks, "a motion of the centre of mass")
-    phases = need(record.phases, "phases")
+    tracks = style.need(record.tracks, "a motion of the centre of mass")
+    phases = style.need(record.phases, "phases")
     contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
     colours = colours_of(contact.effector for contact in contacts)
     seen = np.vstack([t.position for t in tracks.values()] + [c.points_in_world for c in contacts])
@@ -52,12 +40,12 @@ def planes_figure(record: RunRecord) -> Figure:
             draw_obstacles(axes, record.scene, view, low, high)
         for contact in contacts:
             draw_contact(axes, contact, view, colours[contact.effector])
-        draw_paths(axes, view, tracks, STYLES)
+        draw_paths(axes, view, tracks, style.STYLES)
         for name, colour in colours.items():
             axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
         frame_plane(axes, view, low, high)
-        mark_instants(Labels(axes), axes, view, first.at(phases.instants), COLOURS["ink"])
-    legend_in_title(figure, axes)
+        mark_instants(style.Labels(axes), axes, view, first.at(phases.instants), COLOURS["ink"])
+    style.legend_in_title(figure, axes)
     return figure
 
 
@@ -70,7 +58,7 @@ def planes_grid(title: str, spans: FloatArray) -> tuple[Figure, GridSpec]:
     widths = [max(float(view(spans)[0]), 0.3 * float(spans.max())) for view in VIEWS]
     heights = [float(view(spans)[1]) for view in VIEWS]
     height = float(np.clip(max(heights) * 12.8 / sum(widths), 2.5, 6.0))
-    return new_grid(15.0, height + 1.4, title, 1, 3, left=0.75, top=0.85, width_ratios=widths)
+    return style.new_grid(15.0, height + 1.4, title, 1, 3, left=0.75, top=0.85, width_ratios=widths)
 
 
 def frame_plane(axes: Axes, view: View, low: FloatArray, high: FloatArray) -> None:
@@ -79,7 +67,7 @@ def frame_plane(axes: Axes, view: View, low: FloatArray, high: FloatArray) -> No
     axes.set(xlim=(left, right), ylim=(bottom, top))
     axes.set_aspect("equal", adjustable="box", anchor="SW")
     horizontal, vertical = view.labels
-    dress(axes, vertical, horizontal, f"{view.name[0]}-{view.name[1]}, {view.words}")
+    style.dress(axes, vertical, horizontal, f"{view.name[0]}-{view.name[1]}, {view.words}")
 
 
 def draw_paths(
@@ -90,7 +78,7 @@ def draw_paths(
         axes.plot(*view(track.position).T, label=f"centre of mass, {name}", **styles[name])
 
 
-def mark_instants(labels: Labels, axes: Axes, view: View, places: FloatArray, colour: str) -> None:
+def mark_instants(labels: style.Labels, axes: Axes, view: View, places: FloatArray, colour: str) -> None:
     """Mark (n, 3) places of the key instants, numbered from 0 where there is room."""
     points = view(places)
     axes.plot(*points.T, "o", color=colour, markersize=3.5, zorder=6)
@@ -103,7 +91,6 @@ class LowestPoints:
     """Lowest centres of mass of one group of motions.
 
     Attributes:
-        group: Its name.
         com: Lowest heights of the centre of mass above the floor, of each motion or passage [m].
         overhead: Height of what was passed; None where nothing was or it is not known [m].
         rooms: From the highest part of the body to it; empty where not known [m].
@@ -136,10 +123,10 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
         groups: At least one with a height.
         standing: Height of the centre of mass in standing, drawn as a line [m].
     """
-    shown = need([item for item in groups if item.com], "a height of the centre of mass")
-    figure, grid = new_grid(9.6, 4.4, "Lowest centre of mass", 1, 2, top=0.8, across=0.9)
+    shown = style.need([item for item in groups if item.com], "a height of the centre of mass")
+    figure, grid = style.new_grid(9.6, 4.4, "Lowest centre of mass", 1, 2, top=0.8, across=0.9)
     left, right = (figure.add_subplot(grid[column]) for column in range(2))
-    colours = group_colours(item.group for item in shown)
+    colours = style.group_colours(item.group for item in shown)
     for number, item in enumerate(shown):
         colour = colours[item.group]
         _dots(left, number, item.com, colour)
@@ -151,13 +138,13 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
         left.axhline(standing, color=COLOURS["soft"], linewidth=1.0, linestyle=(0, (5, 3)))
         left.annotate("standing", (0.0, standing), (2, 2), textcoords="offset points", fontsize=8,
                       xycoords=("axes fraction", "data"), color=COLOURS["soft"])  # fmt: skip
-    dress(left, "height above the floor [m]", title="Lowest centre of mass")
-    dress(right, "up to what is passed [m]", title="Room above it (dots) and the body (dashes)")
+    style.dress(left, "height above the floor [m]", title="Lowest centre of mass")
+    style.dress(right, "up to what is passed [m]", title="Room above it (dots) and the body (dashes)")
     for axes in (left, right):
-        name_groups(axes, [item.group for item in shown])
+        style.name_groups(axes, [item.group for item in shown])
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.grid(False, axis="x")
-    if not any(item.overhead is not None for item in shown):
+    if all(item.overhead is None for item in shown):
         right.annotate("nothing overhead is known", (0.5, 0.5), xycoords="axes fraction", ha="center",
                        fontsize=9, color=COLOURS["soft"])  # fmt: skip
     return figure
@@ -167,7 +154,7 @@ def _dots(axes: Axes, number: int, values: Sequence[float], colour: str) -> None
     mean = sum(values) / len(values)
     axes.bar(number, mean, width=0.6, color=colour, alpha=0.35)
     axes.plot([number] * len(values), values, "o", color=colour, markersize=4)
-    note(axes, f"{mean:.2f}", (number, 0.0), fontsize=7.5)
+    style.note(axes, f"{mean:.2f}", (number, 0.0), fontsize=7.5)
 
 
 def com_distances_figure(
@@ -185,43 +172,43 @@ def com_distances_figure(
             :func:`~manikin.recordings.statistics.phases.published_distances`.
     """
     known = published or {}
-    result = [(clip, item) for clip in clips for item in support_distances(clip)]
-    effectors = need(sorted({*known, *(item.effector for _, item in result)}), "a support")
-    colours = group_colours(clip.group for clip in clips)
-    groups = list(colours)
-    figure, grid = new_grid(
+    result = [(clip, support_distances(clip)) for clip in clips]
+    used = {item.effector for _, distances in result for item in distances}
+    effectors = style.need(sorted({*known, *used}), "a support")
+    colours = style.group_colours(clip.group for clip in clips)
+    figure, grid = style.new_grid(
         9.6, 1.2 + 2.6 * len(effectors), "Centre of mass to its supports", len(effectors), 2,
         width_ratios=[3.0, 1.0], top=1.0, between=0.85, across=0.5,
     )  # fmt: skip
     for row, effector in enumerate(effectors):
         axes = figure.add_subplot(grid[row, 0])
         most = figure.add_subplot(grid[row, 1], sharey=axes)
-        for clip, item in result:
-            if item.effector == effector:
+        largest: dict[str, list[float]] = {group: [] for group in colours}
+        for clip, distances in result:
+            own = [item for item in distances if item.effector == effector]
+            for item in own:
                 axes.plot(item.time - item.time[0], item.distance, color=colours[clip.group], linewidth=1.0,
                           alpha=0.8)  # fmt: skip
-        for number, group in enumerate(groups):
-            largest: dict[int, float] = {}
-            for clip, item in result:
-                if clip.group == group and item.effector == effector:
-                    most_yet = largest.get(id(clip), 0.0)
-                    largest[id(clip)] = max(most_yet, float(item.distance.max()))
-            most.plot([number] * len(largest), [*largest.values()], "o", color=colours[group], markersize=4)
+            if own:
+                largest[clip.group].append(max(float(item.distance.max()) for item in own))
+        for number, (group, values) in enumerate(largest.items()):
+            most.plot([number] * len(values), values, "o", color=colours[group], markersize=4)
         if effector in known:
             spread = known[effector]
             most.axhspan(spread.smallest, spread.largest, color=COLOURS["shade"], zorder=0)
             most.axhline(spread.mean, color=COLOURS["soft"], linewidth=1.0, zorder=1)
         for panel in (axes, most):
             panel.axhline(limit, color=COLOURS["ink"], linewidth=1.0, linestyle=(0, (5, 3)))
-        dress(axes, "distance [m]", "time from touch-down, or from the beginning [s]", readable(effector))
-        dress(most, title="largest of each motion")
-        name_groups(most, groups)
+        begin = "time from touch-down, or from the beginning [s]"
+        style.dress(axes, "distance [m]", begin, readable(effector))
+        style.dress(most, title="largest of each motion")
+        style.name_groups(most, list(colours))
         most.tick_params(labelleft=False)
     keys = [Line2D([], [], color=colour, label=group) for group, colour in colours.items()]
     keys.append(Line2D([], [], color=COLOURS["ink"], linestyle=(0, (5, 3)), label=f"limit, {limit:g} m"))
     if known:
         keys.append(Line2D([], [], color=COLOURS["soft"], label="published mean and range", linewidth=3))
-    legend_below_title(figure, keys)
+    style.legend_below_title(figure, keys)
     return figure
 
 
@@ -237,21 +224,20 @@ def com_paths_figure(
         origins: Of each motion, from where it is seen.
         overhead: Height of what they pass under, drawn as a line; None for nothing [m].
     """
-    motions = list(need(list(clips), "a recorded motion"))
+    motions = list(style.need(list(clips), "a recorded motion"))
     if len(motions) != len(origins):
         raise FigureError(f"{len(origins)} origins of {len(motions)} motions; valid: one for each")
-    figure, grid = new_grid(
-        9.6, 7.4, "Ways of the centre of mass", 2, 1, height_ratios=[1.25, 1.0], top=0.8, between=0.7
-    )
+    margins, title = {"top": 0.8, "between": 0.7}, "Ways of the centre of mass"
+    figure, grid = style.new_grid(9.6, 7.4, title, 2, 1, height_ratios=[1.25, 1.0], **margins)
     side, above = (figure.add_subplot(grid[row]) for row in range(2))
-    colours = group_colours(clip.group for clip in motions)
+    colours = style.group_colours(clip.group for clip in motions)
     for clip, origin in zip(motions, origins, strict=True):
         _draw(side, above, clip, origin, colours[clip.group])
     side.axhline(0.0, color=COLOURS["soft"], linewidth=1.0)
     if overhead is not None:
         side.axhline(overhead, color=COLOURS["ink"], linewidth=1.4, linestyle=(0, (6, 2)))
-    dress(side, "height above the floor [m]", "along the way [m]")
-    dress(above, "aside [m]", "along the way [m]", "From above, with the supports")
+    style.dress(side, "height above the floor [m]", "along the way [m]")
+    style.dress(above, "aside [m]", "along the way [m]", "From above, with the supports")
     above.set_aspect("equal", adjustable="datalim")
     above.sharex(side)
     keys = [Line2D([], [], color=colour, label=group) for group, colour in colours.items()]
@@ -261,7 +247,7 @@ def com_paths_figure(
     if overhead is not None:
         label = f"overhead, {overhead:g} m"
         keys.append(Line2D([], [], color=COLOURS["ink"], linestyle=(0, (6, 2)), label=label))
-    legend_below_title(figure, keys)
+    style.legend_below_title(figure, keys)
     return figure
 
 
@@ -289,18 +275,15 @@ def _seen(clip: RecordedClip, origin: Origin, places: FloatArray) -> FloatArray:
 
 
 QUANTITIES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s²"))
-
 LEAST_SPAN = 4e-3
 """Height of a panel at the least, in its unit."""
 
 
 def com_figure(record: RunRecord) -> Figure:
     """Draw the CoM along each axis, planned and executed ([Qiu2012]_ Fig. 5.12, 5.22, 6.9, 7.8, 7.14)."""
-    tracks = need(record.tracks, "a motion of the centre of mass")
-    shown = timeline(
-        record, (14.0, 7.0), "Centre of mass", 3, len(QUANTITIES), strip=0.14, top=0.75, between=0.22,
-        across=0.75,
-    )  # fmt: skip
+    tracks = style.need(record.tracks, "a motion of the centre of mass")
+    margins = {"strip": 0.14, "top": 0.75, "between": 0.22, "across": 0.75}
+    shown = timeline(record, (14.0, 7.0), "Centre of mass", 3, len(QUANTITIES), **margins)
     for column, (quantity, unit) in enumerate(QUANTITIES):
         shown.strip(column, quantity.capitalize(), named=column == 0)
         for row, axis in enumerate("xyz"):
@@ -308,13 +291,13 @@ def com_figure(record: RunRecord) -> Figure:
             drawn = []
             for name, track in tracks.items():
                 values = getattr(track, quantity)[:, row]
-                axes.plot(track.time, values, label=name, **STYLES[name])
+                axes.plot(track.time, values, label=name, **style.STYLES[name])
                 drawn.append(values)
             if quantity == "acceleration":
                 axes.set_ylim(_without_spikes(np.concatenate(drawn)))
-            span_at_least(axes, LEAST_SPAN)
+            style.span_at_least(axes, LEAST_SPAN)
             shown.label(axes, f"{axis} [{unit}]")
-    legend_in_title(shown.figure, axes)
+    style.legend_in_title(shown.figure, axes)
     return shown.figure
 
 

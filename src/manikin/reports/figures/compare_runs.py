@@ -12,29 +12,8 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from manikin.pipeline.run_directory import ComTrack
 from manikin.reports.alignment import TimingRow
 from manikin.reports.comparison import RunComparison, shared_tracks
+from manikin.reports.figures import scene, style
 from manikin.reports.figures.com import draw_paths, frame_plane, mark_instants, planes_grid
-from manikin.reports.figures.scene import (
-    GAP,
-    chosen_instants,
-    draw_moment,
-    draw_scene,
-    draw_soles,
-    frame,
-    frame_panels,
-)
-from manikin.reports.figures.style import (
-    Labels,
-    dress,
-    legend_above,
-    legend_in_title,
-    named_below,
-    need,
-    new_figure,
-    new_grid,
-    note,
-    support_colour,
-    support_keys,
-)
 from manikin.reports.figures.views import ALONG_X, ALONG_Y, VIEWS
 from manikin.runtime.display import COLOURS, readable
 
@@ -42,12 +21,12 @@ from manikin.runtime.display import COLOURS, readable
 def compare_margin_figure(comparison: RunComparison) -> Figure:
     """Draw the margins of each stage over matched phases, each phase drawn equally wide."""
     rows = [row for row in comparison.rows if row.first is not None and row.second is not None]
-    need(rows, "a phase that both runs have", "two runs")
+    style.need(rows, "a phase that both runs have", "two runs")
     shared = shared_tracks(*comparison.runs)
     stages = [stage for stage, (one, other) in shared.items() if one.margin_unit == other.margin_unit]
-    need(stages, "a margin of both runs in the same unit")
+    style.need(stages, "a margin of both runs in the same unit")
     most = max(len(row.supports) for row in rows)
-    figure, grid = new_grid(
+    figure, grid = style.new_grid(
         max(9.0, 1.3 * len(rows)), 1.2 + 2.2 * len(stages) + 0.14 * most, "Margins of two runs",
         len(stages), 1, top=0.55, bottom=0.4 + 0.14 * most,
     )  # fmt: skip
@@ -58,15 +37,15 @@ def compare_margin_figure(comparison: RunComparison) -> Figure:
         axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
         last = number == len(stages) - 1
         unit = shared[stage][0].margin_unit
-        dress(axes, f"{stage} [{unit}]", "supports of the phase" if last else "")
+        style.dress(axes, f"{stage} [{unit}]", "supports of the phase" if last else "")
         axes.set_xticks(np.arange(len(rows)) + 0.5)
-        axes.set_xticklabels([named_below(row.supports) for row in rows] if last else [])
+        axes.set_xticklabels([style.named_below(row.supports) for row in rows] if last else [])
         axes.tick_params(axis="x", labelsize=7, length=0)
         axes.grid(False, axis="x")
         for edge in range(1, len(rows)):
             axes.axvline(edge, color="#B9BEC6", linewidth=0.7, linestyle=(0, (4, 3)))
         axes.set_xlim(0.0, len(rows))
-    legend_in_title(figure, axes)
+    style.legend_in_title(figure, axes)
     return figure
 
 
@@ -92,41 +71,37 @@ def compare_postures_figure(comparison: RunComparison) -> Figure:
 
     Under each pair stand the joints that differ most.
     """
-    which = need(comparison.postures_of, "a whole-body motion of the same kind in both runs")
-    postures = list(need(comparison.postures, "a phase that both runs have"))
+    which = style.need(comparison.postures_of, "a whole-body motion of the same kind in both runs")
+    postures = list(style.need(comparison.postures, "a phase that both runs have"))
     for run in comparison.runs:
-        need(run.body, "a body in both runs")
-    chosen = chosen_instants(np.arange(float(len(postures)))).astype(int)
+        style.need(run.body, "a body in both runs")
+    chosen = scene.chosen_instants(np.arange(float(len(postures)))).astype(int)
     postures = [postures[index] for index in chosen]
     com = np.vstack([run.motions[which].com for run in comparison.runs])
     low, high = com.min(axis=0) - REACH, com.max(axis=0) + REACH
     view = ALONG_Y if np.ptp(com[:, 1]) < np.ptp(com[:, 0]) else ALONG_X
     left, right = view(np.array([low, high]))[:, 0]
-    pitch = right - left + GAP
+    pitch = right - left + scene.GAP
     scale = 1.85 / pitch
-    figure, grid = new_grid(
+    figure, grid = style.new_grid(
         max(1.85 * len(postures), 6.0) + 0.9, 2.0 * (high[2] - low[2]) * scale + 2.2,
         f"Postures of two runs at the key instants ({which}), seen {view.words}", 2, 1, top=0.7, bottom=0.95,
         between=0.35, left=0.85,
     )  # fmt: skip
     offsets = [pitch * column for column in range(len(postures))]
-    for row, (name, run, colour) in enumerate(
-        zip(comparison.names, comparison.runs, RUN_COLOURS, strict=True)
-    ):
-        axes = figure.add_subplot(grid[row, 0])
+    for row, (name, run) in enumerate(zip(comparison.names, comparison.runs, strict=True)):
+        axes, motion, colour = figure.add_subplot(grid[row, 0]), run.motions[which], RUN_COLOURS[row]
         for offset, posture in zip(offsets, postures, strict=True):
             time = posture.second_s if row else posture.first_s
-            motion = run.motions[which]
             sample = int(np.argmin(np.abs(motion.time - time)))
-            draw_moment(axes, run, motion, sample, view.moved(offset, 0.0), (low, high))
+            scene.draw_moment(axes, run, motion, sample, view.moved(offset, 0.0), (low, high))
             middle = offset + (left + right) / 2
-            note(axes, f"{time:.2f} s", (middle, high[2]), fontsize=8.5, color=colour)
+            style.note(axes, f"{time:.2f} s", (middle, high[2]), fontsize=8.5, color=colour)
             if row:
-                worst = posture.largest[:2]
-                text = "\n".join(f"{readable(j.joint)} {j.difference_deg:+.1f}°" for j in worst)
-                note(axes, text, (middle, low[2]), -44, va="bottom", fontsize=6.5, color="#5A5F69")
-        dress(axes, f"{name}\n{view.labels[1]}", "")
-        frame_panels(axes, (left, right), (low[2], high[2]), offsets)
+                text = "\n".join(f"{readable(j.joint)} {j.difference_deg:+.1f}°" for j in posture.largest[:2])
+                style.note(axes, text, (middle, low[2]), -44, va="bottom", fontsize=6.5, color="#5A5F69")
+        style.dress(axes, f"{name}\n{view.labels[1]}", "")
+        scene.frame_panels(axes, (left, right), (low[2], high[2]), offsets)
     legend = f"numbers along the axes: {view.labels[0]}; below: largest differences, second less first"
     figure.text(0.01, 0.01, legend, fontsize=7.5, color=COLOURS["soft"])
     return figure
@@ -140,13 +115,12 @@ def compare_timing_figure(comparison: RunComparison) -> Figure:
 
     Lines join the key instants of matched phases; phases without a match are hatched.
     """
-    rows = need(comparison.rows, "phases of both runs")
+    rows = style.need(comparison.rows, "phases of both runs")
     most = max(len(row.supports) for row in rows)
-    longest = max(len(name) for name in comparison.names)
-    figure, grid = new_grid(
+    left = max(0.7, 0.2 + 0.08 * max(map(len, comparison.names)))
+    figure, grid = style.new_grid(
         max(11.0, 1.1 * len(rows)), 5.6 + 0.13 * most, "Timing of two runs", 2, 1, top=0.75,
-        bottom=0.2 + 0.14 * most, between=0.75, left=max(0.7, 0.2 + 0.08 * longest),
-        height_ratios=[1.0, 1.3],
+        bottom=0.2 + 0.14 * most, between=0.75, left=left, height_ratios=[1.0, 1.3],
     )  # fmt: skip
     _draw_bars(figure.add_subplot(grid[0]), comparison)
     _draw_durations(figure.add_subplot(grid[1]), rows, comparison.names)
@@ -159,25 +133,24 @@ def _draw_bars(axes: Axes, comparison: RunComparison) -> None:
         for level, phase in ((1.0, row.first), (0.0, row.second)):
             if phase is None:
                 continue
-            alone = row.first is None or row.second is None
+            colour, alone = style.support_colour(len(row.supports)), row.first is None or row.second is None
             axes.barh(level, phase.duration_s, left=phase.start_s, height=0.5, alpha=0.8, edgecolor="white",
-                      color=support_colour(len(row.supports)), hatch="xx" if alone else None)  # fmt: skip
+                      color=colour, hatch="xx" if alone else None)  # fmt: skip
             axes.text((phase.start_s + phase.end_s) / 2, level, f"{phase.phase}", ha="center", va="center",
                       fontsize=8, color="white", fontweight="bold")  # fmt: skip
             ends.append(phase.end_s)
-        if row.first is not None and row.second is not None:
-            for name in ("start_s", "end_s"):
-                instants = getattr(row.first, name), getattr(row.second, name)
+        if (one := row.first) is not None and (other := row.second) is not None:
+            for instants in ((one.start_s, other.start_s), (one.end_s, other.end_s)):
                 axes.plot(instants, [0.74, 0.26], color=COLOURS["soft"], linewidth=0.8)
     axes.set_ylim(-0.4, 1.4)
     axes.set_xlim(0.0, 1.01 * max(ends))
-    dress(axes, "", "time [s]")
+    style.dress(axes, "", "time [s]")
     axes.set_yticks([1.0, 0.0], list(comparison.names))
     axes.grid(False, axis="y")
-    keys = support_keys(len(row.supports) for row in comparison.rows)
+    keys = style.support_keys(len(row.supports) for row in comparison.rows)
     if any(row.first is None or row.second is None for row in comparison.rows):
         keys.append(Patch(facecolor=COLOURS["soft"], edgecolor="white", hatch="xx", label="no match"))
-    legend_above(axes, keys)
+    style.legend_above(axes, keys)
 
 
 def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str]) -> None:
@@ -187,15 +160,15 @@ def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str
             if phase is None:
                 continue
             axes.bar(number + shift, phase.duration_s, width=0.38, color=colour, alpha=0.85)
-            note(axes, f"{phase.duration_s:.2f}", (number + shift, phase.duration_s), 2, fontsize=7)
+            style.note(axes, f"{phase.duration_s:.2f}", (number + shift, phase.duration_s), 2, fontsize=7)
             longest = max(longest, phase.duration_s)
-    dress(axes, "duration [s]")
-    axes.set_xticks(range(len(rows)), [named_below(row.supports) for row in rows])
+    style.dress(axes, "duration [s]")
+    axes.set_xticks(range(len(rows)), [style.named_below(row.supports) for row in rows])
     axes.tick_params(axis="x", labelsize=7)
     axes.set_ylim(0.0, 1.14 * longest)
     axes.grid(False, axis="x")
     named = zip(RUN_COLOURS, names, strict=True)
-    legend_above(axes, [Patch(color=colour, alpha=0.85, label=name) for colour, name in named])
+    style.legend_above(axes, [Patch(color=colour, alpha=0.85, label=name) for colour, name in named])
 
 
 def compare_planes_figure(comparison: RunComparison) -> Figure:
@@ -210,26 +183,26 @@ def compare_planes_figure(comparison: RunComparison) -> Figure:
         axes = figure.add_subplot(grid[column])
         draw_paths(axes, view, tracks, _styles(comparison))
         frame_plane(axes, view, low, high)
-        labels = Labels(axes)
+        labels = style.Labels(axes)
         for run, track, colour in zip(comparison.runs, tracks.values(), RUN_COLOURS, strict=True):
             if run.phases is not None:
                 mark_instants(labels, axes, view, track.at(run.phases.instants), colour)
-    legend_in_title(figure, axes)
+    style.legend_in_title(figure, axes)
     return figure
 
 
 def compare_scene_figure(comparison: RunComparison) -> Figure:
     """Draw both CoM paths in space, with the scene and supports of the first run ([Qiu2012]_ Fig. 7.17)."""
     tracks, first = _tracks(comparison), comparison.first
-    figure = new_figure(9.5, 8.0, "Centres of mass of two runs")
+    figure = style.new_figure(9.5, 8.0, "Centres of mass of two runs")
     axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
     seen = [track.position for track in tracks.values()]
-    corners = draw_scene(axes, first.scene) if first.scene is not None else np.zeros((0, 3))
+    corners = scene.draw_scene(axes, first.scene)
     if first.schedule is not None:
-        seen.append(draw_soles(axes, first.schedule))
+        seen.append(scene.draw_soles(axes, first.schedule))
     for name, track in tracks.items():
         axes.plot(*track.position.T, label=name, **{**_styles(comparison)[name], "zorder": 8})
-    frame(axes, np.vstack(seen), corners)
+    scene.frame(axes, np.vstack(seen), corners)
     axes.view_init(14.0, -62.0)
     axes.legend(loc="upper right", fontsize=8, frameon=False)
     return figure
@@ -237,10 +210,8 @@ def compare_scene_figure(comparison: RunComparison) -> Figure:
 
 def _tracks(comparison: RunComparison) -> dict[str, ComTrack]:
     """The planned CoM of each run."""
-    result = {}
-    for name, run in zip(comparison.names, comparison.runs, strict=True):
-        result[name] = next(iter(need(run.tracks, "a centre of mass of both runs").values()))
-    return result
+    tracks = [style.need(run.tracks, "a centre of mass of both runs") for run in comparison.runs]
+    return {name: next(iter(of.values())) for name, of in zip(comparison.names, tracks, strict=True)}
 
 
 def _styles(comparison: RunComparison) -> dict[str, dict[str, Any]]:

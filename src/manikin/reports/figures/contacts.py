@@ -1,7 +1,7 @@
 """Contacts: those of each phase of a run, and those chosen for bodies shown as shaded solids in a scene."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -19,16 +19,7 @@ from manikin.body.segments import segment_triangles
 from manikin.contact import Contact, ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.figures.style import dress, legend_in_title, need, new_figure, new_grid
-from manikin.reports.figures.views import (
-    View,
-    best_view,
-    distinct_contacts,
-    draw_contact,
-    draw_obstacles,
-    finite_obstacles,
-    panel_ticks,
-)
+from manikin.reports.figures import style, views
 from manikin.runtime.display import COLOURS, colours_of, readable
 from manikin.scene import Scene
 
@@ -42,10 +33,9 @@ TASK = 0.45
 
 @dataclass(frozen=True, eq=False)
 class ChoicePanel:
-    """One body of the figure.
+    """One body of the figure in a configuration (nq,).
 
     Attributes:
-        q: (nq,) configuration.
         contacts: What was chosen, drawn as points with their normals.
         limbs: Names of the limbs to which they belong.
         task: (3,) direction of the task, drawn beside the head, or None.
@@ -55,26 +45,25 @@ class ChoicePanel:
     q: FloatArray
     contacts: Sequence[Contact] = ()
     limbs: Sequence[str] = ()
-    task: FloatArray | None = field(default=None)
+    task: FloatArray | None = None
 
 
 def contact_choice_figure(
     body: BodyModel, scene: Scene, panels: Sequence[ChoicePanel], title: str = "Chosen contacts", *,
     elevation_deg: float = 14.0, azimuth_deg: float = -68.0, columns: int | None = None,
 ) -> Figure:  # fmt: skip
-    """Draw bodies with their contacts side by side, such as before, by one heuristic and by another.
+    """Draw a body with its contacts side by side, such as before, by one heuristic and by another.
 
     Args:
-        body: The body of all panels.
         scene: Its surroundings, as far as they are near.
         elevation_deg: Height of the eye above the horizon [deg].
         azimuth_deg: Direction of the eye about the vertical [deg].
         columns: Panels in a row; all when omitted.
     """
-    need(panels, "a panel", "at least one body")
+    style.need(panels, "a panel", "at least one body")
     wide = columns or len(panels)
     rows = -(-len(panels) // wide)
-    figure = new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
+    figure = style.new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
     low, high = _box(body, panels)
     if any(panel.task is not None for panel in panels):
         high[2] += TASK
@@ -99,8 +88,7 @@ def _draw(
     if panel.task is not None:
         middle = np.array(Configuration(body, panel.q).com)
         middle[2] = high[2] - 0.7 * TASK
-        start = middle - 0.5 * TASK * panel.task
-        draw_arrow(axes, start, TASK * panel.task, COLOURS["ink"], 3.0)
+        draw_arrow(axes, middle - 0.5 * TASK * panel.task, TASK * panel.task, COLOURS["ink"], 3.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(high - low, zoom=1.25)  # type: ignore[arg-type]
     axes.set_axis_off()
@@ -134,20 +122,19 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Sequence[str]) -> list[S
     pin.framesForwardKinematics(body.pinocchio, data, q)
     result = []
     for segment in body.segments:
-        triangles = segment_triangles(segment, rounds=10)
-        if triangles is None:
+        if (triangles := segment_triangles(segment, rounds=10)) is None:
             continue
-        vertices, faces = triangles
         place = data.oMf[body.segment_frame(segment.name)]
-        world = vertices @ place.rotation.T + place.translation
-        result.append((world[faces], COLOURS["executed"] if segment.name in marked else "#7F8FA6", 1.0))
+        world = triangles[0] @ place.rotation.T + place.translation
+        colour = COLOURS["executed"] if segment.name in marked else "#7F8FA6"
+        result.append((world[triangles[1]], colour, 1.0))
     return result
 
 
 def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
     """Finite obstacles, those of them that are between two corners (3,) of a box [m]."""
     result = []
-    for obstacle in finite_obstacles(scene, low, high):
+    for obstacle in views.finite_obstacles(scene, low, high):
         mesh = obstacle.to_trimesh()
         finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
         triangles = np.asarray(finer[0])[np.asarray(finer[1])]
@@ -170,9 +157,9 @@ def draw_solids(axes: Axes3D, solids: Iterable[Solid]) -> None:
     axes.add_collection3d(Poly3DCollection(triangles, facecolors=colours, edgecolors="none", linewidths=0.0))
 
 
-def draw_floor(axes: Axes3D, height: float, low: FloatArray, high: FloatArray, step: float = 0.5) -> None:
-    """Draw the floor between two corners as lines ``step`` apart [m]."""
-    xs, ys = (np.arange(np.floor(low[i] / step), np.ceil(high[i] / step) + 1) * step for i in (0, 1))
+def draw_floor(axes: Axes3D, height: float, low: FloatArray, high: FloatArray) -> None:
+    """Draw the floor between two corners as lines half a metre apart [m]."""
+    xs, ys = (np.arange(np.floor(low[i] / 0.5), np.ceil(high[i] / 0.5) + 1) * 0.5 for i in (0, 1))
     lines = [[(x, ys[0], height), (x, ys[-1], height)] for x in xs]
     lines += [[(xs[0], y, height), (xs[-1], y, height)] for y in ys]
     axes.add_collection3d(Line3DCollection(lines, colors="#D5D9DF", linewidths=0.6, zorder=0))
@@ -202,12 +189,12 @@ def contacts_figure(record: RunRecord) -> Figure:
     Held contacts are filled; dashed ones have been left or are made in the next phase. The
     view is from above, or along the walls when the contacts are on walls.
     """
-    schedule = need(record.schedule, "a contact schedule")
-    need(len(schedule.sequence) <= MOST, f"at most {MOST} phases")
-    view = best_view(schedule)
+    schedule = style.need(record.schedule, "a contact schedule")
+    style.need(len(schedule.sequence) <= MOST, f"at most {MOST} phases")
+    view = views.best_view(schedule)
     track = next(iter(record.tracks.values()), None)
     count = len(schedule.sequence)
-    points = [c.points_in_world for c in distinct_contacts(schedule)]
+    points = [c.points_in_world for c in views.distinct_contacts(schedule)]
     seen = np.vstack(points + ([] if track is None else [track.position]))
     low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
     width, height = view(high - low)
@@ -217,7 +204,7 @@ def contacts_figure(record: RunRecord) -> Figure:
     most = max(COLUMNS if count != 7 else 4, int(WIDEST / (pitch[0] * scale)))
     rows = -(-count // most)
     columns = min(count, most) if most <= COLUMNS else -(-count // rows)
-    figure, grid = new_grid(
+    figure, grid = style.new_grid(
         columns * pitch[0] * scale + 0.8, rows * pitch[1] * scale + 1.15,
         f"Contacts of each phase, {view.words}", 1, 1, top=0.75,
     )  # fmt: skip
@@ -230,19 +217,18 @@ def contacts_figure(record: RunRecord) -> Figure:
         axes.add_patch(Rectangle((left, bottom), right - left, top - bottom, fill=False, edgecolor="#C4C9D1",
                                  linewidth=0.7, zorder=0.4, clip_on=False))  # fmt: skip
         start, end = schedule.instants[number : number + 2]
-        title = f"{number}: {start:.2f}–{end:.2f} s"
-        axes.annotate(title, (left, top), (0, 3), textcoords="offset points", fontsize=8.5)
+        style.note(axes, f"{number}: {start:.2f}–{end:.2f} s", (left, top), ha="left", fontsize=8.5)
         if record.scene is not None:
-            draw_obstacles(axes, record.scene, place, low, high)
+            views.draw_obstacles(axes, record.scene, place, low, high)
         _draw_phase(axes, schedule, number, place, track)
     (left, bottom), (right, top) = view(low), view(high)
     horizontal, vertical = view.labels
-    dress(axes, f"{vertical}, each panel", f"{horizontal}, each panel")
+    style.dress(axes, f"{vertical}, each panel", f"{horizontal}, each panel")
     axes.grid(False)
     for side in ("left", "bottom"):
         axes.spines[side].set_visible(False)
-    axes.set_xticks(*panel_ticks(left, right, rights))
-    axes.set_yticks(*panel_ticks(bottom, top, ups))
+    axes.set_xticks(*views.panel_ticks(left, right, rights))
+    axes.set_yticks(*views.panel_ticks(bottom, top, ups))
     axes.set(xlim=(left, right + rights[-1]), ylim=(bottom + ups[-1], top + 0.25 * width / panel))
     axes.set_aspect("equal", adjustable="box", anchor="W")
     for name, colour in colours_of(schedule.sequence.effectors).items():
@@ -251,22 +237,21 @@ def contacts_figure(record: RunRecord) -> Figure:
         Line2D([], [], color=COLOURS["ink"], linewidth=2.0, label="centre of mass"),
         Patch(fill=False, linestyle="--", label="dashed or pale: left, or made next"),
     ]
-    legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))
+    style.legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))
     return figure
 
 
 def _draw_phase(
-    axes: Axes, schedule: ContactSchedule, number: int, view: View, track: ComTrack | None
+    axes: Axes, schedule: ContactSchedule, number: int, view: views.View, track: ComTrack | None
 ) -> None:
     stance = schedule.sequence[number].stance
     colours = colours_of(schedule.sequence.effectors)
-    for near in (number - 1, number + 1):
-        if 0 <= near < len(schedule.sequence):
-            for contact in schedule.sequence[near].stance:
-                if not any(contact.same_place(other) for other in stance):
-                    draw_contact(axes, contact, view, colours[contact.effector], held=False)
+    near = schedule.sequence.phases[max(number - 1, 0) : number + 2]
+    for contact in (contact for phase in near for contact in phase.stance):
+        if not any(contact.same_place(other) for other in stance):
+            views.draw_contact(axes, contact, view, colours[contact.effector], held=False)
     for contact in stance:
-        draw_contact(axes, contact, view, colours[contact.effector])
+        views.draw_contact(axes, contact, view, colours[contact.effector])
     if track is not None:
         start, end = schedule.instants[number : number + 2]
         path = view(track.at(np.linspace(start, end, 40)))

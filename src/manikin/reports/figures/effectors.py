@@ -9,16 +9,8 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from manikin.contact import ContactSchedule, Swing
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
+from manikin.reports.figures import style
 from manikin.reports.figures.scene import draw_scene, draw_soles, frame
-from manikin.reports.figures.style import (
-    STYLES,
-    dress,
-    legend_above,
-    legend_in_title,
-    need,
-    new_figure,
-    span_at_least,
-)
 from manikin.reports.figures.timeline import timeline
 from manikin.runtime.display import COLOURS, colours_of, readable
 
@@ -27,28 +19,27 @@ _AXIS_COLOURS = ("#0072B2", "#009E73", "#E69F00")
 
 def tracking_figure(record: RunRecord) -> Figure:
     """Draw the errors of the CoM, the feet and the hands in contact [mm] ([Qiu2012]_ Fig. 6.9, 6.10)."""
-    need(record.motions.get("planned"), "a planned motion")
-    executed = need(record.motions.get("executed"), "an executed motion")
-    paths = need(record.effector_paths, "a body")
+    style.need(record.motions.get("planned"), "a planned motion")
+    executed = style.need(record.motions.get("executed"), "an executed motion")
+    paths = style.need(record.effector_paths, "a body")
     shown = timeline(record, (11.0, 6.0), "Tracking errors of the execution", 2)
     shown.strip()
     axes = shown.panel(1)
     error = 1000.0 * (executed.com - record.tracks["planned"].at(executed.time))
-    for index, axis in enumerate("xyz"):
-        axes.plot(executed.time, error[:, index], color=_AXIS_COLOURS[index], linewidth=1.0, label=axis)
+    for axis, values, colour in zip("xyz", error.T, _AXIS_COLOURS, strict=True):
+        axes.plot(executed.time, values, color=colour, linewidth=1.0, label=axis)
     size = np.linalg.norm(error, axis=1)
     label = f"distance (RMS {np.sqrt(np.mean(size**2)):.2g} mm, largest {size.max():.2g} mm)"
     axes.plot(executed.time, size, color=COLOURS["ink"], linewidth=1.4, label=label)
     shown.label(axes, "centre of mass [mm]")
-    legend_above(axes)
+    style.legend_above(axes)
     feet = shown.panel(2)
-    colours = colours_of(paths["executed"])
-    for name in paths["executed"]:
+    for name, colour in colours_of(paths["executed"]).items():
         gap = _errors(record, name)
         label = f"{readable(name)} (largest {gap.max():.2g} mm)"
-        feet.plot(executed.time, gap, color=colours[name], linewidth=1.2, label=label)
+        feet.plot(executed.time, gap, color=colour, linewidth=1.2, label=label)
     shown.label(feet, "effectors [mm]")
-    legend_above(feet)
+    style.legend_above(feet)
     return shown.figure
 
 
@@ -66,24 +57,23 @@ def flights_figure(record: RunRecord) -> Figure:
     The points drawn are the origins of the contact frames (the middle of the sole), not the
     ankles as in the thesis. Solid: planned by a smooth curve; dashed: by the search.
     """
-    schedule = need(record.schedule, "a contact schedule")
-    planned = need(record.motions.get("planned"), "a planned whole-body motion")
-    paths = need(record.effector_paths, "a body")["planned"]
+    schedule = style.need(record.schedule, "a contact schedule")
+    planned = style.need(record.motions.get("planned"), "a planned whole-body motion")
+    paths = style.need(record.effector_paths, "a body")["planned"]
     swings = [swing for swing in schedule.sequence.swings() if swing.effector in paths]
-    need(swings, "an effector that leaves or makes a contact")
+    style.need(swings, "an effector that leaves or makes a contact")
     colours = colours_of(record.effectors)
-    figure = new_figure(13.0, 6.6, "Flights of feet and hands as planned")
+    figure = style.new_figure(13.0, 6.6, "Flights of feet and hands as planned")
     grid = figure.add_gridspec(1, 2, width_ratios=[1.25, 1])
     space: Axes3D = figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
     height = figure.add_subplot(grid[1])
-    corners = draw_scene(space, record.scene) if record.scene is not None else np.zeros((0, 3))
-    seen = [draw_soles(space, schedule)]
+    corners, seen = draw_scene(space, record.scene), [draw_soles(space, schedule)]
     for swing, method in zip(swings, _methods(record, swings), strict=True):
         time, path = _part(schedule, swing, planned.time, paths[swing.effector])
         colour, dash = colours[swing.effector], "solid" if method != "bi-rrt" else (0, (4, 1.5))
         first, last = swing.first_phase, swing.last_phase
         where = f"phase {first}" if first == last else f"phases {first}–{last}"
-        label = f"{readable(swing.effector)}, {where}" + (f", {method}" if method else "")
+        label = ", ".join(filter(None, (readable(swing.effector), where, method)))
         space.plot(*path.T, color=colour, linestyle=dash, linewidth=2.2, zorder=8)
         height.plot(time, path[:, 2], color=colour, linestyle=dash, linewidth=1.8, label=label)
         seen.append(path)
@@ -95,24 +85,23 @@ def flights_figure(record: RunRecord) -> Figure:
     space.view_init(18.0, -62.0)
     if "executed" in record.effector_paths:
         height.plot([], [], **_EXECUTED, label="executed")
-    dress(height, "height [m]", "time [s]")
+    style.dress(height, "height [m]", "time [s]")
     height.legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return figure
 
 
-_EXECUTED = {**STYLES["executed"], "linestyle": (0, (1, 1.5))}
+_EXECUTED = {**style.STYLES["executed"], "linestyle": (0, (1, 1.5))}
 
 
 def _methods(record: RunRecord, swings: list[Swing]) -> list[str]:
     """Method that planned each flight, as far as the summary says; empty if it just follows the body."""
-    block = record.summary.get("wholebody") or {}
-    known: dict[str, list[str]] = {}
-    for item in block.get("swings") or ():
+    known: dict[str, list[str]] = {swing.effector: [] for swing in swings}
+    for item in (record.summary.get("wholebody") or {}).get("swings") or ():
         if isinstance(item, dict):
             known.setdefault(str(item.get("effector")), []).append(str(item.get("method", "")))
     counts = Counter(swing.effector for swing in swings)
-    left = {name: iter(known.get(name, ())) for name in counts if len(known.get(name, ())) == counts[name]}
-    return [next(left.get(swing.effector, iter(())), "") for swing in swings]
+    left = {name: iter(known[name] if len(known[name]) == count else ()) for name, count in counts.items()}
+    return [next(left[swing.effector], "") for swing in swings]
 
 
 def _part(
@@ -129,22 +118,19 @@ LEAST_SPAN = 0.02
 
 def effectors_figure(record: RunRecord) -> Figure:
     """Draw the coordinates of every foot and hand in contact ([Qiu2012]_ Fig. 6.10, 7.15)."""
-    paths = need(record.effector_paths, "a whole-body motion and the body")
-    names = list(next(iter(paths.values())))
-    need(names, "an effector in contact")
-    size = max(4.4 * len(names), 7.0), 7.0
-    shown = timeline(
-        record, size, "Feet and hands", 3, len(names), strip=0.14, top=0.75, between=0.22, across=0.5
-    )
+    paths = style.need(record.effector_paths, "a whole-body motion and the body")
+    names = style.need(list(next(iter(paths.values()))), "an effector in contact")
+    size, margins = (max(4.4 * len(names), 7.0), 7.0), {"top": 0.75, "between": 0.22, "across": 0.5}
+    shown = timeline(record, size, "Feet and hands", 3, len(names), strip=0.14, **margins)
     for column, name in enumerate(names):
         shown.strip(column, _title(record, name), named=column == 0)
         for row, axis in enumerate("xyz"):
             axes = shown.panel(row + 1, column)
             for kind, result in paths.items():
-                axes.plot(record.motions[kind].time, result[name][:, row], label=kind, **STYLES[kind])
+                axes.plot(record.motions[kind].time, result[name][:, row], label=kind, **style.STYLES[kind])
             shown.label(axes, f"{axis} [m]" if column == 0 else "")
-            span_at_least(axes, LEAST_SPAN)
-    legend_in_title(shown.figure, axes)
+            style.span_at_least(axes, LEAST_SPAN)
+    style.legend_in_title(shown.figure, axes)
     return shown.figure
 
 

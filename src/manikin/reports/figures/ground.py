@@ -15,18 +15,7 @@ from manikin.balance.zmp import ZmpPath
 from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
-from manikin.reports.figures.style import (
-    STYLES,
-    Labels,
-    dress,
-    label_room,
-    legend_in_title,
-    need,
-    new_figure,
-    support_colour,
-    support_words,
-    white_edge,
-)
+from manikin.reports.figures import style
 from manikin.reports.figures.timeline import timeline
 from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, finite_obstacles, sections
 from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
@@ -36,10 +25,8 @@ from manikin.simulation.push_map import told_apart
 
 PLAN_HEIGHT = 5.1
 """Height of the view from above [inch]."""
-
 DISTANCE_WIDTH = 7.4
 """Width of the panel over time [inch]."""
-
 EDGE = "#AEB4BE"
 """Colour of support polygons."""
 
@@ -50,13 +37,13 @@ def zmp_figure(record: RunRecord) -> Figure:
     The distance is drawn firm where it decides about balance: all supports in one plane, no
     grasp. Elsewhere it is dotted, measured in the level plane at their mean height.
     """
-    schedule = need(record.schedule, "a contact schedule")
-    paths = need(record.zmp, "a motion of the centre of mass")
+    schedule = style.need(record.schedule, "a contact schedule")
+    paths = style.need(record.zmp, "a motion of the centre of mass")
     decisive = any(np.any(path.decisive) for path in paths.values())
-    need(decisive, "a phase that stands on one plane without grasping")
+    style.need(decisive, "a phase that stands on one plane without grasping")
     spans = np.subtract(*_plan_box(schedule)[::-1])
     plan = float(np.clip(PLAN_HEIGHT * spans[0] / spans[1], 2.0, 6.5))
-    across = label_room(record.effectors) + 0.15
+    across = style.label_room(record.effectors) + 0.15
     shown = timeline(
         record, (0.8 + plan + across + DISTANCE_WIDTH, PLAN_HEIGHT + 1.35), "Zero moment point", 1, 2,
         strip=0.07, left=0.65, top=0.85, between=0.1, across=across, width_ratios=[plan, DISTANCE_WIDTH],
@@ -71,13 +58,14 @@ def zmp_figure(record: RunRecord) -> Figure:
     shown.label(axes, "distance to the edge of the support polygon [mm]")
     _frame_distance(axes, list(paths.values()))
     axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
-    shown_counts = sorted({min(max(len(phase.stance), 1), 3) for phase in schedule.sequence})
+    counts = sorted({min(max(len(phase.stance), 1), 3) for phase in schedule.sequence})
+    named = [(style.support_colour(count), f"ZMP, {style.support_words(count)}") for count in counts]
     keys = [
-        *(Line2D([], [], color=support_colour(c), label=f"ZMP, {support_words(c)}") for c in shown_counts),
+        *(Line2D([], [], color=colour, label=words) for colour, words in named),
         Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"),
         Line2D([], [], color=EDGE, linestyle=(0, (5, 3)), label="support polygon"),
     ]
-    legend_in_title(shown.figure, handles=keys)
+    style.legend_in_title(shown.figure, handles=keys)
     return shown.figure
 
 
@@ -93,18 +81,18 @@ def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) 
     counts = [len(phase.stance) for phase in schedule.sequence]
     for part in sections(path.phase):
         count = counts[path.phase[part.start]]
-        axes.plot(*path.point[part, :2].T, color=support_colour(count), linewidth=1.6, zorder=4)
+        axes.plot(*path.point[part, :2].T, color=style.support_colour(count), linewidth=1.6, zorder=4)
     low, high = _plan_box(schedule)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_aspect("equal", adjustable="box", anchor="NW")
-    labels = Labels(axes)
+    labels = style.Labels(axes)
     for number, instant in enumerate(schedule.instants[1:-1]):
         sample = min(int(np.searchsorted(path.time, instant)), len(path.time) - 1)
         x, y = path.point[sample, :2]
         if np.isfinite(x) and np.isfinite(y):
             axes.plot(x, y, "*", color=COLOURS["ink"], markersize=8, zorder=6)
             labels.write(f"{number}|{number + 1}", (x, y), (5, 4), zorder=7)
-    dress(axes, "y [m]", "x [m]", f"{name.capitalize()}, from above")
+    style.dress(axes, "y [m]", "x [m]", f"{name.capitalize()}, from above")
 
 
 def _plan_box(schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
@@ -118,9 +106,9 @@ def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
     firm = np.where(path.decisive, millimetres, np.nan)
     least = int(np.nanargmin(firm)) if np.any(path.decisive) else None
     label = name if least is None else f"{name} (least {firm[least]:.1f} mm, {path.time[least]:.2f} s)"
-    axes.plot(path.time, firm, label=label, **STYLES[name])
+    axes.plot(path.time, firm, label=label, **style.STYLES[name])
     if np.any(~path.decisive & np.isfinite(millimetres)):
-        dotted = {**STYLES[name], "linestyle": (0, (1, 2)), "linewidth": 1.0}
+        dotted = {**style.STYLES[name], "linestyle": (0, (1, 2)), "linewidth": 1.0}
         loose = np.where(path.decisive, np.nan, millimetres)
         axes.plot(path.time, loose, label=f"{name}, no criterion: several planes or a grasp", **dotted)
 
@@ -136,43 +124,39 @@ def _frame_distance(axes: Axes, paths: list[ZmpPath]) -> None:
 
 OVERHEAD = 1.0
 """An obstacle that begins above this height [m] is something to walk under."""
-
 NARROW = 0.75
 """A way this much narrower than long has its legend beside it."""
-
 LEVEL = 0.3
 """Contacts whose normal has a smaller vertical part are on a wall."""
 
 
 def footprint_figure(record: RunRecord) -> Figure:
     """Draw the soles in their order, the ZMP path and the CoM's projection ([Qiu2012]_ Fig. 5.13, 5.19)."""
-    tracks = need(record.tracks, "a motion of the centre of mass")
+    tracks = style.need(record.tracks, "a motion of the centre of mass")
     contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
     on_walls = contacts and all(abs(contact.normal[2]) < LEVEL for contact in contacts)
-    need(not on_walls, "a contact that is not on a wall")
-    figure = new_figure(8.6, 8.2, "Footprints, zero moment point and centre of mass from above")
+    style.need(not on_walls, "a contact that is not on a wall")
+    figure = style.new_figure(8.6, 8.2, "Footprints, zero moment point and centre of mass from above")
     axes = figure.add_subplot()
     colours = colours_of(contact.effector for contact in contacts)
-    for number, contact in enumerate(contacts):
-        _draw_contact(axes, contact, number + 1, colours[contact.effector])
-    seen = [next(iter(tracks.values())).position[:, :2], *(c.points_in_world[:, :2] for c in contacts)]
+    for number, contact in enumerate(contacts, 1):
+        _draw_contact(axes, contact, number, colours[contact.effector])
+    com = next(iter(tracks.values())).position
+    everything = np.vstack([com[:, :2], *(contact.points_in_world[:, :2] for contact in contacts)])
     for name, track in tracks.items():
         if name in record.zmp:
-            point = record.zmp[name].point
-            axes.plot(point[:, 0], point[:, 1], label=f"ZMP, {name}", **STYLES[name])
-        dotted = {**STYLES[name], "linestyle": (0, (1.2, 1.6)), "linewidth": 1.6}
+            axes.plot(*record.zmp[name].point[:, :2].T, label=f"ZMP, {name}", **style.STYLES[name])
+        dotted = {**style.STYLES[name], "linestyle": (0, (1.2, 1.6)), "linewidth": 1.6}
         axes.plot(*track.position[:, :2].T, label=f"centre of mass, {name}", **dotted)
-    com = next(iter(tracks.values())).position
     for point, text, marker in ((com[0], "start", "o"), (com[-1], "goal", "D")):
         axes.plot(point[0], point[1], marker, color=COLOURS["ink"], markersize=5, zorder=7)
-        look = {"fontsize": 8, "color": COLOURS["ink"], "zorder": 8, "path_effects": [white_edge()]}
+        look = {"fontsize": 8, "color": COLOURS["ink"], "zorder": 8, "path_effects": [style.white_edge()]}
         axes.annotate(text, point[:2], (7, 4), textcoords="offset points", **look)
-    everything = np.vstack(seen)
     low, high = everything.min(axis=0) - 0.18, everything.max(axis=0) + 0.18
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     if record.scene is not None:
         _draw_obstacles(axes, record.scene)
-    dress(axes, "y [m]", "x [m]")
+    style.dress(axes, "y [m]", "x [m]")
     narrow = high[0] - low[0] < NARROW * (high[1] - low[1])
     beside = {"bbox_to_anchor": (1.02, 1.0)} if narrow else {}
     axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none", **beside)
@@ -189,7 +173,7 @@ def _draw_contact(axes: Axes, contact: Contact, number: int, colour: str) -> Non
     height = f"\nz = {z:.3g} m" if z else ""
     axes.text(
         heel[0], heel[1], f"{number}: {readable(contact.effector)}{height}", fontsize=7.5, ha="center",
-        va="center", color=colour, zorder=8, path_effects=[white_edge()],
+        va="center", color=colour, zorder=8, path_effects=[style.white_edge()],
     )  # fmt: skip
 
 
@@ -217,12 +201,9 @@ def _draw_obstacles(axes: Axes, scene: Scene) -> None:
 
 SOLES = 0.3
 """Part of the radius that the soles reach to."""
-
 CURVES = ("#0072B2", "#D55E00", *CYCLE)
 """Colours of the maps."""
-
 MARKERS = "osD^vP*X"
-
 BOUND = "bound without a step"
 
 
@@ -238,9 +219,9 @@ def push_map_figure(maps: Sequence[PushMap], soles: Sequence[FloatArray] = ()) -
         maps: At least one with a known direction.
         soles: (k, 2) corners of each, from the centre of mass [m].
     """
-    need(any(np.any(np.isfinite(item.held)) for item in maps), "an impulse that was held", "a map")
+    style.need(any(np.any(np.isfinite(item.held)) for item in maps), "an impulse that was held", "a map")
     common, names = told_apart([item.conditions for item in maps])
-    figure = new_figure(7.4, 7.9, "Largest impulse held, by direction of the push")
+    figure = style.new_figure(7.4, 7.9, "Largest impulse held, by direction of the push")
     axes = figure.add_subplot(projection="polar")
     axes.set_title(fill(common, 96), fontsize=8.5, color=COLOURS["soft"], pad=8)
     top = 1.08 * max(float(np.nanmax([*item.held, *(item.bound or ())], initial=0.0)) for item in maps) or 1.0

@@ -17,25 +17,12 @@ from manikin.motion import Motion
 from manikin.motion.motion import phases_of, segment_positions
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.figures.style import dress, need, new_figure, new_grid, note, white_edge
-from manikin.reports.figures.views import (
-    ALONG_X,
-    ALONG_Y,
-    BOX_CORNERS,
-    View,
-    distinct_contacts,
-    draw_body,
-    draw_contact,
-    draw_obstacles,
-    finite_obstacles,
-    panel_ticks,
-)
+from manikin.reports.figures import style, views
 from manikin.runtime.display import COLOURS, colours_of, side_colour
 from manikin.scene import Box, Scene
 
 MOST = 9
 """Largest number of key instants drawn; of more some are left out, evenly."""
-
 GAP = 0.12
 """Gap between two panels [m]."""
 
@@ -46,9 +33,9 @@ def postures_figure(record: RunRecord) -> Figure:
     A motion in one stance has no key instants; it is drawn where much happens. The executed motion is drawn,
     or else the planned one; grey, the path of the CoM.
     """
-    motions = need(record.motions, "a whole-body motion")
-    need(record.body, "a body")
-    phases = need(record.phases, "phases")
+    motions = style.need(record.motions, "a whole-body motion")
+    style.need(record.body, "a body")
+    phases = style.need(record.phases, "phases")
     name, motion = list(motions.items())[-1]
     instants = chosen_instants(phases.instants)
     if len(instants) == 2:
@@ -58,11 +45,11 @@ def postures_figure(record: RunRecord) -> Figure:
     spans = high - low
     widths = np.array([spans[0], spans[1]])
     scale = 1.85 / widths.max()
-    figure, grid = new_grid(
+    figure, grid = style.new_grid(
         (widths.max() + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
         f"Postures at the key instants ({name})", 2, 1, top=0.65, between=0.5,
     )  # fmt: skip
-    for row, view in enumerate((ALONG_Y, ALONG_X)):
+    for row, view in enumerate((views.ALONG_Y, views.ALONG_X)):
         axes = figure.add_subplot(grid[row, 0])
         left, right = view(np.array([low, high]))[:, 0]
         offsets = [(widths.max() + GAP) * column for column in range(len(samples))]
@@ -70,33 +57,43 @@ def postures_figure(record: RunRecord) -> Figure:
             _draw_posture(axes, record, view.moved(offset, 0.0), name, sample, (low, high))
             if row == 0:
                 middle, top = offset + (left + right) / 2, high[2]
-                note(axes, f"{instant:.2f} s", (middle, top), 4, fontsize=9)
+                style.note(axes, f"{instant:.2f} s", (middle, top), 4, fontsize=9)
         horizontal, vertical = view.labels
-        dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
+        style.dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
     return figure
 
 
 def _draw_posture(
-    axes: Axes, record: RunRecord, view: View, name: str, sample: int, box: tuple[FloatArray, FloatArray]
+    axes: Axes,
+    record: RunRecord,
+    view: views.View,
+    name: str,
+    sample: int,
+    box: tuple[FloatArray, FloatArray],
 ) -> None:
     motion = record.motions[name]
     draw_moment(axes, record, motion, sample, view, box)
     if record.schedule is not None:
         end = float(record.schedule.instants[-1])
         for contact in record.schedule.stance_at(min(float(motion.time[sample]), end)):
-            draw_contact(axes, contact, view, side_colour(contact.effector))
+            views.draw_contact(axes, contact, view, side_colour(contact.effector))
     axes.plot(*view(motion.com).T, color=COLOURS["soft"], linewidth=0.8, zorder=4)
 
 
 def draw_moment(
-    axes: Axes, record: RunRecord, motion: Motion, sample: int, view: View, box: tuple[FloatArray, FloatArray]
+    axes: Axes,
+    record: RunRecord,
+    motion: Motion,
+    sample: int,
+    view: views.View,
+    box: tuple[FloatArray, FloatArray],
 ) -> None:
     """Draw the body among the obstacles in a box [m] at one sample of a motion, with its CoM."""
     if record.scene is not None:
-        draw_obstacles(axes, record.scene, view, *box)
+        views.draw_obstacles(axes, record.scene, view, *box)
     if record.body is not None:
-        draw_body(axes, record.body, motion.q[sample], view)
+        views.draw_body(axes, record.body, motion.q[sample], view)
     axes.plot(*view(motion.com[sample]), "o", color=COLOURS["ink"], markersize=4, zorder=5)
 
 
@@ -112,7 +109,7 @@ def frame_panels(
     """
     left, right = across
     axes.grid(False, axis="x")
-    axes.set_xticks(*panel_ticks(left, right, offsets))
+    axes.set_xticks(*views.panel_ticks(left, right, offsets))
     axes.set(xlim=(left, right + offsets[-1]), ylim=upwards)
     axes.set_aspect("equal", adjustable="box", anchor="W")
 
@@ -145,19 +142,18 @@ def _frame(record: RunRecord, com: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 MOST_TICKS = 9
 """Ticks of the longest axis; the others have fewer."""
-
 _QUADS = np.array([(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)])
 """Faces of a box by the numbers of its corners."""
 
 
 def scene_figure(record: RunRecord) -> Figure:
     """Draw the CoM's path, the obstacles, the supports and the body ([Qiu2012]_ Fig. 5.21, 7.7, 7.8)."""
-    name, track = list(need(record.tracks, "a motion of the centre of mass").items())[-1]
+    name, track = list(style.need(record.tracks, "a motion of the centre of mass").items())[-1]
     motion = record.motions.get(name)
-    figure = new_figure(9.5, 8.0, f"Motion in the scene ({name})")
+    figure = style.new_figure(9.5, 8.0, f"Motion in the scene ({name})")
     axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
     seen = [track.position]
-    corners = draw_scene(axes, record.scene) if record.scene is not None else np.zeros((0, 3))
+    corners = draw_scene(axes, record.scene)
     if record.schedule is not None:
         seen.append(draw_soles(axes, record.schedule))
     figure_of = None if record.body is None or record.body.is_point_mass else record.body
@@ -168,9 +164,8 @@ def scene_figure(record: RunRecord) -> Figure:
     axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
     if record.phases is not None:
         places = track.at(record.phases.instants)
-        axes.scatter(
-            *places.T, s=18, color=COLOURS["ink"], zorder=9, depthshade=False, label="at the key instants"
-        )
+        look = {"color": COLOURS["ink"], "zorder": 9, "label": "at the key instants"}
+        axes.scatter(*places.T, s=18, depthshade=False, **look)
     frame(axes, np.vstack(seen), corners)
     axes.view_init(14.0, -62.0)
     if figure_of is not None and motion is not None:
@@ -229,7 +224,7 @@ def _label_heads(axes: Axes3D, body: BodyModel, motion: Motion, schedule: Contac
         taken.append(seen)
         axes.text(
             head[0], head[1], head[2] + 0.05, f"{instants[index]:.2f} s", fontsize=7.5, ha="center",
-            color=COLOURS["ink"], zorder=9, path_effects=[white_edge()],
+            color=COLOURS["ink"], zorder=9, path_effects=[style.white_edge()],
         )  # fmt: skip
 
 
@@ -240,19 +235,17 @@ def _sticks(body: BodyModel) -> list[tuple[str, str]]:
     return sticks + [(effector.segment, f"effector/{effector.name}") for effector in free]
 
 
-def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
+def draw_scene(axes: Axes3D, scene: Scene | None) -> FloatArray:
     """Draw every finite obstacle; return the corners of their bounds."""
     corners = [np.zeros((0, 3))]
-    for obstacle in finite_obstacles(scene):
+    for obstacle in [] if scene is None else views.finite_obstacles(scene):
         if isinstance(obstacle.shape, Box):
-            faces = obstacle.to_world(BOX_CORNERS * obstacle.shape.size / 2)[_QUADS]
+            faces = obstacle.to_world(views.BOX_CORNERS * obstacle.shape.size / 2)[_QUADS]
         else:
             faces = np.asarray(obstacle.to_trimesh().triangles)
         low, high = obstacle.bounds
-        solid = Poly3DCollection(
-            faces, facecolor=COLOURS["obstacle"], edgecolor="#8D94A0", linewidths=0.6, alpha=0.25, zorder=2
-        )
-        axes.add_collection3d(solid)
+        look = {"facecolor": COLOURS["obstacle"], "edgecolor": "#8D94A0", "alpha": 0.25, "zorder": 2}
+        axes.add_collection3d(Poly3DCollection(faces, linewidths=0.6, **look))
         axes.text(high[0], low[1], high[2], f" {obstacle.name}", fontsize=8, color="#666C77", zorder=3)
         corners.append(np.array([low, high]))
     return np.vstack(corners)
@@ -260,7 +253,7 @@ def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
 
 def draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:
     """Draw every contact of a schedule in three dimensions; return its points."""
-    contacts = distinct_contacts(schedule)
+    contacts = views.distinct_contacts(schedule)
     colours = colours_of(contact.effector for contact in contacts)
     for contact in contacts:
         colour = colours[contact.effector]

@@ -20,7 +20,6 @@ from manikin.runtime.display import COLOURS, readable
 
 _WIDTH = 0.64
 """Width of a character over the size of its font, of the widest digits."""
-
 _HEIGHT = 1.1
 """Height of a line over the size of its font."""
 
@@ -39,27 +38,17 @@ class Labels:
         self._taken: list[Bbox] = []
 
     def write(
-        self,
-        text: str,
-        place: tuple[float, float],
-        offset: tuple[float, float] = (0.0, 0.0),
-        *,
-        size: float = 7.5,
-        ha: str = "left",
-        **style: Any,
-    ) -> bool:
-        """Write a text unless it would cover another one.
+        self, text: str, place: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0), *,
+        size: float = 7.5, ha: str = "left", **style: Any,
+    ) -> bool:  # fmt: skip
+        """Write a line of text unless it would cover another one, and return whether it was written.
 
         Args:
-            text: One line.
             place: What it belongs to.
             offset: From there to the lower edge of the text [points].
             size: Of the font [points].
             ha: Horizontal alignment.
             style: Passed on to Matplotlib, such as ``color``.
-
-        Returns:
-            Whether it was written.
         """
         corner = self._transform.transform(place) + self._point * np.asarray(offset)
         width, height = self._point * size * np.array([_WIDTH * len(text), _HEIGHT])
@@ -79,7 +68,6 @@ COLOURS_OF_GROUPS = (
     "#6A51A3", "#D55E00", "#56B4E9", "#B59B00", "#8C564B", "#4D4D4D", "#E7298A", "#66A61E",
 )  # fmt: skip
 """Colours of groups, none of them that of a foot; they are repeated for more groups."""
-
 FITTING = 6.0
 """Characters of tick labels that stand side by side on an inch."""
 
@@ -113,7 +101,6 @@ STYLES: dict[str, dict[str, Any]] = {
     "executed": {"color": COLOURS["executed"], "linewidth": 0.9, "zorder": 4},
 }
 DPI = 150
-
 T = TypeVar("T")
 
 
@@ -170,7 +157,7 @@ def dress(axes: Axes, ylabel: str = "", xlabel: str = "", title: str = "") -> No
 
 def support_colour(count: int) -> str:
     """Colour of a phase with this many supports."""
-    return COLOURS[("one support", "one support", "two supports")[count] if count < 3 else "more supports"]
+    return COLOURS[("one support", "one support", "two supports", "more supports")[min(count, 3)]]
 
 
 def support_words(count: int) -> str:
@@ -180,10 +167,8 @@ def support_words(count: int) -> str:
 
 def support_keys(counts: Iterable[int]) -> list[Patch]:
     """Entries of a legend for the colours of phases with these numbers of supports."""
-    return [
-        Patch(color=support_colour(count), alpha=0.8, label=support_words(count))
-        for count in sorted({min(count, 3) for count in counts})
-    ]
+    known = sorted({min(count, 3) for count in counts})
+    return [Patch(color=support_colour(count), alpha=0.8, label=support_words(count)) for count in known]
 
 
 def named_below(effectors: Iterable[str]) -> str:
@@ -204,8 +189,9 @@ def need(value: T | None, what: str, of: str = "a run") -> T:
 
 def end_of(record: RunRecord) -> float:
     """Last instant that a motion or a phase reaches [s]."""
-    ends = [float(track.time[-1]) for track in record.tracks.values()]
-    return max([*ends, *([] if record.phases is None else [float(record.phases.instants[-1])])])
+    times = [track.time for track in record.tracks.values()]
+    times += [] if record.phases is None else [record.phases.instants]
+    return max(float(time[-1]) for time in times)
 
 
 def span_at_least(axes: Axes, least: float) -> None:
@@ -252,7 +238,7 @@ def legend_below_title(figure: Figure, keys: Sequence[Artist]) -> None:
 
 def draw_heading(axes: Axes, place: Sequence[float] | FloatArray, length: float) -> None:
     """Draw an arrow from x, y [m] along the heading [rad] of a place (3,), so long [m]."""
-    x, y, heading = (float(value) for value in place)
+    x, y, heading = map(float, place)
     tip = x + length * float(np.cos(heading)), y + length * float(np.sin(heading))
     arrow = {"arrowstyle": "-|>", "color": COLOURS["ink"], "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tip, (x, y), arrowprops=arrow, zorder=5)

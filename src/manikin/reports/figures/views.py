@@ -187,9 +187,8 @@ def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list
         offsets: Where the zero of each panel is drawn [m].
     """
     span = high - low
-    step = next(
-        (s for s in (0.1, 0.2, 0.25, 0.5, 1.0, 2.0) if span / s <= 4.0), 10.0 ** np.ceil(np.log10(span))
-    )
+    fitting = (step for step in (0.1, 0.2, 0.25, 0.5, 1.0, 2.0) if span / step <= 4.0)
+    step = next(fitting, 10.0 ** np.ceil(np.log10(span)))
     values = step * np.arange(np.ceil((low + 0.04 * span) / step), np.floor((high - 0.04 * span) / step) + 1)
     places = [float(offset + value) for offset in offsets for value in values]
     return places, [f"{value + 0.0:.3g}" for _ in offsets for value in values]

@@ -33,10 +33,8 @@ from manikin.walking.words import STRAIGHT, THESIS_WORDS, EqualPaths, WordPath, 
 
 EVERY = 0.5
 """Time between the shoulders drawn along a way [s]."""
-
 SECONDS = 1.0
 """Time between the instants written beside a way, where several people walk [s]."""
-
 BESIDE = 0.7
 """Room shown beside the ways [m]."""
 
@@ -96,14 +94,12 @@ def _kind_keys(shoulders: str, width: float) -> list[Line2D]:
 def _write_times(axes: Axes, way: FloatArray, name: str) -> None:
     """Instants beside a way where it has moved on since the one before, and who walks."""
     time, place = way[:, 0], way[:, 1:3]
-    last = None
+    look, last = {"textcoords": "offset points", "fontsize": 7, "color": COLOURS["ink"]}, None
     for instant in np.arange(time[0], time[-1], SECONDS):
         here = place[min(int(np.searchsorted(time, instant)), len(time) - 1)]
         if last is None or np.hypot(*(here - last)) > 0.3:
             text = f"{name}, {instant:g} s" if last is None else f"{instant:g}"
-            axes.annotate(
-                text, tuple(here), (3, 5), textcoords="offset points", fontsize=7, color=COLOURS["ink"]
-            )
+            axes.annotate(text, tuple(here), (3, 5), **look)
             last = here
 
 
@@ -123,13 +119,13 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
     circle = np.linspace(0.0, np.pi, 91)
     for number, (name, zone) in enumerate(shown.items()):
         axes = figure.add_subplot(grid[0, number])
-        for whole, colour in ((True, KINDS["holonomic"]), (False, KINDS["nonholonomic"])):
-            chosen = zone.goals[zone.considered & (zone.whole == whole)]
-            axes.plot(
-                -chosen[:, 1], chosen[:, 0], "o", markersize=4.5, markeredgecolor=colour, linestyle="none",
-                markerfacecolor=colour if whole else "none",
-                label="holonomic from start to goal" if whole else "with a nonholonomic part",
-            )  # fmt: skip
+        goals, wholly = zone.goals[zone.considered], zone.whole[zone.considered]
+        for chosen, edge, face, label in (
+            (goals[wholly], KINDS["holonomic"], KINDS["holonomic"], "holonomic from start to goal"),
+            (goals[~wholly], KINDS["nonholonomic"], "none", "with a nonholonomic part"),
+        ):
+            look = {"markeredgecolor": edge, "markerfacecolor": face, "linestyle": "none", "label": label}
+            axes.plot(-chosen[:, 1], chosen[:, 0], "o", markersize=4.5, **look)
         radii = {"radius of the zone": (zone.radius, "-"), "of the thesis": (THESIS_RADIUS, "--")}
         for label, (radius, line) in radii.items():
             x, y = radius * np.cos(circle), radius * np.sin(circle)
@@ -137,9 +133,8 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
         axes.plot(0.0, 0.0, "^", color=COLOURS["ink"], markersize=7)
         dress(axes, "ahead [m]" if number == 0 else "", "to the right [m]", f"{name}: {zone.radius:.2f} m")
         axes.set(xlim=(-far, far), ylim=(-0.15, far), aspect="equal")
-    figure.legend(
-        *figure.axes[0].get_legend_handles_labels(), loc="lower center", ncols=4, fontsize=8.5, frameon=False
-    )
+    keys = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*keys, loc="lower center", ncols=4, fontsize=8.5, frameon=False)
     return figure
 
 
@@ -162,7 +157,6 @@ def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figur
 
 
 KINDS = {"holonomic": COLOURS["executed"], "nonholonomic": COLOURS["planned"]}
-
 _PANEL = 3.4
 """Width of a panel [inch]."""
 
@@ -172,8 +166,7 @@ def walking_paths_figure(groups: Mapping[str, Sequence[WalkingPath]], title: str
 
     Short bars are shoulders every half second; colours tell where the body goes ahead and where it does not.
     """
-    shown = {name: paths for name, paths in groups.items() if paths}
-    need(shown, "a walking path", "a group")
+    shown = need({name: paths for name, paths in groups.items() if paths}, "a walking path", "a group")
     points = np.vstack([path.place[:, :2] for paths in shown.values() for path in paths])
     low, high = points.min(axis=0) - 0.6, points.max(axis=0) + 0.6  # room beside the paths [m]
     columns = min(4, len(shown))
@@ -222,7 +215,6 @@ WORD_COLOURS = {
     "DIDID": "#8C564B", "ID": "#009E73", "DI": "#CC79A7", STRAIGHT: "#222222",
 }  # fmt: skip
 """Blue begins with I, orange with D; two arcs are green and pink."""
-
 _OTHER = "#8A8A8A"
 
 
@@ -269,9 +261,8 @@ def equal_paths_figure(pairs: Sequence[EqualPaths]) -> Figure:
             at = path.switches
             curvatures.plot(at, path.curvature(at / path.length), "o", markersize=4, color=COLOURS[name])
         x, y, heading = pair.first.goal
-        _dress_ways(
-            ways, f"to ({x:.2f}, {y:.2f}) m, {np.degrees(heading) % 360.0:.0f}°: cost {pair.first.cost:.3f} m"
-        )
+        goal = f"to ({x:.2f}, {y:.2f}) m, {np.degrees(heading) % 360.0:.0f}°"
+        _dress_ways(ways, f"{goal}: cost {pair.first.cost:.3f} m")
         dress(curvatures, "curvature [1/m]", "along the path [m]", "Curvature; points: switching points")
         curvatures.legend(fontsize=8.5, frameon=False)
     return figure
@@ -286,7 +277,7 @@ def _colour(word: str) -> str:
 
 
 def _draw_cells(axes: Axes, one: WordSlice, chosen: Sequence[tuple[int, int]]) -> None:
-    known = sorted({str(word) for word in one.words.ravel()}, key=_order)
+    known = sorted(set(one.words.ravel().tolist()), key=_order)
     index = np.vectorize(known.index)(one.words)
     x, y, half = one.grid.columns, one.grid.rows, one.grid.step / 2
     axes.imshow(
@@ -305,13 +296,10 @@ def _draw_cells(axes: Axes, one: WordSlice, chosen: Sequence[tuple[int, int]]) -
 
 
 def _draw_word_path(axes: Axes, path: WordPath, colour: str) -> None:
-    states = path.states()
-    axes.plot(states[:, 0], states[:, 1], color=colour, linewidth=1.6)
-    at = path.switches / path.length
-    along = np.linspace(0.0, 1.0, len(states))
-    axes.plot(
-        *(np.interp(at, along, states[:, column]) for column in range(2)), "o", color=colour, markersize=3.8
-    )
+    places, at = path.states()[:, :2].T, path.switches / path.length
+    axes.plot(*places, color=colour, linewidth=1.6)
+    along = np.linspace(0.0, 1.0, places.shape[1])
+    axes.plot(*(np.interp(at, along, values) for values in places), "o", color=colour, markersize=3.8)
     draw_heading(axes, path.goal, 0.45)
     axes.plot(*path.start[:2], "o", color=COLOURS["ink"], markersize=4, zorder=6)
 
