@@ -52,8 +52,7 @@ class SupportState:
     Attributes:
         mode: Swing, landing or stance.
         contact: The planned contact in landing and stance; None in flight.
-        load_share: Share of the contact's force limits that it may use after its touch-down,
-            rising to 1.
+        load_share: Share of the contact's force limits that it may use after its touch-down, rising to 1.
         unload_share: Share of the load it carried when its unloading began that it may
             still carry, falling to 0 at lift-off; 1 before that.
         press: How far below the planned contact a landing effector is sent [m]; negative above.

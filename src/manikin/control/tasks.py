@@ -149,9 +149,8 @@ def rolling_task(
 ) -> AccelerationTask:  # fmt: skip
     """Let a foot tilt as planned about the part of its sole that touches.
 
-    The planned twist turns about that part, which itself has no velocity in it. As in
-    :func:`stance_task`, of the placement only the orientation is fed back. Before its planned
-    landing the foot keeps its tilt.
+    The planned twist turns about that part, which itself has no velocity in it. As in :func:`stance_task`, of
+    the placement only the orientation is fed back. Before its planned landing the foot keeps its tilt.
     """
     if not support.planned:
         held = -gains.damping * frame.twist - frame.drift
