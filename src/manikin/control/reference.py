@@ -95,10 +95,8 @@ class Reference:
         """
         own, joints = body.joint_names, motion.joint_names
         if tuple(joints) != tuple(own):
-            told = (
-                f"motion has {len(joints)} joints and body {body.name!r} {len(own)}, or they differ in name"
-            )
-            raise InputError(f"{told}; valid: a motion planned for this body")
+            told = f"motion has {len(joints)} joints and body {body.name!r} {len(own)}"
+            raise InputError(f"{told}, or they differ in name; valid: a motion planned for this body")
         self.motion = motion
         self._model, self._data = body.pinocchio, body.pinocchio.createData()
         self._frames, self._period = dict(frames), period
