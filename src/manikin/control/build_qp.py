@@ -38,10 +38,7 @@ class JointBounds:
     def of(
         cls, body: BodyModel, state: DynamicsState, horizon: float, largest: float, strength: float = 1.0
     ) -> "JointBounds":
-        """Limits of a body at a state; see :func:`joint_acceleration_bounds`.
-
-        ``strength`` is that of torque and speed limits relative to the body's own.
-        """
+        """Limits of a body at a state, torques and speeds times ``strength``, over a horizon [s]."""
         accelerations = joint_acceleration_bounds(
             state.q[7:], state.v[6:], body.lower, body.upper, strength * body.velocity_limit, horizon, largest
         )
@@ -122,15 +119,13 @@ def build_qp(
 ) -> ControlProblem:  # fmt: skip
     """Build the program of one control step.
 
-    The torques that muscles must give against the passive damping of the joints are taken
-    at the middle of the hold, ``damping * (v + a period / 2)``.
-
     Args:
         state: Current dynamics.
         tasks: Weighted tasks on the acceleration.
         contacts: Contacts that may carry load.
         bounds: Joint limits.
-        damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; the muscles overcome it.
+        damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; the muscles overcome it as it is at the
+            middle of the hold, ``damping * (v + a period / 2)``.
         period: Time over which the torques will be held [s].
         acceleration_weight: Regularisation of the accelerations.
         force_weight: Regularisation of the force variables.
@@ -150,9 +145,17 @@ def build_qp(
     free = np.full(len(cap_limits), -np.inf)
     rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, free))
     rows_upper = np.concatenate((-state.bias[:6], bounds.torque_upper - joint_offset, cap_limits))
-    lower, upper = _variable_bounds(contacts, bounds)
+    shares = [np.where(item.basis.normal > 0, 1.0, item.grasp_share) for item in contacts]
+    least = [basis.lower * share for basis, share in zip(bases, shares, strict=True)]
+    most = [basis.upper * share for basis, share in zip(bases, shares, strict=True)]
+    lower = np.concatenate([np.full(6, -np.inf), bounds.acceleration_lower, *least])
+    upper = np.concatenate([np.full(6, np.inf), bounds.acceleration_upper, *most])
     hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
-    _add_wishes(hessian, gradient, contacts, variables)
+    for loaded, part in zip(contacts, variables, strict=True):
+        if loaded.wished is not None:  # weight |force - wished|^2 / 2
+            forces = loaded.basis.wrench[:3]
+            hessian[part, part] += loaded.wish_weight * forces.T @ forces
+            gradient[part] -= loaded.wish_weight * forces.T @ loaded.wished
     program = QuadraticProgram(hessian, gradient, rows, rows_lower, rows_upper, lower, upper, 6)
     return ControlProblem(program, state, tuple(tasks), tuple(contacts), joint_map, joint_offset)
 
@@ -191,17 +194,6 @@ def _cost(
     return hessian, gradient
 
 
-def _add_wishes(
-    hessian: FloatArray, gradient: FloatArray, contacts: Sequence[LoadedContact], variables: Sequence[slice]
-) -> None:
-    """Add ``weight |force - wished|^2 / 2`` of the contacts that should feel a force."""
-    for loaded, part in zip(contacts, variables, strict=True):
-        if loaded.wished is not None:
-            forces = loaded.basis.wrench[:3]
-            hessian[part, part] += loaded.wish_weight * forces.T @ forces
-            gradient[part] -= loaded.wish_weight * forces.T @ loaded.wished
-
-
 def _normal_force_rows(
     contacts: Sequence[LoadedContact], variables: Sequence[slice], size: int, sum_cap: float | None
 ) -> tuple[FloatArray, FloatArray]:
@@ -216,14 +208,3 @@ def _normal_force_rows(
         rows.append(np.sum(rows, axis=0))
         limits.append(sum_cap)
     return np.array(rows).reshape(-1, size), np.array(limits)
-
-
-def _variable_bounds(contacts: Sequence[LoadedContact], bounds: JointBounds) -> tuple[FloatArray, FloatArray]:
-    unbounded = np.full(6, np.inf)
-    lower = [-unbounded, bounds.acceleration_lower]
-    upper = [unbounded, bounds.acceleration_upper]
-    for loaded in contacts:
-        share = np.where(loaded.basis.normal > 0, 1.0, loaded.grasp_share)
-        lower.append(loaded.basis.lower * share)
-        upper.append(loaded.basis.upper * share)
-    return np.concatenate(lower), np.concatenate(upper)

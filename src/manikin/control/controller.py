@@ -9,33 +9,15 @@ from numpy.typing import ArrayLike
 from manikin.body import BodyModel, with_root
 from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
+from manikin.control import edge_forces, tasks
 from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
 from manikin.control.dynamics import Dynamics, DynamicsState
-from manikin.control.edge_forces import (
-    ContactGeometry,
-    contact_force_basis,
-    contact_geometry,
-    inside_the_cone,
-    points_along,
-    segment_key,
-)
+from manikin.control.edge_forces import ContactGeometry, contact_geometry, segment_key
 from manikin.control.plan_return import Deviation, PlanClock, deviation_from_plan, returning_acceleration
 from manikin.control.reference import Reference, ReferenceSample
 from manikin.control.settings import ControlSettings
 from manikin.control.supports import SupportMode, SupportState, SupportSwitch
-from manikin.control.tasks import (
-    AccelerationTask,
-    ForceWish,
-    angular_momentum_task,
-    com_task,
-    landing_reference,
-    lifted,
-    orientation_task,
-    posture_task,
-    rolling_task,
-    stance_task,
-    swing_task,
-)
+from manikin.control.tasks import AccelerationTask, ForceWish, landing_reference, lifted, swing_task
 from manikin.motion import Motion
 from manikin.numerics.qp import QPSolution, WarmQPSolver
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
@@ -107,33 +89,27 @@ class Controller:
             InputError: If the motion or the schedule does not belong to the body.
         """
         body, self._root = with_root(body)
-        self.body = body
-        self.schedule = schedule
-        self._friction_model: FrictionModel = inside_the_cone(schedule.sequence[0].stance.friction_model)
-        self.settings = settings or ControlSettings()
+        self.body, self.schedule, self.settings = body, schedule, settings or ControlSettings()
+        planned = schedule.sequence[0].stance.friction_model
+        self._friction_model: FrictionModel = edge_forces.inside_the_cone(planned)
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
         self._wishes = {wish.effector: wish for wish in wishes}
         self._switch = SupportSwitch(schedule, self.settings.supports)
-        contacts = {_touching_points(item): item for phase in schedule.sequence for item in phase.stance}
+        every = [contact for phase in schedule.sequence for contact in phase.stance]
+        contacts = {_touching_points(item): item for item in every}
         inset = self.settings.supports.sole_inset
         self._geometry = {key: contact_geometry(body, item, inset) for key, item in contacts.items()}
-        self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
-        contacts = [contact for phase in schedule.sequence for contact in phase.stance]
-        self._points = {c.effector for c in contacts if c.kind is ContactKind.POINT}
+        self._along = {key: edge_forces.points_along(body, item) for key, item in self._geometry.items()}
+        self._points = {contact.effector for contact in every if contact.kind is ContactKind.POINT}
         self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
-        carriers = {
-            name for phase in schedule.sequence if phase.load is not None for name in phase.load.masses
-        }
+        carriers = {name for phase in schedule.sequence if phase.load for name in phase.load.masses}
         named = dict.fromkeys((*self._switch.effectors, self._root, *sorted(carriers)))
         frames = {name: body.effector_frame(name) for name in named}
-        segments = {
-            segment_key(segment): body.segment_frame(segment)
-            for geometry in self._geometry.values()
-            for segment, _ in geometry.patches
-        }
-        self._dynamics = Dynamics(body, {**segments, **frames})
+        names = (name for geometry in self._geometry.values() for name, _ in geometry.patches)
+        segments = {segment_key(name): body.segment_frame(name) for name in names}
+        self._dynamics = Dynamics(body, segments | frames)
         self.reference = Reference(body, motion, frames, self.settings.period)
         self._solver, self._spare_solver = WarmQPSolver(), WarmQPSolver()
         self.clock = PlanClock(self.settings.period, self.settings.returning)
@@ -151,43 +127,35 @@ class Controller:
             v: (nv,) measured velocity.
             touching: Whether each effector is felt to touch; the schedule is trusted where it says nothing.
         """
-        waited = self.clock.waited
-        time = self.clock.at(time)
+        clock, waited, rate = self.clock, self.clock.waited, self.clock.rate
+        time = clock.at(time)
         supports = self._switch.update(time, touching)
         state = self._dynamics.evaluate(q, v, self.carried_at(time))
-        reference, deviation = self._where(time, state, supports)
+        # Where the plan is at its own time, which passes now, and how far the body is from it.
+        reference, deviation = self.reference.sample(time, rate, rate), None
+        if self.settings.returning is not None:
+            deviation = deviation_from_plan(state, reference, supports)
+            clock.advance(clock.next_rate(deviation))
+            if clock.rate != rate:
+                reference = self.reference.sample(time, rate, clock.rate)
         problem = self.problem(state, reference, supports, time, deviation)
         solution, fallback = self._solve(problem)
-        tau = self._previous if solution is None else problem.torque(solution.x)
-        self._previous = tau
-        if solution is not None:  # what each support carries until its unloading begins
-            for name, load in problem.normal_forces(solution.x).items():
+        x, iterations = np.zeros(len(problem.program.gradient)), 0
+        if solution is not None:
+            x, iterations = solution.x, solution.iterations
+            self._previous = problem.torque(x)
+            for name, load in problem.normal_forces(x).items():  # what it carries until its unloading begins
                 if supports[name].unload_share >= 1.0:
                     self._carried[name] = load
-        x = np.zeros(len(problem.program.gradient)) if solution is None else solution.x
         return ControlOutput(
-            tau, problem.acceleration(x).copy(), problem.wrenches(x), supports, fallback, state, reference,
-            problem, iterations=0 if solution is None else solution.iterations, waited=waited,
+            self._previous, problem.acceleration(x).copy(), problem.wrenches(x), supports, fallback, state,
+            reference, problem, iterations, waited,
         )  # fmt: skip
 
     def carried_at(self, time: float) -> Mapping[str, float]:
         """Point masses [kg] that effectors carry at a time of the plan [s]."""
         load = self.schedule.sequence[int(self.schedule.phase_at(time))].load
         return {} if load is None else load.masses
-
-    def _where(
-        self, time: float, state: DynamicsState, supports: Mapping[str, SupportState]
-    ) -> tuple[ReferenceSample, Deviation | None]:
-        """Where the plan is at its own time, how far the body is from it, and let the plan's time pass."""
-        clock, rate = self.clock, self.clock.rate
-        reference = self.reference.sample(time, rate, rate)
-        if self.settings.returning is None:
-            return reference, None
-        deviation = deviation_from_plan(state, reference, supports)
-        clock.advance(clock.next_rate(deviation))
-        if clock.rate != rate:
-            reference = self.reference.sample(time, rate, clock.rate)
-        return reference, deviation
 
     def problem(
         self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState],
@@ -200,9 +168,8 @@ class Controller:
             for support in supports.values()
             if support.mode is SupportMode.STANCE and support.contact is not None
         ]
-        bounds = JointBounds.of(
-            self.body, state, settings.joint_limit_horizon, settings.max_joint_acceleration
-        )
+        horizon, largest = settings.joint_limit_horizon, settings.max_joint_acceleration
+        bounds = JointBounds.of(self.body, state, horizon, largest)
         return build_qp(
             state, self.tasks(state, reference, supports, deviation), loaded, bounds, self._damping,
             period=settings.period, acceleration_weight=settings.weights.acceleration,
@@ -218,23 +185,21 @@ class Controller:
         deviation: Deviation | None = None,
     ) -> list[AccelerationTask]:  # fmt: skip
         """List the weighted tasks of one step."""
-        gains, weights = self.settings.impedances, self.settings.weights
-        tasks = [self._com_task(state, reference, deviation)]
+        gains, weights, root = self.settings.impedances, self.settings.weights, self._root
+        wanted = [self._com_task(state, reference, deviation)]
         if not self._rests(supports):
-            frame, planned = state.frames[self._root], reference.effectors[self._root]
-            tasks.append(orientation_task(self._root, frame, planned, gains.pelvis, weights.pelvis))
-        tasks += [self._effector_task(support, state, reference) for support in supports.values()]
-        tasks.append(posture_task(state, reference, gains.posture, self._posture_weight(supports)))
-        if weights.angular_momentum > 0:
-            tasks.append(
-                angular_momentum_task(state, reference, gains.angular_momentum, weights.angular_momentum)
-            )
-        return tasks
+            frame, planned = state.frames[root], reference.effectors[root]
+            wanted.append(tasks.orientation_task(root, frame, planned, gains.pelvis, weights.pelvis))
+        wanted += [self._effector_task(support, state, reference) for support in supports.values()]
+        wanted.append(tasks.posture_task(state, reference, gains.posture, self._posture_weight(supports)))
+        if (weight := weights.angular_momentum) > 0:
+            wanted.append(tasks.angular_momentum_task(state, reference, gains.angular_momentum, weight))
+        return wanted
 
     def _com_task(
         self, state: DynamicsState, reference: ReferenceSample, deviation: Deviation | None
     ) -> AccelerationTask:
-        task = com_task(state, reference, self.settings.impedances.com, self.settings.weights.com)
+        task = tasks.com_task(state, reference, self.settings.impedances.com, self.settings.weights.com)
         returning = self.settings.returning
         if returning is None or deviation is None or returning.share(deviation.size, deviation.speed) == 0.0:
             return task
@@ -244,11 +209,9 @@ class Controller:
 
     def _rests(self, supports: Mapping[str, SupportState]) -> bool:
         """Whether the pelvis itself is on a support, which then says how it is turned."""
+        held = (name for name, support in supports.items() if support.mode is SupportMode.STANCE)
         segment = self.body.effector(self._root).segment
-        return any(
-            support.mode is SupportMode.STANCE and self.body.effector(name).segment == segment
-            for name, support in supports.items()
-        )
+        return any(self.body.effector(name).segment == segment for name in held)
 
     def _effector_task(
         self, support: SupportState, state: DynamicsState, reference: ReferenceSample
@@ -257,7 +220,7 @@ class Controller:
         frame, planned = state.frames[name], reference.effectors[name]
         part = support.contact is not None and support.contact.part is not SolePart.FULL
         if support.mode is SupportMode.STANCE and part:
-            return rolling_task(name, frame, planned, support, gains.stance, weight)
+            return tasks.rolling_task(name, frame, planned, support, gains.stance, weight)
         grasps = support.contact is not None and support.contact.kind is ContactKind.GRASP
         if support.mode is not SupportMode.SWING and (grasps or support.settling):
             # A hand turns in its grasp; what settles is on its way.
@@ -269,7 +232,7 @@ class Controller:
                 gain = replace(gains.stance, stiffness=YIELDING * gains.stance.stiffness)
             return swing_task(name, frame, planned, gain, weight)
         if support.mode is SupportMode.STANCE:
-            return stance_task(name, frame, support, gains.stance, weight)
+            return tasks.stance_task(name, frame, support, gains.stance, weight)
         landing = support.mode is SupportMode.LANDING
         target = landing_reference(support, planned) if landing else lifted(planned, support)
         follow, point = 1.0 if landing else support.follow, name in self._points
@@ -284,7 +247,7 @@ class Controller:
 
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
         geometry = self.geometry(contact)
-        basis = contact_force_basis(
+        basis = edge_forces.contact_force_basis(
             contact, geometry, state, sliding=support.settling,
             friction_share=self.settings.supports.friction_share, friction_model=self._friction_model,
         )  # fmt: skip
@@ -293,13 +256,13 @@ class Controller:
         cap *= support.load_share
         if support.unload_share < 1.0:
             cap = min(cap, support.unload_share * self._carried.get(support.effector, cap))
+        upper = basis.upper
         if support.settling:
-            limits = cap * self._low_shares(geometry, contact, state, edges)
-            basis = replace(basis, upper=np.minimum(basis.upper, limits))
+            upper = np.minimum(upper, cap * self._low_shares(geometry, contact, state, edges))
         if support.fades:
             limits = state.mass * GRAVITY * self._point_shares(support, contact, edges)
-            basis = replace(basis, upper=np.minimum(basis.upper, limits))
-        return LoadedContact(basis, cap, min(support.load_share, support.unload_share))
+            upper = np.minimum(upper, limits)
+        return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
 
     def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:
         """The contact with the force that it should feel at a time, where there is one."""
@@ -313,11 +276,9 @@ class Controller:
         geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int
     ) -> FloatArray:
         """(e k,) share of the load that each point may carry: those that a tilt has raised carry none."""
-        heights = []
-        for segment, points in geometry.patches:
-            frame = state.frames[segment_key(segment)]
-            heights.append((frame.position + points @ frame.rotation.T) @ contact.normal)
-        height = np.concatenate(heights)
+        patches = [(state.frames[segment_key(segment)], points) for segment, points in geometry.patches]
+        places = ((frame.position + points @ frame.rotation.T) @ contact.normal for frame, points in patches)
+        height = np.concatenate(list(places))
         return np.repeat(np.clip(2.0 - (height - height.min()) / RAISED, 0.0, 1.0), edges)
 
     def _point_shares(self, support: SupportState, contact: Contact, edges: int) -> FloatArray:

@@ -68,8 +68,7 @@ class Dynamics:
 
     def __init__(self, body: BodyModel, frames: dict[str, int]) -> None:
         """Evaluate frames: Pinocchio indices by the names they get in ``DynamicsState.frames``."""
-        self._model = body.pinocchio
-        self._data = self._model.createData()
+        self._model, self._data = body.pinocchio, body.pinocchio.createData()
         self._frames = dict(frames)
         self._rest = np.zeros(self._model.nv)
         self._mass = float(pin.computeTotalMass(self._model))
@@ -85,8 +84,7 @@ class Dynamics:
         model, data = self._model, self._data
         mass_matrix = pin.crba(model, data, q).copy()
         bias = pin.nonLinearEffects(model, data, q, v).copy()
-        # ccrba also leaves the joint Jacobians in the data, and the next call the
-        # velocities and (without gravity, joints at rest) the drift accelerations.
+        # ccrba also leaves the joint Jacobians in the data, the next call velocities and drift accelerations.
         pin.ccrba(model, data, q, v)
         centroidal_map, momentum = data.Ag.copy(), data.hg.vector.copy()
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, self._rest)
@@ -104,9 +102,8 @@ class Dynamics:
         model, data = self._model, self._data
         placement = pin.updateFramePlacement(model, data, index)
         return FrameState(
-            rotation=placement.rotation.copy(),
-            position=placement.translation.copy(),
+            placement.rotation.copy(), placement.translation.copy(),
             twist=pin.getFrameVelocity(model, data, index, _WORLD_ALIGNED).vector,
             jacobian=pin.getFrameJacobian(model, data, index, _WORLD_ALIGNED),
             drift=pin.getFrameClassicalAcceleration(model, data, index, _WORLD_ALIGNED).vector,
-        )
+        )  # fmt: skip

@@ -11,7 +11,7 @@ from manikin.body.limbs import hanging_segment, hinge_line
 from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
 from manikin.control.dynamics import DynamicsState
 from manikin.numerics.polytope import chord, inset_polygon
-from manikin.numerics.spatial import FloatArray, skew
+from manikin.numerics.spatial import FloatArray, cross, skew
 
 ROUND = 0.02
 """Length of what of a sole touches up to which it carries at a line: that of a rod is 14 mm [m]."""
@@ -21,8 +21,8 @@ ROUND = 0.02
 class ContactGeometry:
     """Force-carrying points of one effector, on its segment and on what hangs from it.
 
-    A foot carries force at its heel corners and at the two ends of the line of its toe
-    hinge; the tips belong to the toes, so that a load there is paid for by the toe hinge.
+    A foot carries force at its heel corners and at the ends of the line of its toe hinge; the tips belong to
+    the toes, so that a load there is paid for by the toe hinge.
 
     Attributes:
         effector: Name of the effector.
@@ -39,11 +39,7 @@ class ContactGeometry:
 
 
 def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
-    """Find the points of the body that carry the forces of a contact, ``inset`` [m] from the sole's edge.
-
-    Raises:
-        BodyError: If the body has no such effector.
-    """
+    """Find the points of the body that carry the forces of a contact, ``inset`` [m] from the sole's edge."""
     effector = body.effector(contact.effector)
     toes = hanging_segment(body, effector.segment)
 
@@ -114,9 +110,8 @@ def _rectangle(lengths: tuple[float, ...], half_width: float) -> FloatArray:
 class ContactForceBasis:
     """Linear map from the force variables of one effector to forces on the body.
 
-    A sole or a point has a variable for each edge of the friction pyramid at each point,
-    none of which may be negative, each with unit normal force. A grasp has three forces
-    along the world axes and, where it can hold one, three moments.
+    A sole or a point has a variable for each edge of the friction pyramid at each point, not negative, with
+    unit normal force. A grasp has forces along the world axes and, where it can hold one, three moments.
 
     Attributes:
         contact: Its kind, planned place and limits.
@@ -159,11 +154,8 @@ def contact_force_basis(
     edges = edges_in_world(contact, friction_model, friction_share)
     if sliding:
         edges = sliding_edges(contact, state.frames[contact.effector].twist[:3], edges)
-    origin = state.frames[contact.effector].position
-    count = len(edges) * geometry.point_count
-    generalised = np.empty((len(state.v), count))
-    wrench = np.empty((6, count))
-    start = 0
+    origin, count, start = state.frames[contact.effector].position, len(edges) * geometry.point_count, 0
+    generalised, wrench = np.empty((len(state.v), count)), np.empty((6, count))
     for segment, points in geometry.patches:
         frame = state.frames[segment_key(segment)]
         end = start + len(edges) * len(points)
@@ -177,14 +169,9 @@ def contact_force_basis(
 
 def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
     """(6, e k) force and moment of each of the edges (e, 3) at each of the arms (k, 3)."""
-    wrench = np.empty((6, len(arms), len(edges)))
-    force = edges.T[:, None, :]
-    arm = arms.T[:, :, None]
-    wrench[:3] = force
-    wrench[3] = arm[1] * force[2] - arm[2] * force[1]
-    wrench[4] = arm[2] * force[0] - arm[0] * force[2]
-    wrench[5] = arm[0] * force[1] - arm[1] * force[0]
-    return wrench.reshape(6, -1)
+    force = np.broadcast_to(edges, (len(arms), *edges.shape))
+    wrench = np.concatenate((force, cross(arms[:, None, :], edges)), axis=2)
+    return np.ascontiguousarray(wrench.transpose(2, 0, 1)).reshape(6, -1)
 
 
 SLIDING_SPEED = 0.03
@@ -194,8 +181,7 @@ SLIDING_SPEED = 0.03
 def sliding_edges(contact: Contact, velocity: FloatArray, edges: FloatArray) -> FloatArray:
     """(e, 3) edges of a contact at a velocity (3,) [m/s]: those given where it does not slide.
 
-    Where it does, all are the kinetic friction with unit normal force. That is on the friction cone, so
-    outside the inner pyramid: what slides has no other friction.
+    Where it does, all are the kinetic friction with unit normal force, on the friction cone itself.
     """
     along = velocity - (velocity @ contact.normal) * contact.normal
     speed = float(np.linalg.norm(along))

@@ -3,21 +3,18 @@
 The capture point ``c = s + s' / w`` of the body is compared with that of the plan; ``e`` is their difference.
 As long as ``|e|`` is small the plan is followed as ever. Beyond that two things change:
 
-*The wish of the centre of mass.* Following the plan stiffly asks for a ZMP far beyond the soles, and turns
-arms and trunk for it. Instead the wish is the ZMP that brings the capture point back to that of the plan at
-the rate ``k``, ``p = p_plan + (1 + k / w) e``, kept within a distance beyond the support polygon: so much is
-left for arms and trunk.
+*The wish of the centre of mass.* Following the plan stiffly asks for a ZMP far beyond the soles. Instead the
+wish is the ZMP that brings the capture point back to that of the plan at the rate ``k``, ``p = p_plan + (1 +
+k / w) e``, kept within a distance beyond the support polygon: so much is left for arms and trunk.
 
 *The time of the plan.* A plan that goes on takes its next foot off the ground whether the body stands well
 or not. Its clock is stopped, over a short time, and goes on when ``e`` is small again; but only while all
-feet are on the ground, where both capture points are well inside the polygon, so that body and plan can be
-stopped as they stand, and not where the body is pushed ahead, the way of the plan. While a foot flies,
-therefore, time goes on and it lands when it should.
+feet are on the ground and both capture points well inside the polygon, so that body and plan can be stopped
+as they stand, and not where the body is pushed ahead, the way of the plan.
 
 Neither is done where the plan is brisk, as in the middle of a stride: it cannot be stopped there, and a body
-that follows it stiffly was found to take more. The polygon is the hull of the soles that carry load, seen
-from above; the height of the pendulum is taken over their mean height. With anything else than soles in
-contact neither is done.
+that follows it stiffly was found to take more; nor with anything else than soles in contact. The polygon is
+the hull of the soles that carry load, seen from above, and their mean height that of the ground.
 """
 
 from collections.abc import Mapping
@@ -75,11 +72,8 @@ def deviation_from_plan(
     state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState]
 ) -> Deviation | None:
     """Compare the body with its plan; None where it does not stand on soles alone."""
-    held = [
-        support.contact
-        for support in supports.values()
-        if support.mode is SupportMode.STANCE and support.contact is not None
-    ]
+    stances = [support for support in supports.values() if support.mode is SupportMode.STANCE]
+    held = [support.contact for support in stances if support.contact is not None]
     if not held or any(contact.kind is not ContactKind.SOLE for contact in held):
         return None
     points = np.concatenate([contact.points_in_world for contact in held])
@@ -87,14 +81,11 @@ def deviation_from_plan(
     height = float(state.com[2]) - ground
     if len(corners) < 3 or height < LEAST_HEIGHT:
         return None
-    frequency = float(np.sqrt(GRAVITY / height))
-    velocity = state.momentum[:2] / state.mass
-    actual = state.com[:2] + velocity / frequency
-    planned = reference.com[:2] + reference.com_velocity[:2] / frequency
-    speed = float(np.linalg.norm(reference.com_velocity[:2]))
-    error = actual - planned
-    along = float(error @ reference.com_velocity[:2]) / max(speed, LEAST_SPEED)
-    grounded = all(support.mode is SupportMode.STANCE for support in supports.values())
+    frequency, velocity = float(np.sqrt(GRAVITY / height)), reference.com_velocity[:2]
+    actual = state.com[:2] + state.momentum[:2] / state.mass / frequency
+    planned = reference.com[:2] + velocity / frequency
+    speed, error, grounded = float(np.linalg.norm(velocity)), actual - planned, len(stances) == len(supports)
+    along = float(error @ velocity) / max(speed, LEAST_SPEED)
     ahead = along / max(float(np.linalg.norm(error)), 1e-9)
     return Deviation(error, actual, planned, SupportArea(corners, ground), frequency, ahead, speed, grounded)
 

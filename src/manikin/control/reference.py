@@ -66,24 +66,21 @@ class ReferenceSample:
 
     def until(self, end: "ReferenceSample", period: float) -> "ReferenceSample":
         """The same state with the mean accelerations over the time [s] until another one."""
-        effectors = {
-            name: replace(frame, acceleration=(end.effectors[name].twist - frame.twist) / period)
-            for name, frame in self.effectors.items()
-        }
+        later = end.effectors
         return replace(
             self, a=(end.v - self.v) / period,
             com_acceleration=(end.com_velocity - self.com_velocity) / period,
             angular_momentum_rate=(end.angular_momentum - self.angular_momentum) / period,
-            effectors=effectors,
+            effectors={name: replace(frame, acceleration=(later[name].twist - frame.twist) / period)
+                       for name, frame in self.effectors.items()},
         )  # fmt: skip
 
 
 class Reference:
     """Samples a motion anywhere in time; before and after it the body is at rest.
 
-    Accelerations are means over the time for which the torques will be held, the difference
-    of the planned velocities at its ends: a torque that is held cannot follow anything finer,
-    and the acceleration at the beginning of the hold would make the body lag behind.
+    Accelerations are means over the hold, the difference of the planned velocities at its ends: a torque that
+    is held cannot follow anything finer, and with the acceleration at its start the body would lag behind.
     """
 
     def __init__(self, body: BodyModel, motion: Motion, frames: dict[str, int], period: float) -> None:
@@ -96,11 +93,10 @@ class Reference:
         Raises:
             InputError: If the motion's joints are not the body's.
         """
-        if tuple(motion.joint_names) != tuple(body.joint_names):
-            raise InputError(
-                f"motion has {len(motion.joint_names)} joints and body {body.name!r} "
-                f"{len(body.joint_names)}, or they differ in name; valid: a motion planned for this body"
-            )
+        own, joints = body.joint_names, motion.joint_names
+        if tuple(joints) != tuple(own):
+            told = f"motion has {len(joints)} joints and body {body.name!r} {len(own)}"
+            raise InputError(f"{told}, or they differ in name; valid: a motion planned for this body")
         self.motion = motion
         self._model, self._data = body.pinocchio, body.pinocchio.createData()
         self._frames, self._period = dict(frames), period

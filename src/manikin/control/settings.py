@@ -12,12 +12,10 @@ class TaskWeights:
 
     Attributes:
         com: Centre of mass [1/(m/s^2)^2].
-        effectors: Placement of feet and of grasping hands, in flight and in contact; also the
-            hinges of a segment hanging on an effector in contact (toes).
+        effectors: Placement of feet and grasping hands; also the hinges of toes in contact.
         pelvis: Orientation of the pelvis.
         posture: Each joint angle.
-        angular_momentum: Rate of the angular momentum about the centre of mass [1/(N.m)^2];
-            0 (the thesis has no such task) leaves it free.
+        angular_momentum: Rate of the angular momentum [1/(N.m)^2]; 0, as in the thesis, leaves it free.
         acceleration: Regularisation of every generalised acceleration.
         force: Regularisation of every edge force of the friction pyramids [1/N^2].
     """
@@ -72,25 +70,20 @@ class SupportSettings:
 
     Attributes:
         unload_time: The normal force's limit falls to zero over this time before lift-off [s].
-        follow_time: The gains with which a foot follows its flight rise from zero over this time
-            after lift-off [s].
-        load_time: It rises from zero over this time after touch-down [s].
-        rolling_load_time: Over this time it rises at the points of a sole that begin to touch when
-            the foot has rolled onto them, slowly at first: they may not quite touch yet [s].
+        follow_time: The gains with which a foot follows its flight rise over this time after lift-off [s].
+        load_time: The limit rises from zero over this time after touch-down [s].
+        rolling_load_time: The same at points that a foot has rolled onto, slowly at first [s].
         early_window: A touch this long before the planned landing counts as the landing [s].
         release_time: A support that has not touched for this long is landed anew [s].
-        hover: Before its landing a foot is held this far above its support, so that it does
-            not touch, and load the leg, ahead of time [m].
-        press_speed: From its landing time on it goes down at up to this speed [m/s], until it is
-            ``press_depth`` below the planned support.
+        hover: Before its landing a foot is held this far above its support, not to touch ahead of time [m].
+        press_speed: From its landing time on it goes down at up to this speed, to ``press_depth`` [m/s].
         press_time: That speed rises from zero over this time [s].
         rolling_press_speed: The same of a foot that lands on its heel, which this speed sets turning [m/s].
         press_depth: How far below the planned support it is sent at most [m].
         default_cap: Normal force limit of a contact that states none [body weights].
         sole_inset: The controller keeps its forces this far inside the edge of the sole [m].
-        friction_share: Share of the friction of soles and points that it makes use of: a foot whose
-            load dips must not slip. The friction model is that of the plan, the inner pyramid where the
-            plan has the outer one.
+        friction_share: Share of the friction of soles and points that it makes use of. The friction model is
+            that of the plan, the inner pyramid where the plan has the outer one.
     """
 
     unload_time: float = 0.05
@@ -119,10 +112,7 @@ class SupportSettings:
             finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)
 
     def descent(self, contact: Contact | None, late: float) -> tuple[float, float]:
-        """Way [m] and speed [m/s] of a landing foot, ``late`` after it began to go down [s].
-
-        The speed rises evenly to its final value: a sudden one would be felt by the other foot.
-        """
+        """Way [m] and speed [m/s], which rises evenly, of a foot ``late`` [s] after it began to go down."""
         rolls = contact is not None and contact.part is not SolePart.FULL
         speed = self.rolling_press_speed if rolls else self.press_speed
         rising = min(late, self.press_time)
@@ -138,15 +128,12 @@ class ReturnSettings:
         small: Deviation of the capture point up to which the plan is followed as ever [m].
         large: Deviation from which the law of the return holds alone, and the plan may wait [m].
         rate: At which the capture point is brought back [1/s].
-        turning: How far beyond the edge of the soles the wanted ZMP may be, which arms and trunk make up
-            for [m].
+        turning: How far beyond the soles the wanted ZMP may be; arms and trunk make up for it [m].
         sole_inset: The edge is this far inside the soles [m].
         ahead: The plan waits unless more than this share of the deviation is along its way.
-        stoppable: Reach of the planned capture point, from 0 in the centre of the support polygon to 1 on its
-            edge, up to which a plan can be stopped.
+        stoppable: Reach of the planned capture point over the polygon up to which a plan can be stopped.
         slow: Speed of the planned centre of mass up to which the law of the return holds [m/s].
-        brisk: Speed from which it does not, and the plan does not wait: in a stride, a body that follows its
-            plan stiffly takes more [m/s].
+        brisk: Speed from which it does not, and the plan does not wait, as in a stride [m/s].
         stopping_time: In which its clock comes to a stop, and is back at its speed [s].
         longest_wait: The plan waits no longer than this altogether [s].
     """

@@ -10,7 +10,7 @@ import numpy as np
 
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.control.settings import SupportSettings
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, frozen_array
 
 _FIRST_SHARE = 0.05
 """Load share at touch-down, and of a foot that lands early until its planned landing."""
@@ -30,8 +30,7 @@ TIP_RELEASE = 0.008
 _LIFTING_SHARE = 0.6
 """Share of the early window in which the hovering height is reached."""
 
-_NO_LIFT: FloatArray = np.zeros(3)
-_NO_LIFT.setflags(write=False)
+_NO_LIFT = frozen_array(np.zeros(3), "lift")
 
 
 class SupportMode(StrEnum):
@@ -52,10 +51,8 @@ class SupportState:
     Attributes:
         mode: Swing, landing or stance.
         contact: The planned contact in landing and stance; None in flight.
-        load_share: Share of the contact's force limits that it may use after its touch-down,
-            rising to 1.
-        unload_share: Share of the load it carried when its unloading began that it may
-            still carry, falling to 0 at lift-off; 1 before that.
+        load_share: Share of the contact's force limits that it may use after its touch-down, rising to 1.
+        unload_share: Share of the load before its unloading that it may still carry, 0 at lift-off.
         press: How far below the planned contact a landing effector is sent [m]; negative above.
         press_rate: How fast it is sent down [m/s].
         settling: Whether it may still slide to its place.
@@ -63,8 +60,8 @@ class SupportState:
         lift_rate: (3,) rate of that offset [m/s].
         follow: Share of the feedback gains with which a flying effector follows its path.
         planned: Whether the time is one of planned support, not of an early touch.
-        fades: Parts of the sole beyond which the load limits rise after a change of the touching
-            part, or fall before one, and how far, in [0, 1].
+        fades: Parts of the sole beyond which load limits rise after a change of the touching part, or fall
+            before one, and how far, in [0, 1].
     """
 
     effector: str
@@ -91,8 +88,7 @@ class SupportInterval:
         end: Planned lift-off [s]; inf when held to the end.
         early: First time at which a touch counts as this touch-down [s].
         late: Last time at which a touch counts as not having left it yet [s].
-        parts: Contact from each time on, in order; the same place throughout, but other parts of
-            a sole that rolls.
+        parts: Contact from each time on, in order; the same place throughout, but other parts of a sole.
     """
 
     start: float
@@ -132,12 +128,10 @@ def support_intervals(
 ) -> tuple[SupportInterval, ...]:
     """Collect the planned supports of one effector in order of time.
 
-    ``early_window`` is the largest advance of a touch-down [s]; it is more before the end of a long flight,
-    which comes down slowly, but at most its last third.
+    ``early_window`` is the largest advance of a touch-down [s]: more, up to a third, for a long flight.
     """
     intervals: list[SupportInterval] = []
-    phases = list(schedule.sequence)
-    previous_end = -math.inf
+    phases, previous_end = list(schedule.sequence), -math.inf
     for held, run in groupby(range(len(phases)), key=lambda number: effector in phases[number].stance):
         if not held:
             continue
@@ -179,11 +173,9 @@ class SupportSwitch:
         self._memory = {name: _Memory() for name in self.effectors}
 
     def update(self, time: float, touching: Mapping[str, bool] | None = None) -> dict[str, SupportState]:
-        """Advance to a time [s] and return the state of every effector of the schedule.
+        """Advance to a time [s], not before the last one, and return the state of every effector.
 
-        Args:
-            time: Not decreasing from call to call.
-            touching: Whether each effector is felt to touch; the schedule is trusted where it says nothing.
+        ``touching`` says whether each is felt to touch; the schedule is trusted where it says nothing.
         """
         felt = touching or {}
         return {name: self._update(name, time, felt.get(name)) for name in self.effectors}
@@ -216,14 +208,11 @@ class SupportSwitch:
             )  # fmt: skip
         if not planned:
             return self._hovering(name, interval, time)
-        late = time - max(interval.start, memory.touched)
         height = self._hover(interval) if memory.touched < interval.start else 0.0
-        contact = interval.contact_at(time)
-        way, rate = self._settings.descent(contact, late)
+        part = interval.contact_at(time)
+        way, rate = self._settings.descent(part, time - max(interval.start, memory.touched))
         press = min(self._settings.press_depth, way - height)
-        return SupportState(
-            name, SupportMode.LANDING, contact, press=press, press_rate=rate, settling=settling
-        )
+        return SupportState(name, SupportMode.LANDING, part, press=press, press_rate=rate, settling=settling)
 
     def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""
@@ -244,13 +233,12 @@ class SupportSwitch:
 
     def _fades(self, interval: SupportInterval, time: float) -> tuple[tuple[SolePart, float], ...]:
         """Load moves gradually to points that begin to touch, and off those that cease to."""
-        fades = []
-        before, after = interval.part_before(time), interval.part_after(time)
-        if before is not None:
-            share = (time - before[1]) / self._settings.rolling_load_time
+        fades, settings = [], self._settings
+        if (before := interval.part_before(time)) is not None:
+            share = (time - before[1]) / settings.rolling_load_time
             fades.append((before[0], float(np.clip(share, 0.0, 1.0)) ** 2))
-        if after is not None:
-            share = (after[1] - time) / self._settings.unload_time
+        if (after := interval.part_after(time)) is not None:
+            share = (after[1] - time) / settings.unload_time
             fades.append((after[0], float(np.clip(share, 0.0, 1.0))))
         return tuple(item for item in fades if item[1] < 1.0)
 
@@ -261,10 +249,8 @@ class SupportSwitch:
         return float(np.clip(since / self._settings.follow_time, 0.0, 1.0))
 
     def _interval(self, name: str, time: float) -> tuple[int, SupportInterval | None]:
-        for number, interval in enumerate(self._intervals[name]):
-            if interval.early - 1e-9 <= time < interval.end - 1e-9:
-                return number, interval
-        return -1, None
+        every = enumerate(self._intervals[name])
+        return next(((k, i) for k, i in every if i.early - 1e-9 <= time < i.end - 1e-9), (-1, None))
 
     def _remember_touch(self, memory: _Memory, time: float, felt: bool, release: float) -> None:
         if felt:

@@ -1,8 +1,7 @@
 """Tasks of the controller: wanted accelerations and forces ([Qiu2012]_ 6.3).
 
-An acceleration is linear in the generalised acceleration and follows a reference by the impedance law
-``reference acceleration + stiffness * error + damping * error rate``. A force is what an effector in contact
-should feel, such as the reaction of what it pushes.
+Accelerations, linear in the generalised one, follow references by the impedance law ``reference acceleration
++ stiffness * error + damping * error rate``. A force is what an effector in contact should feel.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +14,6 @@ from manikin.control.dynamics import DynamicsState, FrameState
 from manikin.control.reference import EffectorReference, ReferenceSample
 from manikin.control.settings import Impedance
 from manikin.control.supports import SupportMode, SupportState
-from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array, skew
 
 
@@ -38,9 +36,9 @@ class ForceWish:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "force", frozen_array(self.force, "wished force [N]", (3,), InputError))
+        object.__setattr__(self, "force", frozen_array(self.force, "wished force [N]", (3,)))
         for name in ("ramp", "weight"):
-            finite_number(getattr(self, name), f"force wish {name}", above=0.0, error=InputError)
+            finite_number(getattr(self, name), f"force wish {name}", above=0.0)
 
     def at(self, time: float) -> FloatArray:
         """(3,) force at a time [N]; it rises without a jump of its rate."""
@@ -73,12 +71,8 @@ def com_task(
     state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: float
 ) -> AccelerationTask:
     """Follow the centre of mass in position, velocity and acceleration."""
-    velocity = state.momentum[:3] / state.mass
-    wanted = (
-        reference.com_acceleration
-        + gains.stiffness * (reference.com - state.com)
-        + gains.damping * (reference.com_velocity - velocity)
-    )
+    error, rate = reference.com - state.com, reference.com_velocity - state.momentum[:3] / state.mass
+    wanted = reference.com_acceleration + gains.stiffness * error + gains.damping * rate
     matrix = state.centroidal_map[:3] / state.mass
     return AccelerationTask("com", matrix, wanted - state.momentum_drift[:3] / state.mass, np.full(3, weight))
 
@@ -87,22 +81,17 @@ def angular_momentum_task(
     state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: float
 ) -> AccelerationTask:
     """Follow the angular momentum about the centre of mass; only ``gains.damping`` acts."""
-    error = reference.angular_momentum - state.momentum[3:]
-    wanted = reference.angular_momentum_rate + gains.damping * error
-    return AccelerationTask(
-        "angular_momentum", state.centroidal_map[3:], wanted - state.momentum_drift[3:], np.full(3, weight)
-    )
+    error, rows = reference.angular_momentum - state.momentum[3:], state.centroidal_map[3:]
+    target = reference.angular_momentum_rate + gains.damping * error - state.momentum_drift[3:]
+    return AccelerationTask("angular_momentum", rows, target, np.full(3, weight))
 
 
 def orientation_task(
     name: str, frame: FrameState, reference: EffectorReference, gains: Impedance, weight: float
 ) -> AccelerationTask:
     """Follow the orientation of a frame ("Basin" of [Qiu2012]_ Table 6.1)."""
-    wanted = (
-        reference.acceleration[3:]
-        + gains.stiffness * orientation_error(reference.rotation, frame.rotation)
-        + gains.damping * (reference.twist[3:] - frame.twist[3:])
-    )
+    error, rate = orientation_error(reference.rotation, frame.rotation), reference.twist[3:] - frame.twist[3:]
+    wanted = reference.acceleration[3:] + gains.stiffness * error + gains.damping * rate
     return AccelerationTask(name, frame.jacobian[3:], wanted - frame.drift[3:], np.full(3, weight))
 
 
@@ -112,16 +101,11 @@ def swing_task(
 ) -> AccelerationTask:  # fmt: skip
     """Follow placement, twist and acceleration of a flying effector; the gains times ``follow``.
 
-    What touches in a point follows its place alone: held to its planned attitude as well, a leg of three
-    joints goes down to a late contact with the whole body.
+    What touches in a point follows its place alone: a leg of three joints has no attitude of its own.
     """
     turn = orientation_error(reference.rotation, frame.rotation)
-    error = np.concatenate((reference.position - frame.position, turn))
-    wanted = (
-        reference.acceleration
-        + follow * gains.stiffness * error
-        + follow * gains.damping * (reference.twist - frame.twist)
-    )
+    error, rate = np.concatenate((reference.position - frame.position, turn)), reference.twist - frame.twist
+    wanted = reference.acceleration + follow * gains.stiffness * error + follow * gains.damping * rate
     rows = 3 if point else 6
     return AccelerationTask(name, frame.jacobian[:rows], (wanted - frame.drift)[:rows], np.full(rows, weight))
 
@@ -149,15 +133,13 @@ def rolling_task(
 ) -> AccelerationTask:  # fmt: skip
     """Let a foot tilt as planned about the part of its sole that touches.
 
-    The planned twist turns about that part, which itself has no velocity in it. As in
-    :func:`stance_task`, of the placement only the orientation is fed back. Before its planned
-    landing the foot keeps its tilt.
+    The planned twist turns about that part, which itself has no velocity in it. As in :func:`stance_task`, of
+    the placement only the orientation is fed back. Before its planned landing the foot keeps its tilt.
     """
-    if not support.planned:
-        held = -gains.damping * frame.twist - frame.drift
-        return AccelerationTask(name, frame.jacobian, held, np.full(6, weight))
-    wanted = reference.acceleration + gains.damping * (reference.twist - frame.twist)
-    wanted[3:] += gains.stiffness * orientation_error(reference.rotation, frame.rotation)
+    wanted = -gains.damping * frame.twist
+    if support.planned:
+        wanted = reference.acceleration + gains.damping * (reference.twist - frame.twist)
+        wanted[3:] += gains.stiffness * orientation_error(reference.rotation, frame.rotation)
     return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
 
 
@@ -166,36 +148,24 @@ def stance_task(
 ) -> AccelerationTask:
     """Keep an effector in contact where it landed, turning its sole into the surface.
 
-    The velocity is damped to zero. Of the placement only the tilt of the sole against the
-    surface is fed back: a foot that landed a little beside its planned place or heading
-    cannot be moved there while it carries load.
-
-    What touches in a point carries no moment and turns about it as its limb moves: only the point is held.
-    Held against turning as well, six feet of an insect hold its whole body.
+    The velocity is damped to zero. Of the placement only the sole's tilt against the surface is fed back: a
+    foot beside its planned place or heading cannot be moved there while it carries load. What touches in a
+    point may turn about it: held against turning as well, six feet of an insect hold its whole body.
     """
-    wanted = -gains.damping * frame.twist
-    if support.contact is not None and support.contact.kind is ContactKind.POINT:
-        place = frame.jacobian[:3]
-        return AccelerationTask(name, place, (wanted - frame.drift)[:3], np.full(3, weight))
-    if support.contact is not None:
-        tilt = skew(frame.rotation[:, 2]) @ support.contact.normal
-        wanted[3:] += gains.stiffness * tilt
-    return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
+    wanted, contact = -gains.damping * frame.twist, support.contact
+    if contact is not None:
+        wanted[3:] += gains.stiffness * (skew(frame.rotation[:, 2]) @ contact.normal)
+    rows = 3 if contact is not None and contact.kind is ContactKind.POINT else 6
+    return AccelerationTask(name, frame.jacobian[:rows], (wanted - frame.drift)[:rows], np.full(rows, weight))
 
 
 def posture_task(
     state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: FloatArray
 ) -> AccelerationTask:
     """Follow the planned joint angles, with a weight (nv - 6,) for each."""
-    nv = len(state.v)
-    matrix = np.zeros((nv - 6, nv))
-    matrix[:, 6:] = np.eye(nv - 6)
-    wanted = (
-        reference.a[6:]
-        + gains.stiffness * (reference.q[7:] - state.q[7:])
-        + gains.damping * (reference.v[6:] - state.v[6:])
-    )
-    return AccelerationTask("posture", matrix, wanted, weight)
+    error, rate = reference.q[7:] - state.q[7:], reference.v[6:] - state.v[6:]
+    wanted = reference.a[6:] + gains.stiffness * error + gains.damping * rate
+    return AccelerationTask("posture", np.eye(len(rate), len(state.v), 6), wanted, weight)
 
 
 def orientation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:

@@ -33,16 +33,14 @@ Json = dict[str, Any]
 def describe_body(body: BodyModel) -> Json:
     """Everything that makes a body: segments, hinges, inertias, shapes, effectors, limbs [SI]."""
     return {
-        "name": body.name,
-        "stature_m": body.stature,
-        "mass_kg": body.own_mass,
-        "sex": body.sex,
-        "age": body.age,
-        "strength": body.strength,
-        "loads_kg": dict(body.loads),
-        "sole_length_m": body.sole_length,
-        "sole_width_m": body.sole_width,
-        "segments": [_describe_segment(segment) for segment in body.segments],
+        "name": body.name, "stature_m": body.stature, "mass_kg": body.own_mass, "sex": body.sex,
+        "age": body.age, "strength": body.strength, "loads_kg": dict(body.loads),
+        "sole_length_m": body.sole_length, "sole_width_m": body.sole_width,
+        "segments": [
+            _plain(segment, "hinges", "shapes")
+            | {"hinges": _plain(segment.hinges), "shapes": _plain(segment.shapes)}
+            for segment in body.segments
+        ],
         "effectors": [_plain(effector) for effector in body.effectors.values()],
         "standing_angles": dict(body.standing_angles),
         "soft_pairs": sorted(sorted(pair) for pair in body.soft_pairs),
@@ -78,13 +76,9 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
         effectors={effector["name"]: Effector(**effector) for effector in description["effectors"]},
         standing_angles=description["standing_angles"],
         soft_pairs=frozenset(frozenset(pair) for pair in description["soft_pairs"]),
-        stature=description["stature_m"],
-        sex=description["sex"],
-        age=description["age"],
-        strength=description["strength"],
-        loads=description.get("loads_kg", {}),
-        sole_length=description["sole_length_m"],
-        sole_width=description["sole_width_m"],
+        stature=description["stature_m"], sex=description["sex"], age=description["age"],
+        strength=description["strength"], loads=description.get("loads_kg", {}),
+        sole_length=description["sole_length_m"], sole_width=description["sole_width_m"],
         limbs=tuple(
             Limb(
                 limb["name"], limb["effector"], tuple(limb["segments"]), ContactKind(limb["kind"]),
@@ -93,11 +87,6 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
             for limb in description.get("limbs", ())
         ),
     )  # fmt: skip
-
-
-def _describe_segment(segment: Segment) -> Json:
-    parts = {"hinges": _plain(segment.hinges), "shapes": _plain(segment.shapes)}
-    return _plain(segment, *parts) | parts
 
 
 def _segment_from(data: Mapping[str, Any]) -> Segment:
@@ -149,24 +138,17 @@ def _shape_from(data: Mapping[str, Any]) -> Shape:
 
 def describe_schedule(schedule: ContactSchedule) -> Json:
     """Stances and key instants of a schedule [m, s, N]."""
-    return {
-        "instants": schedule.instants.tolist(),
-        "phases": [
-            {
-                "min_duration": phase.min_duration,
-                "max_duration": phase.max_duration,
-                "normal_force_cap": phase.stance.normal_force_cap,
-                "friction_model": phase.stance.friction_model,
-                "contacts": [_describe_contact(contact) for contact in phase.stance],
-                **({} if phase.load is None else {"load": _describe_load(phase.load)}),
-            }
-            for phase in schedule.sequence
-        ],
-    }
-
-
-def _describe_load(load: CarriedLoad) -> Json:
-    return {"masses_kg": dict(load.masses), "offset": load.offset.tolist()}
+    phases: list[Json] = []
+    for phase in schedule.sequence:
+        phases.append({
+            "min_duration": phase.min_duration, "max_duration": phase.max_duration,
+            "normal_force_cap": phase.stance.normal_force_cap,
+            "friction_model": phase.stance.friction_model,
+            "contacts": [_describe_contact(contact) for contact in phase.stance],
+        })  # fmt: skip
+        if (load := phase.load) is not None:
+            phases[-1]["load"] = {"masses_kg": dict(load.masses), "offset": load.offset.tolist()}
+    return {"instants": schedule.instants.tolist(), "phases": phases}
 
 
 def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:
@@ -176,26 +158,18 @@ def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:
         KeyError: If a value is missing.
         ContactError: If a value is not usable.
     """
-    phases = [
-        Phase(
-            Stance(
-                [_contact_from(contact) for contact in phase["contacts"]],
-                phase["normal_force_cap"],
-                phase.get("friction_model", "outer"),
-            ),
-            phase["min_duration"],
-            phase["max_duration"],
-            _load_from(phase["load"]) if "load" in phase else None,
-        )
-        for phase in description["phases"]
-    ]
+    phases = []
+    for phase in description["phases"]:
+        contacts = [_contact_from(contact) for contact in phase["contacts"]]
+        stance = Stance(contacts, phase["normal_force_cap"], phase.get("friction_model", "outer"))
+        load = _load_from(phase["load"]) if "load" in phase else None
+        phases.append(Phase(stance, phase["min_duration"], phase["max_duration"], load))
     return ContactSchedule(StanceSequence(phases), description["instants"])
 
 
 def _load_from(description: Mapping[str, Any]) -> CarriedLoad:
-    return CarriedLoad(
-        description["masses_kg"], frozen_array(description["offset"], "offset of the load [m]", (3,))
-    )
+    offset = frozen_array(description["offset"], "offset of the load [m]", (3,))
+    return CarriedLoad(description["masses_kg"], offset)
 
 
 def _describe_contact(contact: Contact) -> Json:
@@ -206,13 +180,9 @@ def _describe_contact(contact: Contact) -> Json:
 
 def _contact_from(data: Mapping[str, Any]) -> Contact:
     values = dict(data)
-    arrays = {
-        name: frozen_array(values.pop(key), f"contact {key}", shape)
-        for name, key, shape in (
-            ("position", "position", (3,)),
-            ("rotation_contact_to_world", "rotation", (3, 3)),
-            ("points", "points", (None, 3)),
-        )
-    }
+    shapes = {"position": (3,), "rotation": (3, 3), "points": (None, 3)}
+    position, rotation, points = (
+        frozen_array(values.pop(key), f"contact {key}", shape) for key, shape in shapes.items()
+    )
     kinds = {"kind": ContactKind(values.pop("kind")), "part": SolePart(values.pop("part", SolePart.FULL))}
-    return Contact(**values, **arrays, **kinds)
+    return Contact(**values, position=position, rotation_contact_to_world=rotation, points=points, **kinds)

@@ -15,12 +15,7 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.body.strength import with_masses
 from manikin.contact import CarriedLoad, ContactSchedule
-from manikin.motion.configuration_spline import (
-    StateSamples,
-    states_from_raw,
-    tangent_map,
-    turn_derivatives,
-)
+from manikin.motion.configuration_spline import StateSamples, states_from_raw, tangent_map, turn_derivatives
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, rotation_from_quaternion, skew
 from manikin.scene.distance import moves_by_joint

@@ -1,11 +1,10 @@
 """Facets of polytopes given by generators, found as extreme rays of the polar cone.
 
-A polytope ``W = {sum_j l_j g_j : l_j >= 0, sum_j l_j L_j <= 1}`` (several levels, some of
-them ``==``) is a slice of the cone over the rays ``(g_j, L_j)``; every facet of ``W`` is the
-slice of a facet of that cone (the Cayley construction, which keeps Minkowski sums of many
-summands as small as their parts). Adding a segment ``[-s, s]`` refines the cone's polar by
-the hyperplane ``a s = 0``: its rays stay, and each of its edges that crosses the hyperplane
-gives a new ray, one step of the double description method.
+A polytope ``W = {sum_j l_j g_j : l_j >= 0, sum_j l_j L_j <= 1}`` (several levels, some of them ``==``) is a
+slice of the cone over the rays ``(g_j, L_j)``; every facet of ``W`` is the slice of a facet of that cone (the
+Cayley construction, which keeps Minkowski sums of many summands as small as their parts). Adding a segment
+``[-s, s]`` refines the cone's polar by the hyperplane ``a s = 0``: its rays stay, and each of its edges that
+crosses the hyperplane gives a new ray, one step of the double description method.
 """
 
 from dataclasses import dataclass, replace
@@ -251,14 +250,7 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     once = _without_splinters(on_generator)
     side = np.zeros((len(once), 0), dtype=np.int8)
     return NormalFan(
-        basis,
-        inverse,
-        rays,
-        normals[once],
-        on_generator[once],
-        np.zeros((0, d)),
-        side,
-        max(k, 1) * thickness,
+        basis, inverse, rays, normals[once], on_generator[once], np.zeros((0, d)), side, max(k, 1) * thickness
     )
 
 
@@ -345,10 +337,9 @@ def _rank(rows: FloatArray) -> int:
 def _without_splinters(on_generator: BoolArray) -> NDArray[np.intp]:
     """Indices of the facets left when splinters are dropped.
 
-    Rounding makes Qhull split a facet, or put a sliver of any direction along a ridge, where
-    generators are coplanar but for their last digits. A splinter has no generator beside
-    those of another facet; left in, it would pass for the neighbour across that ridge and
-    hide the facets that a segment adds there.
+    Rounding makes Qhull split a facet, or put a sliver of any direction along a ridge, where generators are
+    coplanar but for their last digits. A splinter has no generator beside those of another facet; left in, it
+    would pass for the neighbour across that ridge and hide the facets that a segment adds there.
     """
     order = np.argsort(-on_generator.sum(axis=1), kind="stable")
     tight = on_generator[order].astype(np.float32)

@@ -26,8 +26,7 @@ class BSpline:
 
     Attributes:
         degree: Degree k >= 0.
-        knots: (m + 1,) nondecreasing, the first and the last repeated k + 1 times
-            ([Qiu2012]_ 2.31).
+        knots: (m + 1,) nondecreasing, the first and the last repeated k + 1 times ([Qiu2012]_ 2.31).
         control_points: (n + 1, d) de Boor points, n = m - k - 1.
     """
 

@@ -1,9 +1,8 @@
 """Contacts as the physics engine measures them, and the stances of those that carry.
 
-A planned contact counts when its effector presses, and with no more of its area than touches: the points of
-the contact that are within :data:`TOUCHING` of the surface, and wherever the engine's contact points carry
-force. Unplanned contacts that carry count too. So the measured wrench of the scene lies in the
-wrench polytope of the stance, up to :data:`TOUCHING`.
+A planned contact counts when its effector presses, and with no more of its area than touches: its points
+within :data:`TOUCHING` of the surface, and wherever the engine's contact points carry force. Unplanned ones
+count too. So the measured wrench lies in the wrench polytope of the stance, up to :data:`TOUCHING`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -83,10 +82,7 @@ class Sensed:
     grips: Mapping[str, FloatArray]
 
     def wrench(self, about: FloatArray, segments: Sequence[str] | None = None) -> FloatArray:
-        """(6,) force and moment of the scene about a point (3,) [m], grips apart.
-
-        Only some segments count if they are named.
-        """
+        """(6,) force and moment of the scene about a point (3,) [m] on all or some segments, grips apart."""
         chosen = self.on_scene
         if segments is not None:
             chosen = chosen & np.array([name in segments for name in self.segments], dtype=bool)
@@ -139,22 +135,14 @@ class CarryingContacts:
     """Turns carried points into stances, sample after sample; a contact that stays is the same object."""
 
     def __init__(self, segments: Mapping[str, Sequence[str]], mass: float) -> None:
-        """Start without contacts, with the names of the segments with which each effector touches.
-
-        The mass [kg] bounds the forces of a stance without caps.
-        """
-        self._segments = dict(segments)
-        self._mass = mass
+        """Start with the segments with which each effector touches, and the mass [kg], by which caps go."""
+        self._segments, self._mass = dict(segments), mass
         self._last: dict[str, Contact] = {}
 
     def stance(
-        self,
-        points: CarriedPoints,
-        pose: Callable[[str], Pose],
-        planned: Mapping[str, Contact],
-        gripping: Sequence[str] = (),
-        model: ContactModel | None = None,
-    ) -> Stance:
+        self, points: CarriedPoints, pose: Callable[[str], Pose], planned: Mapping[str, Contact],
+        gripping: Sequence[str] = (), model: ContactModel | None = None,
+    ) -> Stance:  # fmt: skip
         """Stance of one control step.
 
         Args:
@@ -175,22 +163,19 @@ class CarryingContacts:
             left &= ~chosen
             contacts.append(self._known(*_touched(contact, pose(name), points, chosen)))
         for segment, other in dict.fromkeys(zip(points.segments, points.others, strict=True)):
-            pair = np.array(points.others) == other
-            chosen = left & pair & points.of([segment])
+            chosen = left & (np.array(points.others) == other) & points.of([segment])
             if points.forces[chosen].sum() >= PRESSES:
-                contacts.append(
-                    self._known(_unplanned(f"{segment} on {other}", points, chosen), partial=True)
-                )
+                unplanned = _unplanned(f"{segment} on {other}", points, chosen)
+                contacts.append(self._known(unplanned, partial=True))
         return Stance(contacts, model=model).bounded(self._mass)
 
     def _known(self, contact: Contact, partial: bool) -> Contact:
         """The same contact as before where it has not moved, so that stances can be told apart by it."""
         last = self._last.get(contact.effector)
-        if last is not None and _same_place(last, contact):
-            return last
-        kept = replace(contact, points=_hull(contact.points)) if partial else contact
-        self._last[contact.effector] = kept
-        return kept
+        if last is None or not _same_place(last, contact):
+            last = replace(contact, points=_hull(contact.points)) if partial else contact
+            self._last[contact.effector] = last
+        return last
 
 
 def carried_margin(stances: Sequence[Stance], wrenches: FloatArray, com: FloatArray) -> MotionMargin:
@@ -218,9 +203,8 @@ def _same_place(first: Contact, second: Contact) -> bool:
     Every corner of the first is still met by a point of the second, none of which is outside its hull.
     """
     alike = first.kind is second.kind and first.part is second.part and first.friction == second.friction
+    alike &= first.torsion_limit == second.torsion_limit
     if not alike or first.normal @ second.normal < 1.0 - 1e-6:
-        return False
-    if first.torsion_limit != second.torsion_limit:
         return False
     one, other = ((c.points_in_world - first.position) @ first.rotation_contact_to_world
                   for c in (first, second))  # fmt: skip
@@ -238,11 +222,9 @@ def _touched(
     contact: Contact, pose: Pose, points: CarriedPoints, chosen: NDArray[np.bool_]
 ) -> tuple[Contact, bool]:
     """A planned contact where it is, with what of it touches, and whether that is not all of it."""
-    centre = points.centre(chosen)
+    centre, normal, (position, rotation) = points.centre(chosen), contact.normal, pose
     if contact.kind is ContactKind.POINT:
         return replace(contact, position=centre), False
-    position, rotation = pose
-    normal = contact.normal
     if contact.part is SolePart.FULL:
         corners = position + contact.points @ rotation.T
         corners = corners[np.abs((corners - centre) @ normal) <= TOUCHING]

@@ -40,13 +40,12 @@ class PhysicsOptions:
         timestep: [s]; 1 ms as in [Qiu2012]_ 6.1.
         friction: Coulomb coefficient between the body and the scene and of the body with itself.
         contact_friction: Pairs of a segment and a larger coefficient between it and the scene.
-        segment_friction: Pairs of a segment and the coefficient between it and whatever it touches; such a
-            segment is soft, see ``soft_time_constant``.
+        segment_friction: Pairs of a segment and its coefficient to whatever it touches; it is soft, see
+            ``soft_time_constant``.
         contact_time_constant: How fast a contact pushes penetration out [s]; at least two time steps.
         soft_time_constant: The same for segments with their own friction: flesh on a cushion [s].
         joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
-        armature: Inertia added to the axis of each hinge [kg.m^2]; 0 keeps the mass matrix of the planning
-            model.
+        armature: Inertia added to the axis of each hinge [kg.m^2]; 0 keeps the planning model's mass matrix.
         joint_limits: Whether hinges stop at the ends of their ranges.
         self_collision: Whether :attr:`~manikin.body.BodyModel.collision_pairs` may touch.
     """
@@ -92,9 +91,8 @@ _GEOM = mujoco.mjtGeom
 def add_scene(spec: Any, scene: Scene, contact: dict[str, Any]) -> None:
     """Add every obstacle to the world body of a ``mujoco.MjSpec``, with the same contact settings.
 
-    A convex mesh piece becomes one convex geometry. A piece that is not convex becomes one thin prism per
-    triangle, :data:`SHEET_THICKNESS` thick towards its inside, since MuJoCo would collide with its convex
-    hull instead; too many of them are refused.
+    A convex mesh piece becomes one convex geometry. One that is not, of which MuJoCo would take the hull,
+    becomes a prism per triangle, :data:`SHEET_THICKNESS` thick towards its inside; too many are refused.
     """
     for obstacle in scene:
         shape = obstacle.shape
@@ -178,18 +176,11 @@ class SimulationModel:
     options: PhysicsOptions
     mujoco: Any = field(repr=False)
 
-    def q_to_mujoco(self, q: ArrayLike) -> FloatArray:
-        """(nq,) ``qpos`` of a configuration."""
-        qpos = np.array(q, dtype=np.float64)
-        qpos[3], qpos[4:7] = qpos[6], qpos[3:6].copy()
-        return qpos
-
     def q_from_mujoco(self, qpos: ArrayLike) -> FloatArray:
         """(nq,) configuration of ``qpos``; its quaternion is normalised."""
         q = np.array(qpos, dtype=np.float64)
         q[6], q[3:6] = q[3], q[4:7].copy()
-        quaternion = q[3:7]
-        quaternion /= math.sqrt(quaternion.dot(quaternion))
+        q[3:7] /= math.sqrt(q[3:7].dot(q[3:7]))
         return q
 
     def v_to_mujoco(self, q: ArrayLike, v: ArrayLike) -> FloatArray:
@@ -209,7 +200,8 @@ class SimulationModel:
 
     def set_state(self, data: Any, q: ArrayLike, v: ArrayLike | None = None) -> None:
         """Write a state into a ``MjData`` and bring its kinematics up to date."""
-        data.qpos[:] = self.q_to_mujoco(q)
+        data.qpos[:], (x, y, z, w) = q, np.asarray(q)[3:7]
+        data.qpos[3:7] = w, x, y, z
         data.qvel[:] = 0.0 if v is None else self.v_to_mujoco(q, v)
         mujoco.mj_forward(self.mujoco, data)
 
@@ -230,13 +222,11 @@ class SimulationModel:
 def root_rotation(q: ArrayLike) -> FloatArray:
     """(3, 3) rotation from the root's axes to the world's of a configuration."""
     x, y, z, w = np.asarray(q, dtype=np.float64)[3:7].tolist()
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
 
 
 def _turned(rotation: FloatArray, vector: ArrayLike) -> FloatArray:
@@ -247,22 +237,19 @@ def _turned(rotation: FloatArray, vector: ArrayLike) -> FloatArray:
 
 
 def compile_model(
-    body: BodyModel,
-    scene: Scene | None = None,
-    options: PhysicsOptions | None = None,
+    body: BodyModel, scene: Scene | None = None, options: PhysicsOptions | None = None,
     held: Mapping[str, tuple[FloatArray, FloatArray]] | None = None,
-) -> SimulationModel:
+) -> SimulationModel:  # fmt: skip
     """Compile a body and a scene to MuJoCo.
 
-    With the default options (no damping, no armature) the mass matrix and the bias forces are
-    those of the Pinocchio model. Which segments may touch is :attr:`BodyModel.segment_pairs`
-    exactly: every other pair is excluded by name and MuJoCo's own filter of parents is off.
+    With the default options (no damping, no armature) mass matrix and bias forces are those of the Pinocchio
+    model. The pairs that may touch are :attr:`BodyModel.segment_pairs`; MuJoCo's filter of parents is off.
 
     Args:
         scene: Obstacles and floor; None for an empty world without a floor.
         options: Settings; defaults when None.
-        held: Effectors that are welded to the world, with rotation (3, 3) and position (3,) [m]; their
-            segments pass through the scene.
+        held: Effectors welded to the world, at a rotation (3, 3) and a position (3,) [m]; their segments pass
+            through the scene.
 
     Raises:
         SceneError: If a mesh is too large to simulate.
@@ -270,17 +257,6 @@ def compile_model(
     options = options or PhysicsOptions()
     spec = mujoco.MjSpec()
     spec.modelname = body.name
-    _set_options(spec, options)
-    _add_body(spec, body, options)
-    _add_excludes(spec, body)
-    if scene is not None:
-        add_scene(spec, scene, _contact(options, scenery=True))
-    for name, (rotation, position) in (held or {}).items():
-        _hold(spec, body, name, rotation, position)
-    return SimulationModel(body, scene, options, spec.compile())
-
-
-def _set_options(spec: Any, options: PhysicsOptions) -> None:
     spec.compiler.degree = False
     spec.compiler.balanceinertia = False
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
@@ -289,17 +265,26 @@ def _set_options(spec: Any, options: PhysicsOptions) -> None:
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0  # friction that stiff, against the normal direction, holds loaded feet still
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+    _add_body(spec, body, options)
+    allowed = {frozenset(pair) for pair in body.segment_pairs}
+    for first, second in itertools.combinations([segment.name for segment in body.segments], 2):
+        if frozenset((first, second)) not in allowed:
+            spec.add_exclude(bodyname1=first, bodyname2=second)
+    if scene is not None:
+        add_scene(spec, scene, _contact(options, scenery=True))
+    for name, (rotation, position) in (held or {}).items():
+        _hold(spec, body, name, rotation, position)
+    return SimulationModel(body, scene, options, spec.compile())
 
 
 def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:
     """Contact settings of a geometry; bits let body and scene touch, and body and body if wanted."""
     return {
-        "friction": [options.friction, *_TURNING_FRICTION],
-        "condim": 3,
+        "friction": [options.friction, *_TURNING_FRICTION], "condim": 3,
         "solref": [options.contact_time_constant, 1.0],  # critically damped
         "contype": 2 if scenery else 1,
         "conaffinity": 1 if scenery else (3 if options.self_collision else 2),
-    }
+    }  # fmt: skip
 
 
 def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
@@ -315,14 +300,17 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
             item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
         for hinge in segment.hinges:
             _add_hinge(spec, item, hinge, options)
-        friction, soft = (
-            dict(pairs).get(segment.name) for pairs in (options.contact_friction, options.segment_friction)
-        )
+        friction = dict(options.contact_friction).get(segment.name)
+        soft = dict(options.segment_friction).get(segment.name)
         # Of two geometries the engine takes the larger friction.
         special = {} if friction is None else {"friction": [friction, *_TURNING_FRICTION]}
-        special |= {} if soft is None else _soft_contact(soft, options)
+        if soft is not None:  # soft flesh, whose settings count before those of what it touches
+            special = {
+                "friction": [soft, *_TURNING_FRICTION], "solref": [options.soft_time_constant, 1.0],
+                "priority": 1, "solimp": [*SOFT_IMPEDANCE, 0.5, 2.0],
+            }  # fmt: skip
         for shape in segment.shapes:
-            _add_shape(item, segment, shape, {**contact, **special})
+            _add_shape(item, segment, shape, contact | special)
     for effector in body.effectors.values():
         made[effector.segment].add_site(
             name=f"effector/{effector.name}", pos=effector.translation, quat=quaternion(effector.rotation)
@@ -332,16 +320,6 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
 SOFT_IMPEDANCE = (0.3, 0.8, 0.005)
 """Impedance of soft flesh in the engine at first touch and at a depth, the third value [m]. Low ones give way
 under load, so that a body slides on a cushion instead of bouncing along it."""
-
-
-def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
-    """Contact settings of soft flesh, which count before those of what it touches."""
-    return {
-        "friction": [friction, *_TURNING_FRICTION],
-        "solref": [options.soft_time_constant, 1.0],
-        "priority": 1,
-        "solimp": [*SOFT_IMPEDANCE, 0.5, 2.0],
-    }
 
 
 def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions) -> None:
@@ -379,10 +357,3 @@ def _hold(spec: Any, body: BodyModel, name: str, rotation: FloatArray, position:
         solimp=[0.999, 0.9999, 0.001, 0.5, 2.0],
     )  # fmt: skip
     spec.add_exclude(bodyname1=body.effector(name).segment, bodyname2="world")
-
-
-def _add_excludes(spec: Any, body: BodyModel) -> None:
-    allowed = {frozenset(pair) for pair in body.segment_pairs}
-    for first, second in itertools.combinations([segment.name for segment in body.segments], 2):
-        if frozenset((first, second)) not in allowed:
-            spec.add_exclude(bodyname1=first, bodyname2=second)

@@ -16,7 +16,6 @@ from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
 from manikin.numerics.spatial import finite_number
 from manikin.scene import Scene
-from manikin.simulation.carrying import Touch
 from manikin.simulation.compile import PhysicsOptions, compile_model
 from manikin.simulation.execution import Execution, push_outcome
 from manikin.simulation.push_force import Push
@@ -50,8 +49,6 @@ _AT_REST = 1e-2
 class _Hold:
     """One planned support with the obstacles under it, and the segments that may lie on them."""
 
-    effector: str
-    segments: tuple[str, ...]
     lying: tuple[str, ...]
     interval: SupportInterval
     obstacles: tuple[str, ...]
@@ -60,12 +57,10 @@ class _Hold:
 def default_physics(body: BodyModel, schedule: ContactSchedule) -> PhysicsOptions:
     """Physics of an execution: stiff contacts, passive damping, and the friction of the planned contacts.
 
-    Each segment that makes contact has the least friction of its own contacts, everything else the least
-    of all: feet do not slip on the floor because a seat is smooth. A segment that slides to its place on a
-    seat has the friction of that contact alone.
+    Each segment that makes contact has the least friction of its own contacts, everything else the least of
+    all: feet do not slip because a seat is smooth. One that slides to its place has that friction alone.
     """
-    every = (contact for phase in schedule.sequence for contact in phase.stance)
-    contacts = [contact for contact in every if contact.kind is not ContactKind.GRASP]
+    contacts = [c for phase in schedule.sequence for c in phase.stance if c.kind is not ContactKind.GRASP]
     options = PhysicsOptions(joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME)
     sliding = {body.effector(c.effector).segment: c.friction for c in contacts if c.settle > 0.0}
     options = replace(options, segment_friction=tuple(sorted(sliding.items())))
@@ -93,8 +88,7 @@ def execute(
         motion: Planned motion.
         settings: Settings of the controller; the defaults when omitted.
         physics: Settings of the engine; :func:`default_physics` when omitted.
-        hold: Time to stand at the end [s]. With none, the last step of a motion that ends at speed is left
-            out, for it would be stopped dead.
+        hold: Time to stand at the end [s]. With none, a motion that ends at speed lacks its last step.
         pushes: Forces that disturb the execution, in real time, from the motion's first sample on its own;
             from then on a touch of the body with itself is no failure.
         padded: Obstacles that any part of the body may lean on, such as a backrest.
@@ -105,13 +99,11 @@ def execute(
         The outcome; a fall, a divergence or an unplanned touch is a result, not an error.
 
     Raises:
-        InputError: If the control period is not a multiple of the engine's time step, or the
-            motion is of another body.
+        InputError: If the control period is no multiple of the engine's time step, or the body another one.
         ContactError: If a support does not lie on a surface of the scene.
     """
     finite_number(hold, "hold [s]", at_least=0.0)
-    run = _Run(body, scene, motion, schedule, settings, physics, pushes, padded, wishes)
-    return run.execute(hold, progress)
+    return _Run(body, scene, motion, schedule, settings, physics, pushes, padded, wishes).run(hold, progress)
 
 
 class _Run:
@@ -120,32 +112,39 @@ class _Run:
     def __init__(
         self, body: BodyModel, scene: Scene, motion: Motion, schedule: ContactSchedule,
         settings: ControlSettings | None, physics: PhysicsOptions | None, pushes: Sequence[Push],
-        padded: Sequence[str] = (), wishes: Sequence[ForceWish] = (),
+        padded: Sequence[str], wishes: Sequence[ForceWish],
     ) -> None:  # fmt: skip
         self.body, self.plan, self.schedule = body, motion, schedule
         settings = settings or ControlSettings()
         physics = physics or default_physics(body, schedule)
         self.period = settings.period
-        self.substeps = _substeps(settings.period, physics.timestep)
+        self.substeps = round(settings.period / physics.timestep)
+        if self.substeps < 1 or abs(self.substeps * physics.timestep - settings.period) > 1e-9:
+            raise InputError(
+                f"control period is {settings.period:g} s and physics timestep {physics.timestep:g} s; "
+                "valid: a whole multiple"
+            )
         damping = np.full(body.nv - 6, physics.joint_damping)
         self.controller = Controller(body, motion, schedule, settings, joint_damping=damping, wishes=wishes)
-        self.holds = _holds(body, scene, schedule)
+        self.holds: list[_Hold] = []
+        for effector in schedule.sequence.effectors:
+            lying = tuple(sorted({segment for segment, _ in touching_pairs(body, [(effector, "")])}))
+            for interval in support_intervals(schedule, effector, SWITCHING):
+                self.holds.append(_Hold(lying, interval, scene.touched_obstacles(interval.contact)))
         self.world = World(compile_model(body, scene, physics), padded)
         self.pushes = tuple(pushes)
         for push in pushes:
             self.world.apply_push(push)
-        segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
-        self.recorder = Recorder(schedule, segments)
+        self._segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
+        self.recorder = Recorder(schedule, self._segments)
         self.failure, self.failure_time = "", None
         everything = tuple(segment.name for segment in body.segments)
         self._leaning = [(everything, name) for name in padded]
         self._planned_now: tuple[int, ...] | None = None
         self._leaving = set[str]()
 
-    def execute(self, hold: float, progress: Callable[[float], None] | None) -> Execution:
-        began = clock.perf_counter()
-        control = 0.0
-        start = float(self.plan.time[0])
+    def run(self, hold: float, progress: Callable[[float], None] | None) -> Execution:
+        began, control, start = clock.perf_counter(), 0.0, float(self.plan.time[0])
         # None when the motion begins at speed.
         at_rest = float(np.abs(self.plan.v[0]).max()) < _AT_REST
         settle = round(SETTLING / self.period) if at_rest else 0
@@ -169,8 +168,8 @@ class _Run:
             carried = self.world.carried()
             if number >= 0:
                 self.recorder.record(sensed, output, self.world.mean_wrench(), carried)
-            if number >= 0 and self._failed(output):
-                break
+                if self._failed(output):
+                    break
             number += 1
             if number > 0 and progress is not None:
                 progress(min(number / count, 1.0))
@@ -206,10 +205,10 @@ class _Run:
         """Whether each effector touches the support it holds or is about to make."""
         felt: dict[str, bool] = {}
         for number in self._planned_now or ():
-            item = self.holds[number]
-            grasp = item.interval.contact.kind is ContactKind.GRASP
-            if not grasp and time < item.interval.end - 1e-9:
-                felt[item.effector] = any(self.world.touching(item.segments, name) for name in item.obstacles)
+            item, contact = self.holds[number], self.holds[number].interval.contact
+            if contact.kind is not ContactKind.GRASP and time < item.interval.end - 1e-9:
+                segments = self._segments[contact.effector]
+                felt[contact.effector] = any(self.world.touching(segments, name) for name in item.obstacles)
         return felt
 
     def _failed(self, output: ControlOutput) -> bool:
@@ -223,9 +222,11 @@ class _Run:
         return bool(self.failure)
 
     def _report(self, wall: float, control: float) -> Execution:
-        recorder, world = self.recorder, self.world
-        fell = self.failure.startswith("fell")
-        touches = self._counted_touches()
+        recorder, world, fell = self.recorder, self.world, self.failure.startswith("fell")
+        # An arm that swings in a recovery may brush the body.
+        pushed = min((push.start for push in self.pushes), default=np.inf)
+        segments = {segment.name for segment in self.body.segments}
+        touches = tuple(t for t in world.touches if t.time < pushed or t.other not in segments)
         if not self.failure and touches:
             self.failure, self.failure_time = f"unplanned touch: {touches[0]}", touches[0].time
         balance = recorder.margins(self.body.mass)
@@ -233,45 +234,22 @@ class _Run:
         com = recorder.com_errors()
         bound = com[: max(recorder.bound_samples(), 1)]
         peak = np.abs(executed.tau[:, 6:]).max(axis=0)
-        simulated = len(recorder.samples) * self.period
-        effector_error, effector, effector_time = recorder.worst_effector()
+        error, effector, error_time = recorder.worst_effector()
+        fallbacks = ((s.sensed.time, s.output.fallback) for s in recorder.samples if s.output.fallback)
         return Execution(
-            motion=executed,
-            fell=fell,
-            failure=self.failure,
-            failure_time_s=self.failure_time,
-            com_rms_error_m=float(np.sqrt(np.mean(bound**2))),
-            com_max_error_m=float(bound.max()),
-            max_foot_error_m=effector_error,
-            worst_effector=effector,
-            worst_effector_time_s=effector_time,
-            final_com_error_m=float(com[-1]),
-            min_margin=float(executed.margin.min()),
-            min_force_at_com_N=balance.min_force,
-            min_zmp_distance_m=balance.min_zmp_distance,
-            max_penetration_m=world.penetration,
-            max_padding_compression_m=world.padding_compression,
+            motion=executed, fell=fell, failure=self.failure, failure_time_s=self.failure_time,
+            com_rms_error_m=float(np.sqrt(np.mean(bound**2))), com_max_error_m=float(bound.max()),
+            max_foot_error_m=error, worst_effector=effector, worst_effector_time_s=error_time,
+            final_com_error_m=float(com[-1]), min_margin=float(executed.margin.min()),
+            min_force_at_com_N=balance.min_force, min_zmp_distance_m=balance.min_zmp_distance,
+            max_penetration_m=world.penetration, max_padding_compression_m=world.padding_compression,
             peak_torque_Nm=dict(zip(self.body.joint_names, peak.tolist(), strict=True)),
             max_limit_use=float(self.body.torque_share(executed.tau[:, 6:]).max(initial=0.0)),
-            realtime_factor=simulated / wall,
-            wall_s=wall,
-            control_ms=1e3 * control / len(recorder.samples),
-            touches=world.touches,
-            counted_touches=touches,
-            fallbacks=tuple(
-                (s.sensed.time, s.output.fallback) for s in recorder.samples if s.output.fallback
-            ),
-            max_slip_m=recorder.max_slip,
-            friction=recorder.friction_use(),
-            push=push_outcome(self.pushes, recorder, self.failure),
-            schedule=recorder.delayed_schedule(),
-        )
-
-    def _counted_touches(self) -> tuple[Touch, ...]:
-        """Unplanned touches that are a failure; an arm that swings in a recovery may brush the body."""
-        pushed = min((push.start for push in self.pushes), default=np.inf)
-        segments = {segment.name for segment in self.body.segments}
-        return tuple(t for t in self.world.touches if t.time < pushed or t.other not in segments)
+            realtime_factor=len(recorder.samples) * self.period / wall, wall_s=wall,
+            control_ms=1e3 * control / len(recorder.samples), touches=world.touches, counted_touches=touches,
+            fallbacks=tuple(fallbacks), max_slip_m=recorder.max_slip, friction=recorder.friction_use(),
+            push=push_outcome(self.pushes, recorder, self.failure), schedule=recorder.delayed_schedule(),
+        )  # fmt: skip
 
 
 def _expected(interval: SupportInterval, time: float) -> bool:
@@ -279,26 +257,3 @@ def _expected(interval: SupportInterval, time: float) -> bool:
     if interval.contact.kind is not ContactKind.GRASP:
         return near(interval, time)
     return interval.start - GRASPING <= time <= interval.end + GRASPING
-
-
-def _substeps(period: float, timestep: float) -> int:
-    count = round(period / timestep)
-    if count < 1 or abs(count * timestep - period) > 1e-9:
-        raise InputError(
-            f"control period is {period:g} s and physics timestep {timestep:g} s; valid: a whole multiple"
-        )
-    return count
-
-
-def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_Hold, ...]:
-    return tuple(
-        _Hold(
-            effector,
-            end_segments(body, effector),
-            tuple(sorted({segment for segment, _ in touching_pairs(body, [(effector, "")])})),
-            interval,
-            scene.touched_obstacles(interval.contact),
-        )
-        for effector in schedule.sequence.effectors
-        for interval in support_intervals(schedule, effector, SWITCHING)
-    )

@@ -9,7 +9,6 @@ import numpy as np
 from manikin.balance.contact_forces import FrictionUse
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import Displayed
 from manikin.simulation.carrying import Touch
 from manikin.simulation.push_force import Push, push_impulse
@@ -29,8 +28,7 @@ class PushOutcome:
         at_s: When the first began [s].
         recovered: Whether the body came back on its plan, and nothing failed.
         max_deviation_m: Largest distance of the centre of mass from its plan since then [m].
-        return_s: From the first push until the centre of mass is within :data:`BACK` of its plan for
-            good [s]; None if it is not.
+        return_s: From the first push until the CoM is within :data:`BACK` of its plan for good [s], or None.
         waited_s: How long the plan waited for the body [s].
         max_foot_deviation_m: Largest distance of an effector from its plan at the end [m].
     """
@@ -51,27 +49,17 @@ def push_outcome(pushes: Sequence[Push], recorder: Recorder, failure: str) -> Pu
         return None
     first = min(pushes, key=lambda push: push.start)
     since = np.array([sample.sensed.time for sample in recorder.samples]) - first.start
-    errors = recorder.com_errors()
-    back = None if failure else _return(since, errors)
-    after = errors[since >= -1e-9]
+    errors, back = recorder.com_errors(), None
+    if not failure and errors[-1] <= BACK:  # when the errors stay small to the end
+        off = np.flatnonzero(errors > BACK)
+        back = float(max(0.0, since[off[-1] + 1])) if len(off) else 0.0
     return PushOutcome(
         impulse_Ns=float(sum(push_impulse(push) for push in pushes)),
-        direction_deg=float(np.degrees(np.arctan2(first.force[1], first.force[0]))),
-        at_s=first.start,
-        recovered=back is not None,
-        max_deviation_m=float(after.max(initial=0.0)),
-        return_s=back,
-        waited_s=recorder.samples[-1].output.waited,
+        direction_deg=float(np.degrees(np.arctan2(first.force[1], first.force[0]))), at_s=first.start,
+        recovered=back is not None, max_deviation_m=float(errors[since >= -1e-9].max(initial=0.0)),
+        return_s=back, waited_s=recorder.samples[-1].output.waited,
         max_foot_deviation_m=recorder.last_effector_error(),
-    )
-
-
-def _return(since: FloatArray, errors: FloatArray) -> float | None:
-    """Time after which the errors stay small to the end [s]."""
-    if errors[-1] > BACK:
-        return None
-    off = np.flatnonzero(errors > BACK)
-    return 0.0 if not len(off) else float(max(0.0, since[off[-1] + 1]))
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,17 +69,14 @@ class Execution(Displayed):
     Attributes:
         motion: Executed motion, one sample per control step; ``tau`` are the joint torques held from the
             sample on, ``a`` and ``contact_force`` measured in the step's first millisecond, moments about the
-            origin of the *planned* contact frame, ``support`` where it presses, ``margin`` that of the wrench
-            of all contacts, averaged over the control step, about the centre of mass, in the polytope of the
-            contacts that really carried it.
+            origin of the *planned* contact frame, ``support`` where it presses, ``margin`` that of the mean
+            wrench of all contacts over the step, about the CoM, in the polytope of those that carried it.
         fell: Whether the body fell.
         failure: Why the run is no success, in one line; empty for a success.
         failure_time_s: When it failed [s], or None.
-        com_rms_error_m: RMS distance from the planned CoM, over motion and hold, but only until the body
-            sits down where it does [m].
+        com_rms_error_m: RMS distance from the planned CoM, over motion and hold until it sits down [m].
         com_max_error_m: Largest such distance [m].
-        max_foot_error_m: Largest distance of an effector of the schedule from its plan, but not of one
-            that slides to its place on a seat [m].
+        max_foot_error_m: Largest distance of an effector from its plan; one that slides on a seat is out [m].
         worst_effector: Its name; empty without one.
         worst_effector_time_s: Its time [s].
         final_com_error_m: Distance of the CoM from its plan at the end of the hold [m].
@@ -111,8 +96,7 @@ class Execution(Displayed):
         friction: Largest use of friction by the forces that control counted on; None without control.
         schedule: When the planned contacts were due, later where the plan waited; None where it did not.
         min_force_at_com_N: Smallest force at the CoM that would have ended balance; None where none does [N].
-        min_zmp_distance_m: Least distance of the measured ZMP to the edge of what carries, negative outside;
-            None where it never spans one plane [m].
+        min_zmp_distance_m: Least distance of the ZMP to the edge of what carries; None without one [m].
     """
 
     motion: Motion
@@ -152,9 +136,8 @@ class Execution(Displayed):
         """The "execution" block of the run's summary."""
         names = (
             "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m",
-            "min_margin", "min_force_at_com_N", "min_zmp_distance_m",
-            "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm",
-            "realtime_factor", "wall_s",
+            "min_margin", "min_force_at_com_N", "min_zmp_distance_m", "max_penetration_m",
+            "max_padding_compression_m", "peak_torque_Nm", "realtime_factor", "wall_s",
         )  # fmt: skip
         block = {name: getattr(self, name) for name in names}
         block["friction"] = None if self.friction is None else self.friction.summary()

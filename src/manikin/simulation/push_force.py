@@ -9,13 +9,8 @@ from manikin.body import BodyModel, Configuration
 from manikin.control.recovery import joint_groups
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.numerics.spatial import (
-    FloatArray,
-    finite_number,
-    frozen_array,
-    rotation_from_quaternion,
-    rotation_from_yaw,
-)
+from manikin.numerics import spatial
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 
 STRONGEST = 5000.0
 """Largest force of a push [N]: some seven body weights, and far beyond what can be held."""
@@ -65,14 +60,9 @@ class Push:
 
 
 def push_near_com(
-    body: BodyModel,
-    force: ArrayLike,
-    start: float,
-    duration: float,
-    *,
-    frequency: float = 0.0,
+    body: BodyModel, force: ArrayLike, start: float, duration: float, *, frequency: float = 0.0,
     q: ArrayLike | None = None,
-) -> Push:
+) -> Push:  # fmt: skip
     """Push that acts near the centre of mass ([Kudoh2002]_ 3.2).
 
     It acts on the trunk's segment at whose height the centre of mass is in the posture, at that point.
@@ -113,9 +103,9 @@ def push_on_the_way(
         frequency: As of :class:`Push` [Hz].
     """
     sample = min(int(np.searchsorted(motion.time, start)), len(motion.time) - 1)
-    forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
+    forward = spatial.rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
     heading = float(np.arctan2(forward[1], forward[0]))
-    way = rotation_from_yaw(heading + np.deg2rad(direction))[:, 0]
+    way = spatial.rotation_from_yaw(heading + np.deg2rad(direction))[:, 0]
     return Push("thorax", force * way, start, duration, frequency=frequency)
 
 

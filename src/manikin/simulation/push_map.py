@@ -24,8 +24,7 @@ USUAL = {
 def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
     """Words for the conditions that maps have in common, and for each map those that tell it from the others.
 
-    The conditions of each are as in its JSON; usual common ones are left out, and the words of a map are
-    empty where none differs.
+    The conditions are as in JSON. Usual common ones are left out; a map that differs in none has no words.
     """
     lists = [_words(conditions) for conditions in maps]
     differ = [len(set(words)) > 1 for words in zip(*lists, strict=True)]
@@ -119,12 +118,12 @@ class PushMap(Displayed):
     @property
     def held(self) -> FloatArray:
         """(n,) largest impulse held [N.s]; NaN where it is not known or the body does not stand."""
-        return np.array([np.nan if f is None or f.held is None else f.held for f in self.found])
+        return np.array([None if f is None else f.held for f in self.found], dtype=np.float64)
 
     @property
     def beyond(self) -> FloatArray:
         """(n,) smallest impulse not held [N.s]; NaN where it is not known or there is none."""
-        return np.array([np.nan if f is None or f.beyond is None else f.beyond for f in self.found])
+        return np.array([None if f is None else f.beyond for f in self.found], dtype=np.float64)
 
     def with_found(self, number: int, found: HeldImpulse) -> "PushMap":
         """The map with the result of one direction more."""
@@ -132,21 +131,18 @@ class PushMap(Displayed):
 
     def surely_held(self, direction_deg: float) -> float:
         """Impulse held from any direction [N.s]: the smaller one of the two neighbouring directions."""
-        return float(np.min(self.held[list(self._neighbours(direction_deg))]))
+        return float(np.min(self.held[self._neighbours(direction_deg)]))
 
     def surely_beyond(self, direction_deg: float) -> float:
         """Impulse not held from any direction [N.s]: the larger one of the two neighbours."""
-        return float(np.max(self.beyond[list(self._neighbours(direction_deg))]))
+        return float(np.max(self.beyond[self._neighbours(direction_deg)]))
 
-    def _neighbours(self, direction_deg: float) -> tuple[int, int]:
+    def _neighbours(self, direction_deg: float) -> list[int]:
         after = int(np.searchsorted(self.directions, direction_deg % 360.0, side="right"))
-        return (after - 1) % len(self.directions), after % len(self.directions)
+        return [(after - 1) % len(self.directions), after % len(self.directions)]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values; the inverse of :meth:`from_dict`.
-
-        ``trials`` is null for a direction that has not been searched yet.
-        """
+        """Plain values, the inverse of :meth:`from_dict`; ``trials`` is null where it is not searched yet."""
         return {
             **self.conditions, "directions_deg": list(self.directions),
             "impulse_Ns": [None if f is None else f.held for f in self.found],

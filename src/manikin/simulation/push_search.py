@@ -29,10 +29,9 @@ RAISED = np.array([-0.1, 0.0, 0.12])
 
 
 def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
-    """(nq,) posture on one foot, the centre of mass over the middle of its sole.
+    """(nq,) posture of a body with two legs on one foot, the centre of mass over the middle of its sole.
 
-    The foot, an effector of a body with two legs, stays where it is in the standing posture; no part of the
-    body is in another.
+    The foot stays where it is in the standing posture; no part of the body is in another.
 
     Raises:
         InputError: If the body has no such foot, or cannot stand like that.
@@ -89,8 +88,7 @@ PUSH_BEGINS = 0.2
 """Time at which pushes begin [s], as in the scenarios after the thesis."""
 
 AFTERWARDS = 5.2
-"""Time from the end of a push to the end of its run [s]; a body that does not stand at rest by then has
-not recovered."""
+"""Time from the end of a push to the end of its run [s], by which a body has recovered or has not."""
 
 AT_REST = 0.5
 """Time at rest after which a trial is taken as held until it is confirmed [s]."""
@@ -130,8 +128,7 @@ class PushTrials:
     def bound(self, directions_deg: Sequence[float]) -> tuple[float, ...] | None:
         """(n,) upper bounds of the impulse held without a step [N.s], by direction as of :meth:`push` [deg].
 
-        They are those of a pendulum with a flywheel, see
-        :func:`~manikin.control.recovery.edge_limits`; None for feet that are held.
+        Those of :func:`~manikin.control.recovery.edge_limits`; None for feet that are held.
         """
         if self.task.feet is Feet.HELD:
             return None
@@ -143,8 +140,9 @@ class PushTrials:
         return self.body.standing_posture() if self.task.q is None else self.task.q
 
     def _controller(self) -> BalanceRecovery:
+        body, task = self.body, self.task
         return BalanceRecovery(
-            self.body, self._posture, self.settings, support=self.task.support, friction=self.task.friction
+            body, self._posture, self.settings, support=task.support, friction=task.friction
         )
 
     def push(self, direction_deg: float, impulse: float, *, until_at_rest: float | None = None) -> Recovery:
@@ -177,8 +175,7 @@ class HeldImpulse:
 
     Attributes:
         held: Largest impulse found that it recovers from [N.s]; None where it falls without any push.
-        beyond: Smallest impulse found that it does not recover from [N.s]; None where it recovers from the
-            strongest push.
+        beyond: Smallest impulse found that it does not recover from [N.s]; None where there is none.
         trials: Number of pushes that were simulated.
     """
 
@@ -192,10 +189,9 @@ def largest_held(
 ) -> HeldImpulse:
     """Search the largest impulse that is held, by bisection.
 
-    The first impulse is doubled until one is not held, or halved until one is; the gap between the two is
-    then bisected down to the tolerance. Recovery need not be monotone in the force: a body may fall from a
-    push and recover from a harder one, for which it swings its arms in time. The result is *one* border
-    between an impulse that was held and a larger one that was not; both were tried.
+    The first impulse is doubled until one is not held, or halved until one is, and the gap then bisected. A
+    body may fall from a push and recover from a harder one, for which it swings its arms in time: the result
+    is *one* border between an impulse that was held and a larger one that was not; both were tried.
 
     Args:
         holds: Whether an impulse [N.s] is held.
@@ -212,7 +208,7 @@ def largest_held(
         trials.append(impulse)
         return holds(impulse)
 
-    held, beyond = _bracket(tried, tolerance, min(FIRST, strongest), strongest)
+    held, beyond = _bracket(tried, tolerance, strongest)
     while held is not None and beyond is not None and beyond - held > tolerance:
         middle = 0.5 * (held + beyond)
         if tried(middle):
@@ -223,10 +219,10 @@ def largest_held(
 
 
 def _bracket(
-    holds: Callable[[float], bool], tolerance: float, first: float, strongest: float
+    holds: Callable[[float], bool], tolerance: float, strongest: float
 ) -> tuple[float | None, float | None]:
     """An impulse that is held and one that is not, each None if there is none."""
-    impulse = first
+    impulse = min(FIRST, strongest)
     if holds(impulse):
         while impulse < strongest:
             larger = min(2.0 * impulse, strongest)
@@ -258,8 +254,8 @@ class DirectionSearch:
     def run(self) -> HeldImpulse:
         """Search.
 
-        Trials end early once the body has stood at rest for a while. The final impulse is confirmed by a run
-        to its end; if the body falls there, the search is repeated with such runs alone.
+        Trials end once the body has stood at rest for a while. The final impulse is confirmed by a run to its
+        end; if the body falls there, the search is repeated with such runs alone.
         """
         quick = self._search(AT_REST)
         if not quick.held:

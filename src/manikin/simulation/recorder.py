@@ -54,29 +54,22 @@ class Recorder:
         self.effectors = schedule.sequence.effectors
         self.samples: list[Sample] = []
         self._intervals = {name: support_intervals(schedule, name, SWITCHING) for name in self.effectors}
-        self._landings: dict[str, FloatArray | None] = dict.fromkeys(self.effectors)
+        self._landings: dict[str, FloatArray] = {}
         self.max_slip = 0.0
 
     def record(
         self, sensed: Sensed, output: ControlOutput, total: FloatArray, carried: CarriedPoints
     ) -> None:
-        """Add one control step with the measurements of its first engine step.
-
-        Args:
-            total: (6,) mean wrench of all contacts over the whole step.
-            carried: Contact points that carried it.
-        """
-        plan_time = sensed.time - output.waited
-        wrenches = np.array([self._wrench(name, sensed, plan_time) for name in self.effectors])
-        self.samples.append(Sample(sensed, output, wrenches, total, carried))
+        """Add one control step: its first engine step, and the mean wrench (6,) of all its points."""
+        plan_time, wrenches = sensed.time - output.waited, []
         for name in self.effectors:
             self._measure_slip(name, output, plan_time)
-
-    def _wrench(self, name: str, sensed: Sensed, plan_time: float) -> FloatArray:
-        contact = self._nearest_contact(name, plan_time)
-        if contact.kind is ContactKind.GRASP:
-            return sensed.grip_wrench(name, contact.position)
-        return sensed.wrench(contact.position, self._segments[name])
+            contact = self._nearest_contact(name, plan_time)
+            if contact.kind is ContactKind.GRASP:
+                wrenches.append(sensed.grip_wrench(name, contact.position))
+            else:
+                wrenches.append(sensed.wrench(contact.position, self._segments[name]))
+        self.samples.append(Sample(sensed, output, np.array(wrenches), total, carried))
 
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""
@@ -90,13 +83,9 @@ class Recorder:
         held = support.mode is SupportMode.STANCE and support.load_share >= 1
         rolls = support.contact is not None and support.contact.part is not SolePart.FULL
         if not held or support.contact is None or rolls or self._schedule.settling(time, name)[0]:
-            self._landings[name] = None
+            self._landings.pop(name, None)
             return
-        landing = self._landings[name]
-        if landing is None:
-            self._landings[name] = position
-            return
-        moved = position - landing
+        moved = position - self._landings.setdefault(name, position)
         along = moved - (moved @ support.contact.normal) * support.contact.normal
         self.max_slip = max(self.max_slip, float(np.linalg.norm(along)))
 
@@ -110,9 +99,7 @@ class Recorder:
         for sample in self.samples:
             for name, support in sample.output.supports.items():
                 contact, wrench = support.contact, sample.output.wrenches.get(name)
-                if contact is None or wrench is None or support.settling:
-                    continue
-                if contact.kind is ContactKind.GRASP:
+                if contact is None or wrench is None or support.settling or contact.kind is ContactKind.GRASP:
                     continue
                 share = float(friction_share(contact, wrench[None, :3], model)[0])
                 if share > most.share:
@@ -128,9 +115,7 @@ class Recorder:
     def bound_samples(self) -> int:
         """Number of samples before the body sits down, after which its CoM need not follow a plan."""
         times = np.array([s.plan_time for s in self.samples])
-        seated = [
-            item.start for items in self._intervals.values() for item in items if item.contact.settle > 0.0
-        ]
+        seated = [i.start for items in self._intervals.values() for i in items if i.contact.settle > 0.0]
         return int(np.sum(times < min(seated, default=np.inf)))
 
     def worst_effector(self) -> tuple[float, str, float]:
@@ -150,11 +135,8 @@ class Recorder:
 
     def _effector_errors(self, samples: Sequence[Sample]) -> tuple[list[str], FloatArray]:
         """Effectors none of whose contacts slide to their places, and their distances from the plan [m]."""
-        firm = [
-            name
-            for name in self.effectors
-            if all(item.contact.settle == 0.0 for item in self._intervals[name])
-        ]
+        sliding = {name for name, items in self._intervals.items() for item in items if item.contact.settle}
+        firm = [name for name in self.effectors if name not in sliding]
         return firm, _lengths([
             s.output.state.frames[name].position - s.output.reference.effectors[name].position
             for s in samples for name in firm
@@ -171,11 +153,10 @@ class Recorder:
         return ContactSchedule(self._schedule.sequence, instants + late)
 
     def margins(self, mass: float) -> MotionMargin:
-        """Margins of the mean measured wrenches, about the centre of mass.
+        """Margins of the mean measured wrenches about the centre of mass, in the stances that really carry.
 
-        The stance is that of the contacts that really carry, see :mod:`manikin.simulation.carrying`, and
-        not the one that was planned: a foot that is late does not count, and one that is early does. The mass
-        [kg] closes the polytope of a stance without force limits.
+        See :mod:`manikin.simulation.carrying`: a late foot does not count, and one that is early does. The
+        mass [kg] closes the polytope of a stance without force limits.
         """
         carrying = CarryingContacts(self._segments, mass)
         return carried_margin(
@@ -197,39 +178,29 @@ class Recorder:
         """Turn the samples into a motion with its margin (n,) [N.m]."""
         return executed_motion(
             np.round([s.sensed.time for s in self.samples], 9) + 0.0,  # the engine adds up its steps
-            [s.output.state for s in self.samples],
-            a=np.array([s.sensed.a for s in self.samples]),
-            tau=np.array([s.output.tau for s in self.samples]),
-            margin=margin,
+            [s.output.state for s in self.samples], a=np.array([s.sensed.a for s in self.samples]),
+            tau=np.array([s.output.tau for s in self.samples]), margin=margin,
             contact_force=np.array([s.wrenches for s in self.samples]),
-            contact_names=tuple(self.effectors),
-            joint_names=tuple(joint_names),
-        )
+            contact_names=tuple(self.effectors), joint_names=tuple(joint_names),
+        )  # fmt: skip
 
 
 def executed_motion(
-    time: FloatArray,
-    states: Sequence[DynamicsState],
-    *,
-    tau: FloatArray,
-    contact_force: FloatArray,
+    time: FloatArray, states: Sequence[DynamicsState], *, tau: FloatArray, contact_force: FloatArray,
     **series: Any,
-) -> Motion:
+) -> Motion:  # fmt: skip
     """Motion of n states, (n, nv - 6) joint torques [N.m] and (n, contacts, 6) wrenches [N, N.m].
 
     A contact supports where it presses by more than :data:`PRESSES`; ``series`` are the other fields.
     """
     return Motion(
-        time=time,
-        q=np.array([state.q for state in states]),
-        v=np.array([state.v for state in states]),
+        time, q=np.array([state.q for state in states]), v=np.array([state.v for state in states]),
         tau=np.concatenate((np.zeros((len(tau), 6)), tau), axis=1),
         com=np.array([state.com for state in states]),
         angular_momentum=np.array([state.momentum[3:] for state in states]),
-        support=np.linalg.norm(contact_force[..., :3], axis=-1) > PRESSES,
-        contact_force=contact_force,
+        support=np.linalg.norm(contact_force[..., :3], axis=-1) > PRESSES, contact_force=contact_force,
         **series,
-    )
+    )  # fmt: skip
 
 
 def _lengths(vectors: list[FloatArray]) -> FloatArray:

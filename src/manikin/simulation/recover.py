@@ -58,8 +58,7 @@ class RecoveryTask:
         support: Effectors of the feet that carry; both when None.
         steps: Largest number of steps; feet that are held take none.
         until_at_rest: Once pushes and reaction delay are over, a body that has stood at rest for this time
-            ends the run [s]; it saves most of the time where only the verdict is wanted. None for a run to
-            its end, which alone shows all that follows, such as swung arms that come back.
+            ends the run [s]: enough for the verdict. None for a run to its end, with all that follows.
     """
 
     pushes: tuple[Push, ...]
@@ -73,13 +72,9 @@ class RecoveryTask:
 
 
 def recover(
-    body: BodyModel,
-    task: RecoveryTask,
-    settings: RecoverySettings | None = None,
-    *,
-    scene: Scene | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Recovery:
+    body: BodyModel, task: RecoveryTask, settings: RecoverySettings | None = None, *,
+    scene: Scene | None = None, progress: Callable[[float], None] | None = None,
+) -> Recovery:  # fmt: skip
     """Push a standing body and see whether it stays on its feet.
 
     Args:
@@ -103,10 +98,7 @@ def recover(
 
 @contextmanager
 def _quiet_engine() -> Iterator[None]:
-    """Context in which a simulation that diverges leaves no ``MUJOCO_LOG.TXT`` in the working directory.
-
-    :attr:`manikin.simulation.world.World.divergence` says the same.
-    """
+    """Context in which a simulation that diverges leaves no ``MUJOCO_LOG.TXT`` in the working directory."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _message: None)
     try:
@@ -137,11 +129,10 @@ class _RecoveryRun:
             body, self.q, settings, support=task.support, friction=task.friction, joint_damping=damping,
         )  # fmt: skip
         _check_standing(self.controller, self.q)
-        held, standing = None, self.controller.standing
-        if welded:
-            held = {c.effector: (c.rotation_contact_to_world, c.position) for c in standing.soles}
+        standing = self.controller.standing
+        held = {c.effector: (c.rotation_contact_to_world, c.position) for c in standing.soles}
         ground = scene or Scene([], floor_height=standing.area.height)
-        self.world = World(compile_model(body, ground, physics, held))
+        self.world = World(compile_model(body, ground, physics, held if welded else None))
         for push in task.pushes:
             self.world.apply_push(push)
         self.substeps = max(1, round(settings.period / physics.timestep))
@@ -153,20 +144,21 @@ class _RecoveryRun:
         self.stepping = SteppingRecovery(body, self.controller, ground, StepSettings(most=task.steps))
         ends = [push.start + max(push.duration, settings.delay) for push in task.pushes]
         self.rest_from = self.disturbed_until = max(ends, default=0.0)
+        self.pushed_from = min((push.start for push in task.pushes), default=np.inf)
 
     def run(self, progress: Callable[[float], None] | None) -> Recovery:
         began, control = clock.perf_counter(), 0.0
         period = self.substeps * self.world.model.options.timestep
         settle, count = round(STANDING / period), math.ceil(self.task.duration / period)
         self.world.reset(self.q, None, -settle * period)
-        lowest = FALLEN * self.controller.standing.height
-        fallen = ""
+        lowest, fallen = FALLEN * self.controller.standing.height, ""
         for number in range(-settle, count + 1):
             time = number * period
-            before = clock.perf_counter()
-            q, v = self.world.q, self.world.v
+            before, q = clock.perf_counter(), self.world.q
+            # Not from the beginning of the first push until the delay is over.
+            waits = self.pushed_from - 1e-9 <= time < self.pushed_from + self.settings.delay - 1e-9
             output = self.stepping.step(
-                time, q, v, self._felt(q, time), reacting=self._reacts(time), touching=self._touching()
+                time, q, self.world.v, self._felt(q, time), reacting=not waits, touching=self._touching()
             )
             control += clock.perf_counter() - before
             if number == 0:
@@ -194,11 +186,6 @@ class _RecoveryRun:
             foot: any(self.world.touching(end_segments(self.body, foot), name) for name in self.grounds)
             for foot in self.controller.groups.feet
         }
-
-    def _reacts(self, time: float) -> bool:
-        """Not from the beginning of the first push until the delay is over."""
-        start = min((push.start for push in self.task.pushes), default=np.inf)
-        return not start - 1e-9 <= time < start + self.settings.delay - 1e-9
 
     def _felt(self, q: FloatArray, time: float) -> FeltPush:
         """Wrench and generalised force of the pushes that act now, as the skin feels them."""

@@ -84,10 +84,7 @@ class Recovery(Displayed):
         return float(np.mean(chosen == str(strategy))) if len(chosen) else 0.0
 
     def turned(self, group: str) -> FloatArray:
-        """(n,) angular momentum of a group about the axis of the fall [kg.m^2/s].
-
-        The axis is level and square to the push, so that falling the way of the push is positive.
-        """
+        """(n,) angular momentum of a group [kg.m^2/s] about the axis of a fall the way of the push."""
         x, y = self.direction
         return self.trace.momentum[group] @ np.array([-y, x, 0.0])
 
@@ -95,7 +92,7 @@ class Recovery(Displayed):
         """Share of each group in the largest angular momentum after the first reaction; their sum is 1."""
         groups = {group: self.turned(group)[self._reacting] for group in self.trace.momentum}
         total = sum(groups.values(), np.zeros(int(self._reacting.sum())))
-        if not len(total) or not np.any(total):
+        if not np.any(total):
             return dict.fromkeys(groups, 0.0)
         peak = int(np.argmax(np.abs(total)))
         return {group: float(values[peak] / total[peak]) for group, values in groups.items()}
@@ -110,12 +107,10 @@ class Recovery(Displayed):
         peak = {group: float(np.abs(self.turned(group)).max()) for group in trace.momentum}
         return {
             "recovered": self.recovered, "steps": len(self.steps), "feet": self.feet,
-            "impulse_Ns": self.impulse,
-            "direction_deg": float(np.degrees(np.arctan2(self.direction[1], self.direction[0]))),
+            "impulse_Ns": self.impulse, "direction_deg": float(np.degrees(np.arctan2(*self.direction[::-1]))),
             "max_zmp_excess_m": self.zmp_excess, "final_com_height_m": self.final_height,
             "time_to_rest_s": self.time_to_rest, "max_capture_point_reach": self.capture_point,
-            "max_foot_motion_m": self.foot_motion,
-            "steps_taken": [step.summary() for step in self.steps],
+            "max_foot_motion_m": self.foot_motion, "steps_taken": [step.summary() for step in self.steps],
             "posture_share": self.strategy_share(Strategy.POSTURE),
             "program_share": self.strategy_share(Strategy.PROGRAM),
             "angular_momentum_share": self.momentum_shares(), "peak_angular_momentum_Nms": peak,
@@ -149,35 +144,34 @@ def judge(
     moved, most = _foot_motion(controller, motion, steps), FOOT_SLID if steps else FOOT_MOVED
     segments = {segment.name for segment in controller.body.segments}
     propped = [touch for touch in touches if touch.other not in segments]
-    fault = fallen or _fault(rests_from is not None, moved, propped, most)
+    fault = fallen
+    if not fault and propped:
+        fault = f"does not stand on its feet alone: {propped[0]}"
+    elif not fault and rests_from is None:
+        fault = "does not stand at rest and upright at the end"
+    elif not fault and moved > most:
+        fault = f"a foot has moved by {moved:.3f} m"
     return Recovery(
-        trace=trace,
-        feet=feet,
-        failure=_explained(fault, controller, trace, control_from, refused),
+        trace, feet, failure=_explained(fault, controller, trace, control_from, refused),
         direction=level[0] / float(np.linalg.norm(level[0])) if level else np.zeros(2),
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
         time_to_rest=None if rests_from is None else max(0.0, rests_from - start),
         final_height=float(motion.com[-1, 2] - standing.area.height),
         capture_point=max(s.area.reach(point) for s, point in zip(trace.standings, ahead, strict=True)),
-        foot_motion=moved,
-        control_from=control_from,
-        soles=standing.soles,
-        steps=steps,
-        wall=wall,
+        foot_motion=moved, control_from=control_from, soles=standing.soles, steps=steps, wall=wall,
         requirements=_requirements(motion, fallen, propped, rests_from, moved, most),
-    )
+    )  # fmt: skip
 
 
 def _requirements(
     motion: Motion, fallen: str, propped: Sequence[Touch], rests_from: float | None, moved: float, most: float
 ) -> RequirementTable:
     end, first = float(motion.time[-1]), propped[0] if propped else None
+    at, where = (None, "") if first is None else (first.time, f"{first.segment} on {first.other}")
     return RequirementTable((
         Requirement("fell", "falls", "", float(bool(fallen)), "<=", 0.0, end if fallen else None),
-        Requirement("unplanned_touches", "unplanned touches", "", float(len(propped)), "<=", 0.0,
-                    None if first is None else first.time,
-                    "" if first is None else f"{first.segment} on {first.other}"),
+        Requirement("unplanned_touches", "unplanned touches", "", float(len(propped)), "<=", 0.0, at, where),
         Requirement("at_rest", "stands at rest and upright at the end", "", float(rests_from is not None),
                     ">=", 1.0, end),
         Requirement("max_foot_motion_m", "a foot has moved by", "m", moved, "<=", most, end),
@@ -194,10 +188,9 @@ def trunk_lean(state: Configuration, groups: JointGroups) -> float:
 def at_rest(
     state: Configuration, controller: BalanceRecovery, q: FloatArray, com: FloatArray, velocity: FloatArray
 ) -> bool:
-    """Whether a body stands at rest: high, upright and slow, its centre of mass over its soles.
+    """Whether a body stands at rest at ``q`` (nq,), where ``com`` (3,) [m] and its velocity (3,) [m/s] are.
 
-    ``state`` is moved to ``q`` (nq,) where the trunk has to be measured; centre of mass (3,) [m] and its
-    velocity (3,) [m/s] are those there.
+    It is high, upright and slow, its centre of mass over its soles; ``state`` is moved to measure the trunk.
     """
     standing = controller.standing
     return bool(
@@ -217,16 +210,6 @@ def _rests_from(controller: BalanceRecovery, trace: RecoveryTrace) -> float | No
             break
         since = float(time)
     return since
-
-
-def _fault(rests: bool, moved: float, touches: Sequence[Touch], most: float) -> str:
-    if touches:
-        return f"does not stand on its feet alone: {touches[0]}"
-    if not rests:
-        return "does not stand at rest and upright at the end"
-    if moved > most:
-        return f"a foot has moved by {moved:.3f} m"
-    return ""
 
 
 def _explained(

@@ -91,63 +91,49 @@ class RecoveryRecorder:
             carried: Contact points of the scene that carried that wrench.
             held: Whether the feet are welded to the ground, which is no touch.
         """
-        self._stances.append(
-            Stance(output.standing.soles, model=self._model)
-            if held
-            else self._carrying_stance(output, carried)
-        )
+        standing = output.standing
+        stance = Stance(standing.soles, model=self._model) if held else self._carrying_stance(output, carried)
+        self._stances.append(stance)
         self._rows.append((time, output, sensed.a, wrench))
-        self._forces.append(np.array([
-            self._shared(wrench, output.state.frames[foot].position, foot in output.standing.feet) if held
-            else sensed.wrench(output.state.frames[foot].position, names)
-            for foot, names in self._ends.items()
-        ]))  # fmt: skip
-
-    def _shared(self, wrench: FloatArray, position: FloatArray, carries: bool) -> FloatArray:
-        """Equal share of a foot that is held in the wrench of the ground, about its sole's middle."""
-        if not carries:
-            return np.zeros(6)
+        forces = {foot: np.zeros(6) for foot in self._ends}
         share = wrench / len(self._controller.standing.soles)
-        return np.concatenate((share[:3], share[3:] - skew(position) @ share[:3]))
+        for foot, names in self._ends.items():
+            position = output.state.frames[foot].position
+            if not held:
+                forces[foot] = sensed.wrench(position, names)
+            elif foot in standing.feet:
+                forces[foot] = np.concatenate((share[:3], share[3:] - skew(position) @ share[:3]))
+        self._forces.append(np.array(list(forces.values())))
 
     def trace(self, control_ms: float) -> RecoveryTrace:
         """Turn the steps into a trace."""
         outputs = [output for _, output, _, _ in self._rows]
         states = [output.state for output in outputs]
-        torque = np.array([output.tau for output in outputs])
-        speed = np.array([state.v[6:] for state in states])
+        torque, speed = np.array([o.tau for o in outputs]), np.array([state.v[6:] for state in states])
         joints, height = self._controller.groups.joints, self._controller.standing.area.height
         wrenches = np.array([wrench for *_, wrench in self._rows])
         # About the origin instead of the centre of mass: the formula holds for any point.
         zmp = np.array([zmp_of(wrench[:3], wrench[3:], np.zeros(3), height) for wrench in wrenches])
         # Held feet are judged by the soles on which the body stands.
         com = np.array([state.com for state in states])
+        inside = [float(o.standing.area.inside(point)) for o, point in zip(outputs, zmp, strict=True)]
+        motion = executed_motion(
+            np.array([time for time, *_ in self._rows]), states, a=np.array([a for _, _, a, _ in self._rows]),
+            tau=torque, margin=carried_margin(self._stances, wrenches, com).margin,
+            contact_force=np.array(self._forces), contact_names=self._controller.groups.feet,
+            joint_names=self._body.joint_names,
+        )  # fmt: skip
         return RecoveryTrace(
-            motion=executed_motion(
-                np.array([time for time, *_ in self._rows]),
-                states,
-                a=np.array([a for _, _, a, _ in self._rows]),
-                tau=torque,
-                margin=carried_margin(self._stances, wrenches, com).margin,
-                contact_force=np.array(self._forces),
-                contact_names=self._controller.groups.feet,
-                joint_names=self._body.joint_names,
-            ),
-            zmp=zmp,
-            zmp_inside=np.array(
-                [float(o.standing.area.inside(point)) for o, point in zip(outputs, zmp, strict=True)]
-            ),
+            motion, zmp, np.array(inside),
             standings=tuple(output.standing for output in outputs),
             strategies=np.array([str(output.strategy) for output in outputs]),
             gain_share=np.array([output.gain_share for output in outputs]),
             com_velocity=np.array([state.momentum[:3] / state.mass for state in states]),
             momenta=self._momenta,
-            power={
-                group: np.sum(torque[:, index] * speed[:, index], axis=1) for group, index in joints.items()
-            },
+            power={name: np.sum(torque[:, row] * speed[:, row], axis=1) for name, row in joints.items()},
             fallbacks=tuple((time, output.fallback) for time, output, *_ in self._rows if output.fallback),
             control_ms=control_ms,
-        )
+        )  # fmt: skip
 
     def _carrying_stance(self, output: RecoveryOutput, carried: CarriedPoints) -> Stance:
         """Stance of the contacts that really carry: soles as far as they touch, and anything else."""
@@ -163,8 +149,7 @@ class SegmentMomenta:
 
     def __init__(self, body: BodyModel, groups: dict[str, tuple[str, ...]]) -> None:
         """Choose the groups, by names of segments."""
-        self._model = body.pinocchio
-        self._data = self._model.createData()
+        self._model, self._data = body.pinocchio, body.pinocchio.createData()
         self._groups = {
             group: [(body.segment_frame(name), body.segment(name)) for name in names]
             for group, names in groups.items()

@@ -29,8 +29,7 @@ _INERTIAL = (
 class Grip:
     """A hand's hold on a point of the scene: a stiff, damped spring of limited force.
 
-    A contact engine has no fingers; this spring stands for a grasp, and it saturates (the hand slips) where
-    more is asked of it than it may hold.
+    It stands for a grasp by fingers, and saturates (the hand slips) where too much is asked of it.
 
     Attributes:
         effector: Name of the gripping effector.
@@ -62,7 +61,9 @@ class World:
         self._model = copy.copy(model.mujoco)
         self._data = mujoco.MjData(self._model)
         self._before = (self._data.qpos.copy(), self._data.qvel.copy(), 0.0)
-        self._owners = tuple(_owner(model, geom) for geom in range(self._model.ngeom))
+        # Segment or obstacle that each geometry belongs to, and whether it is a segment.
+        names = [(name, obstacle_of(name)) for name in model.geom_names]
+        self._owners = [(obstacle or name.split("/")[0], obstacle is None) for name, obstacle in names]
         self._segments = frozenset(segment.name for segment in model.body.segments)
         self._planned = np.zeros((self._model.ngeom, self._model.ngeom), dtype=bool)
         self._leaning, self._leans = np.zeros_like(self._planned), False
@@ -227,26 +228,12 @@ class World:
             friction,
         )
 
-    def _normal_forces(self) -> FloatArray:
-        """(ncon,) normal force of each contact of the last step [N]."""
-        address = self._data.contact.efc_address
-        return np.where(address >= 0, self._data.efc_force[np.maximum(address, 0)], 0.0)
-
-    def _contact_forces(self) -> FloatArray:
-        """(ncon, 6) force and torque of each contact of the last step in its frame [N, N.m]."""
-        forces = np.zeros((self._data.ncon, 6))
-        for number in range(self._data.ncon):
-            mujoco.mj_contactForce(self._model, self._data, number, forces[number])
-        return forces
-
     def _constraint_wrench(self) -> FloatArray:
         """Wrench of all contacts and grips in the last step; inner forces cancel in the root."""
         qpos, _, _ = self._before
-        generalised = self._data.qfrc_constraint
-        force, total = generalised[:3], np.empty(6)
-        total[:3] = force
-        moment = root_rotation(self.model.q_from_mujoco(qpos)) @ generalised[3:6]
-        np.add(cross(qpos[:3], force), moment, out=total[3:])
+        force, local = self._data.qfrc_constraint[:3], self._data.qfrc_constraint[3:6]
+        moment = root_rotation(self.model.q_from_mujoco(qpos)) @ local
+        total = np.concatenate((force, cross(qpos[:3], force) + moment))
         for pull, position in self._grip_forces.values():
             total += np.concatenate((pull, cross(position, pull)))
         return total
@@ -266,17 +253,14 @@ class World:
         self._data.xfrc_applied[:] = 0.0
         for push in self._pushes:
             if push.active(self.time):
-                self._press(push)
+                number, force = self.model.body_id(push.segment), push.at(self.time)
+                self._data.xfrc_applied[number, :3] += force
+                if push.point is not None:
+                    turned = self._data.xmat[number].reshape(3, 3) @ push.point
+                    arm = self._data.xpos[number] + turned - self._data.xipos[number]
+                    self._data.xfrc_applied[number, 3:] += cross(arm, force)
         for grip in self._grips.values():
             self._hold(grip)
-
-    def _press(self, push: Push) -> None:
-        number, force = self.model.body_id(push.segment), push.at(self.time)
-        self._data.xfrc_applied[number, :3] += force
-        if push.point is not None:
-            turned = self._data.xmat[number].reshape(3, 3) @ push.point
-            arm = self._data.xpos[number] + turned - self._data.xipos[number]
-            self._data.xfrc_applied[number, 3:] += cross(arm, force)
 
     def _hold(self, grip: Grip) -> None:
         site = self.model.site_id(grip.effector)
@@ -296,7 +280,9 @@ class World:
             return
         contact = self._data.contact
         geoms, depths = contact.geom, -contact.dist
-        forces = self._normal_forces() if self._data.nefc else np.zeros(self._data.ncon)
+        forces, first = np.zeros(self._data.ncon), contact.efc_address
+        if self._data.nefc:
+            forces = np.where(first >= 0, self._data.efc_force[np.maximum(first, 0)], 0.0)
         carries = (self._is_segment[geoms[:, 0]] != self._is_segment[geoms[:, 1]]) & (forces > 0.0)
         carries &= ~self._leaning[geoms[:, 0], geoms[:, 1]]
         self._carried.append((
@@ -310,8 +296,6 @@ class World:
             depths = depths[~padded]
         self.penetration = max(self.penetration, float(depths.max(initial=0.0)))
         planned = self._planned[geoms[:, 0], geoms[:, 1]]
-        if planned.all():
-            return
         pressed: dict[tuple[str, str], float] = {}
         for (first, second), force in zip(geoms[~planned], forces[~planned], strict=True):
             segment, other, _ = self._parties(int(first), int(second))
@@ -329,11 +313,10 @@ class World:
 
     def _table(self, segments: tuple[str, ...], obstacle: str) -> NDArray[np.bool_]:
         """(geometries, geometries) whether two geometries are one of the segments and the obstacle."""
-        key = segments, obstacle
-        if key not in self._tables:
+        if (segments, obstacle) not in self._tables:
             body, scene = self._mask(segments, True), self._mask((obstacle,), False)
-            self._tables[key] = np.outer(body, scene) | np.outer(scene, body)
-        return self._tables[key]
+            self._tables[segments, obstacle] = np.outer(body, scene) | np.outer(scene, body)
+        return self._tables[segments, obstacle]
 
     def _mask(self, names: tuple[str, ...], segments: bool) -> NDArray[np.bool_]:
         if (names, segments) not in self._masks:
@@ -347,22 +330,20 @@ class World:
         qpos, qvel, time = self._before
         contact = self._data.contact
         parties = [self._parties(first, second) for first, second in contact.geom.tolist()]
-        # The engine's contact frame has its x axis from the first geometry to the second and
-        # its force is the one on the second.
+        # The engine's contact frame has x from the first geometry to the second, on which its force acts.
         sign = np.array([-1.0 if swapped else 1.0 for *_, swapped in parties]).reshape(-1, 1)
-        frames = np.array(contact.frame).reshape(-1, 3, 3)
+        frames, forces = np.array(contact.frame).reshape(-1, 3, 3), np.zeros((self._data.ncon, 6))
+        for number, force in enumerate(forces):
+            mujoco.mj_contactForce(self._model, self._data, number, force)
         return Sensed(
-            time=time,
-            a=self.model.a_from_mujoco(qpos, qvel, self._data.qacc),
+            time, self.model.a_from_mujoco(qpos, qvel, self._data.qacc),
             segments=tuple(segment for segment, _, _ in parties),
             others=tuple(other for _, other, _ in parties),
             on_scene=np.array([other not in self._segments for _, other, _ in parties], dtype=bool),
-            positions=np.array(contact.pos).reshape(-1, 3),
-            normals=sign * frames[:, 0],
-            forces=sign * np.einsum("ki,kij->kj", self._contact_forces()[:, :3], frames),
-            depths=-np.array(contact.dist).reshape(-1),
-            grips=dict(self._grip_forces),
-        )
+            positions=np.array(contact.pos).reshape(-1, 3), normals=sign * frames[:, 0],
+            forces=sign * np.einsum("ki,kij->kj", forces[:, :3], frames),
+            depths=-np.array(contact.dist).reshape(-1), grips=dict(self._grip_forces),
+        )  # fmt: skip
 
     def _parties(self, first: int, second: int) -> tuple[str, str, bool]:
         """Segment, other party, and whether the segment is the engine's first geometry."""
@@ -379,14 +360,6 @@ class World:
     @property
     def divergence(self) -> str:
         """Fatal warning of the engine, such as ``"BADQACC"``; empty without one."""
-        kinds = ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
-        numbers = (getattr(mujoco.mjtWarning, f"mjWARN_{kind}") for kind in kinds)
-        told = zip(kinds, numbers, strict=True)
-        return next((kind for kind, number in told if self._data.warning[number].number), "")
-
-
-def _owner(model: SimulationModel, geom: int) -> tuple[str, bool]:
-    """Segment or obstacle that a geometry belongs to, and whether it is a segment."""
-    name = model.geom_names[geom]
-    obstacle = obstacle_of(name)
-    return (name.split("/")[0], True) if obstacle is None else (obstacle, False)
+        kinds, number = ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL"), mujoco.mjtWarning
+        told = (kind for kind in kinds if self._data.warning[getattr(number, f"mjWARN_{kind}")].number)
+        return next(told, "")

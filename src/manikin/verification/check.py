@@ -1,7 +1,7 @@
 """Independent check of a contact plan: contacts, reach, collisions, balance, order, start and goal.
 
-Nothing of the planner takes part: solids, triangles and distances, friction cones and linear programs are
-this room's own; the body gives its plain sizes, and Pinocchio the forward kinematics.
+Nothing of the planner takes part: solids, distances, friction cones and linear programs are this room's own;
+the body gives its plain sizes, and Pinocchio the forward kinematics.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,14 +21,7 @@ from manikin.scenarios import Scenario
 from manikin.scenarios.sections.task_sections import StateSection
 from manikin.scenarios.world import friction_of
 from manikin.verification.equilibrium import CentreState, HandForce, dynamic_shortfall, rest, torque_share
-from manikin.verification.holding import (
-    REACHED,
-    HeldPosture,
-    HoldingRows,
-    Kinematics,
-    PostureSearch,
-    ReachBounds,
-)
+from manikin.verification.holding import REACHED, HeldPosture, HoldingRows, PostureSearch, ReachBounds
 from manikin.verification.plan_file import PlannedContacts, PlannedStage, load_contact_plan
 from manikin.verification.solids import Solid
 from manikin.verification.touching import ContactRows, Rules
@@ -48,8 +41,7 @@ class ContactPlanCheck(Displayed):
         requirements: What was measured, with limits and where; :attr:`stages` and the like count.
         stages: Number of stages.
         postures: Number of postures that were given and measured.
-        complete: Whether every change and the goal have a posture, so that reach and collisions are certified
-            and not only bounded.
+        complete: Whether every change and the goal have a posture: reach and collisions are certified.
         room: Least distance that the centre of mass may move any way along the level at a change [m].
     """
 
@@ -139,16 +131,14 @@ class _Check:
         self._mass = self._body.mass
         self._cap = scenario.contact_model.normal_force_cap
         self._solids = [Solid(item, item.name in scenario.padded) for item in scenario.build_scene()]
-        self._kinematics = Kinematics(self._body)
+        self._holding = HoldingRows(self._body, self._solids)
         self._changes = list(self._at_changes())
         self._reach = ReachBounds(self._body)
-        self._act: HandForce | None = None
-        if (act := scenario.file.task.act) is not None:
-            self._act = HandForce(np.array(act.direction) / np.linalg.norm(act.direction), act.force_N)
+        act = scenario.file.task.act
+        self._act = act and HandForce(np.array(act.direction) / np.linalg.norm(act.direction), act.force_N)
 
     def run(self) -> ContactPlanCheck:
-        touching, postures = self._contacts(), list(self._postures())
-        holding = HoldingRows(self._body, self._solids, self._kinematics)
+        touching, postures, holding = self._contacts(), list(self._postures()), self._holding
         contacts = {id(c): c for change in self._changes for c in change.held}
         holding.measure(postures, {key: touching.touched(contact) for key, contact in contacts.items()})
         balance, room = self._balance()
@@ -156,25 +146,21 @@ class _Check:
             *self._order(), *touching.rows, self._within_reach(), *holding.rows, *balance, self._reached(),
             *task_rows(self._scenario, self._plan),
         ]  # fmt: skip
-        complete = all(change.q is not None for change in self._changes)
-        return ContactPlanCheck(
-            requirement_table(rows), len(self._plan.stages), len(postures), complete, room
-        )
+        complete, stages = all(change.q is not None for change in self._changes), len(self._plan.stages)
+        return ContactPlanCheck(requirement_table(rows), stages, len(postures), complete, room)
 
     def _at_changes(self) -> Iterator[_Change]:
         stages, plan = self._plan.stages, self._plan
         for number, (before, after) in enumerate(pairwise((None, *stages, None))):
             q, com = (plan.goal, plan.goal_com) if after is None else (after.posture, after.com)
-            com = com if q is None else self._kinematics.com(q)
+            com = com if q is None else self._holding.com(q)
             yield _Change(before, after, q, com, "goal" if after is None else f"stages[{number}]")
 
     def _contacts(self) -> ContactRows:
-        values = self._scenario.contacts
-        ends = self._scenario.file.task.start, self._scenario.file.task.goal
-        rules = Rules(
-            friction_of(self._scenario), values.grasp_force_N, values.forefoot_m is not None,
-            any(end.posture == "climbing" for end in ends),
-        )  # fmt: skip
+        values, task = self._scenario.contacts, self._scenario.file.task
+        rungs = "climbing" in (task.start.posture, task.goal.posture)
+        forefoot = values.forefoot_m is not None
+        rules = Rules(friction_of(self._scenario), values.grasp_force_N, forefoot, rungs)
         rows = ContactRows(self._body, self._solids, rules)
         for number, stage in enumerate(self._plan.stages):
             rows.measure(stage.contacts, f"stages[{number}]")
@@ -192,9 +178,8 @@ class _Check:
         """One contact is made or broken at each change, both hands at once for an act; one is there."""
         most = Worst("max_changes", "contacts made and broken at one change", 1.0)
         least = Worst("min_contacts", "contacts of a stage", 1.0)
-        said = Worst(
-            "max_com_difference_m", "difference between the centre of mass given and the posture's", 1e-3
-        )
+        between = "difference between the centre of mass given and the posture's"
+        said = Worst("max_com_difference_m", between, 1e-3)
         for number, (before, after) in enumerate(pairwise(self._plan.stages), start=1):
             kept = {name for name, c in after.contacts.items() if before.contacts.get(name) is c}
             changed = len(before.contacts) + len(after.contacts) - 2 * len(kept)
@@ -212,9 +197,8 @@ class _Check:
 
     def _within_reach(self) -> Requirement | None:
         """Contacts that are held at once are no farther apart than the body's segments are long."""
-        farthest = Worst(
-            "max_reach_share", "distance of two contacts over the longest way through the body", 1.0, 1e-6
-        )
+        over = "distance of two contacts over the longest way through the body"
+        farthest = Worst("max_reach_share", over, 1.0, 1e-6)
         for change in self._changes:
             for share, pair in self._shares(change):
                 farthest.take(share, pair)
@@ -249,13 +233,11 @@ class _Check:
             contacts, com, within = change.carrying, change.com, None
             if com is None:
                 within = {number: self._reach.to_com(item.effector) for number, item in enumerate(contacts)}
-            guess = com if com is not None else _middle(change.held)
-            act = self._act if change.after is None else None
-            result = rest(contacts, self._mass, self._cap, guess, within, act)
-            shift = result.shift if com is not None or result.place is None else 0.0
+            guess, act = com if com is not None else _middle(change.held), self._act
+            result = rest(contacts, self._mass, self._cap, guess, within, None if change.after else act)
             names = ", ".join(contact.effector for contact in contacts) or "no contact"
             where = f"{change.where} on {names}"
-            off.take(shift, where)
+            off.take(result.shift if com is not None or result.place is None else 0.0, where)
             if com is not None:
                 room = min(room, result.room)
             if change.q is not None and result.shift <= BALANCE:
@@ -270,12 +252,10 @@ class _Check:
         start, end = self._changes[number], self._changes[number + 1]
         if start.com is None or end.com is None or stage.duration is None:
             return 1.0
-        after = end.after
-        leaving = np.zeros(3) if after is None else after.com_velocity
-        return dynamic_shortfall(
-            tuple(stage.contacts.values()), self._mass, self._cap, CentreState(start.com, stage.com_velocity),
-            CentreState(end.com, leaving), stage.duration,
-        )  # fmt: skip
+        leaving = np.zeros(3) if end.after is None else end.after.com_velocity
+        first, last = CentreState(start.com, stage.com_velocity), CentreState(end.com, leaving)
+        contacts = tuple(stage.contacts.values())
+        return dynamic_shortfall(contacts, self._mass, self._cap, first, last, stage.duration)
 
 
 def _middle(contacts: Sequence[Contact]) -> FloatArray:
@@ -317,16 +297,14 @@ def _end_rows(
     target = state.at if state.at is not None else None if state.com is None else state.com[:2]
     if target is not None and contacts:
         place.take(min(float(np.linalg.norm(at - target)) for at in _places(seat, feet, q)), end)
-    if state.heading_deg is not None or state.at is not None:
-        heading = np.deg2rad(state.heading_deg or 0.0)
-        if (own := _heading(feet, q)) is not None:
-            off = np.angle(np.exp(1j * (own - heading)))
-            turn.take(abs(float(np.rad2deg(off))), end)
-    if state.height_m is not None and state.posture != "climbing":
-        resting = [seat] if seat is not None else list(feet.values())
-        if resting:
-            mean = np.mean([contact.position[2] for contact in resting])
-            level.take(abs(float(mean - state.height_m)), end)
+    own = None if state.heading_deg is None and state.at is None else _heading(feet, q)
+    if own is not None:
+        off = np.angle(np.exp(1j * (own - np.deg2rad(state.heading_deg or 0.0))))
+        turn.take(abs(float(np.rad2deg(off))), end)
+    resting = [seat] if seat is not None else list(feet.values())
+    if state.height_m is not None and state.posture != "climbing" and resting:
+        mean = np.mean([contact.position[2] for contact in resting])
+        level.take(abs(float(mean - state.height_m)), end)
     return [seats.row, place.row, turn.row, level.row]
 
 

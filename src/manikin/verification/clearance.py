@@ -5,9 +5,9 @@ convex function along the segment, found by ternary search, which is exact outsi
 tested for a separating axis, which finds every overlap and gives no more than the distance outside.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import pinocchio as pin
@@ -153,27 +153,29 @@ def _least_along(shapes: Placed, distance: Callable[[FloatArray], FloatArray]) -
     return least
 
 
-def _distance_to_boxes(boxes: Placed) -> Callable[[FloatArray], FloatArray]:
-    def distance(points: FloatArray) -> FloatArray:
-        local = np.einsum("nji,nj->ni", boxes.rotation, points - boxes.position)
-        return box_distance(np.abs(local) - 0.5 * boxes.size)
-
-    return distance
+def _distance_to_boxes(boxes: Placed, points: FloatArray) -> FloatArray:
+    local = np.einsum("nji,nj->ni", boxes.rotation, points - boxes.position)
+    return box_distance(np.abs(local) - 0.5 * boxes.size)
 
 
 def _rounds_to_solid(rounds: Placed, solid: Solid) -> FloatArray:
     if not isinstance(solid.obstacle.shape, Mesh):
         return _least_along(rounds, solid.distance) - rounds.radius
-    result = np.full(len(rounds.shape), np.inf)
-    lowest, highest = rounds.bounds
     start, end = rounds.ends
-    for number in range(len(result)):
-        near = solid.triangles.overlapping(lowest[number] - REACH, highest[number] + REACH)
-        if len(near):
-            corners = solid.triangles.corners[near]
-            result[number] = segment_triangle(start[number], end[number], corners).min()
+    result = np.full(len(start), np.inf)
+    for number, near in _near_triangles(rounds, solid):
+        corners = solid.triangles.corners[near]
+        result[number] = segment_triangle(start[number], end[number], corners).min()
     hidden = solid.inside(rounds.position)
     return np.where(hidden & np.isfinite(result), -result, result) - rounds.radius
+
+
+def _near_triangles(shapes: Placed, solid: Solid) -> Iterator[tuple[int, np.ndarray]]:
+    """Numbers of the shapes that are near a mesh, with the indices of its triangles there."""
+    for number, (low, high) in enumerate(zip(*shapes.bounds, strict=True)):
+        near = solid.triangles.overlapping(low - REACH, high + REACH)
+        if len(near):
+            yield number, near
 
 
 def _boxes_to_solid(boxes: Placed, solid: Solid) -> FloatArray:
@@ -185,15 +187,12 @@ def _boxes_to_solid(boxes: Placed, solid: Solid) -> FloatArray:
         return np.maximum(above, -height.max(axis=1)) if isinstance(shape, Plane) else above
     if isinstance(shape, Sphere):
         middle = np.broadcast_to(place.translation, boxes.position.shape)
-        return _distance_to_boxes(boxes)(middle) - shape.radius
+        return _distance_to_boxes(boxes, middle) - shape.radius
     if isinstance(shape, Capsule):
-        count = len(boxes.shape)
-        axis = Placed(
-            boxes.posture, boxes.shape, np.tile(place.translation, (count, 1)),
-            np.tile(place.rotation, (count, 1, 1)), np.tile([0.0, 0.0, shape.length], (count, 1)),
-            np.zeros(count),
-        )  # fmt: skip
-        return _least_along(axis, _distance_to_boxes(boxes)) - shape.radius
+        count, size = len(boxes.shape), [0.0, 0.0, shape.length]
+        where = np.tile(place.translation, (count, 1)), np.tile(place.rotation, (count, 1, 1))
+        axis = Placed(boxes.posture, boxes.shape, *where, np.tile(size, (count, 1)), np.zeros(count))
+        return _least_along(axis, partial(_distance_to_boxes, boxes)) - shape.radius
     if isinstance(shape, Mesh):
         return _boxes_to_mesh(boxes, solid)
     corners, directions, edges = _polytope(solid)
@@ -204,8 +203,7 @@ def _boxes_to_solid(boxes: Placed, solid: Solid) -> FloatArray:
 
 def _polytope(solid: Solid) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Corners, face normals and edge directions (k, 3) of a box, or of a prism around a cylinder."""
-    shape, place = solid.obstacle.shape, solid.obstacle
-    turn = place.rotation.T
+    shape, place, turn = solid.obstacle.shape, solid.obstacle, solid.obstacle.rotation.T
     if isinstance(shape, Box):
         return place.to_world(_SIGNS * shape.size), turn, turn
     if not isinstance(shape, Cylinder):
@@ -222,17 +220,14 @@ def _polytope(solid: Solid) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _boxes_to_mesh(boxes: Placed, solid: Solid) -> FloatArray:
     result = np.full(len(boxes.shape), np.inf)
-    lowest, highest = boxes.bounds
-    for number in range(len(result)):
-        near = solid.triangles.overlapping(lowest[number] - REACH, highest[number] + REACH)
-        if len(near):
-            corners = solid.triangles.corners[near]
-            sides = np.roll(corners, -1, axis=1) - corners
-            frame = np.broadcast_to(boxes.rotation[number].T, (len(near), 3, 3))
-            crossed = np.cross(frame[:, :, None], sides[:, None]).reshape(len(near), 9, 3)
-            axes = np.concatenate([frame, solid.triangles.normals[near][:, None], crossed], axis=1)
-            own = np.broadcast_to(boxes.corners[number], (len(near), 8, 3))
-            result[number] = separation(own, corners, axes).min()
+    for number, near in _near_triangles(boxes, solid):
+        corners = solid.triangles.corners[near]
+        sides = np.roll(corners, -1, axis=1) - corners
+        frame = np.broadcast_to(boxes.rotation[number].T, (len(near), 3, 3))
+        crossed = np.cross(frame[:, :, None], sides[:, None]).reshape(len(near), 9, 3)
+        axes = np.concatenate([frame, solid.triangles.normals[near][:, None], crossed], axis=1)
+        own = np.broadcast_to(boxes.corners[number], (len(near), 8, 3))
+        result[number] = separation(own, corners, axes).min()
     hidden = solid.inside(boxes.position)
     return np.where(hidden & np.isfinite(result), -np.abs(result), result)
 
@@ -257,7 +252,7 @@ def _between(first: Placed, second: Placed, boxes: int) -> FloatArray:
     if boxes == 0:
         return segment_segment(*first.ends, *second.ends) - first.radius - second.radius
     if boxes == 1:
-        return _least_along(first, _distance_to_boxes(second)) - first.radius
+        return _least_along(first, partial(_distance_to_boxes, second)) - first.radius
     own, other = first.rotation.transpose(0, 2, 1), second.rotation.transpose(0, 2, 1)
     crossed = np.cross(own[:, :, None], other[:, None]).reshape(len(own), 9, 3)
     return separation(first.corners, second.corners, np.concatenate([own, other, crossed], axis=1))
@@ -265,8 +260,8 @@ def _between(first: Placed, second: Placed, boxes: int) -> FloatArray:
 
 def worst(clearance: FloatArray, allowed: np.ndarray) -> tuple[float, tuple[int, ...]]:
     """Least clearance among allowed entries and its place; infinite where there is none."""
-    masked = np.where(allowed, clearance, np.inf)
-    if not masked.size:
+    if not clearance.size:
         return np.inf, (0, 0)
+    masked = np.where(allowed, clearance, np.inf)
     place = np.unravel_index(int(np.argmin(masked)), masked.shape)
     return float(masked[place]), tuple(int(k) for k in place)

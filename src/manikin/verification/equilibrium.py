@@ -1,9 +1,8 @@
 """Whether contacts can hold a body at rest, or along a curve of its centre of mass: linear programs.
 
 Forces act at the points of the contacts, inside Coulomb's circular cones: a pyramid of sixteen edges on the
-cone stands for it, whatever pyramid planning used, so that what is certified here is true friction (it loses
-up to 1.9 %). The place of the centre of mass may be unknown: weight acts along one direction, so that its
-moment is linear in the place.
+cone stands for it, whatever pyramid planning used (it loses up to 1.9 %). The place of the centre of mass may
+be unknown: weight acts along one direction, so that its moment is linear in the place.
 
 A dynamic phase is tested as a whole as CROC does (Fernbach, Tonneau and others 2018): the centre of mass
 follows a polynomial with given ends and one free control point, in which the wrench is linear.
@@ -20,7 +19,7 @@ from scipy.sparse import block_diag, csr_array, hstack, vstack
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind, default_normal_force_cap
-from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.numerics.spatial import GRAVITY, FloatArray, skew
 
 EDGES = 16
 """Edges of the pyramid on a friction cone."""
@@ -71,19 +70,15 @@ def forces_of(contacts: Sequence[Contact], mass: float, cap: float | None, origi
         origin: (3,) point of the moments [m].
     """
     blocks = [_block(contact, origin) for contact in contacts]
-    shared = np.concatenate([
-        np.full(len(block.lower), 0.0 if contact.kind is ContactKind.GRASP else 1.0)
-        for block, contact in zip(blocks, contacts, strict=True)
-    ])  # fmt: skip
+    counts = [0.0 if contact.kind is ContactKind.GRASP else 1.0 for contact in contacts]
+    shared = np.repeat(counts, [len(block.lower) for block in blocks])
     own = block_diag([csr_array(block.rows) for block in blocks]).toarray()
     limit = default_normal_force_cap(mass) if cap is None else cap
     return Forces(
-        np.concatenate([block.wrench for block in blocks], axis=1),
-        np.vstack([own, shared]),
+        np.concatenate([block.wrench for block in blocks], axis=1), np.vstack([own, shared]),
         np.append(np.concatenate([block.limits for block in blocks]), limit),
-        np.concatenate([block.lower for block in blocks]),
-        np.concatenate([block.upper for block in blocks]),
-    )
+        np.concatenate([block.lower for block in blocks]), np.concatenate([block.upper for block in blocks]),
+    )  # fmt: skip
 
 
 def _acting(forces: Forces, contacts: Sequence[Contact], act: HandForce) -> Forces:
@@ -100,7 +95,7 @@ def _block(contact: Contact, origin: FloatArray) -> Forces:
     if contact.kind is ContactKind.GRASP:
         moments = 3 if contact.max_moment > 0.0 else 0
         wrench = np.zeros((6, 3 + moments))
-        wrench[:3, :3], wrench[3:, :3] = np.eye(3), _cross_matrix(arm)
+        wrench[:3, :3], wrench[3:, :3] = np.eye(3), skew(arm)
         wrench[3:, 3:] = np.eye(3)[:, :moments]
         bound = np.repeat([contact.max_force, contact.max_moment], [3, moments])
         return Forces(wrench, np.zeros((0, 3 + moments)), np.zeros(0), -bound, bound)
@@ -108,10 +103,8 @@ def _block(contact: Contact, origin: FloatArray) -> Forces:
     x, y, normal = contact.rotation_contact_to_world.T
     edges = normal + contact.friction * (np.outer(np.cos(turn), x) + np.outer(np.sin(turn), y))
     points = contact.points_in_world
-    force = np.tile(edges, (len(points), 1))
-    where = np.repeat(points, EDGES, axis=0)
-    count = len(force)
-    rows, limits = [], []
+    force, where = np.tile(edges, (len(points), 1)), np.repeat(points, EDGES, axis=0)
+    count, rows, limits = len(force), [], []
     if contact.normal_force_cap is not None:
         rows.append(np.ones(count))
         limits.append(contact.normal_force_cap)
@@ -120,14 +113,8 @@ def _block(contact: Contact, origin: FloatArray) -> Forces:
         rows += [turning, -turning]
         limits += [contact.torsion_limit] * 2
     wrench = np.vstack([force.T, np.cross(where - origin, force).T])
-    return Forces(
-        wrench, np.array(rows).reshape(-1, count), np.array(limits), np.zeros(count), np.full(count, np.inf)
-    )
-
-
-def _cross_matrix(arm: FloatArray) -> FloatArray:
-    x, y, z = arm
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    shared = np.array(rows).reshape(-1, count)
+    return Forces(wrench, shared, np.array(limits), np.zeros(count), np.full(count, np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +122,7 @@ class Rest:
     """Where a body can be at rest on some contacts.
 
     Attributes:
-        shift: Level distance by which the centre of mass would have to move for rest [m]: 0 where it can
-            rest as it is, infinite where no place of it allows rest.
+        shift: Level distance by which the centre of mass would have to move for rest, or infinite [m].
         room: How far it may move any way along the level and still rest [m]; 0 where it cannot.
         place: (2,) x and y of the centre of mass at rest that is nearest [m], or None.
     """
@@ -167,45 +153,36 @@ def rest(
     forces = forces_of(contacts, mass, cap, origin)
     if act is not None:
         forces = _acting(forces, contacts, act)
-    weight = mass * GRAVITY
-    count = len(forces.lower)
+    weight, count = mass * GRAVITY, len(forces.lower)
     # Variables: forces, level shift of the centre of mass (2), its size. Scaled by the weight.
     push = np.zeros((6, 3))
     push[3, 1], push[4, 0] = -1.0, 1.0
     equality = np.hstack([forces.wrench, push])
     target = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     rows, limits = [np.hstack([forces.rows, np.zeros((len(forces.rows), 3))])], [forces.limits / weight]
-    turn = _heading(contacts) + np.arange(2 * _DIRECTIONS) * np.pi / _DIRECTIONS
+    # From a direction that turns with the contacts, so that results do not depend on the world's axes.
+    forward = contacts[0].rotation_contact_to_world[:2, 0]
+    heading = float(np.arctan2(forward[1], forward[0]))
+    turn = heading + np.arange(2 * _DIRECTIONS) * np.pi / _DIRECTIONS
     sides = np.column_stack([np.cos(turn), np.sin(turn)])
-    size = np.zeros((len(sides), count + 3))
-    size[:, count : count + 2], size[:, -1] = sides, -1.0
-    rows.append(size)
+    bound = np.zeros((len(sides), count + 3))
+    bound[:, count : count + 2] = sides
+    rows += [bound - np.eye(1, count + 3, count + 2), *[bound] * len(within or ())]
     limits.append(np.zeros(len(sides)))
     for number, reach in (within or {}).items():
-        bound = np.zeros((len(sides), count + 3))
-        bound[:, count : count + 2] = sides
-        rows.append(bound)
         limits.append(reach + sides @ (contacts[number].position[:2] - com[:2]))
     lower = np.concatenate([forces.lower / weight, [-np.inf, -np.inf, 0.0]])
     upper = np.concatenate([forces.upper / weight, [np.inf, np.inf, np.inf]])
     solved = linprog(
-        np.append(np.zeros(count + 2), 1.0),
-        A_ub=np.vstack(rows), b_ub=np.concatenate(limits), A_eq=equality, b_eq=target,
-        bounds=np.column_stack([lower, upper]), method="highs",
+        np.append(np.zeros(count + 2), 1.0), A_ub=np.vstack(rows), b_ub=np.concatenate(limits),
+        A_eq=equality, b_eq=target, bounds=np.column_stack([lower, upper]), method="highs",
     )  # fmt: skip
     if solved.x is None:
         return Rest(np.inf, 0.0, None)
-    place = com[:2] + solved.x[count : count + 2]
-    shift = float(solved.x[-1])
+    place, shift = com[:2] + solved.x[count : count + 2], float(solved.x[-1])
     if shift > 1e-6:
         return Rest(shift, 0.0, place)
     return Rest(0.0, _room(forces, weight, sides[::2]), place)
-
-
-def _heading(contacts: Sequence[Contact]) -> float:
-    """Direction that turns with the contacts, so that results do not depend on the world's axes [rad]."""
-    forward = contacts[0].rotation_contact_to_world[:2, 0]
-    return float(np.arctan2(forward[1], forward[0]))
 
 
 def _room(forces: Forces, weight: float, sides: FloatArray) -> float:
@@ -223,27 +200,17 @@ def _room(forces: Forces, weight: float, sides: FloatArray) -> float:
     solved = linprog(
         np.append(np.zeros(count * copies), -1.0),
         A_ub=hstack([limits, csr_array((len(forces.rows) * copies, 1))]),
-        b_ub=np.tile(forces.limits / weight, copies),
-        A_eq=hstack([blocks, csr_array(moment)]),
-        b_eq=np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], copies),
-        bounds=bounds, method="highs",
+        b_ub=np.tile(forces.limits / weight, copies), A_eq=hstack([blocks, csr_array(moment)]),
+        b_eq=np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], copies), bounds=bounds, method="highs",
     )  # fmt: skip
     return 0.0 if solved.x is None else float(solved.x[-1])
 
 
-def torque_share(
-    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], cap: float | None
-) -> float:  # fmt: skip
-    """Smallest share of the joints' torque limits with which a posture can be held at rest.
+def torque_share(body: BodyModel, q: FloatArray, contacts: Sequence[Contact], cap: float | None) -> float:
+    """Smallest share of the joints' torque limits with which a posture (nq,) can be held at rest.
 
-    Args:
-        q: (nq,) posture that holds the contacts.
-        contacts: Those that carry.
-        cap: Largest sum of the normal forces of soles and points [N]; the body's default when None.
-
-    Returns:
-        The largest share of any joint, as small as the contact forces can make it; infinite where they cannot
-        hold the posture.
+    The largest share of any joint, as small as the forces of the contacts that carry can make it, normal ones
+    up to a cap as of :func:`rest`; infinite where they cannot hold the posture.
     """
     if not contacts:
         return np.inf
@@ -300,11 +267,9 @@ def dynamic_shortfall(
         end.position - 0.25 * duration * end.velocity, end.position,
     ]  # fmt: skip
     origin = 0.5 * (start.position + end.position)
-    forces = forces_of(contacts, mass, cap, origin)
-    count = len(forces.lower)
+    forces, ends = forces_of(contacts, mass, cap, origin), np.array(fixed) - origin
+    count, ends[2] = len(forces.lower), 0.0
     width = 4 + count * SAMPLES  # free point from the origin (3), shortfall, forces of each instant
-    ends = np.array(fixed) - origin
-    ends[2] = 0.0
     equality, target, limits, bound = [], [], [], []
     for number, share in enumerate(np.linspace(0.0, 1.0, SAMPLES)):
         weights, second = _bernstein(4, share), _bernstein_second(share) / duration**2
@@ -314,7 +279,7 @@ def dynamic_shortfall(
         own = slice(4 + number * count, 4 + (number + 1) * count)
         rows = np.zeros((6, width))
         rows[:3, :3] = second[2] * np.eye(3)
-        rows[3:, :3] = second[2] * _cross_matrix(base) - weights[2] * _cross_matrix(pull)
+        rows[3:, :3] = second[2] * skew(base) - weights[2] * skew(pull)
         rows[:, own] = -GRAVITY * forces.wrench
         equality.append(rows)
         target.append(-np.concatenate([pull, np.cross(base, pull)]))
@@ -333,9 +298,8 @@ def _least_violation(
 ) -> float:  # fmt: skip
     """Smallest size of the wrench that is missing at the worst instant, relative to the weight (and 1 m)."""
     rows, bound = csr_array(np.vstack(limits[0])), np.concatenate(limits[1])
-    width = equality.shape[-1]
-    matrix, wanted = equality.reshape(-1, width), target.ravel()
-    cost = np.eye(1, width, 3)[0]
+    width, wanted = equality.shape[-1], target.ravel()
+    matrix, cost = equality.reshape(-1, width), np.eye(1, width, 3)[0]
     upper = csr_array(np.vstack([matrix - GRAVITY * cost, -matrix - GRAVITY * cost]))
     low = np.concatenate([[-np.inf] * 3, [0.0], np.tile(forces.lower / weight, SAMPLES)])
     high = np.concatenate([[np.inf] * 4, np.tile(forces.upper / weight, SAMPLES)])

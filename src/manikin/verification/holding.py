@@ -3,7 +3,7 @@
 For plans without postures there are a bound of the reach from lengths, and a search for a posture.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,29 +50,13 @@ class HeldPosture:
     where: str
 
 
-class Kinematics:
-    """Forward kinematics of a body."""
-
-    def __init__(self, body: BodyModel) -> None:
-        self._body, self._data = body, body.pinocchio.createData()
-
-    def placements(self, q: FloatArray, effectors: Iterable[str]) -> dict[str, pin.SE3]:
-        """Effector-to-world transforms in a posture (nq,)."""
-        pin.framesForwardKinematics(self._body.pinocchio, self._data, q)
-        return {name: self._data.oMf[self._body.effector_frame(name)].copy() for name in effectors}
-
-    def com(self, q: FloatArray) -> FloatArray:
-        """(3,) centre of mass in a posture [m]."""
-        return np.array(pin.centerOfMass(self._body.pinocchio, self._data, q))
-
-
 class HoldingRows:
     """Measures the postures of a plan."""
 
-    def __init__(self, body: BodyModel, solids: Sequence[Solid], kinematics: Kinematics) -> None:
-        self._body, self._solids, self._kinematics = body, solids, kinematics
-        error = "distance of an effector from its contact"
-        self._error = Worst("max_contact_error_m", error, CONTACT_ERROR, 1e-9)
+    def __init__(self, body: BodyModel, solids: Sequence[Solid]) -> None:
+        self._body, self._solids, self._data = body, solids, body.pinocchio.createData()
+        what = "distance of an effector from its contact"
+        self._error = Worst("max_contact_error_m", what, CONTACT_ERROR, 1e-9)
         self._turn = Worst("max_contact_turn_deg", "angle of a sole from its contact", CONTACT_TURN_DEG, 1e-9)
         self._range = Worst("max_range_violation_deg", "joint range violation", 0.0, np.rad2deg(1e-6))
         self._clearance = Worst("min_clearance_m", "clearance", 0.0, ROUNDING)
@@ -86,6 +70,10 @@ class HoldingRows:
         """The requirements in the order of their attributes."""
         return [item.row for item in vars(self).values() if isinstance(item, Worst)]
 
+    def com(self, q: FloatArray) -> FloatArray:
+        """(3,) centre of mass in a posture [m]."""
+        return np.array(pin.centerOfMass(self._body.pinocchio, self._data, q))
+
     def measure(self, postures: Sequence[HeldPosture], touched: Mapping[int, frozenset[str]]) -> None:
         """Measure postures; ``touched`` names the obstacles on which each contact lies, by its id."""
         for item in postures:
@@ -94,9 +82,10 @@ class HoldingRows:
             self._clear(postures, touched)
 
     def _holds(self, item: HeldPosture) -> None:
-        places = self._kinematics.placements(item.q, [contact.effector for contact in item.held])
+        pin.framesForwardKinematics(self._body.pinocchio, self._data, item.q)
         for contact in item.held:
-            place, where = places[contact.effector], f"{contact.effector}, {item.where}"
+            place = self._data.oMf[self._body.effector_frame(contact.effector)]
+            where = f"{contact.effector}, {item.where}"
             frame = contact.rotation_contact_to_world
             missed, turn = place.translation - contact.position, place.rotation.T @ frame
             if contact.rolls:  # the axis of its edge goes forward with the pitch, which is free
@@ -150,10 +139,7 @@ class HoldingRows:
 
 
 class ReachBounds:
-    """Upper bounds of distances between parts of a body: the length of the way along its segments.
-
-    A body that keeps to its joints' ranges reaches less; no posture reaches more.
-    """
+    """Upper bounds of distances between parts of a body: the length of the way along its segments."""
 
     def __init__(self, body: BodyModel) -> None:
         self._body = body
@@ -165,12 +151,9 @@ class ReachBounds:
 
     def to_com(self, effector: str) -> float:
         """Largest distance of an effector from the body's centre of mass [m]."""
-        end = self._body.effector(effector)
-        ways = [
-            segment.mass * self._way(end.segment, end.translation, segment.name, segment.com)
-            for segment in self._body.segments
-        ]
-        return sum(ways) / sum(segment.mass for segment in self._body.segments)
+        end, parts = self._body.effector(effector), self._body.segments
+        ways = [part.mass * self._way(end.segment, end.translation, part.name, part.com) for part in parts]
+        return sum(ways) / sum(part.mass for part in parts)
 
     def _way(self, first: str, at: FloatArray, second: str, other: FloatArray) -> float:
         """Length of the way from a point of one segment over the joints to a point of another [m]."""
@@ -207,8 +190,8 @@ _WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 class PostureSearch:
     """Looks for a posture on contacts where a plan gives none: damped Gauss-Newton within the joints' ranges.
 
-    What it finds is reach; collisions are not avoided. A local search from a few starts may miss a posture:
-    a plan without postures may be refused although there is one, which it then has to give.
+    Collisions are not avoided. A local search from a few starts may miss a posture, which a plan then has to
+    give.
     """
 
     def __init__(self, body: BodyModel) -> None:
@@ -228,8 +211,7 @@ class PostureSearch:
             for _ in range(_STEPS):
                 q[7:] = np.clip(q[7:], self._body.lower, self._body.upper)
                 missed, rows = self._linear(q, contacts, com)
-                worst = max((float(np.linalg.norm(part)) for part in missed), default=0.0)
-                best = min(best, worst)
+                best = min(best, max((float(np.linalg.norm(part)) for part in missed), default=0.0))
                 if best <= REACHED:
                     return best
                 q = self._moved(q, np.concatenate(missed), np.concatenate(rows))
@@ -256,16 +238,14 @@ class PostureSearch:
             frame = self._body.effector_frame(contact.effector)
             place, jacobian = data.oMf[frame], pin.getFrameJacobian(model, data, frame, _WORLD_AXES)
             away, moves = contact.position - place.translation, jacobian[:3]
-            turn = pin.log3(contact.rotation_contact_to_world @ place.rotation.T)
-            turns = jacobian[3:]
+            turn, turns = pin.log3(contact.rotation_contact_to_world @ place.rotation.T), jacobian[3:]
             if contact.rolls:
                 forward, across = contact.rotation_contact_to_world[:, :2].T
                 arm, pitch = place.rotation @ contact.pivot, -float(across @ turn)
                 rolled = contact.rotation_contact_to_world @ contact.pivot
                 away = away + rolled + contact.edge_radius * pitch * forward - arm
-                moves = (
-                    moves - pin.skew(arm) @ turns - contact.edge_radius * np.outer(forward, across @ turns)
-                )
+                rolls = contact.edge_radius * np.outer(forward, across @ turns)
+                moves = moves - pin.skew(arm) @ turns - rolls
                 level = np.eye(3) - np.outer(across, across)
                 turn, turns = level @ turn, level @ turns
             missed.append(away)
@@ -274,9 +254,8 @@ class PostureSearch:
                 missed.append(_SOLE_END * turn)
                 rows.append(_SOLE_END * turns)
         if com is not None:
-            jacobian = pin.jacobianCenterOfMass(model, data, q, False)
+            rows.append(pin.jacobianCenterOfMass(model, data, q, False)[:2])
             missed.append((com - data.com[0])[:2])
-            rows.append(jacobian[:2])
         return missed, rows
 
     def _moved(self, q: FloatArray, missed: FloatArray, rows: FloatArray) -> FloatArray:

@@ -1,8 +1,7 @@
 """Contact-plan file: the contacts of a way from start to goal, by whichever planner, in JSON.
 
 The file names its scenario or holds it, and lists the stages in order: the contacts of each and, where the
-planner has them, the posture and the centre of mass with which the stage begins. All coordinates are in the
-world.
+planner has them, posture and centre of mass with which it begins. All coordinates are in the world.
 """
 
 import json
@@ -23,22 +22,10 @@ from manikin.errors import ContactError, InputError, ScenarioError
 from manikin.numerics.spatial import FloatArray, check_rotation
 from manikin.runtime import __version__
 from manikin.runtime.files import read_json
-from manikin.scenarios import Scenario, ScenarioFile, load_scenario
+from manikin.scenarios import Scenario, ScenarioFile, load_scenario, validation
 from manikin.scenarios.sections.planning_sections import BodySection
 from manikin.scenarios.sections.support_sections import ContactSection, SoleSection, contact_tag
-from manikin.scenarios.validation import (
-    Duration,
-    Number,
-    Section,
-    Text,
-    Vector3,
-    optional,
-    preset,
-    refuse,
-    refuse_if,
-    required,
-    validate,
-)
+from manikin.scenarios.validation import Duration, Number, Section, Text, Vector3, optional, preset, required
 from manikin.scenarios.world import build_contact, friction_of
 
 FORMAT = "manikin-contact-plan-1"
@@ -63,7 +50,7 @@ class PlannedContactSection(ContactSection):
     def _frame(self) -> Self:
         given = [key for key in ("yaw_deg", "normal", "rpy_deg") if getattr(self, key)]
         if self.rotation is not None and given:
-            raise refuse(given[0], "is given beside rotation; valid: one of both")
+            raise validation.refuse(given[0], "is given beside rotation; valid: one of both")
         return self
 
 
@@ -104,7 +91,7 @@ class StageSection(Section):
     @model_validator(mode="after")
     def _timed(self) -> Self:
         missing = self.dynamic and self.duration_s is None
-        refuse_if(missing, "duration_s", "is missing; valid: a number > 0 [s] for a dynamic stage")
+        validation.refuse_if(missing, "duration_s", "is missing; valid: a number > 0 [s] for a dynamic stage")
         return self
 
 
@@ -136,7 +123,7 @@ class ContactPlanFile(Section):
                 key = f"stages[{number}].contacts.{effector}"
                 if isinstance(entry, str):
                     problem = "is 'same' but the stage before has no such contact; valid: a contact"
-                    refuse_if(effector not in before, key, problem)
+                    validation.refuse_if(effector not in before, key, problem)
                 else:
                     entry.check_for(effector, f"{key}.")
             before = set(stage.contacts)
@@ -205,19 +192,12 @@ class PlannedContacts:
         object.__setattr__(self, "stages", tuple(stages))
 
     def to_dict(self, body: BodyModel, scenario: Scenario | None = None) -> dict[str, Any]:
-        """Content of a contact-plan file.
-
-        Args:
-            body: Whose plan it is.
-            scenario: Kept in the file as a whole; left out when None.
-        """
+        """Content of a contact-plan file for a body, with the whole scenario where one is given."""
         content: dict[str, Any] = {"format": FORMAT, "planner": self.planner}
         if scenario is not None:
             content["scenario"] = yaml.safe_load(scenario.to_yaml())
-        stages, before = [], {}
-        for stage in self.stages:
-            stages.append(_stage_dict(body, stage, before))
-            before = stage.contacts
+        before = [{}, *(stage.contacts for stage in self.stages)]
+        stages = [_stage_dict(body, stage, kept) for stage, kept in zip(self.stages, before, strict=False)]
         goal = {"posture": _posture_dict(body, self.goal), "com": _listed(self.goal_com)}
         return content | {"stages": stages, "goal": {k: v for k, v in goal.items() if v is not None}}
 
@@ -262,11 +242,11 @@ def parse_contact_plan(
         source: Name of the file, for messages.
         folder: Folder that relative paths start from; the current one when omitted.
     """
-    file = validate(ContactPlanFile, json.loads(json.dumps(content)), source)
+    file = validation.validate(ContactPlanFile, json.loads(json.dumps(content)), source)
     scenario = scenario or _own_scenario(file, source, folder or Path())
     if file.body is not None and file.body != scenario.file.body:
-        problem = f"body is not that of scenario {scenario.name!r}"
-        raise ScenarioError(f"{source}: {problem}; valid: the same, or none")
+        own = scenario.name
+        raise ScenarioError(f"{source}: body is not that of scenario {own!r}; valid: the same, or none")
     body = scenario.build_body()
     stages, before = [], {}
     for number, section in enumerate(file.stages):
@@ -287,13 +267,13 @@ def parse_contact_plan(
 
 def _own_scenario(file: ContactPlanFile, source: str, folder: Path) -> Scenario:
     if file.scenario is None:
-        valid = "a name, a file, or what a scenario file holds"
-        raise ScenarioError(f"{source}: scenario is missing; valid: {valid}")
+        problem = "scenario is missing; valid: a name, a file, or what a scenario file holds"
+        raise ScenarioError(f"{source}: {problem}")
     if isinstance(file.scenario, str):
         beside = folder / file.scenario
         return load_scenario(str(beside) if beside.is_file() else file.scenario)
     name = f"{source}: scenario"
-    return Scenario(validate(ScenarioFile, file.scenario, name), name, folder)
+    return Scenario(validation.validate(ScenarioFile, file.scenario, name), name, folder)
 
 
 def _contact(
@@ -351,16 +331,14 @@ def _listed(value: FloatArray | None) -> list[float] | None:
 
 
 def _stage_dict(body: BodyModel, stage: PlannedStage, before: Mapping[str, Contact]) -> dict[str, Any]:
-    result: dict[str, Any] = {
-        "contacts": {
-            name: "same" if before.get(name) is contact else _contact_dict(contact)
-            for name, contact in stage.contacts.items()
-        },
-        "posture": _posture_dict(body, stage.posture),
-        "com": _listed(stage.com),
-        "via": _posture_dict(body, stage.via),
-        "duration_s": stage.duration,
+    contacts = {
+        name: "same" if before.get(name) is contact else _contact_dict(contact)
+        for name, contact in stage.contacts.items()
     }
+    result: dict[str, Any] = {
+        "contacts": contacts, "posture": _posture_dict(body, stage.posture), "com": _listed(stage.com),
+        "via": _posture_dict(body, stage.via), "duration_s": stage.duration,
+    }  # fmt: skip
     if np.any(stage.com_velocity):
         result["com_velocity_m_s"] = stage.com_velocity.tolist()
     if stage.dynamic:
@@ -374,9 +352,7 @@ def _contact_dict(contact: Contact) -> dict[str, Any]:
         common["rotation"] = contact.rotation_contact_to_world.tolist()
     if contact.kind is ContactKind.GRASP:
         return common | {"max_force_N": contact.max_force, "max_moment_Nm": contact.max_moment}
-    limits = {
-        "normal_force_cap_N": contact.normal_force_cap, "torsion_limit_Nm": contact.torsion_limit,
-    }  # fmt: skip
+    limits = {"normal_force_cap_N": contact.normal_force_cap, "torsion_limit_Nm": contact.torsion_limit}
     if contact.rolls:
         common["edge_radius_m"] = contact.edge_radius
     elif contact.kind is ContactKind.SOLE:

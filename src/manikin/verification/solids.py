@@ -1,19 +1,17 @@
 """Obstacles as plain solids: signed distances of points, and the flat pieces that can carry a contact.
 
 Everything is computed from the obstacles' own sizes by elementary formulas; nothing is shared with the
-distances that planning uses, so that an error there is found here.
-
-Formulas for single features after Ericson, Real-Time Collision Detection (2005), chapter 5; the winding
-number by solid angles after van Oosterom and Strackee (1983).
+distances that planning uses, so that an error there is found here. Formulas for single features are after
+Ericson, Real-Time Collision Detection (2005), chapter 5, the winding number after van Oosterom (1983).
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, dot
 from manikin.scene.mesh import Mesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Sphere
 
@@ -67,29 +65,28 @@ def distance_to_triangles(points: FloatArray, corners: FloatArray) -> FloatArray
 
 def point_triangle(points: FloatArray, corners: FloatArray) -> FloatArray:
     """(...) distances of points (..., 3) to triangles (..., 3, 3) [m]."""
-    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
-    normal = np.cross(b - a, c - a)
-    size = np.linalg.norm(normal, axis=-1)
-    height = np.abs(_dot(points - a, normal)) / size
+    a, b, c = np.moveaxis(corners, -2, 0)
+    normal, sides = np.cross(b - a, c - a), ((a, b), (b, c), (c, a))
+    height = np.abs(dot(points - a, normal)) / np.linalg.norm(normal, axis=-1)
     above = np.ones(height.shape, dtype=bool)
-    for start, end in ((a, b), (b, c), (c, a)):
-        above &= _dot(np.cross(normal, end - start), points - start) >= 0.0
-    edges = [point_segment(points, start, end) for start, end in ((a, b), (b, c), (c, a))]
-    return np.where(above, height, np.minimum(np.minimum(edges[0], edges[1]), edges[2]))
+    for start, end in sides:
+        above &= dot(np.cross(normal, end - start), points - start) >= 0.0
+    edges = (point_segment(points, start, end) for start, end in sides)
+    return np.where(above, height, reduce(np.minimum, edges))
 
 
 def point_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     """(...) distances of points (..., 3) to segments [m]."""
     along = end - start
-    share = np.clip(_dot(points - start, along) / np.maximum(_dot(along, along), 1e-30), 0.0, 1.0)
+    share = np.clip(dot(points - start, along) / np.maximum(dot(along, along), 1e-30), 0.0, 1.0)
     return np.linalg.norm(points - start - share[..., None] * along, axis=-1)
 
 
 def segment_segment(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
     """(...) distances of segments from ``a`` to ``b`` to segments from ``c`` to ``d``, (..., 3) each [m]."""
     first, second, between = b - a, d - c, a - c
-    aa, bb, ab = _dot(first, first), _dot(second, second), _dot(first, second)
-    ar, br = _dot(first, between), _dot(second, between)
+    aa, bb, ab = dot(first, first), dot(second, second), dot(first, second)
+    ar, br = dot(first, between), dot(second, between)
     spread = aa * bb - ab * ab
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = np.clip((ab * br - ar * bb) / spread, 0.0, 1.0)
@@ -97,27 +94,25 @@ def segment_segment(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) 
     other = np.clip((ab * share + br) / np.maximum(bb, 1e-30), 0.0, 1.0)
     share = np.clip((ab * other - ar) / np.maximum(aa, 1e-30), 0.0, 1.0)
     inner = np.linalg.norm(between + share[..., None] * first - other[..., None] * second, axis=-1)
-    ends = (
-        point_segment(a, c, d), point_segment(b, c, d), point_segment(c, a, b), point_segment(d, a, b),
-    )  # fmt: skip
+    ends = point_segment(a, c, d), point_segment(b, c, d), point_segment(c, a, b), point_segment(d, a, b)
     return np.minimum(inner, np.min(np.stack(np.broadcast_arrays(*ends)), axis=0))
 
 
 def segment_triangle(start: FloatArray, end: FloatArray, corners: FloatArray) -> FloatArray:
     """(...) distances of segments, (..., 3) each, to triangles (..., 3, 3) [m]; 0 where they cross."""
-    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
+    a, b, c = np.moveaxis(corners, -2, 0)
     nearest = np.minimum(point_triangle(start, corners), point_triangle(end, corners))
-    for first, second in ((a, b), (b, c), (c, a)):
+    normal, sides = np.cross(b - a, c - a), ((a, b), (b, c), (c, a))
+    for first, second in sides:
         nearest = np.minimum(nearest, segment_segment(start, end, first, second))
-    normal = np.cross(b - a, c - a)
-    from_start, from_end = _dot(start - a, normal), _dot(end - a, normal)
+    from_start, from_end = dot(start - a, normal), dot(end - a, normal)
     drop = from_start - from_end
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(drop != 0.0, from_start / drop, -1.0)
     crossing = start + share[..., None] * (end - start)
     inside = (share >= 0.0) & (share <= 1.0)
-    for first, second in ((a, b), (b, c), (c, a)):
-        inside &= _dot(np.cross(normal, second - first), crossing - first) >= 0.0
+    for first, second in sides:
+        inside &= dot(np.cross(normal, second - first), crossing - first) >= 0.0
     return np.where(inside, 0.0, nearest)
 
 
@@ -127,14 +122,10 @@ def winding_numbers(points: FloatArray, corners: FloatArray) -> FloatArray:
     for number, point in enumerate(points):
         a, b, c = np.moveaxis(corners - point, 1, 0)
         la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-        volume = _dot(a, np.cross(b, c))
-        base = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+        volume = dot(a, np.cross(b, c))
+        base = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
         result[number] = np.arctan2(volume, base).sum() / (2.0 * np.pi)
     return result
-
-
-def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
-    return np.einsum("...i,...i->...", first, second)
 
 
 REACH = 0.25
@@ -193,7 +184,11 @@ class Solid:
             height = points @ normal - offset
             return np.abs(height) if isinstance(shape, Plane) else height
         if isinstance(shape, Mesh):
-            return self._distance_to_mesh(points)
+            near = self._near(points)
+            if not len(near):
+                return np.full(len(points), np.inf)
+            distance = distance_to_triangles(points, self.triangles.corners[near]).min(axis=1)
+            return np.where(self.inside(points), -distance, np.where(distance <= REACH, distance, np.inf))
         local = (points - place.translation) @ place.rotation
         if isinstance(shape, Sphere):
             return np.linalg.norm(local, axis=-1) - shape.radius
@@ -208,13 +203,9 @@ class Solid:
             beyond = np.abs(local) - 0.5 * shape.size
         return box_distance(beyond)
 
-    def _distance_to_mesh(self, points: FloatArray) -> FloatArray:
-        low, high = points.min(axis=0) - REACH, points.max(axis=0) + REACH
-        near = self.triangles.overlapping(low, high)
-        if not len(near):
-            return np.full(len(points), np.inf)
-        distance = distance_to_triangles(points, self.triangles.corners[near]).min(axis=1)
-        return np.where(self.inside(points), -distance, np.where(distance <= REACH, distance, np.inf))
+    def _near(self, points: FloatArray) -> np.ndarray:
+        """Indices of the triangles within the reach of points (n, 3), by their boxes."""
+        return self.triangles.overlapping(points.min(axis=0) - REACH, points.max(axis=0) + REACH)
 
     def inside(self, points: FloatArray) -> np.ndarray:
         """(n,) whether points (n, 3) are inside a closed piece of a mesh."""
@@ -230,15 +221,15 @@ class Solid:
     def support(
         self, points: FloatArray, normal: FloatArray, max_angle: float
     ) -> tuple[FloatArray, FloatArray]:
-        """Distance (n,) [m] of points (n, 3) to the flat pieces that face a direction, and their angle (n,).
+        """Distance (n,) of points (n, 3) to the flat pieces that face a direction, and their angle (n,).
 
         Args:
             normal: (3,) unit direction from the surface into the body.
             max_angle: Largest angle between it and a piece's outward normal [rad].
 
         Returns:
-            Distances, infinite where nothing faces there, and angles of the nearest piece [rad]; of pieces
-            that are equally near (to 0.1 mm) the one with the smallest angle.
+            Distances [m], infinite where nothing faces there, and angles [rad]; of pieces that are equally
+            near (to 0.1 mm) the one with the smallest angle counts.
         """
         best, angle = np.full(len(points), np.inf), np.full(len(points), np.pi)
         for distance, facing in self._pieces(points, normal, float(np.cos(max_angle))):
@@ -259,15 +250,11 @@ class Solid:
                 if sign * (own @ normal) >= least:
                     yield np.abs(points @ own - offset), sign * (own @ normal) * every
         elif isinstance(shape, Mesh):
-            triangles = self.triangles
-            low, high = points.min(axis=0) - REACH, points.max(axis=0) + REACH
-            near = triangles.overlapping(low, high)
+            triangles, near = self.triangles, self._near(points)
             near = near[triangles.normals[near] @ normal >= least]
             if len(near):
-                table, facing = (
-                    distance_to_triangles(points, triangles.corners[near]),
-                    triangles.normals[near] @ normal,
-                )
+                table = distance_to_triangles(points, triangles.corners[near])
+                facing = triangles.normals[near] @ normal
                 # Of triangles that are equally near, as along a shared edge, the one that faces best.
                 close = table <= table.min(axis=1, keepdims=True) + NORMAL_LIMIT
                 yield table.min(axis=1), np.where(close, facing, -1.0).max(axis=1)

@@ -103,8 +103,9 @@ class ContactRows:
             return self._grasped(contact, where)
         self._friction.take(contact.friction, where)
         self._hidden.take(*self._deepest(contact, where))
-        hull = outline(contact.points) if contact.kind is ContactKind.SOLE else None
+        hull = None
         if contact.kind is ContactKind.SOLE:
+            hull = outline(contact.points)
             self._of_the_sole(contact, hull, where)
         else:
             self._beyond.take(float(np.abs(contact.points).max()), where)
@@ -134,8 +135,8 @@ class ContactRows:
         lying = float(weight @ (best[: len(samples)] <= ON_SURFACE) / weight.sum())
         size = nominal_size(self._body, contact.effector)
         if size is not None:
-            share, carried = lying * area(hull) / (size[0] * size[1]), best <= ON_SURFACE
-            on = np.vstack([local, contact.points])[carried]
+            share, on = lying * area(hull) / (size[0] * size[1]), np.vstack([local, contact.points])
+            on = on[best <= ON_SURFACE]
             middle = 0.5 * (on.min(axis=0) + on.max(axis=0)) if len(on) else np.full(3, np.inf)
             if self._rules.rungs and share < LEAST_SHARE and abs(middle[0]) <= MIDDLE * size[0]:
                 self._across.take(float(np.ptp(on[:, 1])) / size[1], where)
@@ -147,15 +148,13 @@ class ContactRows:
         """Points, or an edge, on any surface."""
         touched = set()
         for point in contact.points_in_world:
-            distances = [float(solid.distance(point[None])[0]) for solid in self._solids]
-            near = int(np.argmin(np.abs(distances))) if distances else -1
-            distance = abs(distances[near]) if distances else np.inf
-            self._distance.take(distance, where)
-            if distance <= ON_SURFACE:
-                measured = zip(self._solids, distances, strict=True)
-                touched |= {solid.name for solid, distance in measured if abs(distance) <= ON_SURFACE}
-                away = self._solids[near].distance((point + _RAISED * contact.normal)[None])[0]
-                rise = np.clip((away - distances[near]) / _RAISED, -1.0, 1.0)
+            distances = [(float(solid.distance(point[None])[0]), solid) for solid in self._solids]
+            near, nearest = min(distances, key=lambda item: abs(item[0]), default=(np.inf, None))
+            self._distance.take(abs(near), where)
+            if nearest is not None and abs(near) <= ON_SURFACE:
+                touched |= {solid.name for distance, solid in distances if abs(distance) <= ON_SURFACE}
+                away = nearest.distance((point + _RAISED * contact.normal)[None])[0]
+                rise = np.clip((away - near) / _RAISED, -1.0, 1.0)
                 self._point_angle.take(float(np.rad2deg(np.arccos(rise))), where)
         return frozenset(touched)
 
@@ -183,14 +182,12 @@ class ContactRows:
         return deepest, place
 
     def _of_the_sole(self, contact: Contact, hull: FloatArray | None, where: str) -> None:
-        size = nominal_size(self._body, contact.effector)
         self._beyond.take(float(np.abs(contact.points[:, 2]).max()), where)
-        if size is None:
-            return
-        half = 0.5 * np.array(size)
-        self._beyond.take(float((np.abs(contact.points[:, :2]) - half).max()), where)
-        if hull is None and not contact.rolls:
-            self._share.take(0.0, where)
+        if (size := nominal_size(self._body, contact.effector)) is not None:
+            beyond = np.abs(contact.points[:, :2]) - 0.5 * np.array(size)
+            self._beyond.take(float(beyond.max()), where)
+            if hull is None and not contact.rolls:
+                self._share.take(0.0, where)
 
 
 def outline(points: FloatArray) -> FloatArray | None:
@@ -201,8 +198,7 @@ def outline(points: FloatArray) -> FloatArray | None:
         hull = ConvexHull(points[:, :2])
     except QhullError:
         return None
-    corners = np.zeros((len(hull.vertices), 3))
-    corners[:, :2] = points[hull.vertices, :2]
+    corners = points[hull.vertices]
     corners[:, 2] = points[:, 2].mean()
     return corners
 
@@ -215,9 +211,8 @@ def area(corners: FloatArray) -> float:
 
 def polygon_samples(corners: FloatArray) -> FloatArray:
     """(n, 3) points of a convex polygon (k, 3): on rings from its edge to its middle."""
-    following = np.roll(corners, -1, axis=0)
     edge = []
-    for start, end in zip(corners, following, strict=True):
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         count = max(1, int(np.ceil(np.linalg.norm(end - start) / _SPACING)))
         edge.append(start + np.arange(count)[:, None] / count * (end - start))
     ring, middle = np.concatenate(edge), corners.mean(axis=0)

@@ -5,30 +5,19 @@ Until the reaction delay is over, muscles hold the posture as springs and damper
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments
+from manikin.control import edge_forces
 from manikin.control.build_qp import JointBounds, force_variables
 from manikin.control.dynamics import Dynamics, DynamicsState
-from manikin.control.edge_forces import (
-    ContactForceBasis,
-    contact_force_basis,
-    contact_geometry,
-    inside_the_cone,
-    segment_key,
-)
-from manikin.control.recovery.recovery_problem import (
-    ROOT,
-    ArmSwing,
-    Objective,
-    Objectives,
-    RecoveryProblem,
-    build_recovery_qp,
-    leg_symmetry,
-)
+from manikin.control.edge_forces import ContactForceBasis, contact_geometry, segment_key
+from manikin.control.recovery import recovery_problem
+from manikin.control.recovery.recovery_problem import ROOT, ArmSwing, Objectives, RecoveryProblem
 from manikin.control.recovery.standing import (
     ClosedLoop,
     FeltPush,
@@ -64,10 +53,9 @@ def held_posture(
 ) -> FloatArray:  # fmt: skip
     """(nv - 6,) joint torques that hold the posture of a way to stand, whatever the ground can give [N.m].
 
-    A spring has the gains of :attr:`RecoverySettings.stiffness` on the inertia of what hangs on its joint;
-    hips and knees have :data:`LEG_STIFFNESS` at least, ankles :attr:`RecoverySettings.ankle_stiffness`. The
-    springs act on the state at the end of the period, so that stiff ones on light segments do not swing up
-    ("stable PD", Tan et al. 2011), beside the torques at rest (nv - 6,) [N.m].
+    Springs have the gains of :attr:`RecoverySettings.stiffness` on the inertia of what hangs on a joint; hips
+    and knees :data:`LEG_STIFFNESS` at least, ankles :attr:`RecoverySettings.ankle_stiffness`. They act on the
+    state at the end of the period ("stable PD", Tan et al. 2011), beside the torques at rest (nv - 6,) [N.m].
     """
     period, joints = settings.period, groups.joints
     inertia = np.diag(state.mass_matrix)[6:]
@@ -140,9 +128,7 @@ class BalanceRecovery:
             InputError: If its soles are not level, or the support is not of its feet.
         """
         self.body, self.settings = body, settings or RecoverySettings()
-        self.groups = joint_groups(body)
-        self.friction = friction
-        joints = body.nv - 6
+        self.groups, self.friction, joints = joint_groups(body), friction, body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
         feet = self.groups.feet if support is None else tuple(support)
@@ -170,11 +156,12 @@ class BalanceRecovery:
         self._calm = standing.area.shrunk(self.settings.posture_area)
         self._geometry = tuple(contact_geometry(self.body, contact, 0.0) for contact in standing.soles)
         self._switch = StrategySwitch(self.settings)
-        self._alike = [
-            (left, right)
-            for left, right in _leg_joints(self.body)
-            if len(standing.soles) > 1 and abs(standing.posture[left] - standing.posture[right]) < ALIKE
-        ]
+        # Left and right knee flexion and ankle flexion ([Kudoh2002]_ 2.49-2.50).
+        joints = [(f"left_{name}", f"right_{name}") for name in ("knee_flexion", "ankle_dorsiflexion")]
+        known = [pair for pair in joints if len(standing.soles) > 1 and {*pair} <= {*self.body.joint_names}]
+        pairs = [(self.body.joint_index(left), self.body.joint_index(right)) for left, right in known]
+        posture = standing.posture
+        self._alike = [(left, right) for left, right in pairs if abs(posture[left] - posture[right]) < ALIKE]
 
     def evaluate(self, q: FloatArray, v: FloatArray) -> DynamicsState:
         """Dynamics at a configuration (nq,) and velocity (nv,)."""
@@ -187,10 +174,10 @@ class BalanceRecovery:
         rows = zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
         law = com_law(state, self.standing.com, self.standing.area, self.settings, self._turned)
         objective = self._objectives.balancing(state, self.standing.posture, law, self._time)
-        return build_recovery_qp(
-            state, loop, self._contacts(state), felt, self._bounds(state), rows,
-            LinearMap.none(loop.size), objective,
-        )  # fmt: skip
+        contacts, none = self._contacts(state), LinearMap.none(loop.size)
+        return recovery_problem.build_recovery_qp(
+            state, loop, contacts, felt, self._bounds(state), rows, none, objective
+        )
 
     def step(
         self, q: FloatArray, v: FloatArray, push: FeltPush | None = None, *, reacting: bool = True,
@@ -215,8 +202,7 @@ class BalanceRecovery:
         law = self._law(state, may_turn=swing is None)
         strategy = self._switch.choose(state.com, law.settled, self.standing.area)
         rows = zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
-        share, leaving = 0.0, False
-        objective: Objective | None = None
+        share, leaving, objective = 0.0, False, None
         if swing is not None:
             strategy = Strategy.STEP
             objective = self._objectives.stepping(state, self.standing.posture, law, *swing)
@@ -230,11 +216,11 @@ class BalanceRecovery:
             strategy = Strategy.PROGRAM
             objective = self._objectives.balancing(state, self.standing.posture, law, self._time)
         contacts = self._contacts(state)
-        alike = leg_symmetry(loop, state.q[7:], self._alike, ALIKE)
+        alike = recovery_problem.leg_symmetry(loop, state.q[7:], self._alike, ALIKE)
         # The ground carries at least a share of the weight; not in the thesis.
         least = self.settings.least_load * state.mass * GRAVITY
         loaded = LinearMap(-loop.force.matrix[2:], least - loop.force.offset[2:])
-        problem = build_recovery_qp(
+        problem = recovery_problem.build_recovery_qp(
             state, loop, contacts, felt, self._bounds(state), LinearMap.none(loop.size) if leaving else rows,
             alike.joined(loaded), objective, pulling=leaving,
         )  # fmt: skip
@@ -250,33 +236,28 @@ class BalanceRecovery:
         """The law of the centre of mass one period later, with what has been turned meanwhile."""
         self._time += self.settings.period
         self._turned = self._turned + self.settings.period * fall_momentum(state)
-        law = com_law(
-            state, self.standing.com, self.standing.area, self.settings, self._turned, may_turn=may_turn
-        )
+        area, home = self.standing.area, self.standing.com
+        law = com_law(state, home, area, self.settings, self._turned, may_turn=may_turn)
         if law.need > 0.0:
-            self._arms.begin(self._time, law.settled - self.standing.area.centre, law.reach, self._ahead)
+            self._arms.begin(self._time, law.settled - area.centre, law.reach, self._ahead)
         return law
 
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave."""
-        calm = zmp_rows(self._calm, loop, state.com, 0.0)
-        gains = self.settings.posture
+        calm, gains = zmp_rows(self._calm, loop, state.com, 0.0), self.settings.posture
         stiff = gains.stiffness * (self.standing.posture - state.q[7:])
         damped = -gains.damping * state.v[6:]
         return posture_control(loop, calm, stiff, damped, always=self.settings.posture_control_only)
 
     def _contacts(self, state: DynamicsState) -> list[ContactForceBasis]:
-        share, model = self.settings.friction_share, inside_the_cone(self.settings.friction_model)
-        return [
-            contact_force_basis(contact, geometry, state, friction_share=share, friction_model=model)
-            for contact, geometry in zip(self.standing.soles, self._geometry, strict=True)
-        ]
+        share, soles = self.settings.friction_share, zip(self.standing.soles, self._geometry, strict=True)
+        model = edge_forces.inside_the_cone(self.settings.friction_model)
+        build = partial(edge_forces.contact_force_basis, friction_share=share, friction_model=model)
+        return [build(contact, geometry, state) for contact, geometry in soles]
 
     def _bounds(self, state: DynamicsState) -> JointBounds:
-        settings = self.settings
-        return JointBounds.of(
-            self.body, state, settings.joint_limit_horizon, settings.max_joint_acceleration, settings.strength
-        )
+        limits, horizon = self.settings, self.settings.joint_limit_horizon
+        return JointBounds.of(self.body, state, horizon, limits.max_joint_acceleration, limits.strength)
 
     def _solve(self, problem: RecoveryProblem) -> tuple[QPSolution | None, str]:
         solution = self._solvers["full"].solve(problem.program)
@@ -304,13 +285,3 @@ def _frames(body: BodyModel, feet: Sequence[str]) -> dict[str, int]:
     effectors = {name: body.effector_frame(name) for name in (*feet, ROOT)}
     segments = {name for foot in feet for name in end_segments(body, foot)}
     return effectors | {segment_key(name): body.segment_frame(name) for name in sorted(segments)}
-
-
-def _leg_joints(body: BodyModel) -> list[tuple[int, int]]:
-    """Left and right knee flexion and ankle flexion ([Kudoh2002]_ 2.49-2.50)."""
-    pairs = [(f"left_{name}", f"right_{name}") for name in ("knee_flexion", "ankle_dorsiflexion")]
-    return [
-        (body.joint_index(left), body.joint_index(right))
-        for left, right in pairs
-        if left in body.joint_names and right in body.joint_names
-    ]

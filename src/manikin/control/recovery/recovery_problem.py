@@ -7,10 +7,9 @@ share their load in many ways.
 
 Arms help against a fall ahead by being raised and swung; this part is ours. Of hanging arms that swing back,
 the angular momentum about the centre of mass is next to nothing: that of their turning is undone by that of
-their centres, which are as high as the centre of mass and move back. Of arms overhead that swing forward and
-down both go with the fall, over a range of half a turn and more. A program that looks at one instant cannot
-find that out. So arms go up first, sideways to begin with, where raising them costs little, and are then
-swung; meanwhile the trunk turns.
+their centres. Of arms overhead that swing forward and down both go with the fall, over half a turn and more,
+which a program that looks at one instant cannot find out. So arms go up first, sideways to begin with, where
+raising them costs little, and are then swung; meanwhile the trunk turns.
 """
 
 from collections.abc import Sequence
@@ -173,36 +172,25 @@ def build_recovery_qp(
         objective: What is minimised.
         pulling: Whether the ground may pull as well.
     """
-    k, joints = loop.size, len(state.v) - 6
     generalised = np.concatenate([basis.generalised for basis in contacts], axis=1)
     basis, drift = loop.acceleration.matrix, loop.acceleration.offset
     motion = np.concatenate((state.mass_matrix @ basis, -generalised), axis=1)
     still = state.mass_matrix @ drift + state.bias - push.generalised
-    torque = LinearMap(motion[6:], still[6:])
-    size, forces = k + generalised.shape[1], generalised.shape[1]
-
-    rows = np.zeros((6 + 2 * joints + len(symmetry.offset) + len(zmp.offset), size))
-    lower, upper = np.full(len(rows), -np.inf), np.full(len(rows), np.inf)
-    rows[:6], lower[:6], upper[:6] = motion[:6], -still[:6], -still[:6]
-    part = slice(6, 6 + joints)
-    rows[part] = torque.matrix
-    lower[part], upper[part] = bounds.torque_lower - torque.offset, bounds.torque_upper - torque.offset
-    part = slice(part.stop, part.stop + len(zmp.offset))
-    rows[part, :k], upper[part] = zmp.matrix, -zmp.offset
-    first = part.stop
-    part = slice(first, first + joints)
-    rows[part, :k] = loop.joints.matrix
-    lower[part] = bounds.acceleration_lower - loop.joints.offset
-    upper[part] = bounds.acceleration_upper - loop.joints.offset
-    part = slice(part.stop, part.stop + len(symmetry.offset))
-    rows[part, :k], upper[part] = symmetry.matrix, -symmetry.offset
-
-    least = -np.inf if pulling else 0.0
-    variable_lower = np.concatenate((np.full(k, -np.inf), np.full(forces, least)))
+    torque, size, forces = LinearMap(motion[6:], still[6:]), motion.shape[1], generalised.shape[1]
+    moves = np.concatenate((zmp.matrix, loop.joints.matrix, symmetry.matrix))
+    rows = np.concatenate((motion, np.pad(moves, ((0, 0), (0, forces)))))
+    lower = np.concatenate((
+        -still[:6], bounds.torque_lower - still[6:], np.full(len(zmp.offset), -np.inf),
+        bounds.acceleration_lower - loop.joints.offset, np.full(len(symmetry.offset), -np.inf),
+    ))  # fmt: skip
+    upper = np.concatenate((
+        -still[:6], bounds.torque_upper - still[6:], -zmp.offset,
+        bounds.acceleration_upper - loop.joints.offset, -symmetry.offset,
+    ))  # fmt: skip
+    least = np.concatenate((np.full(loop.size, -np.inf), np.full(forces, -np.inf if pulling else 0.0)))
     hessian, gradient = _cost(loop, objective, size)
-    free = np.full(size, np.inf)
-    program = QuadraticProgram(hessian, gradient, rows, lower, upper, variable_lower, free, 6)
-    return RecoveryProblem(program, loop, torque, (first, len(rows)))
+    program = QuadraticProgram(hessian, gradient, rows, lower, upper, least, np.full(size, np.inf), 6)
+    return RecoveryProblem(program, loop, torque, (len(motion) + len(zmp.offset), len(rows)))
 
 
 def leg_symmetry(
@@ -270,8 +258,7 @@ class Objectives:
 
     def balancing(self, state: DynamicsState, posture: FloatArray, law: ComLaw, time: float) -> Objective:
         """The objective of the quadratic program (2.54) with the law of the centre of mass."""
-        settings = self._settings
-        weight = np.ones(len(posture))
+        settings, weight = self._settings, np.ones(len(posture))
         weight[self._groups.joints["arm"]] = settings.arm_weight
         weight[self._groups.joints["trunk"]] = settings.trunk_weight
         gains = settings.unwinding
@@ -287,10 +274,9 @@ class Objectives:
         self, state: DynamicsState, posture: FloatArray, law: ComLaw, foot: str, way: EffectorReference
     ) -> Objective:
         """A foot follows its way, the trunk stays upright and the centre of mass keeps its law."""
-        settings = self._settings
+        settings, firmness = self._settings, self._settings.swing_weight
         weight = np.full(len(posture), STEPPING_JOINTS)
         joints = self._with_locked(state, posture, pull(settings.posture, state, posture), weight)
-        firmness = settings.swing_weight
         tasks = (
             swing_task(foot, state.frames[foot], way, settings.swing, firmness),
             orientation_task(ROOT, state.frames[ROOT], self._upright, settings.posture, firmness),

@@ -1,10 +1,9 @@
 """A way to stand, and the mechanics of a body whose feet are held ([Kudoh2002]_ 2.2).
 
 With both feet on the ground the generalised acceleration is ``a = basis phi'' + drift``: ``basis`` spans the
-accelerations that leave the feet where they are and ``drift`` is what their centripetal accelerations ask
-for. The thesis takes coordinates ``phi`` of the loops and finds the maps by evaluating the inverse dynamics
-at unit vectors (Fig. 2.6); an orthonormal basis gives the same maps at once, and since the objective and all
-limits are written in joint accelerations, forces and moments, it does not matter which basis is taken.
+accelerations that leave the feet where they are, ``drift`` is what their centripetal accelerations ask for.
+The thesis finds the maps by evaluating the inverse dynamics at unit vectors of coordinates ``phi`` of the
+loops (Fig. 2.6); an orthonormal basis gives the same maps at once, and any basis the same torques.
 """
 
 from collections.abc import Sequence
@@ -29,8 +28,7 @@ class JointGroups:
 
     Attributes:
         feet: Effectors of the two legs, the left one first.
-        joints: Hinge indices of ``"ankle"`` (with what hangs on the foot), ``"knee"``, ``"hip"``, ``"trunk"``
-            and ``"arm"``.
+        joints: Hinge indices of ``"ankle"`` (with the toes), ``"knee"``, ``"hip"``, ``"trunk"``, ``"arm"``.
         segments: Segment names of ``"arms"``, ``"trunk"`` and ``"legs"``.
     """
 
@@ -64,18 +62,13 @@ def joint_groups(body: BodyModel) -> JointGroups:
     }
     sorted_out = {name for names in parts.values() for name in names}
     parts["trunk"] = [segment.name for segment in body.segments if segment.name not in sorted_out]
-    joints = {
-        group: np.array(
-            [body.joint_index(hinge.name) for name in names for hinge in body.segment(name).hinges],
-            dtype=np.int64,
-        )
+    hinges = {
+        group: [body.joint_index(hinge.name) for name in names for hinge in body.segment(name).hinges]
         for group, names in parts.items()
     }
-    segments = {
-        "arms": tuple(parts["arm"]),
-        "trunk": tuple(parts["trunk"]),
-        "legs": (*parts["hip"], *parts["knee"], *parts["ankle"]),
-    }
+    joints = {group: np.array(numbers, dtype=np.int64) for group, numbers in hinges.items()}
+    legs_down = (*parts["hip"], *parts["knee"], *parts["ankle"])
+    segments = {"arms": tuple(parts["arm"]), "trunk": tuple(parts["trunk"]), "legs": legs_down}
     return JointGroups((legs[0].effector, legs[1].effector), joints, segments)
 
 
@@ -98,8 +91,8 @@ class LinearMap:
 
     def joined(self, other: "LinearMap") -> "LinearMap":
         """Both values, one after the other."""
-        matrices, offsets = (self.matrix, other.matrix), (self.offset, other.offset)
-        return LinearMap(np.concatenate(matrices), np.concatenate(offsets))
+        matrix = np.concatenate((self.matrix, other.matrix))
+        return LinearMap(matrix, np.concatenate((self.offset, other.offset)))
 
     def __call__(self, phi: FloatArray) -> FloatArray:
         """(m,) value at the accelerations (k,)."""
@@ -158,24 +151,18 @@ def close_loop(
     frames = [state.frames[name] for name in feet]
     jacobian = np.concatenate([frame.jacobian for frame in frames])
     wanted = np.concatenate([-frame.drift - settling * frame.twist for frame in frames])
-    held = len(wanted)
-    factors = np.linalg.qr(jacobian.T, mode="complete")
-    full: FloatArray = factors.Q
-    upper: FloatArray = factors.R
-    drift = full[:, :held] @ np.linalg.solve(upper[:held].T, wanted)
-    basis = full[:, held:]
-    momentum_rate = state.centroidal_map @ basis
-    offset = state.centroidal_map @ drift + state.momentum_drift
-    weight = np.array([0.0, 0.0, state.mass * GRAVITY])
-    push_force = push.wrench[:3]
+    held, factors = len(wanted), np.linalg.qr(jacobian.T, mode="complete")
+    drift = factors.Q[:, :held] @ np.linalg.solve(factors.R[:held].T, wanted)
+    basis = factors.Q[:, held:]
+    rate, offset = state.centroidal_map @ basis, state.centroidal_map @ drift + state.momentum_drift
+    weight, push_force = np.array([0.0, 0.0, state.mass * GRAVITY]), push.wrench[:3]
     push_moment = push.wrench[3:] - skew(state.com) @ push_force
     return ClosedLoop(
-        acceleration=LinearMap(basis, drift),
-        joints=LinearMap(basis[6:], drift[6:]),
-        com=LinearMap(momentum_rate[:3] / state.mass, offset[:3] / state.mass),
-        force=LinearMap(momentum_rate[:3], offset[:3] + weight - push_force),
-        moment=LinearMap(momentum_rate[3:], offset[3:] - push_moment),
-    )
+        LinearMap(basis, drift), LinearMap(basis[6:], drift[6:]),
+        com=LinearMap(rate[:3] / state.mass, offset[:3] / state.mass),
+        force=LinearMap(rate[:3], offset[:3] + weight - push_force),
+        moment=LinearMap(rate[3:], offset[3:] - push_moment),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,12 +185,11 @@ class SupportArea:
             InputError: If they do not.
         """
         points = np.concatenate([contact.points_in_world for contact in soles])
-        if np.ptp(points[:, 2]) > 1e-6:
-            raise InputError(
-                f"soles lie at heights from {points[:, 2].min():.3g} to {points[:, 2].max():.3g} m; "
-                "valid: both on one level plane"
-            )
-        return cls(convex_polygon(points[:, :2]), float(points[:, 2].mean()))
+        heights = points[:, 2]
+        if np.ptp(heights) > 1e-6:
+            told = f"soles lie at heights from {heights.min():.3g} to {heights.max():.3g} m"
+            raise InputError(f"{told}; valid: both on one level plane")
+        return cls(convex_polygon(points[:, :2]), float(heights.mean()))
 
     @cached_property
     def centre(self) -> FloatArray:
@@ -212,8 +198,7 @@ class SupportArea:
 
     def reach(self, point: FloatArray) -> float:
         """How far out a point (2,) is: 0 in the centre, 1 on the edge, more outside."""
-        normals, _ = self._edges
-        return float(np.max((normals @ (point - self.centre)) / self._room))
+        return float(np.max((self._edges[0] @ (point - self.centre)) / self._room))
 
     def inside(self, points: FloatArray) -> FloatArray:
         """Distance of points (..., 2) to the edge, negative outside [m]."""
@@ -226,8 +211,7 @@ class SupportArea:
     def nearest(self, point: FloatArray, inset: float) -> FloatArray:
         """Point (2,) drawn towards the centre until it is inside by ``inset`` [m]."""
         normals, offsets = self.half_planes(inset)
-        along = normals @ (point - self.centre)
-        room = offsets - normals @ self.centre
+        along, room = normals @ (point - self.centre), offsets - normals @ self.centre
         return self.centre + (point - self.centre) / max(1.0, float(np.max(along / room)))
 
     def closest(self, point: FloatArray, inset: float = 0.0) -> FloatArray:
@@ -269,10 +253,9 @@ class SupportArea:
 def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float) -> LinearMap:
     """Rows that are not positive when the ZMP is inside ([Kudoh2002]_ 2.39-2.44, z up).
 
-    With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` on
-    the ground at the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and
-    ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right
-    where ``f_z > 0``. The ZMP is kept ``inset`` [m] from the edge.
+    With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` at
+    the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and, across, ``s_y f_z + (z - s_z) f_y +
+    n_x``; the rows are ``normal . p f_z - offset f_z`` for ``f_z > 0``, the ZMP ``inset`` [m] from the edge.
     """
     normals, offsets = area.half_planes(inset)
     moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)
@@ -293,11 +276,8 @@ def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float
 def _turned(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
     """(2, ...) ``p f_z`` for the ZMP ``p``."""
     drop = height - com[2]
-    turned: FloatArray = np.stack((
-        com[0] * force[2] + drop * force[0] - moment[1],
-        com[1] * force[2] + drop * force[1] + moment[0],
-    ))  # fmt: skip
-    return turned
+    x, y = com[0] * force[2] + drop * force[0] - moment[1], com[1] * force[2] + drop * force[1] + moment[0]
+    return np.stack((x, y))
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,7 +324,5 @@ def sole_at(
     body: BodyModel, effector: str, rotation: FloatArray, position: FloatArray, friction: float
 ) -> Contact:
     """Whole sole of a foot, from its rotation (3, 3) to the world and its middle (3,) [m]."""
-    return sole(
-        effector, position, rotation=rotation, length=float(body.sole_length or 0.0),
-        width=float(body.sole_width or 0.0), friction=friction,
-    )  # fmt: skip
+    length, width = float(body.sole_length or 0.0), float(body.sole_width or 0.0)
+    return sole(effector, position, rotation=rotation, length=length, width=width, friction=friction)

@@ -17,9 +17,8 @@ point over the soles when it begins with the *settled point*
 
 over them. While that is beyond the soles the law asks for turning, and once it is over them for stopping
 it. The moment that stops it is what uses up the range ``R`` of arms and trunk that is left, ``M = L^2 / (2
-R)``: stopping sooner and harder would throw the capture point out again. Where it would have to be large,
-the law asks for stopping even if the capture point is not back: else the joints stop at their ends, all at
-once. This part is ours; it is what a controller that looks no step ahead has in place of a plan.
+R)``: stopping sooner and harder would throw the capture point out again. Where it would have to be large, the
+law asks for stopping in any case: else the joints stop at their ends, all at once. This part is ours.
 
 Near the centre of the soles posture control has the largest gains that keep the ZMP inside (2.5.2); farther
 out the quadratic program is solved instead (2.5.3).
@@ -58,10 +57,9 @@ def posture_control(
 ) -> PostureControl | None:
     """Find the largest gains at which no row is positive, all reduced at the same damping ratio.
 
-    With the share ``s`` of the damping and ``s^2`` of the stiffness the body comes back as it does with the
-    largest gains, only ``1/s`` times more slowly: with equal shares of both, as the thesis' equal reduction
-    of its gains has it, it would sway the more the smaller they have to be. Every row is quadratic in ``s``,
-    so that its borders are found in closed form.
+    With the share ``s`` of the damping and ``s^2`` of the stiffness the body comes back as with the largest
+    gains, only ``1/s`` times more slowly: with equal shares of both, as in the thesis, it would sway. Every
+    row is quadratic in ``s``, so that its borders are found in closed form.
 
     Args:
         loop: Maps at the state.
@@ -131,17 +129,14 @@ class RecoverySettings:
             point is: otherwise the stops of the joints do it, all at once.
         range: Integral over time of the angular momentum that arms, trunk and legs can have, for each
             kilogram of the body [m^2].
-        friction_model: Friction model of the soles, in which margins are measured; control stays inside the
-            cone.
-        least_load: Share of the weight that the ground carries where that is possible: a body that lets
-            itself drop has nothing to push against.
+        friction_model: Friction model of the soles, of margins; control stays inside the cone.
+        least_load: Share of the weight that the ground carries where that is possible, to push against.
         stopping: Damping of all joints while the turning is stopped [1/s].
         height: Gains of the same law for the height.
         height_weight: Weight of its squared error; 0, as in the thesis, leaves the height to ``upward``.
         arm_weight: Weight of a squared acceleration of an arm's joint, against 1 of any other: the diagonal
             of ``C_theta`` (2.27).
-        trunk_weight: The same of the trunk: hips fold first, so that both come to the end of their range
-            together.
+        trunk_weight: The same of the trunk: hips fold first, so that both ranges end together.
         upward: Slope of the objective by the upward acceleration of the centre of mass (2.54).
         swing: Gains with which a stepping foot follows its way.
         swing_weight: Weight of its squared error, and of that of the pelvis' tilt meanwhile.
@@ -208,10 +203,8 @@ class RecoverySettings:
             finite_number(getattr(self, name), f"recovery {name}", above=0.0)
         for name in ("delay", "upward", "sole_inset", "ankle_stiffness"):
             finite_number(getattr(self, name), f"recovery {name}", at_least=0.0)
-        if self.least_braking > self.turning:
-            raise InputError(
-                f"recovery least_braking is {self.least_braking:g}; valid: at most turning, {self.turning:g}"
-            )
+        if (least := self.least_braking) > self.turning:
+            raise InputError(f"recovery least_braking is {least:g}; valid: at most turning, {self.turning:g}")
         if self.inner > self.outer:
             raise InputError(f"recovery inner is {self.inner:g}, outer {self.outer:g}; valid: inner <= outer")
         for name in self.locked:
@@ -237,14 +230,12 @@ class StrategySwitch:
 
     def __init__(self, settings: RecoverySettings) -> None:
         """Begin with posture control."""
-        self._settings = settings
-        self._near = True
+        self._settings, self._near = settings, True
 
     def choose(self, com: FloatArray, settled: FloatArray, area: SupportArea) -> Strategy:
         """Choose for a centre of mass (3,) and where the capture point settles (2,) [m].
 
-        The thesis looks at the centre of mass alone, and would hold the posture while a fast body passes the
-        centre; both must be near it here.
+        The thesis looks at the first alone, and would hold the posture while a fast body passes the centre.
         """
         settings = self._settings
         if settings.posture_control_only:
@@ -303,9 +294,10 @@ def com_law(
     frequency = np.sqrt(GRAVITY / height)
     velocity = state.momentum[:3] / state.mass
     momentum = fall_momentum(state)
-    amount = float(np.linalg.norm(momentum))
-    most = settings.turning * weight
-    needed = _needed_braking(momentum, turned, settings.range * state.mass)
+    amount, most = float(np.linalg.norm(momentum)), settings.turning * weight
+    # What stops the turning at the end of the range [N.m]; infinite where that is used up.
+    left = settings.range * state.mass - float(turned @ momentum) / max(amount, 1e-9)
+    needed = amount**2 / (2.0 * left) if left > 0.0 else np.inf
     brake = float(np.clip(needed, settings.least_braking * weight, most))
     settled = capture_point(state.com, velocity, height)
     if amount > 0.0:
@@ -322,13 +314,6 @@ def com_law(
     law[:2] = frequency**2 * (state.com[:2] - zmp) - moment / (state.mass * height)
     law[2] = settings.height.stiffness * (home[2] - state.com[2]) - settings.height.damping * velocity[2]
     return ComLaw(law, settled, reach, need)
-
-
-def _needed_braking(momentum: FloatArray, turned: FloatArray, reach: float) -> float:
-    """Moment that stops the turning at the end of the range [N.m]; infinite where that is used up."""
-    amount = float(np.linalg.norm(momentum))
-    left = reach - float(turned @ momentum) / max(amount, 1e-9)
-    return amount**2 / (2.0 * left) if left > 0.0 else np.inf
 
 
 def capture_point(com: FloatArray, velocity: FloatArray, height: float) -> FloatArray:

@@ -6,15 +6,13 @@ of the soles and whose flywheel is turned with the moment ``M`` has the capture 
     ``c' = w (c - p) - w M / (m g)``.
 
 The flywheel has to stop before the ends of its range. Turning with ``M`` for the time ``t``, on with the
-angular momentum ``L = M t`` for the time ``u``, and stopping with ``-M`` brings a capture point back to the
-edge that was outside it by
+angular momentum ``L = M t`` for ``u``, and stopping with ``-M`` brings a capture point back to the edge from
 
     ``e = M / (m g) (1 - exp(-w t) - exp(-w (t + u)) (1 - exp(-w L / M)))``
 
 at most, and takes ``M t^2 / 2 + L u + L^2 / (2 M)`` of the range. What a body can give is measured on it: the
-moment by a linear program on its torques, contact forces and friction in the posture, the largest angular
-momentum and the range by turning it as fast as its joints allow from there to their ends, the feet and the
-centre of mass above them in their places.
+moment by a linear program on its torques, contact forces and friction in the posture, angular momentum and
+range by turning it as fast as its joints allow to their ends, feet and centre of mass in their places.
 """
 
 from collections.abc import Sequence
@@ -25,7 +23,6 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
 from manikin.body import integrate
-from manikin.control.dynamics import DynamicsState
 from manikin.control.recovery.recovery_controller import BalanceRecovery
 from manikin.control.recovery.standing import FeltPush, close_loop
 from manikin.numerics.spatial import GRAVITY, FloatArray
@@ -68,15 +65,9 @@ class Turning:
         return float(np.max(self.moment / weight * (gained - lost)))
 
 
-def available_turning(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> Turning:
-    """Measure how far a body can turn in a posture (nq,) against a fall in a unit direction (2,)."""
-    state = controller.evaluate(q, np.zeros(controller.body.nv))
-    momentum, travel = _turned(controller, q, towards)
-    return Turning(_moment(controller, state, towards), momentum, travel)
-
-
-def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArray) -> float:
+def _moment(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> float:
     """Largest moment beyond that of a ZMP at the edge, from the largest level acceleration back."""
+    state = controller.evaluate(q, np.zeros(controller.body.nv))
     problem = controller.problem_at(state)
     program, loop = problem.program, problem.loop
     push_back = np.zeros(len(program.gradient))
@@ -87,21 +78,18 @@ def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArr
     upper, lower = np.isfinite(program.rows_upper), np.isfinite(program.rows_lower)
     upper[:equal] = lower[:equal] = False
     result = linprog(
-        push_back,
-        A_ub=np.concatenate((program.rows[upper], -program.rows[lower])),
+        push_back, A_ub=np.concatenate((program.rows[upper], -program.rows[lower])),
         b_ub=np.concatenate((program.rows_upper[upper], -program.rows_lower[lower])),
         A_eq=np.concatenate((program.rows[:equal], level)),
         b_eq=np.concatenate((program.rows_lower[:equal], -loop.com.offset[2:])),
         bounds=list(zip(program.lower, program.upper, strict=True)),
-    )
+    )  # fmt: skip
     if not result.success:
         return 0.0
     height = controller.standing.height
-    ahead = float(np.max((controller.standing.area.corners - state.com[:2]) @ towards))
-    by_zmp = GRAVITY / height * ahead
-    return max(
-        0.0, state.mass * height * (-float(result.fun) - float(towards @ loop.com.offset[:2]) - by_zmp)
-    )
+    by_zmp = GRAVITY / height * float(np.max((controller.standing.area.corners - state.com[:2]) @ towards))
+    beyond = -float(result.fun) - float(towards @ loop.com.offset[:2]) - by_zmp
+    return max(0.0, state.mass * height * beyond)
 
 
 def _turned(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> tuple[float, float]:
@@ -158,11 +146,10 @@ def held_impulse(limits: Sequence[EdgeLimit], direction: float) -> float:
 def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> tuple[EdgeLimit, ...]:
     """Upper bounds of what a posture (nq,) holds of a push of a duration [s] without a step, by support edge.
 
-    The pendulum is pushed with a constant force. Until it reacts it has the spring of its ankles. Over the
-    side of two feet it has the stiffness of both legs, with which the ZMP can be at the edge at once, as with
-    ankles of more than ``m g h`` per radian. Then its ZMP is at the edge and its flywheel turns. The mass
-    stays as high as in the posture: the bound leaves out that a bent body is lower, and that trunk and arms
-    which turn down unload the ground. A body holds less.
+    The pendulum is pushed with a constant force. Until it reacts it has the spring of its ankles; over the
+    side of two feet the stiffness of both legs, with which the ZMP can be at the edge at once, as with ankles
+    of more than ``m g h`` per radian. Then its ZMP is at the edge and its flywheel turns. The mass stays as
+    high as in the posture, and trunk and arms that turn down unload no ground: a body holds less.
     """
     posture = np.array(q, dtype=np.float64)
     weight = controller.body.mass * GRAVITY
@@ -170,7 +157,7 @@ def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> t
     normals, offsets = controller.standing.area.half_planes()
     limits = []
     for normal, offset in zip(normals, offsets, strict=True):
-        turning = available_turning(controller, posture, normal)
+        turning = Turning(_moment(controller, posture, normal), *_turned(controller, posture, normal))
         excess = turning.excess(weight, frequency)
         room = float(offset - normal @ controller.standing.com[:2])
         impulse = _impulse(controller, normal, room, excess, duration)

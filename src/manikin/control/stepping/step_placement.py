@@ -1,9 +1,8 @@
 """Where and when a foot is put down so that the body can come to rest over it.
 
-While one foot carries, with the ZMP ``p`` held at the point of its sole that is nearest to the capture point
-``c``, the capture point of a linear inverted pendulum runs away as ``c(t) = p + (c - p) exp(w t)``. A step of
-the duration ``T`` captures the body when ``c(T)`` is over the hull of the old sole and the new one (Pratt et
-al. 2006, Koolen et al. 2012).
+While one foot carries, with the ZMP ``p`` at the point of its sole nearest to the capture point ``c``, that
+of a linear inverted pendulum runs away as ``c(t) = p + (c - p) exp(w t)``. A step of the duration ``T``
+captures the body when ``c(T)`` is over the hull of both soles (Pratt et al. 2006, Koolen et al. 2012).
 """
 
 from collections.abc import Iterator
@@ -90,8 +89,7 @@ def capture_after(
 ) -> FloatArray:
     """(2,) capture point after a time [s], with the ZMP as near to it as the support area allows [m].
 
-    ``capture`` (2,) is the one now [m], the frequency that of the pendulum [1/s], ``inset`` the distance of
-    the ZMP from the edge [m].
+    ``capture`` (2,) is that now [m], ``frequency`` the pendulum's [1/s], the ZMP ``inset`` [m] from the edge.
     """
     zmp = area.closest(capture, inset)
     return zmp + (capture - zmp) * np.exp(frequency * time)
@@ -111,8 +109,8 @@ def step_goals(
         for moving in (0, 1)
     ]
     captured = False
-    for first, second in zip(tried[::2], tried[1::2], strict=True):
-        goals = [goal for places in (first, second) for goal in places.captured(settings.inside)]
+    for pair in zip(tried[::2], tried[1::2], strict=True):
+        goals = [goal for places in pair for goal in places.captured(settings.inside)]
         captured = captured or bool(goals)
         yield from (goal for _, goal in sorted(goals, key=lambda item: item[0]))
     if captured or steps < 2:
@@ -143,10 +141,8 @@ class _Places:
 
     def captured(self, inside: float) -> list[tuple[float, StepGoal]]:
         """Goals whose room is enough, with their cost."""
-        return [
-            (float(self.moved[k] - self.room[k]), self._goal(k))
-            for k in np.flatnonzero(self.room >= inside).tolist()
-        ]
+        enough = np.flatnonzero(self.room >= inside).tolist()
+        return [(float(self.moved[k] - self.room[k]), self._goal(k)) for k in enough]
 
     def nearest(self) -> list[tuple[float, StepGoal]]:
         """At each distance across, the goal that leaves the capture point least outside, with how far."""
@@ -163,12 +159,9 @@ def _reachable(
     settings: StepSettings,
 ) -> _Places:  # fmt: skip
     """Places that a foot can be put down on in time, parallel to the other one and without crossing it."""
-    foot, stays = soles[moving], soles[1 - moving]
-    outward = 1.0 if moving == 0 else -1.0
-    area = SupportArea.of([stays])
-    landing = capture_after(capture, area, frequency, duration, settings.inset)
-    rotation = stays.rotation_contact_to_world
-    axes = rotation[:2, :2]
+    foot, stays, outward = soles[moving], soles[1 - moving], (1.0, -1.0)[moving]
+    area, rotation = SupportArea.of([stays]), stays.rotation_contact_to_world
+    landing, axes = capture_after(capture, area, frequency, duration, settings.inset), rotation[:2, :2]
     ahead = float(axes[:, 0] @ (landing - foot.position[:2]))
     steps = np.stack(np.meshgrid(ahead + ALONG, outward * ACROSS, indexing="ij"), axis=-1).reshape(-1, 2)
     middles = foot.position[:2] + steps @ axes.T
@@ -179,18 +172,15 @@ def _reachable(
         & (np.linalg.norm(between, axis=1) <= settings.reach)
         & (moved <= settings.speed * duration)
     )
-    room = _room(area, middles[allowed] - stays.position[:2], landing)
-    return _Places(
-        foot.effector, rotation, float(stays.position[2]), duration, landing, middles[allowed], room,
-        moved[allowed],
-    )  # fmt: skip
+    middles, moved, height = middles[allowed], moved[allowed], float(stays.position[2])
+    room = _room(area, middles - stays.position[:2], landing)
+    return _Places(foot.effector, rotation, height, duration, landing, middles, room, moved)
 
 
 def _room(area: SupportArea, moves: FloatArray, point: FloatArray) -> FloatArray:
     """(k,) distance of a point (2,) to the nearest edge of the hull of an area and its copies, inside > 0.
 
-    The hull of an area and its copy moved by ``d`` has the edges of the area, moved out where ``d`` does, and
-    the two that lead along ``d``.
+    The hull with a copy moved by ``d`` has the area's edges, moved out where ``d`` does, and two along ``d``.
     """
     normals, offsets = area.half_planes()
     out = offsets + np.maximum(moves @ normals.T, 0.0) - normals @ point

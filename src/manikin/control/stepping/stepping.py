@@ -54,9 +54,8 @@ class SwingFoot:
 
     def sample(self, time: float) -> EffectorReference:
         """Go on to a time [s], not before the last one, and return where the foot should be."""
-        self._level = _ahead(
-            self._level, self.goal[:2], self.start + self.duration - self._time, time - self._time
-        )
+        remaining = self.start + self.duration - self._time
+        self._level = _ahead(self._level, self.goal[:2], remaining, time - self._time)
         self._time = time
         height, climb, lift = self._height(time)
         twist, acceleration = np.zeros(6), np.zeros(6)
@@ -82,19 +81,14 @@ class SwingFoot:
 
 
 def _ahead(state: FloatArray, goal: FloatArray, remaining: float, time: float) -> FloatArray:
-    """State (3, 2) after a time [s] on the fifth-degree polynomial that rests at a goal (2,) [m].
-
-    The state is position, velocity and acceleration; the goal is reached in the remaining time [s].
-    """
+    """(3, 2) position, velocity, acceleration after a time [s] on the quintic to rest at a goal (2,)."""
     if remaining <= time + 1e-9:
         return np.array([goal, np.zeros(2), np.zeros(2)])
-    position, velocity, acceleration = state
-    t = remaining
+    (position, velocity, acceleration), t, x = state, remaining, time
     missing = goal - position - velocity * t - 0.5 * acceleration * t**2
     known = np.array([missing, -velocity - acceleration * t, -acceleration])
     powers = np.array([[t**3, t**4, t**5], [3 * t**2, 4 * t**3, 5 * t**4], [6 * t, 12 * t**2, 20 * t**3]])
     third, fourth, fifth = np.linalg.solve(powers, known)
-    x = time
     return np.array([
         position + velocity * x + 0.5 * acceleration * x**2 + third * x**3 + fourth * x**4 + fifth * x**5,
         velocity + acceleration * x + 3 * third * x**2 + 4 * fourth * x**3 + 5 * fifth * x**4,
@@ -155,8 +149,8 @@ class StepCheck:
             return False
         corners = contact.points_in_world
         around = np.concatenate((corners, 0.5 * (corners + np.roll(corners, 1, axis=0)), [contact.position]))
-        above = around + ABOVE * contact.normal
-        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in above)
+        raised = around + ABOVE * contact.normal
+        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in raised)
 
     def standing(self, soles: tuple[Contact, ...], q: FloatArray) -> Standing:
         """Posture on given soles with the centre of mass over their middle, near a configuration (nq,)."""
@@ -166,8 +160,7 @@ class StepCheck:
         return Standing(tuple(soles), area, result.q[7:].copy(), state.com.copy())
 
     def _problem(self, soles: tuple[Contact, ...], area: SupportArea, q: FloatArray) -> PostureProblem:
-        reference = self._home.copy()
-        reference[:7] = q[:7]
+        reference = np.concatenate((q[:7], self._home[7:]))
         return PostureProblem(self._body, tuple(soles), com=com_target(*area.centre), reference=reference)
 
     def _stands(self, stays: Contact, moved: Contact, q: FloatArray) -> bool:
@@ -177,11 +170,10 @@ class StepCheck:
 
     def _passes(self, stays: Contact, goal: StepGoal, half: FloatArray, q: FloatArray) -> bool:
         """Whether the body is free with its foot half way."""
-        middle = 0.5 * (stays.position + half)[:2]
+        placements, com = {goal.foot: Placement(half, goal.rotation)}, 0.5 * (stays.position + half)[:2]
         problem = PostureProblem(
-            self._body, (stays,), placements={goal.foot: Placement(half, goal.rotation)},
-            com=com_target(*middle), com_weight=1.0, reference=q,
-        )  # fmt: skip
+            self._body, (stays,), placements=placements, com=com_target(*com), com_weight=1.0, reference=q
+        )
         result = generate_posture(problem, q)
         return result.succeeded and self._clear(result.q, (stays,))
 
@@ -264,8 +256,8 @@ class SteppingRecovery:
             if output.strategy not in (Strategy.STIFF, Strategy.STEP) and self._must_step(time, output.state):
                 self._lift(time, output.state)
             return output
-        reference = swing.sample(time)
-        output = self.balance.step(q, v, push, reacting=reacting, swing=(swing.foot, reference))
+        way = swing.foot, swing.sample(time)
+        output = self.balance.step(q, v, push, reacting=reacting, swing=way)
         self._aim(time, output.state, swing)
         return output
 
@@ -295,37 +287,33 @@ class SteppingRecovery:
         stays = right if goal.foot == left.effector else left
         over = np.array([*stays.position[:2], self._home.com[2]])  # the centre of mass stays as high
         self.balance.stand(Standing((stays,), SupportArea.of([stays]), self._home.posture, over))
-        self._swing = SwingFoot(
-            goal.foot, goal.rotation, self._from.position, goal.position, time, goal.duration,
-            self.settings.clearance,
-        )  # fmt: skip
+        start, rise = self._from.position, self.settings.clearance
+        self._swing = SwingFoot(goal.foot, goal.rotation, start, goal.position, time, goal.duration, rise)
         self._goal = goal
 
     def _aim(self, time: float, state: DynamicsState, swing: SwingFoot) -> None:
         """Follow the capture point with the goal while there is time, where the foot has room."""
-        remaining = swing.start + swing.duration - time
+        remaining, standing = swing.start + swing.duration - time, self.balance.standing
         if remaining < self.settings.aim_until:
             return
-        landing = capture_after(
-            self._capture(state), self.balance.standing.area, self._frequency, remaining, self.settings.inset
-        )
+        capture, inset = self._capture(state), self.settings.inset
+        landing = capture_after(capture, standing.area, self._frequency, remaining, inset)
         wanted = self._goal.position[:2] + landing - self._goal.capture
         goal = np.array([*wanted, self._goal.position[2]])
         moved = sole_at(self.body, swing.foot, swing.rotation, goal, self.balance.friction)
-        near = np.linalg.norm(goal - self.balance.standing.soles[0].position) <= self.settings.reach
+        near = np.linalg.norm(goal - standing.soles[0].position) <= self.settings.reach
         if near and self.check.free(moved):
             swing.goal = goal
 
     def _land(self, time: float, q: FloatArray, swing: SwingFoot) -> None:
         """Both feet carry from now on, where they are."""
         assert self._from is not None
-        state = Configuration(self.body, q)
         stays = self.balance.standing.soles[0]
-        _, position = state.effector_placement(swing.foot)
+        _, position = Configuration(self.body, q).effector_placement(swing.foot)
         middle = np.array([*position[:2], stays.position[2]])
         landed = sole_at(self.body, swing.foot, swing.rotation, middle, self.balance.friction)
-        step = StepTaken(swing.foot, swing.start, time, self._from.position, swing.goal.copy(), middle)
-        self.steps.append(step)
+        start, goal = self._from.position, swing.goal.copy()
+        self.steps.append(StepTaken(swing.foot, swing.start, time, start, goal, middle))
         order = self.balance.groups.feet.index
         soles = tuple(sorted((stays, landed), key=lambda contact: order(contact.effector)))
         self.balance.stand(self.check.standing(soles, q))
