@@ -295,7 +295,7 @@ def _placed(marked: _Marked, body: BodyModel) -> PointTargets:
     kept = np.flatnonzero(~np.isnan(positions[frames][..., 0]).all(axis=0))
     names, positions = tuple(names[k] for k in kept), positions[:, kept]
     segments = tuple(marked.set.segments[name] for name in names)
-    first = _present(wanted, frames)
+    first, _ = seen_targets(wanted, frames)
     q, _ = follow(body, first, _starts(body, marked, pelvis)[frames])
     for number in range(ROUNDS + 1):
         points = _local(body, q, segments, positions[frames])
@@ -312,14 +312,14 @@ def _frames(unknown: NDArray[np.bool_], unseen: NDArray[np.bool_]) -> NDArray[np
     return good[np.unique(np.linspace(0, len(good) - 1, min(PLACING_FRAMES, len(good))).astype(int))]
 
 
-def _present(targets: PointTargets, frames: NDArray[np.int64]) -> PointTargets:
-    """Targets in some frames, without those that are not seen there."""
+def seen_targets(targets: PointTargets, frames: NDArray[np.int64]) -> tuple[PointTargets, NDArray[np.int64]]:
+    """Targets in some frames, without those that are not seen there, and (k,) which they are."""
     positions = targets.positions[frames]
     kept = np.flatnonzero(~np.isnan(positions[..., 0]).all(axis=0))
     return PointTargets(
         tuple(targets.names[k] for k in kept), tuple(targets.segments[k] for k in kept),
         targets.points[kept], positions[:, kept], targets.weights[kept],
-    )  # fmt: skip
+    ), kept  # fmt: skip
 
 
 def _local(body: BodyModel, q: FloatArray, segments: tuple[str, ...], places: FloatArray) -> FloatArray:
