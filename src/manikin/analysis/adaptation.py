@@ -23,7 +23,6 @@ from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, StanceSequence
 from manikin.control import ControlSettings, TaskWeights
 from manikin.errors import InputError
-from manikin.kinematics import PointTargets
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
 from manikin.numerics.spatial import FloatArray
@@ -31,7 +30,6 @@ from manikin.planning.com import (
     BentSurface,
     CentroidalProblem,
     CentroidalResult,
-    GeometricConstraint,
     KeyframeProblem,
     NearKeyFramesResult,
     RecordedCom,
@@ -39,14 +37,8 @@ from manikin.planning.com import (
     plan_com,
     plan_com_near_key_frames,
 )
-from manikin.recordings import (
-    Reconstruction,
-    RecordedSupports,
-    Support,
-    motion_of,
-    recorded_schedule,
-    smoothed,
-)
+from manikin.recordings import Reconstruction, RecordedSupports, motion_of, recorded_schedule, smoothed
+from manikin.recordings.reconstruction.marker_reconstruction import seen_targets
 from manikin.recordings.supports.recorded_stances import FRICTION
 from manikin.scene import Scene
 from manikin.simulation import Execution, execute
@@ -60,44 +52,28 @@ def crop(
 ) -> tuple[Reconstruction, RecordedSupports]:
     """Cut a reconstruction and its supports, so that the first instant left is 0 on both clocks.
 
-    Args:
-        start: On the clock of the supports [s].
-        end: The last instant left [s].
-
-    Raises:
-        InputError: If fewer than four frames are left.
+    The window is on the clock of the supports [s], with at least four frames.
     """
     time = supports.start + found.time
     rows = np.flatnonzero((time >= start - 1e-9) & (time <= end + 1e-9))
     if len(rows) < LEAST_FRAMES:
-        raise InputError(
-            f"window from {start:g} to {end:g} s leaves {len(rows)} frames; valid: at least {LEAST_FRAMES} "
-            f"between {time[0]:g} and {time[-1]:g} s"
-        )
-    begin, last, known = float(time[rows[0]]), float(time[rows[-1]]), found.targets
-    seen = np.flatnonzero(np.any(np.isfinite(known.positions[rows, :, 0]), axis=0))
-    targets = PointTargets(
-        tuple(known.names[k] for k in seen), tuple(known.segments[k] for k in seen), known.points[seen],
-        known.positions[np.ix_(rows, seen)], known.weights[seen],
-    )  # fmt: skip
+        valid = f"at least {LEAST_FRAMES} between {time[0]:g} and {time[-1]:g} s"
+        raise InputError(f"window from {start:g} to {end:g} s leaves {len(rows)} frames; valid: {valid}")
+    begin, last = float(time[rows[0]]), float(time[rows[-1]])
+    targets, seen = seen_targets(found.targets, rows)
     part = replace(
         found, time=found.time[rows] - found.time[rows[0]], q=found.q[rows], targets=targets,
         residual=found.residual[np.ix_(rows, seen)], first_frame=found.first_frame + int(rows[0]),
     )  # fmt: skip
     held = tuple(
-        _cut(support, begin, last)
-        for support in supports.supports
-        if support.start < last and support.end > begin
-    )
-    return part, RecordedSupports(held, 0.0, last - begin, supports.surfaces)
-
-
-def _cut(support: Support, begin: float, last: float) -> Support:
-    return replace(
-        support, start=max(support.start - begin, 0.0), end=min(support.end, last) - begin,
-        start_seen=support.start_seen and support.start >= begin,
-        end_seen=support.end_seen and support.end <= last,
+        replace(
+            one, start=max(one.start - begin, 0.0), end=min(one.end, last) - begin,
+            start_seen=one.start_seen and one.start >= begin, end_seen=one.end_seen and one.end <= last,
+        )
+        for one in supports.supports
+        if one.start < last and one.end > begin
     )  # fmt: skip
+    return part, RecordedSupports(held, 0.0, last - begin, supports.surfaces)
 
 
 Method = Literal["keyframes", "timing-free"]
@@ -125,13 +101,14 @@ def plan_recorded_com(
         return plan_near_recorded_com(mass, recording)
     durations = zip(recording.sequence, recording.schedule.durations.tolist(), strict=True)
     free = [Phase(phase.stance, SHORTEST * lasting, LONGEST * lasting) for phase, lasting in durations]
-    return plan_com(
-        CentroidalProblem(
-            mass, StanceSequence(free), recording.com[0], recording.com[-1],
-            start_velocity=velocity[0], goal_velocity=velocity[1],
-            support_distance=farthest_support(recording), geometric=_recorded_heights(recording),
-        )
-    )  # fmt: skip
+    # Recorded heights with some room: contacts alone would admit a way through the floor.
+    heights = recording.com[:, 2]
+    ends = heights.min() - HEIGHT_ROOM, heights.max() + HEIGHT_ROOM
+    return plan_com(CentroidalProblem(
+        mass, StanceSequence(free), recording.com[0], recording.com[-1],
+        start_velocity=velocity[0], goal_velocity=velocity[1], support_distance=farthest_support(recording),
+        geometric=height_band(*(BentSurface(float(height), 0.0, 0.0, 0.0) for height in ends)),
+    ))  # fmt: skip
 
 
 def plan_near_recorded_com(mass: float, recording: RecordedCom) -> NearKeyFramesResult:
@@ -148,13 +125,6 @@ def farthest_support(recording: RecordedCom) -> float:
         com = recording.com[rows[0] : rows[-1] + 2]
         distances += [np.linalg.norm(com - contact.position, axis=1).max() for contact in phase.stance]
     return float(max(distances))
-
-
-def _recorded_heights(recording: RecordedCom) -> tuple[GeometricConstraint, ...]:
-    """Recorded heights with some room; contacts alone would admit a way through the floor."""
-    heights = recording.com[:, 2]
-    ends = heights.min() - HEIGHT_ROOM, heights.max() + HEIGHT_ROOM
-    return height_band(*(BentSurface(float(height), 0.0, 0.0, 0.0) for height in ends))
 
 
 SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
@@ -239,24 +209,19 @@ class Replan:
             return None
         measured = self.adapted.certificate
         names = ("max_support_error_m", "max_com_error_m", "min_clearance_m", "max_torque_share")
-        return {
-            **{name: measured.value(name) for name in names},
-            "closest_pair": list(measured.closest_pair),
-            "posture_rms_rad": self.adapted.posture_rms,
+        return {name: measured.value(name) for name in names} | {
+            "closest_pair": list(measured.closest_pair), "posture_rms_rad": self.adapted.posture_rms,
             "share_positive_margin": float(np.mean(self.adapted.motion.margin > 0.0)),
-        }
+        }  # fmt: skip
 
     def _execution_block(self) -> dict[str, Any] | None:
-        found = self.execution
-        if found is None:
+        if (found := self.execution) is None:
             return None
-        block = found.summary()
+        left_out = ("push", "peak_torque_Nm")
         return {
-            "failure": found.failure or None,
-            "executed_s": found.motion.duration,
+            "failure": found.failure or None, "executed_s": found.motion.duration,
             "share_positive_margin": float(np.mean(found.motion.margin > 0.0)),
-            **{name: value for name, value in block.items() if name not in ("push", "peak_torque_Nm")},
-        }
+        } | {name: value for name, value in found.summary().items() if name not in left_out}  # fmt: skip
 
 
 def adapt_recording(
@@ -276,13 +241,12 @@ def adapt_recording(
     """
     if method not in METHODS:
         raise InputError(f"replan method is {method!r}; valid: {', '.join(METHODS)}")
-    even, recorded = smoothed(found), motion_of(found)
+    even, recorded, time = smoothed(found), motion_of(found), supports.start + found.time
     stances = recorded_schedule(even, supports, friction=friction, rolling=rolling)
     stances = on_one_seat(landing_flat(stances, found.body))
-    stances = leaving_with_the_hinge(stances, found.body, supports.start + found.time, even.q)
-    stances = rising_at_once(stances, found.body, supports.start + found.time, even.q)
+    stances = leaving_with_the_hinge(stances, found.body, time, even.q)
+    stances = rising_at_once(stances, found.body, time, even.q)
     stances = within_toe_strength(without_remnants(stances), found.body)
-    time = supports.start + found.time
     recording = RecordedCom(time, recorded.com, stances.sequence, stances.instants)
     velocity = np.gradient(recorded.com, recorded.time, axis=0, edge_order=2)[[0, -1]]
     scene = scene_under(stances, supports.surfaces[0] if supports.surfaces else 0.0)
@@ -290,7 +254,7 @@ def adapt_recording(
         recording = _with_turning(found.body, scene, recording, (even.time, even.q))
     com = plan_recorded_com(found.body.mass, recording, velocity, method)
     result = Replan(method, found.body, scene, recording, recorded, com)
-    return _executed(result, even) if execute and com.trajectory is not None else result
+    return _executed(result, even) if execute else result
 
 
 def _with_turning(
@@ -313,8 +277,7 @@ def _executed(result: Replan, even: Reconstruction) -> Replan:
     body, scene, trajectory = result.body, result.scene, result.com.trajectory
     if trajectory is None:
         return result
-    schedule = trajectory.schedule
-    clock = schedule.instants, result.recording.key_times
+    clock = trajectory.schedule.instants, result.recording.key_times
     adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, (even.time, even.q), clock)
-    execution = execute(body, scene, adapted.motion, schedule, settings=SETTINGS, hold=0.0)
+    execution = execute(body, scene, adapted.motion, trajectory.schedule, settings=SETTINGS, hold=0.0)
     return replace(result, adapted=adapted, execution=execution)

@@ -47,7 +47,7 @@ OTHER_MASS = 0.03
 
 def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
     """Reasons to doubt what was measured on a recording, a line each."""
-    found, supports, lines = analysis.found, analysis.supports, []
+    found, supports, plates, lines = analysis.found, analysis.supports, analysis.plates, []
     if found.median > LARGE_RESIDUAL:
         lines.append(
             f"the body does not fit the recording: residual {1e3 * found.median:.0f} mm (median); "
@@ -82,13 +82,13 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         )
     if shifted is not None and not shifted.solved:
         lines.append("no shift onto the contacts was found: the postures jump")
-    mass = None if analysis.plates is None else analysis.plates.mass
+    mass = None if plates is None else plates.mass
     if mass is not None and abs(mass / analysis.body.mass - 1.0) > OTHER_MASS:
         lines.append(
             f"the force plates carry {mass:.1f} kg, not {analysis.body.mass:.1f} kg: forces, torques and "
             f"margins are in proportion to the mass (--mass {mass:.1f} for the plates')"
         )
-    if analysis.plates is not None and not analysis.plates.compared.any():
+    if plates is not None and not plates.compared.any():
         lines.append("no instant has all supports on force plates: their forces are not compared")
     return tuple(lines)
 
@@ -97,9 +97,7 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
 class MeasuredMotion:
     """A motion as recorded and smoothed, and the nearest one that its contacts can carry.
 
-    Attributes:
-        shifted: The motion nearest to it that its contacts can carry, whether that one is to be believed or
-            not; None if none was looked for.
+    ``shifted`` is the latter, whether it is to be believed or not; None if none was looked for.
     """
 
     recorded: RecordedDynamics
@@ -129,17 +127,14 @@ class MeasuredMotion:
 
     def shifted_dict(self) -> dict[str, Any] | None:
         """JSON-ready numbers of the shifted motion; None if none was looked for."""
-        shifted = self.shifted
-        if shifted is None:
+        if (shifted := self.shifted) is None:
             return None
         margin, held, at_floor = shifted.margins.whole_body, shifted.margins.held, shifted.at_floor
-        lowest, is_floor = self.lowest_shifted()
-        imposed = margin[at_floor]
+        (lowest, is_floor), imposed = self.lowest_shifted(), margin[at_floor]
         return {
             "believed": shifted.believable, "share_positive": float(np.mean(margin > 0.0)),
             "share_positive_in_contact": shifted.margins.balanced, "rms_m": shifted.rms,
-            "max_m": float(shifted.size.max()), "floor_m": shifted.floor_length,
-            "floor_Nm": shifted.floor,
+            "max_m": float(shifted.size.max()), "floor_m": shifted.floor_length, "floor_Nm": shifted.floor,
             "margin_at_floor_Nm": float(np.median(imposed)) if imposed.size else None,
             "share_at_floor_in_contact": float(np.mean(at_floor[held])) if held.any() else None,
             "min_at_floor": is_floor, "min": lowest,
@@ -195,15 +190,10 @@ class PlateReport:
 def _torques(compared: Sequence[TorqueComparison]) -> dict[str, dict[str, float]]:
     """JSON-ready, by joint."""
     return {
-        one.joint: {
-            "frames": one.frames,
-            "rms_Nm": one.rms,
-            "mean_Nm": one.mean,
-            "peak_Nm": one.peak,
-            "peak_by_plates_Nm": one.peak_by_plates,
-        }
+        one.joint: {"frames": one.frames, "rms_Nm": one.rms, "mean_Nm": one.mean, "peak_Nm": one.peak,
+                    "peak_by_plates_Nm": one.peak_by_plates}
         for one in compared
-    }
+    }  # fmt: skip
 
 
 def plate_report(
@@ -219,21 +209,17 @@ def plate_report(
     height = float(np.mean([plate.origin[2] for plate in plates]))
     with np.errstate(divide="ignore", invalid="ignore"):
         cop = zero_moment_point(forces.wrench, height)
-    loaded = forces.wrench[:, 2] > 20.0
+        cop = np.where((forces.wrench[:, 2] > 20.0)[:, None], cop, np.nan)
     shifted, moved, moved_torques = measured.shifted, None, ()
     if shifted is not None:
         moved = compare_with_plates(shifted.dynamics, shifted.margins, forces, height)
         if motions[1] is not None:
             moved_torques = compare_torques(shifted.dynamics, motions[1], forces)
     return PlateReport(
-        forces.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), forces.covered, mass,
-        timing_errors(supports, plates),
+        forces.wrench[:, 2], cop, forces.covered, mass, timing_errors(supports, plates),
         compare_with_plates(measured.recorded, measured.recorded_margins, forces, height), moved,
         compare_torques(measured.recorded, motions[0], forces), moved_torques,
     )  # fmt: skip
-
-
-WHOLE_BODY = "whole-body"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -321,29 +307,25 @@ class Analysis(Displayed):
 
     def series(self) -> dict[str, FloatArray]:
         """(n,) columns for a table, by name and unit."""
-        momentum, shifted = self.motion.angular_momentum, self.measured.shifted
-        columns: dict[str, FloatArray] = {"time_s": self.time}
-        columns |= {f"com_{name}_m": self.motion.com[:, axis] for axis, name in enumerate("xyz")}
+        motion, shifted, margins = self.motion, self.measured.shifted, self.measured.recorded_margins
+        momentum, columns = motion.angular_momentum, {"time_s": self.time}
+        columns |= {f"com_{name}_m": motion.com[:, axis] for axis, name in enumerate("xyz")}
         columns |= {f"angular_momentum_{name}_kgm2ps": momentum[:, axis] for axis, name in enumerate("xyz")}
         columns |= {
-            "margin_Nm": self.motion.margin,
-            "point_mass_margin_Nm": self.point_mass_margin,
-            "recorded_margin_Nm": self.measured.recorded_margins.whole_body,
-        }
+            "margin_Nm": motion.margin, "point_mass_margin_Nm": self.point_mass_margin,
+            "recorded_margin_Nm": margins.whole_body,
+        }  # fmt: skip
         if shifted is not None:
             columns["shifted_margin_Nm"] = shifted.margins.whole_body
             columns["shifted_at_floor"] = shifted.at_floor.astype(np.float64)
             columns["shift_m"] = shifted.size
         columns |= {
-            "balance_force_N": self.measured.recorded_margins.body.force,
-            "zmp_distance_m": self.measured.recorded_margins.body.zmp_distance,
-            "vertical_force_N": self.vertical_force,
-            "cop_x_m": self.cop[:, 0],
-            "cop_y_m": self.cop[:, 1],
-        }
-        for number, name in enumerate(self.motion.contact_names):
-            columns[f"{name}_support"] = self.motion.support[:, number].astype(np.float64)
-            columns[f"{name}_vertical_force_N"] = self.motion.contact_force[:, number, 2]
+            "balance_force_N": margins.body.force, "zmp_distance_m": margins.body.zmp_distance,
+            "vertical_force_N": self.vertical_force, "cop_x_m": self.cop[:, 0], "cop_y_m": self.cop[:, 1],
+        }  # fmt: skip
+        for number, name in enumerate(motion.contact_names):
+            columns[f"{name}_support"] = motion.support[:, number].astype(np.float64)
+            columns[f"{name}_vertical_force_N"] = motion.contact_force[:, number, 2]
         if self.plates is not None:
             columns["plates_vertical_force_N"] = self.plates.vertical_force
             columns |= {f"plates_cop_{name}_m": self.plates.cop[:, axis] for axis, name in enumerate("xy")}
@@ -352,18 +334,15 @@ class Analysis(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready numbers (SI), as ``manikin analyze --json`` prints them."""
-        lowest = int(np.argmin(self.com_height))
-        supports = self.supports
+        lowest, start, supports = int(np.argmin(self.com_height)), float(self.time[0]), self.supports
         return {
             "name": self.name, "file": self.source,
             "duration_s": float(self.time[-1] - self.time[0]), "frames": len(self.time), "rate_hz": self.rate,
             "stature_m": self.body.stature, "mass_kg": self.body.own_mass,
             "load_kg": sum(self.body.loads.values()), "sex": self.sex,
             "supports": [
-                {
-                    "effector": one.effector, "start_s": one.start, "end_s": one.end,
-                    "start_seen": one.start_seen, "end_seen": one.end_seen, "place_m": one.place.tolist(),
-                }
+                {"effector": one.effector, "start_s": one.start, "end_s": one.end,
+                 "start_seen": one.start_seen, "end_seen": one.end_seen, "place_m": one.place.tolist()}
                 for one in supports.supports
             ],
             "surfaces_m": list(supports.surfaces), "sequence": list(supports.sequence),
@@ -374,15 +353,13 @@ class Analysis(Displayed):
             "com_height_min_at_s": float(self.time[lowest]),
             "reconstruction_residual_m": {"median": self.found.median, "max": self.found.worst},
             "segments": None if self.segments is None else [
-                {"kind": one.kind, "start_s": float(self.time[0]) + one.start,
-                 "end_s": float(self.time[0]) + one.end}
+                {"kind": one.kind, "start_s": start + one.start, "end_s": start + one.end}
                 for one in self.segments.segments
             ],
             "margin": self._margin(),
             "force_plates": None if self.plates is None else self.plates.as_dict(),
             "ergonomics": _later(self.ergonomics.as_dict(), self.supports.start),
-            "remarks": list(self.remarks),
-            "wall_s": self.wall,
+            "remarks": list(self.remarks), "wall_s": self.wall,
         }  # fmt: skip
 
     def _phase(self, phase: SupportPhase) -> dict[str, Any]:
@@ -397,16 +374,15 @@ class Analysis(Displayed):
         margin = self.motion.margin
         known = np.isfinite(margin)
         lowest = int(np.nanargmin(margin)) if known.any() else None
-        recorded = self.measured.recorded_margins
+        recorded, limiting = self.measured.recorded_margins, self.limiting
         body, held = recorded.body, recorded.held
         points = self.point_mass_margin[np.isfinite(self.point_mass_margin)]
         return {
-            "form": WHOLE_BODY, "motion": "recorded", "unit": self.motion.margin_unit,
+            "form": "whole-body", "motion": "recorded", "unit": self.motion.margin_unit,
             "min": None if lowest is None else float(margin[lowest]),
             "at_s": None if lowest is None else float(self.time[lowest]),
             "share_positive": float(np.mean(margin[known] > 0.0)) if known.any() else None,
-            "limiting": None if self.limiting is None else self.limiting.description,
-            "limiting_contact": None if self.limiting is None else self.limiting.effector,
+            "limiting": limiting and limiting.description, "limiting_contact": limiting and limiting.effector,
             "share_known": float(np.mean(known)), "share_in_contact": float(np.mean(held)),
             "share_positive_in_contact": recorded.balanced,
             "recorded": {

@@ -38,9 +38,6 @@ from manikin.recordings.supports.support_levels import effector_places
 from manikin.recordings.supports.supports import supports_of
 from manikin.walking.segmentation import PathSegments, ShoulderPaths, segment_path
 
-SHOULDERS = ("left_upper_arm", "right_upper_arm")
-"""Segments that begin at the shoulders."""
-
 UPRIGHT = 0.5
 """Height of the shoulders above the pelvis, per that in standing, below which no walk is segmented."""
 
@@ -63,18 +60,13 @@ def walked_segments(found: Reconstruction) -> PathSegments | None:
 
 def _places(found: Reconstruction, postures: FloatArray) -> FloatArray:
     """(n, 3, 3) left shoulder, right shoulder and pelvis [m]."""
-    shoulders = effector_places(found.body, postures, SHOULDERS)
+    shoulders = effector_places(found.body, postures, ("left_upper_arm", "right_upper_arm"))
     return np.stack([*shoulders, postures[:, :3]], axis=1)
 
 
 @dataclass(frozen=True)
 class AnalysisJob:
-    """One file to measure.
-
-    Attributes:
-        directory: For its files; None to write none.
-        draw: Whether the report has its figure.
-    """
+    """One file to measure, the directory of its results, if any, and whether the report has its figure."""
 
     path: Path
     directory: Path | None = None
@@ -83,12 +75,7 @@ class AnalysisJob:
 
 @dataclass(frozen=True)
 class AnalysisEntry:
-    """Result of one file.
-
-    Attributes:
-        summary: As :meth:`manikin.analysis.Analysis.as_dict`; None where it was refused.
-        refusal: Why, in one line.
-    """
+    """Result of one file: :meth:`manikin.analysis.Analysis.as_dict`, or None and why it was refused."""
 
     job: AnalysisJob
     summary: dict[str, Any] | None
@@ -99,10 +86,7 @@ def recordings_in(sources: Iterable[str | Path]) -> tuple[Path, ...]:
     """Recordings among files and folders, each once: files as given, those of a folder in order of path.
 
     A file that is named is taken whatever its ending, so that its reader can say what is wrong with it.
-    Folders are searched to any depth.
-
-    Raises:
-        InputError: If a source is not there, or a folder holds no recording.
+    Folders are searched to any depth. InputError if a source is not there, or a folder holds no recording.
     """
     found: dict[Path, None] = {}
     for source in map(Path, sources):
@@ -111,9 +95,7 @@ def recordings_in(sources: Iterable[str | Path]) -> tuple[Path, ...]:
         if not source.is_dir():
             found[source] = None
             continue
-        inside = sorted(
-            path for path in source.rglob("*") if path.suffix.lower() in READERS and path.is_file()
-        )
+        inside = sorted(one for one in source.rglob("*") if one.suffix.lower() in READERS and one.is_file())
         if not inside:
             raise InputError(f"{source}: holds no recording; valid: files {', '.join(READERS)}")
         found |= dict.fromkeys(inside)
@@ -195,25 +177,19 @@ def analyze(
         InputError: If it is too short, or is not a person's motion that can be measured.
     """
     given, began = options or AnalysisOptions(), clock.perf_counter()
+    where, enough = f"recording {recording.name!r}", f"valid: at least {FEWEST_FRAMES}"
     if len(recording) < FEWEST_FRAMES:
-        raise InputError(
-            f"recording {recording.name!r} has {len(recording)} frame(s); valid: at least {FEWEST_FRAMES}"
-        )
+        raise InputError(f"{where} has {len(recording)} frame(s); {enough}")
     if recording.rate <= 2.0 * CUTOFF:
-        raise InputError(
-            f"recording {recording.name!r} has {recording.rate:g} frames per second; "
-            f"valid: more than {2.0 * CUTOFF:g}"
-        )
-    start, plates = 0.0, ()
+        wrong = f"has {recording.rate:g} frames per second"
+        raise InputError(f"{where} {wrong}; valid: more than {2.0 * CUTOFF:g}")
+    start, plates, stated = 0.0, (), given.mass
     if isinstance(recording, MarkerRecording):
-        start, plates = recording.start, recording.plates
+        start, plates, stated = recording.start, recording.plates, given.mass or recording.subject.mass
     found = reconstruct(recording, sex=given.sex, mass=given.mass)
     found = replace(found, body=carrying(found.body, given.load, given.load_hand))
     if len(found.time) < FEWEST_FRAMES:
-        raise InputError(
-            f"recording {recording.name!r} shows the person in {len(found.time)} frame(s); "
-            f"valid: at least {FEWEST_FRAMES}"
-        )
+        raise InputError(f"{where} shows the person in {len(found.time)} frame(s); {enough}")
     supports = supports_of(found, start=start)
     if not {one.effector for one in supports.supports} <= set(found.body.effectors):
         found = replace(found, body=with_knees_and_elbows(found.body))
@@ -223,7 +199,6 @@ def analyze(
     mass = None
     if plates:
         mass = mass_on_plates(dynamics, plate_forces(plates, dynamics.time + supports.start, schedule))
-    stated = given.mass is not None or (isinstance(recording, MarkerRecording) and recording.subject.mass)
     if mass is not None and not stated and (weighed := _weighed(found, mass - given.load)) is not None:
         found = weighed
         schedule = recorded_schedule(found, supports, friction=given.friction)
@@ -235,22 +210,20 @@ def analyze(
     beside: Motion | None = None
     if (believed := measured.believed) is not None:
         beside = motion_on_contacts(believed.dynamics, schedule, supports.start, believed.margins)
-    ground = min(supports.surfaces, default=0.0)
     report: PlateReport | None = None
     if plates:
         report = plate_report(plates, supports, schedule, measured, (motion, beside), mass)
     neck = upright_neck(found.body, motion.q)
-    circumstances = Circumstances(
-        load_kg=given.load, neck_upright_deg=0.0 if neck is None else float(np.degrees(neck))
-    )
+    upright = 0.0 if neck is None else float(np.degrees(neck))
     ergonomics = ergonomics_of(
-        found.body, motion, given=circumstances, untold=found.neutral, lowest=_lowest(motion, recorded)
-    )
+        found.body, motion, given=Circumstances(load_kg=given.load, neck_upright_deg=upright),
+        untold=found.neutral, lowest=_lowest(motion, recorded),
+    )  # fmt: skip
     analysis = Analysis(
         name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
         supports=supports, motion=motion, shifted_motion=beside, point_mass_margin=recorded.point_mass,
         measured=measured, limiting=recorded.limiting(recorded.lowest),
-        cop=_centre_of_pressure(dynamics, motion, ground),
+        cop=_centre_of_pressure(dynamics, motion, min(supports.surfaces, default=0.0)),
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
     )  # fmt: skip
     return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)

@@ -28,28 +28,21 @@ def effector_placements(body: BodyModel, q: FloatArray, name: str) -> tuple[Floa
 
 def toe_hinge(body: BodyModel, name: str) -> FloatArray | None:
     """(3,) middle of the hinge of a foot's toes in the frame of its sole [m]; None without toes."""
-    toes = hanging_segment(body, body.effector(name).segment)
-    if toes is None:
-        return None
     frame = body.effector(name)
-    return frame.rotation.T @ (toes.origin - frame.translation)
+    toes = hanging_segment(body, frame.segment)
+    return None if toes is None else frame.rotation.T @ (toes.origin - frame.translation)
 
 
 RAISED = 0.02
 """A contact this far above the floor has a block under it [m]."""
 
-RISEN = 0.015
-"""Height of the buttocks over a seat from which it carries nothing [m]."""
+RISEN, SAME_SEAT = 0.015, 0.15
+"""Height of the buttocks over a seat from which it carries nothing, distance of seats that are one [m]."""
 
-SAME_SEAT = 0.15
-"""Seats nearer to each other are one [m]."""
-
-ROLLED = 0.02
-"""Way of the hinge of the toes from which a foot counts as rolling over their tips [m]."""
-
-EARLY = 0.1
-"""Time by which such a foot leaves earlier than recorded at most: one whose hinge has moved for longer
-carries, as a stealthy walker's does for most of a second [s]."""
+ROLLED, EARLY = 0.02, 0.1
+"""Way of the hinge of the toes from which a foot counts as rolling over their tips [m]; time by which it
+leaves earlier than recorded at most: one whose hinge has moved for longer carries, as a stealthy walker's
+does for most of a second [s]."""
 
 SHORTEST = 0.06
 """What is left at least of a phase whose foot or seat is left earlier: the controller takes some 40 ms to
@@ -62,11 +55,8 @@ in [s]."""
 TOE_LOAD = 1.4
 """Load of a foot on its toes: above the second peak of a brisk walk's vertical force [body weights]."""
 
-ROOM = 0.03
-"""Reach of a block beyond its contact [m]."""
-
-THICKNESS = 0.05
-"""Thickness of a block: legs pass below a seat [m]."""
+ROOM, THICKNESS = 0.03, 0.05
+"""Reach of a block beyond its contact, and its thickness: legs pass below a seat [m]."""
 
 
 def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
@@ -85,12 +75,11 @@ def without_remnants(schedule: ContactSchedule) -> ContactSchedule:
     A heel that lifts 40 ms after a clip begins is almost up by then: the foot stands as it does next to it.
     Phases that do not differ any more are one.
     """
-    phases = list(schedule.sequence)
-    durations = np.array(schedule.durations)
-    _without_first_remnants(phases, durations)
-    phases.reverse()
-    _without_first_remnants(phases, durations[::-1])
-    return _joined(phases[::-1], schedule.instants)
+    phases, durations = list(schedule.sequence), np.array(schedule.durations)
+    for lasting in (durations, durations[::-1]):
+        _without_first_remnants(phases, lasting)
+        phases.reverse()
+    return _joined(phases, schedule.instants)
 
 
 def leaving_with_the_hinge(
@@ -102,29 +91,25 @@ def leaving_with_the_hinge(
     toe segment lies flat up to the end, and would hold the leg back. Recorded are postures (n, nq) at times
     (n,) on the schedule's clock [s].
     """
-    instants = np.array(schedule.instants)
-    phases = list(schedule.sequence)
+    instants, phases = np.array(schedule.instants), list(schedule.sequence)
     for name in schedule.sequence.effectors:
         hinge = toe_hinge(body, name)
         if hinge is None:
             continue
         position, rotation = effector_placements(body, q, name)
         path = position + rotation @ hinge
-        for index in range(len(phases) - 1):
-            stance = phases[index].stance
-            following = set(phases[index + 1].stance.effectors)
+        for index, (stance, after) in enumerate(pairwise(phase.stance for phase in phases)):
             # Nothing that lands at the same instant shall land earlier.
-            if name not in stance or not following <= set(stance.effectors) - {name}:
+            if name not in stance or not set(after.effectors) <= set(stance.effectors) - {name}:
                 continue
-            contact = stance[name]
+            contact, (start, end) = stance[name], instants[index : index + 2].tolist()
             place = contact.position + contact.rotation_contact_to_world @ hinge
-            rows = np.flatnonzero((time > instants[index]) & (time < instants[index + 1]))
+            rows = np.flatnonzero((time > start) & (time < end))
             near = rows[np.linalg.norm(path[rows] - place, axis=1) <= ROLLED]
-            left = instants[index] if len(near) == 0 else time[near[-1]]
-            if contact.part is SolePart.TOES and left < instants[index + 1]:
-                shortest = min(max(SHORTEST, time[1] - time[0]), instants[index + 1] - instants[index])
-                earliest = max(instants[index] + shortest, instants[index + 1] - EARLY)
-                instants[index + 1] = max(left, earliest)
+            left = start if len(near) == 0 else time[near[-1]]
+            if contact.part is SolePart.TOES and left < end:
+                shortest = min(max(SHORTEST, time[1] - time[0]), end - start)
+                instants[index + 1] = max(left, start + shortest, end - EARLY)
     return _timed(phases, instants)
 
 
@@ -141,14 +126,12 @@ def rising_at_once(
         return schedule
     height = effector_placements(body, q, SEAT)[0][:, 2]
     instants, phases = np.array(schedule.instants), list(schedule.sequence)
-    for index, (before, after) in enumerate(pairwise(phases)):
-        if set(before.stance.effectors) - set(after.stance.effectors) != {SEAT}:
-            continue
-        if not set(after.stance.effectors) <= set(before.stance.effectors):
+    for index, (stance, after) in enumerate(pairwise(phase.stance for phase in phases)):
+        if set(stance.effectors) != {*after.effectors, SEAT} or SEAT in after:
             continue
         start, end = instants[index : index + 2]
         seated = (time > start) & (time < end)
-        low = height[seated] < before.stance[SEAT].position[2] + RISEN
+        low = height[seated] < stance[SEAT].position[2] + RISEN
         if np.any(low) and not low[-1]:
             instants[index + 1] = min(max(float(time[seated][low][-1]), start + SHORTEST), end)
     return _timed(phases, instants)
@@ -178,16 +161,12 @@ def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
 
 def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
     """A floor at a height [m], and a block under every contact above it; grasps hold on to nothing."""
-    blocks: list[Obstacle] = []
-    known: set[tuple[float, ...]] = set()
-    for phase in schedule.sequence:
-        for contact in phase.stance:
-            place = tuple(np.round(contact.position, 6).tolist())
-            if contact.position[2] - floor < RAISED or place in known:
-                continue
-            known.add(place)
-            blocks.append(_block(contact, f"{contact.effector} {len(blocks) + 1}"))
-    return Scene(blocks, floor_height=floor)
+    blocks: dict[tuple[float, ...], Obstacle] = {}
+    for contact in (contact for phase in schedule.sequence for contact in phase.stance):
+        place = tuple(np.round(contact.position, 6).tolist())
+        if contact.position[2] - floor >= RAISED and place not in blocks:
+            blocks[place] = _block(contact, f"{contact.effector} {len(blocks) + 1}")
+    return Scene(list(blocks.values()), floor_height=floor)
 
 
 def _without_first_remnants(phases: list[Phase], durations: FloatArray) -> None:
@@ -199,10 +178,9 @@ def _without_first_remnants(phases: list[Phase], durations: FloatArray) -> None:
         count = next((k for k, part in enumerate(parts) if part.part is not first.part), None)
         if count is None or durations[:count].sum() >= REMNANT:
             continue
-        for index in range(count):
-            stance = phases[index].stance
-            contacts = [parts[count] if c.effector == name else c for c in stance]
-            phases[index] = replace(phases[index], stance=stance.with_contacts(contacts))
+        for index, phase in enumerate(phases[:count]):
+            contacts = [parts[count] if c.effector == name else c for c in phase.stance]
+            phases[index] = replace(phase, stance=phase.stance.with_contacts(contacts))
 
 
 def _with_contacts(schedule: ContactSchedule, change: Callable[[Contact], Contact]) -> ContactSchedule:
@@ -214,24 +192,21 @@ def _with_contacts(schedule: ContactSchedule, change: Callable[[Contact], Contac
 
 
 def _timed(phases: Sequence[Phase], instants: FloatArray) -> ContactSchedule:
-    timed = [
-        replace(phase, min_duration=float(duration), max_duration=float(duration))
-        for phase, duration in zip(phases, np.diff(instants), strict=True)
-    ]
+    durations = np.diff(instants).tolist()
+    timed = [replace(p, min_duration=d, max_duration=d) for p, d in zip(phases, durations, strict=True)]
     return ContactSchedule(StanceSequence(timed), instants)
 
 
 def _joined(phases: Sequence[Phase], ends: FloatArray) -> ContactSchedule:
     """A schedule of phases between instants (phases + 1,), those that do not differ as one."""
-    joined: list[Phase] = []
-    instants = [float(ends[0])]
-    for phase, end in zip(phases, ends[1:], strict=True):
+    joined, instants = list[Phase](), [float(ends[0])]
+    for phase, end in zip(phases, ends[1:].tolist(), strict=True):
         if joined and _alike(joined[-1].stance, phase.stance):
             joined.pop()
             instants.pop()
-        duration = float(end) - instants[-1]
+        duration = end - instants[-1]
         joined.append(Phase(phase.stance, duration, duration))
-        instants.append(float(end))
+        instants.append(end)
     return ContactSchedule(StanceSequence(joined), instants)
 
 
@@ -250,11 +225,9 @@ def _strong_part(contact: Contact, body: BodyModel) -> Contact:
 def _whole(contact: Contact, body: BodyModel) -> Contact:
     if contact.part is not SolePart.HEEL:
         return contact
-    size = body.sole_length or contact.length, body.sole_width or contact.width
-    flat = sole(
-        contact.effector, contact.position, contact.yaw, length=size[0], width=size[1],
-        friction=contact.friction,
-    )  # fmt: skip
+    length, width = body.sole_length or contact.length, body.sole_width or contact.width
+    name, place, yaw, friction = contact.effector, contact.position, contact.yaw, contact.friction
+    flat = sole(name, place, yaw, length=length, width=width, friction=friction)
     return replace(flat, normal_force_cap=contact.normal_force_cap)
 
 
@@ -266,8 +239,8 @@ def _alike(first: Stance, second: Stance) -> bool:
 
 
 def _block(contact: Contact, name: str) -> Obstacle:
-    size = [contact.length + 2.0 * ROOM, contact.width + 2.0 * ROOM, THICKNESS]
-    if contact.kind is not ContactKind.SOLE:
-        size[:2] = [2.0 * ROOM] * 2
+    size = [2.0 * ROOM, 2.0 * ROOM, THICKNESS]
+    if contact.kind is ContactKind.SOLE:
+        size[:2] = contact.length + 2.0 * ROOM, contact.width + 2.0 * ROOM
     centre = contact.position - 0.5 * THICKNESS * contact.normal
     return Obstacle(name, Box(size), contact.rotation_contact_to_world, centre)

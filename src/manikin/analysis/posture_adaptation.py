@@ -56,21 +56,16 @@ TILTING = 0.08
 JOINING = 0.45
 """Share of a flight at either end in which it leaves, or joins, the recorded path."""
 
+SHORTEST_JOINING, LONGEST_JOINING = 0.2, 0.25
+"""Time in which a foot in flight at a clip's end does so at least, as long as there is so much, and in which
+any effector does so at most: buttocks that lag behind make the arms swing up [s]."""
+
 SIDEWAYS = 0.15
 """Importance of a flying foot's place to the side, as a share of that ahead and upward: a recorded foot may
 pass nearer to the other leg than the body's soles and shanks can."""
 
-SHORTEST_JOINING = 0.2
-"""Time in which a foot in flight at a clip's end does so at least, as long as there is so much [s]."""
-
-LONGEST_JOINING = 0.25
-"""Time in which any effector does so at most: buttocks that lag behind make the arms swing up [s]."""
-
-SWING_HEIGHT = 0.03
-"""Least height of a foot's lowest point in the middle of its flight [m]."""
-
-CUT_HEIGHT = 0.02
-"""The same at a clip's end that cuts a flight [m]."""
+SWING_HEIGHT, CUT_HEIGHT = 0.03, 0.02
+"""Least height of a foot's lowest point in mid-flight, and at a clip's end that cuts a flight [m]."""
 
 ROUNDING = 0.005
 """Width of the bend between a flight that is lifted to that height and one that is not [m]."""
@@ -88,11 +83,7 @@ which they matter more."""
 
 @dataclass(frozen=True, eq=False)
 class EffectorPaths:
-    """Targets of every effector of a schedule.
-
-    Attributes:
-        toes: (n,) angle of each joint of toes, by its index among the hinges [rad].
-    """
+    """Targets of every effector of a schedule, and (n,) angles of toes by their index among hinges [rad]."""
 
     targets: dict[str, EffectorTarget]
     toes: dict[int, FloatArray]
@@ -134,10 +125,8 @@ class _Path:
             self._hold(first, stop)
         for first, stop in mask_runs(self.weight == 0.0):
             self._fly(first, stop)
-        flat = np.zeros_like(self.position)
-        return EffectorTarget(
-            self.position, self.rotation, self.weight, self.rotation_weight, self.along, flat
-        )
+        parts = self.position, self.rotation, self.weight, self.rotation_weight, self.along
+        return EffectorTarget(*parts, np.zeros_like(self.position))
 
     def _hold(self, first: int, stop: int) -> None:
         """Place it on one of its contacts, which lasts from a phase up to another."""
@@ -146,11 +135,9 @@ class _Path:
         flat = np.isin(self.phases, [first + i for i, c in enumerate(contacts) if c.part is SolePart.FULL])
         rest = float(np.median(tilt[flat])) if np.any(flat) else 0.0
         for part, begin, end in _parts(contacts):
-            # At the very instant of its lift-off it still is where it was.
-            left = np.abs(self.time - self.schedule.instants[first + end]) < SAME_INSTANT
-            rows = ((self.phases >= first + begin) & (self.phases < first + end)) | (
-                left & (end == len(contacts))
-            )
+            rows = (self.phases >= first + begin) & (self.phases < first + end)
+            if end == len(contacts):  # at the very instant of its lift-off it still is where it was
+                rows |= np.abs(self.time - self.schedule.instants[first + end]) < SAME_INSTANT
             contact = contacts[begin]
             place = np.tile(contact.position, (int(rows.sum()), 1))
             turn = np.tile(contact.rotation_contact_to_world, (len(place), 1, 1))
@@ -173,8 +160,8 @@ class _Path:
         rows = slice(first, stop)
         leaves, lands = first > 0, stop < len(self.time)
         start, end = self.time[max(first - 1, 0)], self.time[min(stop, len(self.time) - 1)]
-        share = (self.time[rows] - start) / max(end - start, 1e-9)
         lasting = max(end - start, 1e-9)
+        share = (self.time[rows] - start) / lasting
         joining = min(JOINING if leaves and lands else max(JOINING, SHORTEST_JOINING / lasting), 1.0)
         joining = min(joining, LONGEST_JOINING / lasting)
         # The hinge of the toes starts from rest, and the foot keeps turning about it.
@@ -194,11 +181,10 @@ class _Path:
             self.toes[rows] = self._straightening(first, share, TOES_BACK * (end - start))
         near = np.maximum(share, 0.5 if not leaves else 0.0)
         near = np.clip(np.minimum(near, 0.5 if not lands else 1.0), 1e-6, 1.0 - 1e-6)
-        if self.hinge is not None:
-            self._lift(rows, np.minimum(near, 1.0 - near), share, (not leaves, not lands))
         self.weight[rows] = flight_weight(near, FLIGHT_POSITION, FLIGHT_END, FLIGHT_END)
         self.rotation_weight[rows] = flight_weight(near, FLIGHT_ROTATION, FLIGHT_END, FLIGHT_END)
         if self.hinge is not None:
+            self._lift(rows, np.minimum(near, 1.0 - near), share, (not leaves, not lands))
             side = self.rotation[rows, :, 1] * [1.0, 1.0, 0.0]
             side /= np.linalg.norm(side, axis=1, keepdims=True)
             less = (1.0 - SIDEWAYS) * (1.0 - self.weight[rows]) / (1.0 - FLIGHT_POSITION)
@@ -254,30 +240,23 @@ def _up_to(limit: float, angle: FloatArray) -> FloatArray:
 def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
     """Part of a contact with the first and the last but one phase in which it is the one."""
     for part, run in groupby(range(len(contacts)), key=lambda number: contacts[number].part):
-        numbers = list(run)
-        yield part, numbers[0], numbers[-1] + 1
+        first, *more = run
+        yield part, first, first + len(more) + 1
 
 
-KNOT_SPACING = 0.035
-"""Largest distance of the spline's knots [s]."""
-
-FINE = 1
-"""How often the knots near the key instants are doubled: heels that rise there turn at up to 8 rad/s."""
+KNOT_SPACING, FINE = 0.035, 1
+"""Largest distance of the spline's knots [s], and how often those near the key instants are doubled: heels
+that rise there turn at up to 8 rad/s."""
 
 STEP = 1e-3
 """Distance of the finished motion's samples [s]."""
 
-POSTURE = 0.06
-"""Deviation of a hinge or of the pelvis' turn from the recording that costs one unit [rad]."""
-
-TRUNK_POSTURE = 0.04
-"""Deviation of the pelvis' turn, trunk and head that costs one unit [rad]."""
+POSTURE, TRUNK_POSTURE = 0.06, 0.04
+"""Deviation from the recording that costs one unit: of a hinge; of the pelvis' turn, trunk and head [rad]."""
 
 TRUNK = ("lumbar", "thorax", "neck")
-"""First words of the hinges of trunk and head."""
-
 ARMS = ("left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist")
-"""First words of the hinges of the arms."""
+"""First words of the hinges of trunk and head, and of the arms."""
 
 END_SHARE = 0.25
 """Share of these deviations of trunk and arms that costs as much at a clip's ends, where a bend of the
@@ -348,9 +327,8 @@ def rate_on_contacts(
         np.column_stack([np.interp(task.time, recording.time, column) for column in values.T])
         for values in (recording.com, second)
     )
-    return _angular_momentum_rate(
-        body, task.fit(com, acceleration, np.zeros_like(com), LOOSE), recording.time
-    )
+    spline = task.fit(com, acceleration, np.zeros_like(com), LOOSE)
+    return centroidal_motion(body, *spline.evaluate(recording.time)).angular_momentum_rate
 
 
 def rate_on_plan(
@@ -363,11 +341,7 @@ def rate_on_plan(
     """
     clock = trajectory.schedule.instants, recording.key_times
     spline = _Task.of(body, scene, trajectory.schedule, recorded, clock).follow(trajectory)
-    return _angular_momentum_rate(body, spline, recording.time)
-
-
-def _angular_momentum_rate(body: BodyModel, spline: ConfigurationSpline, time: FloatArray) -> FloatArray:
-    return centroidal_motion(body, *spline.evaluate(time)).angular_momentum_rate
+    return centroidal_motion(body, *spline.evaluate(recording.time)).angular_momentum_rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,18 +367,13 @@ class _Task:
 
     @classmethod
     def of(
-        cls,
-        body: BodyModel,
-        scene: Scene,
-        schedule: ContactSchedule,
-        recorded: tuple[FloatArray, FloatArray],
-        clock: tuple[FloatArray, FloatArray],
-    ) -> "_Task":
+        cls, body: BodyModel, scene: Scene, schedule: ContactSchedule,
+        recorded: tuple[FloatArray, FloatArray], clock: tuple[FloatArray, FloatArray],
+    ) -> "_Task":  # fmt: skip
         job = FitJob(KNOT_SPACING)
         time, _ = job.samples(job.knots(schedule, FINE))
         reference = _postures(recorded, np.interp(time, *clock))
-        paths = effector_paths(body, schedule, time, reference)
-        scale = _posture_scale(body, time)
+        paths, scale = effector_paths(body, schedule, time, reference), _posture_scale(body, time)
         lay_toes_flat(paths.toes, reference, scale)
         ignored = ignored_pairs(body, scene, schedule, time)
         return cls(body, Proximity(body, scene), schedule, job, time, reference, scale, paths, ignored)

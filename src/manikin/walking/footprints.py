@@ -18,7 +18,7 @@ SIMULTANEOUS = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """One support of a foot.
+    """One support of a foot; InputError if a value is not usable.
 
     Attributes:
         effector: ``"left_foot"`` or ``"right_foot"``.
@@ -26,9 +26,6 @@ class Footprint:
         yaw: Heading of the toes, counter-clockwise from the world's x [rad].
         lands: Touch-down [s]; the start of the walk for a foot that stands there.
         leaves: Lift-off [s]; the end of the walk for a foot that stays.
-
-    Raises:
-        InputError: If a value is not usable.
     """
 
     effector: str
@@ -40,26 +37,23 @@ class Footprint:
     def __init__(self, effector: str, position: ArrayLike, yaw: float, lands: float, leaves: float) -> None:
         if effector not in FEET:
             raise InputError(f"footprint effector is {effector!r}; valid: {', '.join(FEET)}")
-        lands = finite_number(lands, f"footprint of {effector} lands [s]")
+        where = f"footprint of {effector}"
+        lands = finite_number(lands, f"{where} lands [s]")
         vars(self).update(
-            effector=effector,
-            position=frozen_array(position, f"footprint of {effector} position [m]", (3,)),
-            yaw=finite_number(yaw, f"footprint of {effector} yaw [rad]"),
-            lands=lands,
-            leaves=finite_number(leaves, f"footprint of {effector} leaves [s]", above=lands),
-        )
+            effector=effector, position=frozen_array(position, f"{where} position [m]", (3,)),
+            yaw=finite_number(yaw, f"{where} yaw [rad]"), lands=lands,
+            leaves=finite_number(leaves, f"{where} leaves [s]", above=lands),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Footprints:
     """All supports of both feet in a walk that begins and ends on both.
 
+    InputError if a foot lands before it left, both fly at once, or the walk does not begin and end on both.
+
     Attributes:
         steps: In order of touch-down, those at the start first.
-
-    Raises:
-        InputError: If a foot lands before it left, both fly at once, or the walk does not begin and end on
-            both feet.
     """
 
     steps: tuple[Footprint, ...]
@@ -111,10 +105,8 @@ class Footprints:
             raise InputError(f"footprints have none of {foot}; valid: at least one of each foot")
         for before, after in itertools.pairwise(steps):
             if after.lands <= before.leaves + SIMULTANEOUS:
-                raise InputError(
-                    f"footprints let {foot} land at {after.lands:.3f} s before it has left at "
-                    f"{before.leaves:.3f} s; valid: in the air in between"
-                )
+                wrong = f"land at {after.lands:.3f} s before it has left at {before.leaves:.3f} s"
+                raise InputError(f"footprints let {foot} {wrong}; valid: in the air in between")
         if abs(steps[0].lands - self.start) > SIMULTANEOUS or abs(steps[-1].leaves - self.end) > SIMULTANEOUS:
             raise InputError(f"footprints begin or end with {foot} in the air; valid: on both feet")
 

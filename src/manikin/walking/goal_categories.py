@@ -45,18 +45,15 @@ def holonomic_ends(walk: PathSegments) -> HolonomicEnds:
     instants. Standing before and after the walk belongs to its ends. Without any nonholonomic frame, both
     lengths are that of the whole way; a single one ends the first part, so walks are better cut off-line.
     """
-    paths = walk.paths
-    rates = np.asarray(np.gradient(paths.middle, 1.0 / paths.rate, axis=0))
+    step = 1.0 / walk.paths.rate
+    rates = np.asarray(np.gradient(walk.paths.middle, step, axis=0))
     speed = np.hypot(rates[:, 0], rates[:, 1])
     ahead = np.flatnonzero(walk.labels == NONHOLONOMIC)
+    first, after = len(speed) - 1, 0
     if ahead.size:
         first, after = int(ahead[0]), min(int(ahead[-1]) + 1, len(speed) - 1)
-    else:
-        first, after = len(speed) - 1, 0
-    whole, begin, end = (
-        float(np.trapezoid(part, dx=1.0 / paths.rate)) for part in (speed, speed[: first + 1], speed[after:])
-    )
-    return HolonomicEnds(begin, end, whole)
+    parts = speed[: first + 1], speed[after:], speed
+    return HolonomicEnds(*(float(np.trapezoid(part, dx=step)) for part in parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,26 +82,20 @@ class PathDeviation:
 
 
 def path_deviation(walks: Sequence[ShoulderPaths]) -> PathDeviation:
-    """Mean path of several walks to one goal and how far they are from it ([Truong2010]_ 4.4).
+    """Mean path of two or more walks to one goal and how far they are from it ([Truong2010]_ 4.4).
 
     All are rescaled in time to the shortest one and interpolated linearly at as many instants as it has.
     The thesis calls TD a sum of distances; its formula, used here, is their root mean square.
-
-    Raises:
-        InputError: If there are fewer than two walks.
     """
     if len(walks) < 2:
         raise InputError(f"deviation of {len(walks)} walks; valid: at least 2")
     shortest = min(walks, key=lambda walk: walk.time[-1])
     share = shortest.time / shortest.time[-1]
-    resampled = np.array(
-        [[np.interp(share, w.time / w.time[-1], line) for line in w.middle.T] for w in walks]
-    ).transpose(0, 2, 1)
-    mean = np.mean(resampled, axis=0)
+    lines = [[np.interp(share, w.time / w.time[-1], line) for line in w.middle.T] for w in walks]
+    resampled = np.array(lines).transpose(0, 2, 1)
+    mean = frozen_array(np.mean(resampled, axis=0), "mean path [m]")
     deviation = np.sqrt(np.mean(np.sum((resampled - mean) ** 2, axis=2), axis=0))
-    return PathDeviation(
-        shortest.time, frozen_array(mean, "mean path [m]"), frozen_array(deviation, "deviation [m]")
-    )
+    return PathDeviation(shortest.time, mean, frozen_array(deviation, "deviation [m]"))
 
 
 THESIS_RADIUS = THESIS_RULE.diagonal_step
@@ -160,10 +151,7 @@ class HolonomicZone:
 
 
 def holonomic_zone(
-    goals: ArrayLike,
-    walks: Sequence[PathSegments],
-    *,
-    largest_turn: float = HALF_EIGHTH,
+    goals: ArrayLike, walks: Sequence[PathSegments], *, largest_turn: float = HALF_EIGHTH
 ) -> HolonomicZone:
     """The zone around a start in which goals are reached holonomically, from segmented walks.
 
@@ -173,23 +161,16 @@ def holonomic_zone(
 
     Args:
         goals: (k, 3) x, y [m], heading [rad] of every walk's goal.
-        walks: (k) segmented walks from :data:`START`, better off-line.
+        walks: (k) segmented walks from :data:`START`, better off-line; InputError if not as many as goals.
         largest_turn: Goals with a larger turn are left out [rad].
-
-    Raises:
-        InputError: If there are not as many goals as walks.
     """
-    seen = seen_from(goals)
+    seen = frozen_array(seen_from(goals), "goals of the zone")
     if len(seen) != len(walks):
         raise InputError(f"{len(seen)} goals of {len(walks)} walks; valid: one goal of each walk")
-    shares = [_holonomic_share(walk) for walk in walks]
+    shares = frozen_array([_holonomic_share(walk) for walk in walks], "shares of the zone")
     angle = np.abs(np.arctan2(seen[:, 1], seen[:, 0]))
-    considered = (
-        (angle >= HALF_EIGHTH - 1e-9) & (angle <= np.pi / 2 + 1e-9) & (np.abs(seen[:, 2]) <= largest_turn)
-    )
-    return HolonomicZone(
-        frozen_array(seen, "goals of the zone"), frozen_array(shares, "shares of the zone"), considered
-    )
+    considered = (angle >= HALF_EIGHTH - 1e-9) & (angle <= np.pi / 2 + 1e-9)
+    return HolonomicZone(seen, shares, considered & (np.abs(seen[:, 2]) <= largest_turn))
 
 
 def _holonomic_share(walk: PathSegments) -> float:
@@ -243,22 +224,20 @@ def category_goals(distance: float) -> list[tuple[str, FloatArray]]:
     60 degrees from straight behind.
     """
     radius = finite_number(distance, "distance of the goals [m]", at_least=2.0 * BESIDE)
-    goals = []
-    for name, degrees in HEADINGS_DEG.items():
-        for bearing in np.radians(_BEARINGS_DEG[name[2]]):
-            place = (START[0] + radius * np.sin(bearing), START[1] + radius * np.cos(bearing))
-            goals.append((name, np.array([*place, np.radians(degrees)])))
-    return goals
+    return [
+        (name, np.array([START[0] + radius * np.sin(b), START[1] + radius * np.cos(b), np.radians(degrees)]))
+        for name, degrees in HEADINGS_DEG.items()
+        for b in np.radians(_BEARINGS_DEG[name[2]])
+    ]
 
 
 @dataclass(frozen=True)
 class CategorySpread:
-    """Spread of a length over several walks.
+    """Spread of a length over several walks [m].
 
     Attributes:
-        mean: Mean length [m].
-        average_deviation: AD, mean distance from the mean [m].
-        largest_deviation: MD, largest distance from the mean [m].
+        average_deviation: AD, mean distance from the mean.
+        largest_deviation: MD, largest distance from the mean.
     """
 
     mean: float
@@ -274,13 +253,10 @@ class CategorySpread:
 
 @dataclass(frozen=True)
 class CategoryStatistics:
-    """Statistics of walks to the goals of one category.
+    """Statistics of a number of walks to a number of goals of one category.
 
     Attributes:
-        goals: Number of goals.
-        walks: Number of walks.
-        from_origin: Spread of PLO.
-        to_goal: Spread of PLG.
+        from_origin: Spread of PLO; ``to_goal`` is that of PLG.
         patterned: Share of the walks that are holonomic, then nonholonomic, then holonomic [-].
         holonomic: Mean share of the moving frames that are holonomic [-].
         average_deviation: ATD, the mean of the goals with several walks [m]; None if there is none.
@@ -302,11 +278,8 @@ def category_statistics(
 ) -> dict[str, CategoryStatistics]:
     """Statistics of walks from :data:`START` by the names of :data:`HEADINGS_DEG` that occur, in order.
 
-    Given is every goal, (3,) x, y [m], heading [rad], with the walks to it; goals of no category are left
-    out.
-
-    Raises:
-        InputError: If a goal has no walk.
+    Given is every goal, (3,) x, y [m], heading [rad], with the walks to it, at least one; goals of no
+    category are left out.
     """
     groups: dict[str, list[Sequence[ShoulderPaths]]] = {name: [] for name in HEADINGS_DEG}
     for goal, several in walks:
@@ -323,12 +296,11 @@ def _statistics(group: Sequence[Sequence[ShoulderPaths]]) -> CategoryStatistics:
     ends = [holonomic_ends(walk) for walk in segmented]
     spreads = [path_deviation(walks) for walks in group if len(walks) > 1]
     return CategoryStatistics(
-        goals=len(group),
-        walks=len(segmented),
-        from_origin=CategorySpread.of([item.from_origin for item in ends]),
-        to_goal=CategorySpread.of([item.to_goal for item in ends]),
+        len(group), len(segmented),
+        CategorySpread.of([item.from_origin for item in ends]),
+        CategorySpread.of([item.to_goal for item in ends]),
         patterned=float(np.mean([walk.pattern == "H-N-H" for walk in segmented])),
         holonomic=float(np.mean([_holonomic_share(walk) for walk in segmented])),
         average_deviation=float(np.mean([item.average for item in spreads])) if spreads else None,
-        largest_deviation=max(item.largest for item in spreads) if spreads else None,
-    )
+        largest_deviation=max((item.largest for item in spreads), default=None),
+    )  # fmt: skip

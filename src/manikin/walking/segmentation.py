@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.errors import InputError
-from manikin.numerics.signals import SHARES, low_passed
+from manikin.numerics.signals import SHARES, low_passed, mask_runs
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.readers.marker_sets import SIDES, joint_of
 from manikin.recordings.readers.skeleton_recording import Recording
@@ -39,13 +39,11 @@ LEAST_DISTANCE = 1e-3
 class ShoulderPaths:
     """Both shoulders on the ground plane, at an even rate; in the world, y is to the left of x.
 
-    Attributes:
-        left: (n, 2) left shoulder [m].
-        right: (n, 2) right shoulder [m].
-        rate: Frames per second [Hz].
+    InputError if there are fewer than three frames, the paths differ in length, or the shoulders meet.
 
-    Raises:
-        InputError: If there are fewer than three frames, the paths differ in length, or the shoulders meet.
+    Attributes:
+        left: (n, 2) left shoulder [m]; ``right`` is the other one.
+        rate: Frames per second [Hz].
     """
 
     left: FloatArray
@@ -60,20 +58,14 @@ class ShoulderPaths:
             raise InputError(f"shoulder paths have {len(left)} frames; valid: at least 3")
         close = np.flatnonzero(np.hypot(*(left - right).T) < LEAST_DISTANCE)
         if close.size:
-            raise InputError(
-                f"shoulders meet at frame {close[0]}; "
-                f"valid: at least {LEAST_DISTANCE} m apart, seen from above"
-            )
+            valid = f"at least {LEAST_DISTANCE} m apart, seen from above"
+            raise InputError(f"shoulders meet at frame {close[0]}; valid: {valid}")
         object.__setattr__(self, "left", left)
         object.__setattr__(self, "right", right)
 
     @classmethod
     def of_recording(cls, recording: Recording) -> Self:
-        """Shoulder joints of a recorded person.
-
-        Raises:
-            InputError: If the recording has no such joints, or fewer than three frames.
-        """
+        """Shoulder joints of a recorded person; InputError if there are none, or fewer than three frames."""
         left, right = (recording.positions[:, joint_of(recording, f"{side}_upper_arm"), :2] for side in SIDES)
         return cls(left, right, recording.rate)
 
@@ -84,11 +76,7 @@ class ShoulderPaths:
 
     @classmethod
     def of_places(cls, place: ArrayLike, rate: float) -> Self:
-        """Shoulders on both sides of places (n, 3) x, y [m], heading [rad] at a rate [Hz].
-
-        Raises:
-            InputError: If there are fewer than three places.
-        """
+        """Shoulders on both sides of three places (n, 3) x, y [m], heading [rad] or more, at a rate [Hz]."""
         places = frozen_array(place, "places [m, m, rad]", (None, 3))
         left = 0.5 * BREADTH * np.column_stack([-np.sin(places[:, 2]), np.cos(places[:, 2])])
         return cls(places[:, :2] + left, places[:, :2] - left, rate)
@@ -205,9 +193,8 @@ class SegmentationRule:
     def __post_init__(self) -> None:
         where = "segmentation rule"
         finite_number(self.tolerance, f"{where} tolerance [rad]", above=0.0, at_most=np.pi)
-        units = {"half_step": "s", "standing_speed": "m/s", "noise": "s", "diagonal_step": "m"}
-        for name, unit in units.items():
-            finite_number(getattr(self, name), f"{where} {name} [{unit}]", at_least=0.0)
+        for name in ("half_step [s]", "standing_speed [m/s]", "noise [s]", "diagonal_step [m]"):
+            finite_number(getattr(self, name.split()[0]), f"{where} {name}", at_least=0.0)
         if self.cutoff is not None:
             finite_number(self.cutoff, f"{where} cutoff [-]", above=0.0, at_most=0.99)
         if self.boundary is not None:
@@ -264,11 +251,7 @@ class PathSegments:
         return "-".join(kind[0].upper() for kind, _ in itertools.groupby(moving))
 
     def share(self, kind: str) -> float:
-        """Share of the frames that are of a kind [-].
-
-        Raises:
-            InputError: If there is no such kind.
-        """
+        """Share of the frames that are of a kind of :data:`KINDS` [-]."""
         if kind not in KINDS:
             raise InputError(f"kind of a segment is {kind!r}; valid: {', '.join(KINDS)}")
         return float(np.mean(self.labels == kind))
@@ -301,7 +284,9 @@ def segment_path(
         labels = _with_diagonal_steps(labels, paths, rule)
     labels.setflags(write=False)
     angles.setflags(write=False)
-    return PathSegments(paths, labels, angles, _segments(labels, paths.time))
+    times = [*paths.time.tolist(), float(paths.time[-1])]
+    segments = (PathSegment(str(kind), times[first], times[stop]) for kind, first, stop in _runs(labels))
+    return PathSegments(paths, labels, angles, tuple(segments))
 
 
 def _function_1(angles: FloatArray, velocities: FloatArray, rule: SegmentationRule) -> Labels:
@@ -312,14 +297,11 @@ def _function_1(angles: FloatArray, velocities: FloatArray, rule: SegmentationRu
 
 def _without_noise(labels: Labels, angles: FloatArray, rate: float, rule: SegmentationRule) -> Labels:
     """Labels with short holonomic intervals made nonholonomic where the low-passed deviation is small."""
-    runs = list(_runs(labels))
-    noisy = np.zeros(len(labels), dtype=bool)
-    for (before, *_), (kind, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
-        around = before == after == NONHOLONOMIC and kind == HOLONOMIC
-        noisy[first:stop] = around and (stop - first) / rate <= rule.noise
-    cleaned = labels.copy()
-    for joined, first, stop in _runs((labels == NONHOLONOMIC) | noisy):
-        if joined and np.any(noisy[first:stop]):
+    noisy, cleaned = np.zeros(len(labels), dtype=bool), labels.copy()
+    for first, stop in _between(labels, HOLONOMIC, NONHOLONOMIC):
+        noisy[first:stop] = (stop - first) / rate <= rule.noise
+    for first, stop in mask_runs((labels == NONHOLONOMIC) | noisy):
+        if np.any(noisy[first:stop]):
             smooth = _smoothed(angles[first:stop], min(0.99, 1.0 / (rule.noise * rate)))
             cleaned[first:stop][noisy[first:stop] & rule.ahead(smooth)] = NONHOLONOMIC
     return cleaned
@@ -336,21 +318,25 @@ def _smoothed(angles: FloatArray, cutoff: float) -> FloatArray:
 def _with_diagonal_steps(labels: Labels, paths: ShoulderPaths, rule: SegmentationRule) -> Labels:
     """Labels with single steps made holonomic that keep the heading and go obliquely to it."""
     stepped = labels.copy()
-    runs = list(_runs(labels))
     if rule.boundary is None:
         return stepped
-    for (before, *_), (kind, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
-        if not (before == after == STANDING and kind == NONHOLONOMIC):
-            continue
-        start, end = first - 1, stop
-        turned = paths.heading[end] - paths.heading[start]
-        way = paths.middle[end] - paths.middle[start]
-        if np.hypot(way[0], way[1]) > rule.diagonal_step:
-            continue
+    for first, stop in _between(labels, NONHOLONOMIC, STANDING):
+        start = first - 1
+        turned = paths.heading[stop] - paths.heading[start]
+        way = paths.middle[stop] - paths.middle[start]
         aside = np.arctan2(way[1], way[0]) - paths.heading[start]
-        if abs(turned) < rule.boundary <= abs(np.arctan2(np.sin(aside), np.cos(aside))):
+        oblique = abs(turned) < rule.boundary <= abs(np.arctan2(np.sin(aside), np.cos(aside)))
+        if oblique and np.hypot(way[0], way[1]) <= rule.diagonal_step:
             stepped[first:stop] = HOLONOMIC
     return stepped
+
+
+def _between(labels: Labels, kind: str, around: str) -> Iterator[tuple[int, int]]:
+    """First frame and the one after the last of stretches of a kind between two of another kind."""
+    runs = list(_runs(labels))
+    for (before, *_), (own, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
+        if before == after == around and own == kind:
+            yield first, stop
 
 
 def _runs(values: NDArray[np.generic]) -> Iterator[tuple[object, int, int]]:
@@ -358,10 +344,3 @@ def _runs(values: NDArray[np.generic]) -> Iterator[tuple[object, int, int]]:
     changes = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
     for first, stop in itertools.pairwise(changes):
         yield values[first].item(), first, stop
-
-
-def _segments(labels: Labels, time: FloatArray) -> tuple[PathSegment, ...]:
-    return tuple(
-        PathSegment(str(kind), float(time[first]), float(time[min(stop, len(time) - 1)]))
-        for kind, first, stop in _runs(labels)
-    )

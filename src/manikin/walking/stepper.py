@@ -34,19 +34,16 @@ class StepRule:
         longest_step: Steps are shorter than this at any speed [m]; no plan was found for steps of 0.6 m.
         side_step: Way of the body in a close-and-open pair of steps to the side [m].
         turn_step: Turn of the body in a step [rad].
-        width: Between the soles' middles in walking, across the heading [m].
-        standing_width: The same at the start and the end [m].
+        width: Between the soles' middles in walking, across the heading [m]; ``standing_width`` is the same
+            at the start and the end.
         narrowest: Least distance of a landing foot from a parallel one, across their mean heading [m]; feet
-            do not cross. Turned feet keep what their soles need beyond that.
-        sole_length: Of the soles [m].
-        widest: Largest such distance [m].
-        longest: Largest distance along their mean heading [m].
-        toes_in: A landing foot is turned inwards from the other one by at most this [rad].
-        toes_out: The same, outwards [rad].
+            do not cross. Turned feet keep what their soles, of ``sole_length`` [m], need beyond that.
+        widest: Largest such distance [m]; ``longest`` is that along their mean heading.
+        toes_in: A landing foot is turned inwards from the other one by at most this [rad], outwards by
+            ``toes_out``.
         single: Least time on one foot [s].
-        double: Least time on both feet between steps [s].
+        double: Least time on both feet between steps [s]; ``standing`` is that at the start and the end.
         double_share: Share of a step that is spent on both feet [-].
-        standing: Least time on both feet at the start and the end [s].
     """
 
     walk_ratio: float = 0.0065 * 60.0
@@ -80,17 +77,11 @@ class StepRule:
         """The rule of a body of another stature [m]: lengths grow with it, times with its square root."""
         length = finite_number(stature, "stature [m]", above=0.0) / 1.75
         time = np.sqrt(length)
-        lengths = (
-            "longest_step", "side_step", "width", "standing_width", "narrowest", "sole_length", "widest",
-            "longest",
-        )  # fmt: skip
-        times = ("single", "double", "standing")
-        return replace(
-            self,
-            walk_ratio=self.walk_ratio * length * time,
-            **{name: getattr(self, name) * length for name in lengths},
-            **{name: getattr(self, name) * time for name in times},
-        )
+        factors = dict.fromkeys(("longest_step", "side_step", "width", "standing_width", "narrowest",
+                                 "sole_length", "widest", "longest"), length)  # fmt: skip
+        factors |= dict.fromkeys(("single", "double", "standing"), time)
+        scaled = {name: getattr(self, name) * factor for name, factor in factors.items()}
+        return replace(self, walk_ratio=self.walk_ratio * length * time, **scaled)
 
     def frequency(self, velocity: FloatArray) -> FloatArray:
         """(...) steps per second at (..., 3) forward, left [m/s] and angular velocities [rad/s]."""
@@ -127,7 +118,7 @@ def place_footprints(
         raise InputError(f"first is {first!r}; valid: {', '.join(FEET)}")
     cuts = _Cuts(path, rule)
     stands = {foot: _beside(foot, cuts.place(0.0), rule.standing_width) for foot in FEET}
-    steps = list(_steps(cuts, rule, _leading(cuts) if first is None else first, stands))
+    steps = list(_steps(cuts, rule, first or _leading(cuts), stands))
     return _timed(stands, steps, cuts, rule, height)
 
 
@@ -204,35 +195,29 @@ def within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepR
 
 
 def _timed(
-    stands: dict[str, FloatArray],
-    steps: list[tuple[str, FloatArray]],
-    cuts: _Cuts,
-    rule: StepRule,
+    stands: dict[str, FloatArray], steps: list[tuple[str, FloatArray]], cuts: _Cuts, rule: StepRule,
     height: float,
-) -> Footprints:
+) -> Footprints:  # fmt: skip
     """Times of lift-off and touch-down: half a step before the body passes, none shorter than the rule's."""
-    passed = [cuts.time(number + 0.5) for number in range(cuts.count)]
-    end = cuts.path.duration
+    passed, end = [cuts.time(number + 0.5) for number in range(cuts.count)], cuts.path.duration
     usual = float(np.median(np.diff(passed))) if len(passed) > 1 else rule.single + rule.double
     while len(passed) < len(steps):
         passed.append(max(end, passed[-1] + usual) if len(passed) == cuts.count else passed[-1] + usual)
     half = rule.double_share * usual / 2
     lifts, lands = [], []
     for number, middle in enumerate(passed[: len(steps)]):
-        if number == 0:
-            lift = max(rule.standing, middle - half - (1.0 - rule.double_share) * usual)
-        else:
+        lift = max(rule.standing, middle - half - (1.0 - rule.double_share) * usual)
+        if number:
             lift = max(lands[-1] + rule.double, passed[number - 1] + half)
         lifts.append(lift)
         lands.append(max(lift + rule.single, middle - half))
     finish = max(end, (lands[-1] if lands else 0.0) + rule.standing)
     supports = []
     for foot in FEET:
-        numbers = [number for number, (each, _) in enumerate(steps) if each == foot]
-        places = [stands[foot], *(steps[number][1] for number in numbers)]
-        begins = [0.0, *(lands[number] for number in numbers)]
-        ends = [*(lifts[number] for number in numbers), finish]
-        for (x, y, yaw), begin, leave in zip(places, begins, ends, strict=True):
+        own = [row for row in zip(lifts, lands, steps, strict=True) if row[2][0] == foot]
+        begins = [(0.0, stands[foot]), *((land, place) for _, land, (_, place) in own)]
+        ends = [*(lift for lift, _, _ in own), finish]
+        for (begin, (x, y, yaw)), leave in zip(begins, ends, strict=True):
             supports.append(Footprint(foot, [x, y, height], yaw, begin, leave))
     return Footprints(supports)
 
@@ -255,11 +240,9 @@ def walked_footprints(walk: Walk, rule: StepRule | None = None, *, height: float
         InputError: If the walk has a moment without a foot on the floor, or does not begin and end on both.
     """
     rule = StepRule() if rule is None else rule
-    flying = np.flatnonzero(~walk.support.any(axis=1))
+    flying = walk.time[~walk.support.any(axis=1)]
     if flying.size:
-        raise InputError(
-            f"walk has no foot on the floor at {walk.time[flying[0]]:.2f} s; valid here: a slower one"
-        )
+        raise InputError(f"walk has no foot on the floor at {flying[0]:.2f} s; valid here: a slower one")
     held = sorted(
         (step for foot in range(len(walk.feet)) for step in _shifted_footprints(walk, foot)),
         key=lambda step: (step.lands, step.effector),
@@ -292,9 +275,8 @@ def _overlapping(held: Sequence[Footprint], walk: Walk) -> Iterator[Footprint]:
     frame = float(walk.time[1] - walk.time[0])
     for step in held:
         landings = [s.lands for s in held if s.effector != step.effector and s.lands > step.lands]
-        leaves = step.leaves
-        if landings and abs(landings[0] - leaves) < frame / 2:
-            leaves += frame
+        together = bool(landings) and abs(landings[0] - step.leaves) < frame / 2
+        leaves = step.leaves + frame if together else step.leaves
         yield Footprint(step.effector, step.position, step.yaw, step.lands, leaves)
 
 

@@ -30,20 +30,14 @@ from manikin.recordings.readers.markers import ForcePlate
 CUTOFF = 20.0
 """Low-pass of the plates, of second order, forward and backward [Hz]."""
 
-LEAST_UNLOADED = 0.1
-"""Time without load from which the offset of a plate is taken [s]."""
+LEAST_UNLOADED, SHORTEST = 0.1, 0.3
+"""Time without load from which the offset of a plate, and time on plates from which a mass, is taken [s]."""
 
-OVERHANG = 0.02
-"""How far a sole may be beyond the edge of the plate that is to carry it [m]."""
-
-BESIDE = 0.1
-"""How far beside a sole the centre of pressure may be that is its own [m]."""
+OVERHANG, BESIDE = 0.02, 0.1
+"""How far a sole may be beyond the edge of its plate, and its centre of pressure beside a sole [m]."""
 
 UNSURE = 0.03
 """Time about a support off the plates whose frames are left out: supports are known that well [s]."""
-
-SHORTEST = 0.3
-"""Shortest time on the plates from which a mass is taken [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,17 +89,12 @@ def plate_forces(
     """The wrench of all plates at the instants of a motion, and where it is all there is.
 
     A foot is on a plate if its sole is within the plate's edges, where they are known, and its centre of
-    pressure stays close to the sole for most of the support.
-
-    Args:
-        plates: Of the same recording, at least one.
-        times: (n,) instants on their clock [s], which is that of the schedule.
-        cutoff: Of the low-pass [Hz].
+    pressure stays close to the sole for most of the support. Instants (n,) and schedule are on the clock of
+    the plates [s], at least one, that are low-passed with a cutoff [Hz].
     """
     wrenches = np.array([_sampled(plate, times, cutoff) for plate in plates])
-    phases = schedule.phase_at(times)
+    phases, held = schedule.phase_at(times), _held(schedule)
     covered, single = np.ones(len(times), dtype=bool), np.zeros(len(times), dtype=bool)
-    held = _held(schedule)
     carried = [[one for one in held if _carries(plate, one.contact, schedule)] for plate in plates]
     on_plates = {id(one.contact) for ones in carried for one in ones}
     for number, phase in enumerate(schedule.sequence):
@@ -116,9 +105,7 @@ def plate_forces(
             covered[(times > begin - UNSURE) & (times < end + UNSURE)] = False
     names = schedule.sequence.effectors
     parts, apart = np.zeros((len(times), len(names), 6)), covered.copy()
-    for ones, each in zip(carried, wrenches, strict=True):
-        if not ones:
-            continue
+    for ones, each in ((ones, each) for ones, each in zip(carried, wrenches, strict=True) if ones):
         # A plate may be loaded a moment before its foot is found on it, and after.
         away = np.array([np.maximum(np.maximum(one.begin - times, times - one.end), 0.0) for one in ones])
         apart &= ~((np.sum(away == 0.0, axis=0) > 1) & each.any(axis=1))
@@ -148,9 +135,7 @@ def compare_with_plates(
 ) -> PlateComparison | None:
     """Compare forces, centres of pressure and margins; None where no frame is covered in single support.
 
-    Args:
-        dynamics: The motion, with the person's mass.
-        height: Of the plates' surfaces, where centres of pressure are compared [m].
+    The motion has the person's mass; centres of pressure are compared at the plates' height [m].
     """
     both = measured.covered & measured.single
     if not both.any():
@@ -182,13 +167,12 @@ def _held(schedule: ContactSchedule) -> list[_HeldPlate]:
     found: list[_HeldPlate] = []
     for phase, (begin, end) in zip(schedule.sequence, pairwise(schedule.instants.tolist()), strict=True):
         for contact in phase.stance:
-            for one in found:
-                same = one.contact.effector == contact.effector and one.contact.same_place(contact)
-                if same and one.end == begin:
-                    one.end = end
-                    break
-            else:
+            ended = (one for one in found if one.end == begin and one.contact.effector == contact.effector)
+            one = next((one for one in ended if one.contact.same_place(contact)), None)
+            if one is None:
                 found.append(_HeldPlate(contact, begin, end))
+            else:
+                one.end = end
     return found
 
 
@@ -208,12 +192,11 @@ def _carries(plate: ForcePlate, contact: Contact, schedule: ContactSchedule) -> 
     """Whether a plate carries a contact over the time for which it is held."""
     if contact.kind is not ContactKind.SOLE or not plate.below(contact.points_in_world, OVERHANG):
         return False
-    held = [phase.stance for phase in schedule.sequence]
-    mine = [contact.effector in stance and stance[contact.effector].same_place(contact) for stance in held]
-    alone = np.array([here and len(stance) == 1 for here, stance in zip(mine, held, strict=True)])
-    phases = schedule.phase_at(plate.time)
+    name, held = contact.effector, [phase.stance for phase in schedule.sequence]
+    mine = np.array([name in stance and stance[name].same_place(contact) for stance in held])
+    alone = mine & np.array([len(stance) == 1 for stance in held])
     inside = (plate.time >= schedule.instants[0]) & (plate.time <= schedule.instants[-1])
-    frames = inside & (alone if alone.any() else np.array(mine))[phases]
+    frames = inside & (alone if alone.any() else mine)[schedule.phase_at(plate.time)]
     if not frames.any() or np.mean(plate.pressed[frames]) < 0.5:
         return False
     local = (plate.cop[frames & plate.pressed] - contact.position) @ contact.rotation_contact_to_world
@@ -253,24 +236,16 @@ def compare_torques(
 ) -> tuple[TorqueComparison, ...]:
     """Compare the torques of legs with those by plates; none where no foot is on a plate of its own.
 
-    Args:
-        motion: The same with forces and torques, of
-            :func:`manikin.recordings.dynamics.recorded_forces.motion_on_contacts`.
-        measured: The plates at its instants.
+    The motion is of :func:`manikin.recordings.dynamics.recorded_forces.motion_on_contacts`.
     """
     theirs = torques_of(dynamics, measured.effectors, measured.of_effector)
-    held = {
-        name: measured.apart & support
-        for name, support in zip(motion.contact_names, motion.support.T, strict=True)
-    }
-    found = []
+    supports, found = dict(zip(motion.contact_names, motion.support.T, strict=True)), []
     for joint in JOINTS:
         parts = [np.zeros((2, 0))]
-        for side in SIDES:
-            rows = held.get(f"{side}_foot")
-            if rows is not None:
-                column = 6 + motion.joint_names.index(f"{side}_{joint}")
-                parts.append(np.stack([motion.tau[rows, column], theirs[rows, column]]))
+        for side in (side for side in SIDES if f"{side}_foot" in supports):
+            rows = measured.apart & supports[f"{side}_foot"]
+            column = 6 + motion.joint_names.index(f"{side}_{joint}")
+            parts.append(np.stack([motion.tau[rows, column], theirs[rows, column]]))
         mine, plates = np.hstack(parts)
         if len(mine):
             apart, peaks = mine - plates, (float(np.abs(each).max()) for each in (mine, plates))

@@ -66,19 +66,14 @@ MOTION_CUTOFF = 6.0
 
 FEWEST_FRAMES = 4
 
-HIGHEST_SHARE = 0.45
-"""Highest cutoff at a touch-down, per rate of the recording: faster motion aliases."""
-
 
 def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruction:
     """A reconstruction low-passed by a Butterworth filter of second order, forward and backward.
 
     Filtered are position, hinges, and the rotation of the pelvis as a quaternion of continuous sign, then
     normalised; hinges are kept to their limits. Residuals are those of the filtered postures. Each of the two
-    passes halves the power at the cutoff [Hz].
-
-    Raises:
-        InputError: If there are less than four instants, or the cutoff is not below half their rate.
+    passes halves the power at the cutoff [Hz]. InputError if there are less than four instants, or the cutoff
+    is not below half their rate.
     """
     q = smoothed_postures(found, cutoff)
     residual = PostureCost(found.body, found.targets).distances(q, found.targets.positions)
@@ -131,10 +126,7 @@ def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArr
     """(n, nv) velocities and accelerations of postures at the instants of a reconstruction.
 
     By central differences on the configuration space, the pelvis' parts in its own frame; at both ends
-    velocities continue the line of the next two.
-
-    Raises:
-        InputError: If there are too few instants.
+    velocities continue the line of the next two. InputError if there are less than four instants.
     """
     model, rate = found.body.pinocchio, _rate(found)
     inner = [0.5 * pin.difference(model, before, after) for before, after in zip(q[:-2], q[2:], strict=True)]
@@ -149,8 +141,9 @@ def _rate(found: Reconstruction) -> float:
     return found.rate
 
 
-TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH = 8.0, 0.08
-"""Cutoff at a touch-down [Hz], and time from it in which the cutoff falls to 1/e of its rise [s]."""
+TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH, HIGHEST_SHARE = 8.0, 0.08, 0.45
+"""Cutoff at a touch-down [Hz], time from it in which the cutoff falls to 1/e of its rise [s], and highest
+cutoff there per rate of the recording: faster motion aliases."""
 
 
 def local_cutoff(time: FloatArray, touch_downs: Sequence[float], cutoff: float) -> FloatArray:
@@ -252,17 +245,15 @@ def dynamics_of(
 ) -> RecordedDynamics:
     """Smooth a reconstruction, differentiate it twice and find the wrench that it needs.
 
+    Errors are those of :func:`smoothed`.
+
     Args:
         found: At least four instants at an even rate, not yet smoothed.
         cutoff: Of the low-pass of the postures [Hz].
         touch_downs: Instants at which it rises for a moment, see :func:`touch_downs_of` [s].
-
-    Raises:
-        InputError: If there are too few instants, or the cutoff is not below half their rate.
     """
-    return dynamics_of_postures(
-        found, smoothed_postures(found, cutoff, limits=False, touch_downs=touch_downs)
-    )
+    q = smoothed_postures(found, cutoff, limits=False, touch_downs=touch_downs)
+    return dynamics_of_postures(found, q)
 
 
 def touch_downs_of(supports: RecordedSupports) -> tuple[float, ...]:
@@ -271,11 +262,7 @@ def touch_downs_of(supports: RecordedSupports) -> tuple[float, ...]:
 
 
 def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynamics:
-    """The wrench that (n, nq) smooth postures at the instants of a reconstruction need.
-
-    Raises:
-        InputError: If there are too few instants.
-    """
+    """The wrench that (n, nq) smooth postures at four or more instants of a reconstruction need."""
     v, a = rates_of(found, q)
     moved, free = centroidal_motion(found.body, q, v, a), FreeDynamics.of(found.body, q, v, a)
     return RecordedDynamics(
@@ -285,11 +272,7 @@ def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynami
 
 
 def with_mass(found: Reconstruction, mass: float) -> Reconstruction:
-    """Postures of a body of another mass [kg], its shares of segments and its effectors kept.
-
-    Raises:
-        BodyError: If it is not the mass of an adult.
-    """
+    """Postures of a body of another adult's mass [kg], its shares of segments and its effectors kept."""
     body = body_from_signature(found.body.signature() | {"mass": mass})
     if set(JOINTS) <= set(found.body.effectors):
         body = with_knees_and_elbows(body)
@@ -350,22 +333,16 @@ class RecordedMargins:
 
     def limiting(self, frame: int) -> LimitingConstraint | None:
         """Contact and limit that the facet with the margin of a frame stands for; None in flight."""
-        polytope = self.polytopes[int(self.phase[frame])]
+        polytope, com = self.polytopes[int(self.phase[frame])], self.com[frame]
         if polytope is None:
             return None
-        com = self.com[frame]
         return polytope.at_reference(com).limiting(wrench_about(self.wrench[frame], com))
 
 
 def recorded_margins(
     dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0
 ) -> RecordedMargins:
-    """Margins of a recorded motion on its stances.
-
-    Args:
-        schedule: Of :func:`manikin.recordings.supports.body_supports.recorded_schedule`.
-        start: The schedule's clock at the motion's first instant [s].
-    """
+    """Margins of a recorded motion on its stances; their clock is ``start`` [s] at its first instant."""
     phases = schedule.phase_at(dynamics.time + start)
     stances = [phase.stance for phase in schedule.sequence]
     held = [number for number in np.unique(phases).tolist() if len(stances[number])]

@@ -31,7 +31,6 @@ from scipy.sparse.linalg import splu
 
 from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.balance.friction import contact_limits
-from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Stance
 from manikin.motion.motion import Motion
 from manikin.numerics.signals import mask_runs
@@ -109,18 +108,15 @@ def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray
     middle = np.mean([contact.position for contact in stance], axis=0)
     wanted = _about(wrench, middle, weight)
     generators = _generators(stance, middle, weight)
-    columns = np.vstack(generators).T
-    known = np.zeros((len(wanted), columns.shape[1]))
+    columns, known = np.vstack(generators).T, 0.0
     if near is not None:
         given = _about(near, middle, weight).swapaxes(0, 1)
         known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, given, strict=True)])
     pushes = _pushes(columns, wanted, known)
-    ends = np.cumsum([0, *map(len, generators)])
-    shares = np.stack(
-        [pushes[:, a:b] @ part for a, b, part in zip(ends[:-1], ends[1:], generators, strict=True)], axis=1
-    )
+    each = np.split(pushes, np.cumsum([len(one) for one in generators[:-1]]), axis=1)
+    shares = np.stack([push @ part for push, part in zip(each, generators, strict=True)], axis=1)
     shares += _smallest([contact.position - middle for contact in stance], wanted - shares.sum(axis=1))
-    shares = shares * weight
+    shares *= weight
     shares[..., 3:] *= LEVER
     return wrench_about(shares, -middle)
 
@@ -182,15 +178,10 @@ def _telling(beside: NDArray[np.bool_], step: float) -> bool:
 
 def _sums(frame: NDArray[np.int64], arm: FloatArray, frames: int) -> sparse.csr_array:
     """(6 f, 6 k) sums over each frame's contacts of wrenches about points ``arm`` (k, 3) off its middle."""
-    carried = _carried(arm)
+    carried = wrench_map(-arm / LEVER)
     rows = 6 * frame[:, None, None] + np.arange(6)[:, None] + np.zeros(6, dtype=np.int64)
     columns = 6 * np.arange(len(frame))[:, None, None] + np.zeros((6, 1), dtype=np.int64) + np.arange(6)
     return sparse.csr_array((carried.ravel(), (rows.ravel(), columns.ravel())), (6 * frames, 6 * len(frame)))
-
-
-def _carried(arm: FloatArray) -> FloatArray:
-    """(k, 6, 6) which carry wrenches, moments per lever, from points (k, 3) away."""
-    return wrench_map(-arm / LEVER)
 
 
 def _about(wrench: FloatArray, point: FloatArray, weight: float = 1.0) -> FloatArray:
@@ -220,11 +211,10 @@ def _pushes(columns: FloatArray, wanted: FloatArray, known: FloatArray | float =
 
 def _smallest(arms: Sequence[FloatArray], missing: FloatArray) -> FloatArray:
     """(n, c, 6) smallest wrenches at points ``arms`` away that add up to (n, 6) missing ones."""
-    maps = _carried(np.array(arms))
+    maps = wrench_map(-np.array(arms) / LEVER)
     each = missing @ np.linalg.pinv(np.hstack(list(maps))).T
-    return np.stack(
-        [part @ one.T for part, one in zip(np.split(each, len(arms), axis=1), maps, strict=True)], axis=1
-    )
+    parts = zip(np.split(each, len(arms), axis=1), maps, strict=True)
+    return np.stack([part @ one.T for part, one in parts], axis=1)
 
 
 def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches: FloatArray) -> FloatArray:
@@ -233,9 +223,10 @@ def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches:
     Args:
         wrenches: (n, c, 6) on each, about the world's origin [N, N.m].
     """
-    torques = np.array(dynamics.free_torque)
+    torques, body, model = np.array(dynamics.free_torque), dynamics.body, dynamics.body.pinocchio
     for number, effector in enumerate(effectors):
-        moved = _moved_by(dynamics.body, effector)
+        joints = model.supports[model.frames[body.effector_frame(effector)].parentJoint]
+        moved = [model.idx_vs[one] + k for one in joints if one for k in range(model.nvs[one])]
         torques[:, moved] -= np.einsum("nij,ni->nj", dynamics.jacobians[:, :, moved], wrenches[:, number])
     return torques
 
@@ -259,16 +250,13 @@ def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, star
     names, times = schedule.sequence.effectors, dynamics.time + start
     phases, held = schedule.phase_at(times), schedule.support(times, names)
     points = _points(schedule, phases)
-    step = float(dynamics.time[1] - dynamics.time[0])
-    wrenches, weight = smooth_shares(dynamics.wrench, held, points, step), GRAVITY * dynamics.body.mass
+    step, weight = float(dynamics.time[1] - dynamics.time[0]), GRAVITY * dynamics.body.mass
+    wrenches = smooth_shares(dynamics.wrench, held, points, step)
     for number, phase in enumerate(schedule.sequence):
-        frames = np.flatnonzero(phases == number)
-        if len(frames) and len(phase.stance) > 1:
-            columns = [names.index(name) for name in phase.stance.effectors]
-            near = wrenches[frames[:, None], columns]
-            wrenches[frames[:, None], columns] = shared_wrenches(
-                phase.stance, dynamics.wrench[frames], weight, near
-            )
+        frames, stance = np.flatnonzero(phases == number), phase.stance
+        if len(frames) and len(stance) > 1:
+            place = frames[:, None], [names.index(name) for name in stance.effectors]
+            wrenches[place] = shared_wrenches(stance, dynamics.wrench[frames], weight, wrenches[place])
     return wrenches
 
 
@@ -298,10 +286,3 @@ def motion_on_contacts(
         support=schedule.support(times, names), contact_force=forces, contact_names=names,
         joint_names=tuple(dynamics.body.joint_names),
     )  # fmt: skip
-
-
-def _moved_by(body: BodyModel, effector: str) -> list[int]:
-    """Indices of the velocities that move an effector."""
-    model = body.pinocchio
-    joints = model.supports[model.frames[body.effector_frame(effector)].parentJoint]
-    return [model.idx_vs[one] + k for one in joints if one for k in range(model.nvs[one])]

@@ -140,13 +140,9 @@ def least_shift(
 
     Args:
         found: The reconstruction of the person.
-        dynamics: Of its smooth postures.
-        margins: Of ``dynamics`` on its stances.
-        inside: Margin to impose, per body weight [m].
-        aside: ``a`` [m]; None to shift no more than the contacts ask for.
-
-    Raises:
-        InputError: If ``inside`` is negative, or ``aside`` is not positive.
+        dynamics: Of its smooth postures; ``margins`` are those on its stances.
+        inside: Margin to impose, per body weight [m], at least 0.
+        aside: ``a`` [m], above 0; None to shift no more than the contacts ask for.
     """
     if not inside >= 0.0:
         raise InputError(f"inside is {inside!r}; valid: at least 0 m")
@@ -165,7 +161,7 @@ def least_shift(
             break
         used = known
         facets = _facets(dynamics, margins, used, kept)
-        coefficients = _solve(facets.turned(turn), axes.scaled(aside or 1.0).turned(turn), spline)
+        coefficients = _solve(facets.turned(turn), axes.turned(turn, aside or 1.0), spline)
         if coefficients is None:
             solved = False
             break
@@ -263,13 +259,10 @@ class _Rows:
         each = [none, *((one.frame, one.base, one.on_shift, one.on_bend) for one in parts)]
         return cls(*(np.concatenate(column) for column in zip(*each, strict=True)))
 
-    def scaled(self, unit: float) -> "_Rows":
-        """Rows in another unit of length."""
-        return _Rows(self.frame, self.base / unit, self.on_shift / unit, self.on_bend / unit)
-
-    def turned(self, axes: FloatArray) -> "_Rows":
-        """Rows for shifts along the columns of ``axes`` (3, 3)."""
-        return _Rows(self.frame, self.base, self.on_shift @ axes, self.on_bend @ axes)
+    def turned(self, axes: FloatArray, unit: float = 1.0) -> "_Rows":
+        """Rows for shifts along the columns of ``axes`` (3, 3), in another unit of length."""
+        base, on_shift, on_bend = (each / unit for each in (self.base, self.on_shift, self.on_bend))
+        return _Rows(self.frame, base, on_shift @ axes, on_bend @ axes)
 
     def taken(self, spline: "_Spline") -> list[sparse.csr_array]:
         """What the coefficients of each axis take, (v, k) each."""
@@ -312,7 +305,6 @@ class _Spline:
 
     values: sparse.csr_array
     second: sparse.csr_array
-    count: int
 
     @classmethod
     def over(cls, time: FloatArray) -> "_Spline":
@@ -328,7 +320,7 @@ class _Spline:
         velocity.setdiag(0.5, 1)
         velocity[0, :3], velocity[n - 1, n - 3 :] = [-1.5, 2.0, -0.5], [0.5, -2.0, 1.5]
         gradient = velocity.tocsr() / step
-        return cls(values, sparse.csr_array(gradient @ gradient @ values), spans + _DEGREE)
+        return cls(values, sparse.csr_array(gradient @ gradient @ values))
 
 
 def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
@@ -336,17 +328,15 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
 
     None where the solver finds none, as for postures that jump.
     """
-    count = spline.count
+    count = spline.values.shape[1]
     cost = spline.values.T @ spline.values / PLACE_ERROR**2
     cost = cost + spline.second.T @ spline.second / ACCELERATION_ERROR**2
     aside = sparse.hstack(axes.taken(spline)).tocsr()
     frames, owner = np.unique(facets.frame, return_inverse=True)
-    excess = sparse.csr_array(
-        (-np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), len(frames))
-    )
-    quadratic = sparse.block_diag([
-        sparse.block_diag([cost, cost, cost]) + aside.T @ aside, sparse.csr_array((len(frames), len(frames)))
-    ])  # fmt: skip
+    ones = -np.ones(len(owner)), (np.arange(len(owner)), owner)
+    excess = sparse.csr_array(ones, shape=(len(owner), len(frames)))
+    moved = sparse.block_diag([cost, cost, cost]) + aside.T @ aside
+    quadratic = sparse.block_diag([moved, sparse.csr_array((len(frames), len(frames)))])
     linear = np.concatenate([-(aside.T @ axes.base), np.full(len(frames), PRICE)])
     bound = np.concatenate([np.full(3 * count, LARGEST_SHIFT), np.full(len(frames), np.inf)])
     rows = sparse.csc_matrix(sparse.hstack([*facets.taken(spline), excess]))

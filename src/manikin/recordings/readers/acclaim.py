@@ -6,6 +6,7 @@ the rest pose. Our joint of a bone's name is where the bone begins.
 """
 
 from dataclasses import dataclass
+from itertools import accumulate, pairwise, starmap
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,10 @@ def read_asf(path: str | Path) -> Skeleton:
     scale = numbers(units.get("length", ["1"])[:1], f"{file}: length")[0]
     if not scale > 0.0:
         raise InputError(f"{file}: length is {scale:g}; valid: > 0")
-    radians = _radians(units.get("angle", ["deg"])[0], file)
+    angle = units.get("angle", ["deg"])[0]
+    if angle not in ("deg", "rad"):
+        raise InputError(f"{file}: angle is {angle[:40]!r}; valid: deg, rad")
+    radians = angle == "rad"
     root = _root(sections["root"], file)
     bones = {ROOT: root, **_bones(sections["bonedata"], file)}
     order, parents = _tree(sections["hierarchy"], bones, file)
@@ -87,12 +91,6 @@ def _sections(text: str, file: str) -> dict[str, list[list[str]]]:
     if missing:
         raise InputError(f"{file}: no section :{missing[0]}; valid: an ASF file (is it cut short?)")
     return found
-
-
-def _radians(word: str, file: str) -> bool:
-    if word not in ("deg", "rad"):
-        raise InputError(f"{file}: angle is {word[:40]!r}; valid: deg, rad")
-    return word == "rad"
 
 
 def _root(lines: list[list[str]], file: str) -> dict[str, Any]:
@@ -140,15 +138,10 @@ def _bone(entry: dict[str, list[str]], file: str) -> tuple[str, dict[str, Any]]:
         raise InputError(f"{where} direction is {direction.tolist()}; valid: not zero")
     axis = entry.get("axis", [])
     dof = tuple(word.lower() for word in entry.get("dof", ()))
-    wrong = [word for word in dof if word not in TURNS]
-    if wrong or len(set(dof)) != len(dof):
+    if not set(dof) <= set(TURNS) or len(set(dof)) != len(dof):
         raise InputError(f"{where} dof is {' '.join(dof)[:60]!r}; valid: some of rx, ry, rz")
-    return name, {
-        "vector": direction / size * length,
-        "axis": _three(axis[:3], f"{where} axis"),
-        "order": _order((axis[3:] or ["XYZ"])[0], f"{where} axis"),
-        "dof": dof,
-    }
+    turn, order = _three(axis[:3], f"{where} axis"), _order((axis[3:] or ["XYZ"])[0], f"{where} axis")
+    return name, {"vector": direction / size * length, "axis": turn, "order": order, "dof": dof}
 
 
 def _three(words: list[str], where: str) -> FloatArray:
@@ -201,17 +194,15 @@ def read_amc(
         InputError: If a file is missing, damaged, cut short or holds what is no number.
     """
     finite_number(rate, "rate [Hz]", above=0.0)
+    if not skeleton:
+        skeleton = Path(path).with_name(Path(path).stem.split("_")[0] + ".asf")
+        if not skeleton.is_file():
+            wrong = f"no skeleton {skeleton.name!r} beside it"
+            raise InputError(f"{Path(path)}: {wrong}; valid: skeleton, an ASF file")
     if not isinstance(skeleton, Skeleton):
-        skeleton = read_asf(skeleton or _beside(Path(path)))
+        skeleton = read_asf(skeleton)
     frames, radians = _frames(read_text(path, "AMC"), skeleton, str(path))
     return _recording(Path(path).name, skeleton, frames, radians, rate)
-
-
-def _beside(motion: Path) -> Path:
-    file = motion.with_name(motion.stem.split("_")[0] + ".asf")
-    if not file.is_file():
-        raise InputError(f"{motion}: no skeleton {file.name!r} beside it; valid: skeleton, an ASF file")
-    return file
 
 
 def _frames(text: str, skeleton: Skeleton, file: str) -> tuple[FloatArray, bool]:
@@ -219,7 +210,7 @@ def _frames(text: str, skeleton: Skeleton, file: str) -> tuple[FloatArray, bool]
     slots = _slots(skeleton)
     width = sum(len(turns) for turns in skeleton.turns)
     words: list[list[str]] = []
-    radians, number, seen = skeleton.radians, None, width
+    radians, number = skeleton.radians, None
     for line, content in enumerate(text.splitlines(), start=1):
         entry, where, last = content.split("#")[0].split(), f"{file}: line {line}", number
         if not entry:
@@ -230,37 +221,32 @@ def _frames(text: str, skeleton: Skeleton, file: str) -> tuple[FloatArray, bool]
             number = whole_number(entry[0], where)
             if last is not None and number != last + 1:
                 raise InputError(f"{where}: frame {number} after {last}; valid: {last + 1}")
-            _complete(seen, width, where)
+            _complete(words, where)
             words.append([""] * width)
-            seen = 0
         elif not words:
             raise InputError(f"{where}: {entry[0][:40]!r} before the first frame; valid: a frame number")
         else:
-            seen += _take(entry, slots, words[-1], where)
+            _take(entry, slots, words[-1], where)
     if not words:
         raise InputError(f"{file}: no frame; valid: an AMC file")
-    _complete(seen, width, f"{file}: the end")
+    _complete(words, f"{file}: the end")
     flat = [word for frame in words for word in frame]
     return numbers(flat, f"{file}: a frame").reshape(len(words), width), radians
 
 
 def _slots(skeleton: Skeleton) -> dict[str, slice]:
-    found, start = {}, 0
-    for bone, turns in zip(skeleton.bones, skeleton.turns, strict=True):
-        found[bone] = slice(start, start + len(turns))
-        start += len(turns)
-    return found
+    ends = accumulate(map(len, skeleton.turns), initial=0)
+    return dict(zip(skeleton.bones, starmap(slice, pairwise(ends)), strict=True))
 
 
-def _complete(seen: int, width: int, where: str) -> None:
-    if seen != width:
-        raise InputError(
-            f"{where}: {seen} of {width} values in the frame before; valid: all (is it cut short?)"
-        )
+def _complete(frames: list[list[str]], where: str) -> None:
+    if frames and (missing := frames[-1].count("")):
+        wrong = f"{len(frames[-1]) - missing} of {len(frames[-1])} values in the frame before"
+        raise InputError(f"{where}: {wrong}; valid: all (is it cut short?)")
 
 
-def _take(entry: list[str], slots: dict[str, slice], frame: list[str], where: str) -> int:
-    """Put the values of one bone into the frame; returns how many."""
+def _take(entry: list[str], slots: dict[str, slice], frame: list[str], where: str) -> None:
+    """Put the values of one bone into the frame."""
     name, values = entry[0], entry[1:]
     slot = slots.get(name)
     if slot is None:
@@ -271,7 +257,6 @@ def _take(entry: list[str], slots: dict[str, slice], frame: list[str], where: st
     if frame[slot.start]:
         raise InputError(f"{where}: {name!r} twice in one frame; valid: once")
     frame[slot] = values
-    return len(values)
 
 
 def _recording(name: str, skeleton: Skeleton, frames: FloatArray, radians: bool, rate: float) -> Recording:

@@ -40,8 +40,11 @@ def read_bvh(path: str | Path, metres_per_unit: float | None = None) -> Recordin
     if metres_per_unit is not None:
         finite_number(metres_per_unit, "metres_per_unit", above=0.0)
     file = str(path)
-    hierarchy, motion = _halves(read_text(path, "BVH"), file)
-    joints = _Hierarchy(hierarchy, file).joints
+    head, mark, motion = read_text(path, "BVH").partition("MOTION")
+    words = head.split()
+    if not words or words[0] != "HIERARCHY" or not mark:
+        raise InputError(f"{file}: is no BVH file; valid: HIERARCHY, the joints, MOTION, the frames")
+    joints = _Hierarchy(words[1:], file).joints
     rate, values = _motion(motion, sum(len(joint.channels) for joint in joints), file)
     unit = metres_per_unit or _unit(joints, file)
     offsets = unit * np.array([joint.offset if joint.parent >= 0 else np.zeros(3) for joint in joints])
@@ -66,10 +69,8 @@ class _Hierarchy:
     """Joints of the first half of a file, read word by word."""
 
     def __init__(self, words: list[str], file: str) -> None:
-        self.file = file
+        self.file, self._words, self._next = file, words, 0
         self.joints: list[_Joint] = []
-        self._words = words
-        self._next = 0
         self._expect("ROOT")
         open_joints = [self._begin(-1)]
         while open_joints:
@@ -89,7 +90,10 @@ class _Hierarchy:
         elif word == "JOINT":
             open_joints.append(self._begin(joint))
         elif word == "End":
-            self.joints[joint].end = self._end_site()
+            for expected in ("Site", "{", "OFFSET"):
+                self._expect(expected)
+            self.joints[joint].end = self._vector()
+            self._expect("}")
         elif word == "}":
             open_joints.pop()
         else:
@@ -102,13 +106,6 @@ class _Hierarchy:
         self._expect("{")
         self.joints.append(_Joint(name, parent))
         return len(self.joints) - 1
-
-    def _end_site(self) -> FloatArray:
-        for word in ("Site", "{", "OFFSET"):
-            self._expect(word)
-        offset = self._vector()
-        self._expect("}")
-        return offset
 
     def _channels(self, joint: int) -> tuple[str, ...]:
         where = f"{self.file}: channels of {self.joints[joint].name[:40]!r}"
@@ -141,15 +138,6 @@ class _Hierarchy:
         return InputError(f"{self.file}: {wrong} in the hierarchy; valid: {valid}")
 
 
-def _halves(text: str, file: str) -> tuple[list[str], str]:
-    """Words between HIERARCHY and MOTION, and the text after it."""
-    head, mark, motion = text.partition("MOTION")
-    words = head.split()
-    if not words or words[0] != "HIERARCHY" or not mark:
-        raise InputError(f"{file}: is no BVH file; valid: HIERARCHY, the joints, MOTION, the frames")
-    return words[1:], motion
-
-
 def _motion(text: str, channels: int, file: str) -> tuple[float, FloatArray]:
     """Frames per second and the values (n, channels) of all frames."""
     words = text.split()
@@ -161,27 +149,13 @@ def _motion(text: str, channels: int, file: str) -> tuple[float, FloatArray]:
         raise InputError(f"{file}: {frames} frames of {step:g} s; valid: at least one, of more than 0 s")
     values = words[5:]
     if len(values) != frames * channels:
-        raise InputError(
-            f"{file}: {len(values)} values for {frames} frames of {channels} channels; "
-            f"valid: {frames * channels} (is the file cut short?)"
-        )
+        wrong = f"{len(values)} values for {frames} frames of {channels} channels"
+        raise InputError(f"{file}: {wrong}; valid: {frames * channels} (is the file cut short?)")
     return 1.0 / step, numbers(values, f"{file}: MOTION").reshape(frames, channels)
 
 
 def _unit(joints: list[_Joint], file: str) -> float:
-    """Unit of length [m] in which the skeleton is a person."""
-    size = _span(joints)
-    for metres in UNITS.values():
-        if PERSON[0] <= metres * size <= PERSON[1]:
-            return metres
-    raise InputError(
-        f"{file}: the skeleton is {size:g} units long, a person in none of {', '.join(UNITS)}; "
-        "valid: a file for which metres_per_unit is given"
-    )
-
-
-def _span(joints: list[_Joint]) -> float:
-    """Sum of the two longest chains of bones that leave the root."""
+    """Unit of length [m] in which the two longest chains of bones that leave the root are a person's."""
     lengths: list[float] = []
     branches: dict[int, float] = {}
     owner: list[int] = []
@@ -191,7 +165,14 @@ def _span(joints: list[_Joint]) -> float:
         owner.append(number if joint.parent <= 0 else owner[joint.parent])
         tip = before + (0.0 if joint.end is None else float(np.linalg.norm(joint.end)))
         branches[owner[-1]] = max(branches.get(owner[-1], 0.0), tip)
-    return sum(sorted(branches.values())[-2:])
+    size = sum(sorted(branches.values())[-2:])
+    for metres in UNITS.values():
+        if PERSON[0] <= metres * size <= PERSON[1]:
+            return metres
+    raise InputError(
+        f"{file}: the skeleton is {size:g} units long, a person in none of {', '.join(UNITS)}; "
+        "valid: a file for which metres_per_unit is given"
+    )
 
 
 def _rotations(joints: list[_Joint], values: FloatArray) -> FloatArray:

@@ -81,10 +81,9 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
 
 def _finite(values: FloatArray, file: str, what: str) -> FloatArray:
     """Values, NaN in gaps, of which none is absurd."""
-    values = np.asarray(values, dtype=np.float64)
     if np.any(np.abs(values) > LARGEST):
         raise InputError(f"{file}: {what} beyond {LARGEST:g}; valid: finite numbers")
-    return values
+    return np.asarray(values, dtype=np.float64)
 
 
 def _texts(parameters: Mapping[str, Any], group: str, name: str) -> list[str]:
@@ -112,21 +111,16 @@ def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
     """Measures that Plug-in Gait leaves in ``PROCESSING``, in the unit of the points, means of both sides."""
     given = {key.lower().replace(" ", ""): value for key, value in parameters.get("PROCESSING", {}).items()}
 
-    def measure(*names: str) -> float | None:
+    def measure(factor: float, *names: str) -> float | None:
         cells = [np.ravel(given[name].get("value", [])) for name in names if name in given]
         found = [float(cell[0]) for cell in cells if cell.size and np.issubdtype(cell.dtype, np.number)]
         found = [value for value in found if 0.0 < value < LARGEST]
-        return float(np.mean(found)) if found else None
+        return factor * float(np.mean(found)) if found else None
 
-    def length(*names: str) -> float | None:
-        found = measure(*names)
-        return None if found is None else unit * found
-
-    diameter = length("markerdiameter")
     both = ("kneewidth", "anklewidth", "elbowwidth", "shoulderoffset")
-    knee, ankle, elbow, offset = (length(f"l{name}", f"r{name}") for name in both)
-    radius = None if diameter is None else 0.5 * diameter
-    return Subject(measure("bodymass"), length("height"), knee, ankle, elbow, offset, radius)
+    lengths = (measure(unit, f"l{name}", f"r{name}") for name in both)
+    radius = measure(0.5 * unit, "markerdiameter")
+    return Subject(measure(1.0, "bodymass"), measure(unit, "height"), *lengths, radius)
 
 
 def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:
@@ -208,7 +202,7 @@ def _plates(
     rate = layout.real("POINT", "RATE")
     if force_unit not in ("N", "") or channels.shape[1] != layout.frames * layout.samples:
         raise layout.error(f"force plates in {force_unit[:20]!r}", "N, every sample")
-    found = []
+    sampled, start, found = rate * layout.samples, (layout.first_frame - 1) / rate, []
     for plate, kind in enumerate(types[:count].tolist()):
         name = f"force plate {plate + 1}"
         calibration = None
@@ -223,7 +217,6 @@ def _plates(
         surface, where = unit * surface @ turn.T, f"{layout.file}: {name}"
         middle, normal = surface.mean(axis=0), _normal(surface, where)
         wrenches = wrench_about(np.hstack([force @ turn.T, unit * moment @ turn.T]), -middle)
-        sampled, start = rate * layout.samples, (layout.first_frame - 1) / rate
         found.append(ForcePlate(where, wrenches, middle, sampled, start, normal, surface))
     return tuple(found)
 

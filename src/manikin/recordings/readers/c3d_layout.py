@@ -29,11 +29,14 @@ def plate_load(
     Args:
         kind: Type of the plate: 1 force, centre of pressure and free moment; 2 force and moment; 3 eight
             forces of four sensors; 4 as 2 with a calibration matrix.
-        channels: (c, n) its channels.
-        corners: (4, 3), and ``origin`` (3,).
+        channels: (c, n) its channels; its ``corners`` are (4, 3), its ``origin`` (3,).
         calibration: (6, 6), used by type 4 only.
     """
-    axes, origin = _axes(corners), -origin if origin[2] > 0.0 else origin
+    x, y = corners[0] - corners[1], corners[0] - corners[3]
+    z = np.cross(x, y)
+    axes, origin = np.stack([x, np.cross(z, x), z], axis=1), -origin if origin[2] > 0.0 else origin
+    with np.errstate(invalid="ignore", divide="ignore"):
+        axes /= np.linalg.norm(axes, axis=0)  # NaN where the corners enclose no surface
     if kind == 1:
         force, zero = channels[:3].T, np.zeros(channels.shape[1])
         place, free = np.stack([*channels[3:5], zero], axis=1), np.stack([zero, zero, channels[5]], axis=1)
@@ -49,15 +52,6 @@ def plate_load(
     load = channels[:6] if kind == 2 or calibration is None else calibration @ channels[:6]
     force, moment = load[:3].T, load[3:].T
     return force @ axes.T, (moment + np.cross(force, origin)) @ axes.T
-
-
-def _axes(corners: FloatArray) -> FloatArray:
-    """(3, 3) with columns x, y, z; NaN where the corners enclose no surface."""
-    x, y = corners[0] - corners[1], corners[0] - corners[3]
-    z = np.cross(x, y)
-    columns = np.stack([x, np.cross(z, x), z], axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return columns / np.linalg.norm(columns, axis=0)
 
 
 BLOCK = 512
@@ -109,11 +103,7 @@ class C3dLayout:
     parameters: Mapping[tuple[str, str], Parameter]
 
     def integers(self, group: str, name: str) -> NDArray[np.int64]:
-        """(n,) values of a whole-numbered parameter, n = 0 where it is missing.
-
-        Raises:
-            InputError: If it is of another type.
-        """
+        """(n,) values of a whole-numbered parameter, none where it is missing; InputError for other types."""
         parameter = self.parameters.get((group, name))
         if parameter is None:
             return np.zeros(0, dtype=np.int64)
@@ -123,11 +113,7 @@ class C3dLayout:
         return np.frombuffer(parameter.raw, kind).astype(np.int64)
 
     def real(self, group: str, name: str) -> float:
-        """First value of a real parameter, 0 where it is missing.
-
-        Raises:
-            InputError: If it is of another type.
-        """
+        """First value of a real parameter, 0 where it is missing; InputError for other types."""
         parameter = self.parameters.get((group, name))
         if parameter is None or not parameter.count:
             return 0.0
@@ -153,10 +139,7 @@ class C3dLayout:
 
 
 def c3d_layout(content: bytes, file: str) -> C3dLayout:
-    """Check header, parameters and size of a C3D file.
-
-    Args:
-        file: Its path, for messages.
+    """Check header, parameters and size of a C3D file, ``file`` in messages.
 
     Raises:
         InputError: If it is no C3D file, cut short, or its counts contradict each other.
@@ -271,9 +254,7 @@ class _Reader:
     """Bytes of the parameters, one after the other."""
 
     def __init__(self, content: bytes, place: int, file: str) -> None:
-        self.place = place
-        self._content = content
-        self._file = file
+        self.place, self._content, self._file = place, content, file
 
     def take(self, count: int) -> bytes:
         if self.place + count > len(self._content):

@@ -3,9 +3,7 @@
 Known are the names of Plug-in Gait and Helen Hayes sets, of OpenSim's gait models, and of sets that spell
 the place out (``R_Knee_Lat``, ``L.ASIS``, ``r_shoulder``). Case, separators and a subject's prefix
 (``Anna:LASI``) do not matter. Points that Plug-in Gait computes (``LFEP``, ``PELO``) and names that say
-nothing are left out.
-
-Also the joints at which the segments of a recorded skeleton begin.
+nothing are left out. Also the joints at which the segments of a recorded skeleton begin.
 """
 
 import re
@@ -76,19 +74,16 @@ class MarkerSet:
 
 def marker_set(recording: MarkerRecording) -> MarkerSet:
     """Recognise the markers of a recording that are seen at all."""
-    plain = {name: _plain(name) for name in recording.marker_names}
+    # Small letters and digits behind the prefix.
+    plain = {n: re.sub(r"[^a-z0-9]", "", n.rpartition(":")[2].lower()) for n in recording.marker_names}
     computed = _computed(set(plain.values()))
     roles: dict[str, str] = {}
     segments: dict[str, str] = {}
-    for marker, name in enumerate(recording.marker_names):
-        if plain[name] in computed or not recording.seen[:, marker].any():
-            continue
-        found = next(_places(name, plain[name]), None)
-        if found is None:
-            continue
-        role, segments[name] = found
-        if role:
-            roles.setdefault(role, name)
+    for (name, letters), seen in zip(plain.items(), recording.seen.any(axis=0), strict=True):
+        if letters not in computed and seen and (found := next(_places(name, letters), None)):
+            role, segments[name] = found
+            if role:
+                roles.setdefault(role, name)
     others = tuple(name for name in plain if name not in segments)
     return MarkerSet(MappingProxyType(roles), MappingProxyType(segments), others)
 
@@ -113,18 +108,10 @@ def _sides(name: str, plain: str) -> Iterator[tuple[str, str]]:
             yield side, plain[: -len(word)]
 
 
-def _plain(name: str) -> str:
-    """Small letters and digits behind the prefix."""
-    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
-
-
 def _computed(names: set[str]) -> set[str]:
     """Points that describe axes: all four of a stem are there."""
-    return {
-        name
-        for name in names
-        if len(name) > 2 and name[-1] in _COMPUTED and names.issuperset(name[:-1] + end for end in _COMPUTED)
-    }
+    axes = {name for name in names if len(name) > 2 and name[-1] in _COMPUTED}
+    return {name for name in axes if names.issuperset(name[:-1] + end for end in _COMPUTED)}
 
 
 SIDES = ("left", "right")
@@ -153,13 +140,9 @@ WRISTS = {"left_hand": ("lhand",), "right_hand": ("rhand",)}
 
 
 def joint_of(recording: Recording, segment: str, before: Mapping[str, tuple[str, ...]] = WRISTS) -> int:
-    """Index of the recorded joint at which one of our segments begins.
+    """Index of the recorded joint at which one of our segments, of :data:`JOINTS`, begins.
 
-    Args:
-        before: Names that are looked for before those of :data:`JOINTS`.
-
-    Raises:
-        InputError: If the segment is not among :data:`JOINTS`, or the skeleton has none of its names.
+    Names ``before`` are looked for before those of :data:`JOINTS`; InputError if the skeleton has none.
     """
     if segment not in JOINTS:
         raise InputError(f"no segment {segment!r}; valid: {', '.join(JOINTS)}")

@@ -121,16 +121,10 @@ class ForcePlate:
         return bool(depth.min() > -overhang)
 
     def cut(self, begin: float, end: float) -> "ForcePlate":
-        """Samples at instants from ``begin`` up to, not with, ``end`` [s].
-
-        Raises:
-            InputError: If no sample is left.
-        """
+        """Samples at instants from ``begin`` up to, not with, ``end`` [s]; InputError if none is left."""
         # A thousandth of a sample absorbs what is lost in dividing by the rate.
-        first, last = (
-            min(max(int(np.ceil((instant - self.start) * self.rate - 1e-3)), 0), len(self))
-            for instant in (begin, end)
-        )
+        samples = np.ceil((np.array([begin, end]) - self.start) * self.rate - 1e-3)
+        first, last = samples.clip(0, len(self)).astype(int).tolist()
         return replace(self, wrenches=self.wrenches[first:last], start=self.start + first / self.rate)
 
 
@@ -179,11 +173,10 @@ class MarkerRecording(Displayed):
         if len(set(self.marker_names)) != len(self.marker_names):
             raise InputError(f"{where} has a marker name twice; valid: unique names")
         positions = np.array(self.positions, dtype=np.float64)
-        if positions.ndim != 3 or positions.shape[1:] != (len(self.marker_names), 3) or not len(positions):
-            raise InputError(
-                f"{where} positions have shape {positions.shape}; "
-                f"valid: (n, {len(self.marker_names)}, 3) with at least one frame"
-            )
+        count, shape = len(self.marker_names), positions.shape
+        if positions.ndim != 3 or shape[1:] != (count, 3) or not len(positions):
+            valid = f"(n, {count}, 3) with at least one frame"
+            raise InputError(f"{where} positions have shape {shape}; valid: {valid}")
         if np.any(np.isinf(positions)):
             raise InputError(f"{where} has an infinite position; valid: finite numbers, NaN for gaps")
         positions[np.any(np.isnan(positions), axis=2)] = np.nan
@@ -220,50 +213,31 @@ class MarkerRecording(Displayed):
         )
 
     def marker(self, name: str) -> FloatArray:
-        """(n, 3) places of one marker [m].
-
-        Raises:
-            InputError: If there is none of that name.
-        """
+        """(n, 3) places of one marker [m]; InputError if there is none of that name."""
         return self.positions[:, self.marker_index(name)]
 
     def marker_index(self, name: str) -> int:
-        """Place of a marker among the markers.
-
-        Raises:
-            InputError: If there is none of that name.
-        """
-        try:
+        """Place of a marker among the markers; InputError if there is none of that name."""
+        if name in self.marker_names:
             return self.marker_names.index(name)
-        except ValueError:
-            raise InputError(
-                f"recording {self.name!r} has no marker {name!r}; valid: {', '.join(self.marker_names)}"
-            ) from None
+        known = ", ".join(self.marker_names)
+        raise InputError(f"recording {self.name!r} has no marker {name!r}; valid: {known}")
 
     def chosen(self, names: Sequence[str]) -> "MarkerRecording":
-        """Recording with some markers only, in a given order.
-
-        Raises:
-            InputError: If one is not there or twice.
-        """
+        """Recording with some markers only, in a given order; InputError if one is not there or twice."""
         places = [self.marker_index(name) for name in names]
         return replace(self, marker_names=tuple(names), positions=self.positions[:, places])
 
     def cut(self, start: int, stop: int) -> "MarkerRecording":
         """The frames from ``start`` up to, not with, ``stop``, the plates' samples and events in between.
 
-        Raises:
-            InputError: If no frame, or of a plate no sample, is left.
+        InputError if no frame, or of a plate no sample, is left.
         """
         first, last, _ = slice(start, stop).indices(len(self))
         begin, end = self.start + first / self.rate, self.start + last / self.rate
-        return replace(
-            self,
-            positions=self.positions[first:last],
-            start=begin,
-            plates=tuple(plate.cut(begin, end) for plate in self.plates),
-            events=tuple(event for event in self.events if begin <= event.time < end),
-        )
+        plates = tuple(plate.cut(begin, end) for plate in self.plates)
+        events = tuple(event for event in self.events if begin <= event.time < end)
+        return replace(self, positions=self.positions[first:last], start=begin, plates=plates, events=events)
 
     def with_gaps_filled(self, longest: float = LONGEST_GAP) -> "MarkerRecording":
         """Recording with gaps of up to ``longest`` [s] filled; its :attr:`gaps` are those that are left.

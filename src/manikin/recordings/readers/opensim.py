@@ -46,8 +46,7 @@ def read_mot(
 
     Args:
         up: The file's axis that points up.
-        moments_about: (3,) fixed point of all moments in the world, z up [m]; None to find
-            it from the moments of each plate.
+        moments_about: (3,) fixed point of all moments [m], z up; None to find each plate's.
 
     Raises:
         InputError: If the file is missing, damaged, cut short, uneven in time, holds what is no number
@@ -113,10 +112,8 @@ def _mot_table(text: str, file: str) -> tuple[list[str], FloatArray]:
     rows = [line.split() for line in lines[1:]]
     for number, row in enumerate(rows, start=1):
         if len(row) != len(names):
-            raise InputError(
-                f"{file}: row {number}: {len(row)} numbers for {len(names)} columns; "
-                f"valid: {len(names)} (is the file cut short?)"
-            )
+            wrong = f"{len(row)} numbers for {len(names)} columns"
+            raise InputError(f"{file}: row {number}: {wrong}; valid: {len(names)} (is the file cut short?)")
     counts = {"rows": len(rows), "columns": len(names)}
     for line in head.splitlines():  # such as nRows=12 or datarows 12
         key, *number = line.replace("=", " ").split() or [""]
@@ -136,10 +133,7 @@ def _mot_plates(names: list[str], file: str) -> dict[str, list[list[int]]]:
     if len(places) != len(names):
         raise InputError(f"{file}: a column occurs twice; valid: unique names")
     found = {}
-    for name in names:
-        if not name.endswith("vx"):
-            continue
-        stem = name[:-2]
+    for stem in (name[:-2] for name in names if name.endswith("vx")):
         moments = [f"{stem}m", stem.replace("force", "torque"), stem.replace("force", "moment")]
         moment = next((m for m in moments if f"{m}x" in places), f"{stem}m")
         wanted = [[f"{part}{axis}" for axis in "xyz"] for part in (f"{stem}v", f"{stem}p", moment)]
@@ -199,9 +193,8 @@ def _header(lines: list[str], file: str) -> tuple[float, int, int, float]:
     rate = float(numbers([values["DataRate"]], f"{file}: DataRate")[0])
     frames, markers = (whole_number(values[key], f"{file}: {key}") for key in ("NumFrames", "NumMarkers"))
     if not (rate > 0.0 and frames and markers):
-        raise InputError(
-            f"{file}: {frames} frames of {markers} markers at {rate:g} Hz; valid: more than none of each"
-        )
+        wrong = f"{frames} frames of {markers} markers at {rate:g} Hz"
+        raise InputError(f"{file}: {wrong}; valid: more than none of each")
     return rate, frames, markers, metres_per(values["Units"], f"{file}: Units")
 
 
@@ -222,9 +215,8 @@ def _table(lines: list[str], width: int, file: str) -> FloatArray:
             continue
         cells = line.split("\t")
         if len(cells) < width or any(cell.strip() for cell in cells[width:]):
-            raise InputError(
-                f"{file}: line {number}: {len(cells)} cells; valid: {width} (is the file cut short?)"
-            )
+            wrong = f"line {number}: {len(cells)} cells"
+            raise InputError(f"{file}: {wrong}; valid: {width} (is the file cut short?)")
         words += [cell if cell.strip() else "nan" for cell in cells[:width]]
     table = numbers(words, f"{file}: a frame", gaps=True).reshape(-1, width)
     if np.any(np.isnan(table[:, :2])):

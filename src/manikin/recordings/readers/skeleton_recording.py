@@ -43,8 +43,6 @@ class Subject:
 
 
 UNKNOWN = Subject()
-"""Nothing is said."""
-
 
 Y_UP_TO_Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rotation of the files' axes (X left, Y up, Z forward) to ours (x forward, y left, z up)."""
@@ -124,9 +122,8 @@ class Recording(Displayed):
     def world_rotations(self) -> FloatArray:
         """(n, j, 3, 3) from each joint's frame to the world's."""
         turns = np.array(self.rotations)
-        for joint, parent in enumerate(self.parents):
-            if parent >= 0:
-                turns[:, joint] = turns[:, parent] @ turns[:, joint]
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            turns[:, joint] = turns[:, parent] @ turns[:, joint]
         turns.setflags(write=False)
         return turns
 
@@ -134,23 +131,16 @@ class Recording(Displayed):
     def positions(self) -> FloatArray:
         """(n, j, 3) places of the joints in the world [m]."""
         places = np.empty((len(self), len(self.joint_names), 3))
-        for joint, parent in enumerate(self.parents):
-            if parent < 0:
-                places[:, joint] = self.root_positions
-            else:
-                places[:, joint] = places[:, parent] + self.world_rotations[:, parent] @ self.offsets[joint]
+        places[:, 0] = self.root_positions
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            places[:, joint] = places[:, parent] + self.world_rotations[:, parent] @ self.offsets[joint]
         places.setflags(write=False)
         return places
 
     def cut(self, start: int, stop: int) -> "Recording":
-        """Recording of the frames from ``start`` up to, not with, ``stop``.
-
-        Raises:
-            InputError: If no frame is left.
-        """
-        return replace(
-            self, rotations=self.rotations[start:stop], root_positions=self.root_positions[start:stop]
-        )
+        """Recording of the frames from ``start`` up to, not with, ``stop``; InputError if none is left."""
+        rows = slice(start, stop)
+        return replace(self, rotations=self.rotations[rows], root_positions=self.root_positions[rows])
 
 
 def z_up(

@@ -24,11 +24,7 @@ The file's x axis stays x where it is not the one that points up: OpenSim's forw
 
 
 def metres_per(unit: str, where: str) -> float:
-    """A declared unit of length, one of :data:`LENGTHS` [m].
-
-    Raises:
-        InputError: If it is none of them; the message begins with ``where``.
-    """
+    """A declared unit of length, of :data:`LENGTHS` [m]; else an InputError that begins with ``where``."""
     metres = LENGTHS.get(unit.strip().lower())
     if metres is None:
         raise InputError(f"{where}: unit of length is {unit[:40]!r}; valid: {', '.join(LENGTHS)}")
@@ -38,8 +34,7 @@ def metres_per(unit: str, where: str) -> float:
 def rotation_to_z_up(up: str, where: str) -> FloatArray:
     """(3, 3) rotation to the world's axes of a file whose axis ``up`` (``"y"``, ``"-X"``) points up.
 
-    Raises:
-        InputError: If that is no axis; the message begins with ``where``.
+    If that is no axis, an InputError begins with ``where``.
     """
     axis = up.strip().lower()
     rotation = UP_TO_Z.get(axis if axis[:1] in ("+", "-") else f"+{axis}")
@@ -53,11 +48,7 @@ LARGEST = 1e12
 
 
 def read_text(path: str | Path, kind: str) -> str:
-    """Text of a file that should be of a ``kind`` such as ``"BVH"``.
-
-    Raises:
-        InputError: If it is missing, unreadable, empty or no text.
-    """
+    """Text of a file of a ``kind`` such as ``"BVH"``; InputError if it is missing, unreadable or no text."""
     file = Path(path)
     try:
         text = file.read_bytes().decode("utf-8-sig")
@@ -73,14 +64,16 @@ def read_text(path: str | Path, kind: str) -> str:
 def numbers(words: list[str], where: str, gaps: bool = False) -> FloatArray:
     """(n,) finite numbers, none beyond :data:`LARGEST`; with ``gaps``, ``nan`` may stand where there is none.
 
-    Raises:
-        InputError: If a word is no such number; the message begins with ``where``.
+    If a word is no such number, an InputError begins with ``where``.
     """
+    found = []
     try:
-        values = np.array(list(map(float, words)), dtype=np.float64)
+        for word in words:
+            found.append(float(word))
     except ValueError:
-        wrong = next(word for word in words if not _is_number(word))
+        wrong = words[len(found)]
         raise InputError(f"{where}: {wrong[:40]!r} is no number; valid: finite numbers") from None
+    values = np.array(found, dtype=np.float64)
     good = (np.abs(values) <= LARGEST) | (np.isnan(values) & gaps)
     if not np.all(good):
         wrong = words[int(np.argmin(good))]
@@ -89,22 +82,14 @@ def numbers(words: list[str], where: str, gaps: bool = False) -> FloatArray:
 
 
 def whole_number(word: str, where: str) -> int:
-    """A whole number of at least 0.
-
-    Raises:
-        InputError: If the word is none.
-    """
+    """A whole number of at least 0; InputError if the word is none."""
     if not (word.isascii() and word.isdigit()) or len(word) > 12:
         raise InputError(f"{where}: {word[:40]!r} is no frame count or number; valid: a whole number >= 0")
     return int(word)
 
 
 def check_even(time: FloatArray, rate: float, where: str) -> None:
-    """Refuse instants (n,) [s] that are not at an even rate [Hz], to half a frame.
-
-    Raises:
-        InputError: If an instant is elsewhere; the message begins with ``where``.
-    """
+    """Refuse instants (n,) [s] not at an even rate [Hz] to half a frame, by an InputError of ``where``."""
     even = np.abs((time - time[0]) * rate - np.arange(len(time))) < 0.5
     if not np.all(even):
         row = int(np.argmin(even)) + 1
@@ -121,8 +106,7 @@ def rotations_of(angles: FloatArray, axes: str) -> FloatArray:
 
 def fixed_turns(angles: FloatArray, order: str) -> FloatArray:
     """(n, 3, 3) turns by (n, 3) angles [rad] about the fixed X, Y and Z, in the order of happening."""
-    reverse = order[::-1]
-    return rotations_of(angles[:, ["XYZ".index(axis) for axis in reverse]], reverse)
+    return rotations_of(angles[:, ["XYZ".index(axis) for axis in order[::-1]]], order[::-1])
 
 
 def _turns(angle: FloatArray, axis: int) -> FloatArray:
@@ -134,11 +118,3 @@ def _turns(angle: FloatArray, axis: int) -> FloatArray:
     turn[:, second, first] = np.sin(angle)
     turn[:, first, second] = -turn[:, second, first]
     return turn
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

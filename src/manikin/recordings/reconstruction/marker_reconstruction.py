@@ -62,17 +62,13 @@ def landmarks(recording: MarkerRecording, found: MarkerSet) -> dict[str, FloatAr
 def pelvis_axes(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
     """(n, 3, 3) axes of the pelvis by its markers, to the world: y to the left ASIS, x forward in the plane.
 
-    Of them both ASIS are needed, and both PSIS or the sacrum. Messages begin with ``where``.
-
-    Raises:
-        InputError: If a marker is missing or never seen with the others, or the ASIS are too far apart or too
-            close.
+    Of them both ASIS are needed, and both PSIS or the sacrum. If one is missing or never seen with the
+    others, or the ASIS are too far apart or too close, an InputError begins with ``where``.
     """
     for side in SIDES:
         if f"{side}_asis" not in marks:
-            raise InputError(
-                f"{where} has no marker that is known as the {side} ASIS; valid: both, and PSIS or sacrum"
-            )
+            wrong = f"no marker that is known as the {side} ASIS"
+            raise InputError(f"{where} has {wrong}; valid: both, and PSIS or sacrum")
     y = marks["left_asis"] - marks["right_asis"]
     x = middle(marks, "asis") - _back(marks, where)
     axes = frames(np.cross(x, y), y, keep_y=True)
@@ -80,8 +76,8 @@ def pelvis_axes(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
     seen = ~np.isnan(axes[:, 0, 0])
     if not seen.any():
         raise InputError(f"{where} never sees the markers of the pelvis at once; valid: in one frame or more")
-    low, high = PELVIS_WIDTHS
-    if not low <= (usual := float(np.median(width[seen]))) <= high:
+    (low, high), usual = PELVIS_WIDTHS, float(np.median(width[seen]))
+    if not low <= usual <= high:
         right = f"valid: {low} to {high} m (is the unit of length right?)"
         raise InputError(f"{where} has the ASIS {usual:.3g} m apart; {right}")
     return axes
@@ -127,13 +123,10 @@ def marker_centres(
             found[f"{side}_hand"] = sum(wrist[1:], wrist[0]) / len(wrist)
         for part, (joint, first, last, bend) in _LIMBS.items():
             outer, inner = (marks.get(f"{side}_{joint}_{place}") for place in ("lateral", "medial"))
-            if outer is None:
-                continue
-            if inner is not None:
-                found[f"{side}_{part}"] = 0.5 * (outer + inner)
-                continue
             begin, end = found.get(f"{side}_{first}"), found.get(f"{side}_{last}")
-            if begin is not None:
+            if outer is not None and inner is not None:
+                found[f"{side}_{part}"] = 0.5 * (outer + inner)
+            elif outer is not None and begin is not None:
                 end = np.full_like(outer, np.nan) if end is None else end
                 reach = 0.5 * widths[part] + radius
                 found[f"{side}_{part}"] = _hinge(outer, begin, end, axes[:, :, 1], sign, bend, reach)
@@ -199,22 +192,19 @@ def check_sides(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -
     """Refuse markers whose left and right are swapped.
 
     The pelvis is not turned inside out: left ASIS, back and the way up to the trunk or away from the ankles
-    make a right-handed frame; knees, ankles and shoulders are on the side of their ASIS, as a median.
-
-    Raises:
-        InputError: If they are not.
+    make a right-handed frame; knees, ankles and shoulders are on the side of their ASIS, as a median. If they
+    are not, an InputError begins with ``where``.
     """
     up = _upward(marks)
-    if up is not None and _median(np.sum(axes[:, :, 2] * up, axis=1)) < 0.0:
-        raise InputError(
-            f"{where} has left and right of the pelvis swapped; valid: left on the person's left"
-        )
+    ways = [] if up is None else [("of the pelvis", axes[:, :, 2], up)]
     for role in ("knee_lateral", "ankle_lateral", "shoulder", "elbow_lateral"):
         left, right = marks.get(f"left_{role}"), marks.get(f"right_{role}")
-        if left is None or right is None:
-            continue
-        if _median(np.sum(axes[:, :, 1] * (left - right), axis=1)) < 0.0:
-            name = role.replace("_lateral", "")
+        if left is not None and right is not None:
+            ways.append((role.replace("_lateral", ""), axes[:, :, 1], left - right))
+    for name, axis, way in ways:
+        along = np.sum(axis * way, axis=1)
+        seen = along[~np.isnan(along)]
+        if seen.size and np.median(seen) < 0.0:
             raise InputError(f"{where} has left and right {name} swapped; valid: left on the person's left")
 
 
@@ -228,11 +218,6 @@ def _upward(marks: Mapping[str, FloatArray]) -> FloatArray | None:
         if f"left_{name}" in marks and f"right_{name}" in marks:
             return pelvis - middle(marks, name)
     return None
-
-
-def _median(values: FloatArray) -> float:
-    seen = values[~np.isnan(values)]
-    return float(np.median(seen)) if seen.size else 0.0
 
 
 PLACING_FRAMES = 40
@@ -249,11 +234,7 @@ COMPLETE = 0.9
 
 
 def centres_of_markers(recording: MarkerRecording) -> dict[str, FloatArray]:
-    """(n, 3) joint centres [m] by segment, NaN where one is not known.
-
-    Raises:
-        InputError: If the pelvis is not marked, or left and right are swapped.
-    """
+    """(n, 3) joint centres [m] by segment, NaN where one is not known; errors of :class:`_Marked`."""
     return _Marked(recording).centres
 
 
@@ -265,8 +246,7 @@ def reconstruct_markers(
     Short gaps are filled; in longer ones a marker does not count. Frames at the ends that see less than half
     of the markers are left out. Segments without markers stay as in standing.
     """
-    marked = _Marked(recording)
-    subject = recording.subject
+    marked, subject = _Marked(recording), recording.subject
     if body is None:
         body = human_of(marked.centres, sex, subject.mass if mass is None else mass, subject.stature)
     placed = _placed(marked, body)
@@ -274,12 +254,10 @@ def reconstruct_markers(
     enough = np.flatnonzero(seen.mean(axis=1) >= LEAST_SEEN)
     first, stop = int(enough[0]), int(enough[-1]) + 1
     if stop - first < 2:
-        raise InputError(
-            f"recording {recording.name!r} sees half of its markers in one frame only; valid: in two at least"
-        )
-    starts = _starts(body, marked)[first:stop]
+        wrong = "sees half of its markers in one frame only"
+        raise InputError(f"recording {recording.name!r} {wrong}; valid: in two at least")
     wanted = replace(placed, positions=filled[first:stop])
-    q, residual = follow(body, wanted, starts, recording.rate)
+    q, residual = follow(body, wanted, _starts(body, marked)[first:stop], recording.rate)
     recorded = recording.chosen(placed.names).positions[first:stop]
     return Reconstruction(
         body, np.arange(stop - first) / recording.rate, q, replace(placed, positions=recorded),
@@ -290,7 +268,10 @@ def reconstruct_markers(
 
 
 class _Marked:
-    """Markers of a recording by role, the axes of the pelvis and the joint centres."""
+    """Markers of a recording by role, the axes of the pelvis and the joint centres.
+
+    InputError if the pelvis is not marked, or left and right are swapped.
+    """
 
     def __init__(self, recording: MarkerRecording) -> None:
         where = f"recording {recording.name!r}"
@@ -314,7 +295,7 @@ def _placed(marked: _Marked, body: BodyModel) -> PointTargets:
     kept = np.flatnonzero(~np.isnan(positions[frames][..., 0]).all(axis=0))
     names, positions = tuple(names[k] for k in kept), positions[:, kept]
     segments = tuple(marked.set.segments[name] for name in names)
-    first = _present(wanted, frames)
+    first, _ = seen_targets(wanted, frames)
     q, _ = follow(body, first, _starts(body, marked, pelvis)[frames])
     for number in range(ROUNDS + 1):
         points = _local(body, q, segments, positions[frames])
@@ -331,14 +312,14 @@ def _frames(unknown: NDArray[np.bool_], unseen: NDArray[np.bool_]) -> NDArray[np
     return good[np.unique(np.linspace(0, len(good) - 1, min(PLACING_FRAMES, len(good))).astype(int))]
 
 
-def _present(targets: PointTargets, frames: NDArray[np.int64]) -> PointTargets:
-    """Targets in some frames, without those that are not seen there."""
+def seen_targets(targets: PointTargets, frames: NDArray[np.int64]) -> tuple[PointTargets, NDArray[np.int64]]:
+    """Targets in some frames, without those that are not seen there, and (k,) which they are."""
     positions = targets.positions[frames]
     kept = np.flatnonzero(~np.isnan(positions[..., 0]).all(axis=0))
     return PointTargets(
         tuple(targets.names[k] for k in kept), tuple(targets.segments[k] for k in kept),
         targets.points[kept], positions[:, kept], targets.weights[kept],
-    )  # fmt: skip
+    ), kept  # fmt: skip
 
 
 def _local(body: BodyModel, q: FloatArray, segments: tuple[str, ...], places: FloatArray) -> FloatArray:

@@ -36,16 +36,10 @@ def placing_targets(
     recording: MarkerRecording, found: MarkerSet, body: BodyModel, marks: Mapping[str, FloatArray],
     centres: Mapping[str, FloatArray], pelvis: FloatArray,
 ) -> tuple[PointTargets, FloatArray]:  # fmt: skip
-    """Joint centres and guides of every frame, and the pelvis' turns.
+    """Joint centres and guides of every frame, NaN where one is not seen, and the turns of our pelvis.
 
-    Args:
-        found: Which of them are known.
-        marks: (n, 3) markers by role [m].
-        centres: (n, 3) joint centres [m].
-        pelvis: (n, 3, 3) from the axes of the pelvis' markers to the world's.
-
-    Returns:
-        Targets, NaN where one is not seen, and (n, 3, 3) from the axes of our pelvis to the world's.
+    They follow from ``marks`` (n, 3) by role [m], joint ``centres`` (n, 3) [m] and ``pelvis`` (n, 3, 3), from
+    the axes of the pelvis' markers to the world's; the turns found are (n, 3, 3) from those of our pelvis.
     """
     joints = [name for name in CENTRES if name in centres and _seen(centres[name])]
     up = _trunk_up(marks, centres)
@@ -53,10 +47,10 @@ def placing_targets(
         up = None
     pelvis = _aligned_pelvis(pelvis, up, centres)
     guides = [("pelvis", ARM * _Z, middle(centres, "thigh") + ARM * pelvis[:, :, 2])]
-    thorax = _thorax(recording, found, centres, pelvis, up)
+    thorax = _thorax(cluster_turns(_of_segment(recording, found, "thorax")), centres, pelvis, up)
     if thorax is not None:
         guides += _thorax_guides(body, marks, centres, thorax)
-        guides += _marker_guides_head(recording, found, body, centres, thorax)
+        guides += _marked_head(cluster_turns(_of_segment(recording, found, "head")), body, centres, thorax)
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         guides += _foot(side, marks, centres)
         guides += _turns_of_limbs(body, side, sign, marks, centres)
@@ -119,9 +113,8 @@ def _aligned_pelvis(
     turns: FloatArray, up: FloatArray | None, centres: Mapping[str, FloatArray]
 ) -> FloatArray:
     """Turned about the left-right axis, by the same angle always, to the trunk or the vertical."""
-    if up is None:
-        local = np.nanmedian(turns[:, 2], axis=0)
-    else:
+    local = np.nanmedian(turns[:, 2], axis=0)
+    if up is not None:
         straight = _straightest(up, centres, turns)
         local = turns[straight].T @ up[straight]
     angle = float(np.arctan2(local[0], local[2]))
@@ -141,11 +134,9 @@ def _straightest(up: FloatArray, centres: Mapping[str, FloatArray], turns: Float
 
 
 def _thorax(
-    recording: MarkerRecording, found: MarkerSet, centres: Mapping[str, FloatArray], pelvis: FloatArray,
-    up: FloatArray | None,
-) -> FloatArray | None:  # fmt: skip
+    turns: FloatArray | None, centres: Mapping[str, FloatArray], pelvis: FloatArray, up: FloatArray | None
+) -> FloatArray | None:
     """(n, 3, 3) from the axes of the thorax to the world's; None without three markers of it."""
-    turns = cluster_turns(_of_segment(recording, found, "thorax"))
     if turns is None or up is None:
         return None
     both = turns[:, 0, 0] + up[:, 0] + pelvis[:, 0, 0]
@@ -188,11 +179,10 @@ def _trunk_length(body: BodyModel) -> float:
     return float(np.linalg.norm(sum(body.segment(name).origin for name in ("neck", "thorax", "lumbar"))))
 
 
-def _marker_guides_head(
-    recording: MarkerRecording, found: MarkerSet, body: BodyModel, centres: Mapping[str, FloatArray],
-    thorax: FloatArray,
-) -> list[_Guide]:  # fmt: skip
-    turns = cluster_turns(_of_segment(recording, found, "head"))
+def _marked_head(
+    turns: FloatArray | None, body: BodyModel, centres: Mapping[str, FloatArray], thorax: FloatArray
+) -> list[_Guide]:
+    """As :func:`_head`, by the turns of three markers."""
     if turns is None:
         return []
     local = turns.transpose(0, 2, 1) @ thorax
@@ -220,10 +210,14 @@ def _foot(side: str, marks: Mapping[str, FloatArray], centres: Mapping[str, Floa
     heel, toe, ankle = (marks.get(f"{side}_heel"), marks.get(f"{side}_toe"), centres.get(f"{side}_foot"))
     if heel is None or toe is None or ankle is None or not _seen(heel + toe + ankle):
         return []
-    bone = toe - heel
-    rise = rise_when_flat(ankle, bone, 0.0)
+    rise = rise_when_flat(ankle, toe - heel, 0.0)
     point = ARM * np.array([np.cos(rise), 0.0, np.sin(rise)])
-    return [(f"{side}_foot", point, ankle + ARM * bone / np.linalg.norm(bone, axis=1, keepdims=True))]
+    return [(f"{side}_foot", point, ankle + _arm(toe - heel))]
+
+
+def _arm(way: FloatArray) -> FloatArray:
+    """(n, 3) of the length :data:`ARM` along (n, 3)."""
+    return ARM * way / np.linalg.norm(way, axis=1, keepdims=True)
 
 
 def _turns_of_limbs(
@@ -237,15 +231,12 @@ def _turns_of_limbs(
     ):  # fmt: skip
         centre, marker = centres.get(f"{side}_{following}"), marks.get(f"{side}_{role}")
         if centre is not None and marker is not None and _seen(marker - centre):
-            away = marker - centre
-            place = centre + ARM * away / np.linalg.norm(away, axis=1, keepdims=True)
-            origin = body.segment(f"{side}_{following}").origin
-            guides.append((f"{side}_{segment}", origin + sign * ARM * np.eye(3)[1], place))
+            point = body.segment(f"{side}_{following}").origin + sign * ARM * _Y
+            guides.append((f"{side}_{segment}", point, centre + _arm(marker - centre)))
     radius, ulna = marks.get(f"{side}_wrist_radius"), marks.get(f"{side}_wrist_ulna")
     if radius is not None and ulna is not None and _seen(radius - ulna):
-        away = radius - ulna
-        place = 0.5 * (radius + ulna) + ARM * away / np.linalg.norm(away, axis=1, keepdims=True)
-        guides.append((f"{side}_forearm", body.segment(f"{side}_hand").origin + ARM * _X, place))
+        point = body.segment(f"{side}_hand").origin + ARM * _X
+        guides.append((f"{side}_forearm", point, 0.5 * (radius + ulna) + _arm(radius - ulna)))
     return guides
 
 
@@ -268,7 +259,7 @@ OTHER_FOOT = np.deg2rad(25.0)
 
 _PARTS = {"pelvis": "thigh", "thorax": "upper_arm"}
 
-_X, _, _Z = np.eye(3)
+_X, _Y, _Z = np.eye(3)
 
 HEADS = ("head", "Head")
 NECKS = ("neck", "Neck", "lowerneck")
@@ -306,9 +297,8 @@ def orientation_targets(
         for segment in (f"{side}_foot", f"{side}_hand"):
             far = far_point(recording, joint_of(recording, segment))
             if far is not None:
-                bone = far - centres[segment]
+                bone, direction = far - centres[segment], -_Z
                 length = float(np.median(np.linalg.norm(bone, axis=1)))
-                direction = -_Z
                 if segment.endswith("foot"):
                     toes = body.segment(f"{side}_toes").origin
                     rise = rise_when_flat(centres[segment], bone, float(np.arctan2(toes[2], toes[0])))

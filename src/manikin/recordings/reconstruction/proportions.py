@@ -25,11 +25,7 @@ CENTRES = tuple(
 
 
 def joint_centres(recording: Recording) -> Mapping[str, FloatArray]:
-    """Joint centres in the world, (n, 3) [m], by segment of :data:`CENTRES`.
-
-    Raises:
-        InputError: If the skeleton lacks one of the joints.
-    """
+    """(n, 3) joint centres in the world [m] by segment of :data:`CENTRES`; InputError if one is missing."""
     return {segment: recording.positions[:, joint_of(recording, segment)] for segment in CENTRES}
 
 
@@ -219,15 +215,14 @@ def hanging_arms(centres: Mapping[str, FloatArray]) -> NDArray[np.int64]:
     hips are not known are none; an arm whose elbow is not known counts as hanging.
     """
     down = middle(centres, "thigh") - middle(centres, "upper_arm")
-    cosines = []
-    known = ~np.isnan(down[:, 0])
+    known, cosines = ~np.isnan(down[:, 0]), []
     for side in SIDES:
         arm = centres.get(f"{side}_forearm", np.full_like(down, np.nan)) - centres[f"{side}_upper_arm"]
         sizes = np.linalg.norm(arm, axis=1) * np.linalg.norm(down, axis=1)
         cosine = np.sum(arm * down, axis=1) / np.maximum(sizes, 1e-9)
         cosines.append(np.where(np.isnan(cosine), 1.0, cosine))
-    found = np.flatnonzero((np.min(cosines, axis=0) > 0.5) & known)
-    return found if found.size else np.flatnonzero(known)
+    hanging = (np.min(cosines, axis=0) > 0.5) & known
+    return np.flatnonzero(hanging if hanging.any() else known)
 
 
 def middle(centres: Mapping[str, FloatArray], part: str) -> FloatArray:
@@ -241,14 +236,13 @@ def human_of(
 ) -> BodyModel:  # fmt: skip
     """Our human with the lengths of a recorded person, its masses off the lines between joints.
 
+    A length or stature that is not an adult's raises a BodyError.
+
     Args:
         centres: (n, 3) joint centres [m]; what is missing is scaled with the stature.
         sex: Table of the segment masses.
         mass: Body mass [kg]; None for the body mass index of 79 kg at 1.75 m.
         stature: Sole to vertex [m]; None for the one whose thigh, shank and trunk add up to theirs.
-
-    Raises:
-        BodyError: If a length or the stature is not that of an adult.
     """
     lengths = segment_lengths(centres)
     if stature is None:

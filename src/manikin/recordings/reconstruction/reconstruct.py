@@ -40,7 +40,6 @@ UPRIGHT = ("lumbar", "thorax", "neck", "left_upper_arm", "right_upper_arm")
 
 _TILTED = ("lumbar", "thorax")
 
-
 CALMED_SHARE = 1.0 / 3.0
 """Share of the pelvis' fast motion forward and back that the upper end of an unmeasured trunk has too."""
 
@@ -154,17 +153,17 @@ def person_of(
         centres_of_markers(one) if isinstance(one, MarkerRecording) else joint_centres(one)
         for one in recordings
     ]
+    unknown = [np.full((len(recording), 3), np.nan) for recording in recordings]
     everywhere = {
-        name: np.concatenate([
-            found.get(name, np.full((len(recording), 3), np.nan))
-            for found, recording in zip(each, recordings, strict=True)
-        ])
+        name: np.concatenate([found.get(name, none) for found, none in zip(each, unknown, strict=True)])
         for name in CENTRES
         if any(name in found for found in each)
-    }  # fmt: skip
+    }
     subjects = [recording.subject for recording in recordings if isinstance(recording, MarkerRecording)]
-    masses = [subject.mass for subject in subjects if subject.mass is not None]
-    statures = [subject.stature for subject in subjects if subject.stature is not None]
+    masses, statures = (
+        [value for value in values if value is not None]
+        for values in ([one.mass for one in subjects], [one.stature for one in subjects])
+    )
     if mass is None and masses:
         mass = float(np.median(masses))
     return human_of(everywhere, sex, mass, float(np.median(statures)) if statures else None)

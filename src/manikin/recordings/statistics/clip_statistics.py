@@ -76,11 +76,7 @@ class StatisticsSettings:
         return clip.phases if self.active is None else clip.phases.of_effectors(self.active)
 
     def origin_of(self, clip: RecordedClip) -> Origin:
-        """From where its placements are seen.
-
-        Raises:
-            InputError: If it has no support, or does not move on.
-        """
+        """From where its placements are seen; InputError if it has no support, or does not move on."""
         if self.origin == "stance":
             return first_stance(clip)
         return com_extreme(clip, highest=self.origin == "highest")
@@ -115,29 +111,19 @@ class GroupStatistics:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, with units in the keys."""
-        low = [passage.com_lowest for passage in self.whole.values()]
+        low, alike = [passage.com_lowest for passage in self.whole.values()], self.consistency
         return {
             "motions": list(self.motions),
-            "durations": {
-                by: {name: one.as_dict("s") for name, one in each.items()}
-                for by, each in self.durations.items()
-            },
-            "sequences": [
-                {"sequence": initials(one), "motions": count}
-                for one, count in self.consistency.counts.items()
-            ],
-            "modal_share": self.consistency.modal_share,
-            "modal_share_mirrored": self.consistency.mirrored_share,
-            "first_steps": dict(self.consistency.first_steps),
-            "largest_com_distance": {name: one.as_dict("m") for name, one in self.distances.items()},
-            "share_within_limit": dict(self.within),
+            "durations": {by: _dicts(each, "s") for by, each in self.durations.items()},
+            "sequences": [{"sequence": initials(one), "motions": n} for one, n in alike.counts.items()],
+            "modal_share": alike.modal_share, "modal_share_mirrored": alike.mirrored_share,
+            "first_steps": dict(alike.first_steps),
+            "largest_com_distance": _dicts(self.distances, "m"), "share_within_limit": dict(self.within),
             "com_lowest": Spread.of(low).as_dict("m") if low else None,
             "passages": [{"motion": name, **one.as_dict()} for name, one in self.under],
             "placements": [
-                {
-                    "effector": one.effector, "number": one.number, "count": len(one.places),
-                    "mean_m": one.mean, "covariance_m2": one.covariance,
-                }
+                {"effector": one.effector, "number": one.number, "count": len(one.places),
+                 "mean_m": one.mean, "covariance_m2": one.covariance}
                 for one in self.placements
             ],
             "unplaced": dict(self.unplaced),
@@ -147,11 +133,7 @@ class GroupStatistics:
 def group_statistics(
     group: str, clips: Sequence[RecordedClip], settings: StatisticsSettings | None = None
 ) -> GroupStatistics:
-    """Measures of the motions of one group.
-
-    Raises:
-        InputError: If a passage is asked for of a motion without highest points.
-    """
+    """Measures of the motions of one group, which need highest points if a passage is asked for."""
     how = settings or StatisticsSettings()
     sequences = [how.phases_of(clip) for clip in clips]
     placed, origins, unplaced = [], [], {}
@@ -162,17 +144,13 @@ def group_statistics(
         except InputError as error:
             unplaced[clip.name] = str(error)
     return GroupStatistics(
-        group,
-        tuple(clip.name for clip in clips),
-        _durations(sequences),
+        group, tuple(clip.name for clip in clips), _durations(sequences),
         sequence_consistency(sequences, phases=how.phases, start=how.start),
-        distances=largest_distances(clips),
-        within=shares_within(clips, how.limit),
+        largest_distances(clips), shares_within(clips, how.limit),
         whole={clip.name: whole_passage(clip) for clip in clips},
         under=tuple((c.name, p) for c in clips for p in passages(c, how.overhead)) if how.overhead else (),
-        placements=support_placements(placed, origins, mirror=True),
-        unplaced=unplaced,
-    )
+        placements=support_placements(placed, origins, mirror=True), unplaced=unplaced,
+    )  # fmt: skip
 
 
 def statistics_of(
@@ -210,10 +188,8 @@ def clip_as_dict(clip: RecordedClip, settings: StatisticsSettings | None = None)
     how = settings or StatisticsSettings()
     phases = how.phases_of(clip)
     return {
-        "name": clip.name,
-        "group": clip.group,
-        "duration_s": float(clip.time[-1] - clip.time[0]),
-        "standing_com_m": clip.standing_com,
+        "name": clip.name, "group": clip.group,
+        "duration_s": float(clip.time[-1] - clip.time[0]), "standing_com_m": clip.standing_com,
         "phases": [
             {"phase": label, "effectors": list(one.effectors), "start_s": one.start, "end_s": one.end,
              "whole": whole}
@@ -235,3 +211,7 @@ def clip_as_dict(clip: RecordedClip, settings: StatisticsSettings | None = None)
 
 def _durations(sequences: Sequence[PhaseSequence]) -> dict[By, Mapping[str, Spread]]:
     return {by: phase_durations(sequences, by) for by in BYS}
+
+
+def _dicts(spreads: Mapping[str, Spread], unit: str) -> dict[str, dict[str, float | int]]:
+    return {name: one.as_dict(unit) for name, one in spreads.items()}

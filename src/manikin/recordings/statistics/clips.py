@@ -56,9 +56,7 @@ class RecordedClip:
         if not n or np.any(np.diff(self.time) <= 0.0):
             raise InputError(f"{where} has {n} instants that do not rise; valid: at least one, rising")
         object.__setattr__(self, "com", frozen_array(self.com, f"{where} com", (n, 3)))
-        tops = {
-            name: frozen_array(top, f"{where} top of {name!r}", (n, 3)) for name, top in self.tops.items()
-        }
+        tops = {k: frozen_array(top, f"{where} top of {k!r}", (n, 3)) for k, top in self.tops.items()}
         object.__setattr__(self, "tops", MappingProxyType(tops))
 
     @property
@@ -143,22 +141,16 @@ def grouped_files(words: Iterable[str]) -> tuple[GroupedFile, ...]:
     """Files of words such as ``walk.bvh``, ``duck=clips/127_3*.amc`` or ``clips``.
 
     Each is a file, a folder (all recordings directly in it) or a pattern, after its group and ``=``; without
-    them the group is the name of the file's folder.
-
-    Raises:
-        InputError: If a folder or pattern has no recording.
+    them the group is the name of the file's folder. InputError if a folder or pattern has no recording.
     """
     found = []
     for word in words:
         group, _, place = word.rpartition("=") if not Path(word).exists() else ("", "", word)
-        path = Path(place)
+        path, files = Path(place), [Path(place)]
         if path.is_dir():
             files = [file for file in path.iterdir() if file.suffix.lower() in READERS]
         elif any(sign in place for sign in "*?["):
-            base = Path(path.anchor)
-            files = list(base.glob(str(path.relative_to(base))))
-        else:
-            files = [path]
+            files = list(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
         if not files:
             raise InputError(f"{place}: no recording there; valid: {', '.join(READERS)} files")
         found += [GroupedFile(file, group or file.resolve().parent.name) for file in sorted(files)]
@@ -168,13 +160,9 @@ def grouped_files(words: Iterable[str]) -> tuple[GroupedFile, ...]:
 def read_clips(
     files: Sequence[GroupedFile], *, sex: str = "male", report: Callable[[float, str], None] | None = None
 ) -> ClipFiles:
-    """Read and reconstruct recordings.
+    """Read and reconstruct recordings, those of one skeleton with the lengths that come from all of them.
 
-    Recordings of the same skeleton are taken as of one person, whose lengths come from all of them.
-
-    Args:
-        sex: Table of segment masses.
-        report: Told the share that is done and the file at work.
+    ``sex`` is the table of segment masses; ``report`` is told the share that is done and the file at work.
     """
     tell = report or (lambda _share, _remark: None)
     recordings: dict[int, Recording | MarkerRecording] = {}
@@ -220,10 +208,8 @@ def _bodies(recordings: Mapping[int, Recording | MarkerRecording], sex: str) -> 
 
 def _names(files: Sequence[GroupedFile]) -> list[str]:
     """Names of the files without what they have in common, each once."""
-    stems = Counter(file.path.stem for file in files)
-    names = [
-        file.path.stem if stems[file.path.stem] == 1 else f"{file.path.parent.name}/{file.path.name}"
-        for file in files
-    ]
+    paths = [file.path for file in files]
+    stems = Counter(path.stem for path in paths)
+    names = [path.stem if stems[path.stem] == 1 else f"{path.parent.name}/{path.name}" for path in paths]
     again = Counter(names)
     return [name if again[name] == 1 else f"{name} ({number})" for number, name in enumerate(names, start=1)]

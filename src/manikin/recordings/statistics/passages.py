@@ -85,16 +85,12 @@ class SupportPlacement:
     def ellipse(self, share: float = 0.5) -> tuple[FloatArray, float]:
         """Ellipse about the mean in which a share of places lies, were they normal with this covariance.
 
-        Returns:
-            (2,) half axes, the longer one first [m], and the direction of the longer one [rad].
-
-        Raises:
-            InputError: If the share is not between 0 and 1, or there is one place only.
+        Of two places or more, and a share between 0 and 1, it has (2,) half axes, the longer one first [m],
+        and the direction of the longer one [rad].
         """
         if not 0.0 < share < 1.0 or len(self.places) < 2:
-            raise InputError(
-                f"ellipse of {share:g} of {len(self.places)} places; valid: a share in 0 to 1, two places"
-            )
+            wrong = f"ellipse of {share:g} of {len(self.places)} places"
+            raise InputError(f"{wrong}; valid: a share in 0 to 1, two places")
         values, axes = np.linalg.eigh(self.covariance)
         halves = np.sqrt(np.maximum(values[::-1], 0.0) * -2.0 * np.log(1.0 - share))
         return halves, float(np.arctan2(axes[1, 1], axes[0, 1]))
@@ -103,10 +99,8 @@ class SupportPlacement:
 def first_stance(clip: RecordedClip) -> Origin:
     """Middle of the first places of the feet, x towards the farthest place reached.
 
-    Without any foot that supports it is the middle of the first places of all effectors.
-
-    Raises:
-        InputError: If nothing supports, or the centre of mass does not move on.
+    Without any foot that supports it is the middle of the first places of all effectors. InputError if
+    nothing supports, or the centre of mass does not move on.
     """
     supports = clip.supports.supports
     first = {one.effector: one.place for one in reversed(supports)}
@@ -121,8 +115,7 @@ def first_stance(clip: RecordedClip) -> Origin:
 def com_extreme(clip: RecordedClip, *, highest: bool = False) -> Origin:
     """Where the centre of mass was lowest (highest), x along its way there: the place of what was passed.
 
-    Raises:
-        InputError: If the centre of mass does not move on there.
+    InputError if the centre of mass does not move on there.
     """
     frame = int(np.argmax(clip.com[:, 2]) if highest else np.argmin(clip.com[:, 2]))
     instant = float(clip.time[frame])
@@ -138,11 +131,8 @@ def support_placements(
 
     Args:
         clips: The motions of one group.
-        origins: One for each; :func:`first_stance` if None.
+        origins: One for each; :func:`first_stance`, with its errors, if None.
         mirror: Whether motions whose first step after the origin is made by the right foot are mirrored.
-
-    Raises:
-        InputError: As :func:`first_stance`, or if there are not as many origins as motions.
     """
     if origins is None:
         origins = [first_stance(clip) for clip in clips]
@@ -168,9 +158,8 @@ def support_placements(
 
 def _heading(clip: RecordedClip, way: FloatArray) -> float:
     if np.hypot(*way) < FEWEST_TRAVELLED:
-        raise InputError(
-            f"clip {clip.name!r} stays where it is, without a direction; valid: an origin with a heading"
-        )
+        wrong = "stays where it is, without a direction"
+        raise InputError(f"clip {clip.name!r} {wrong}; valid: an origin with a heading")
     return float(np.arctan2(way[1], way[0]))
 
 
@@ -271,22 +260,18 @@ def whole_passage(clip: RecordedClip) -> Passage:
 
 
 def passages(clip: RecordedClip, overhead: Overhead) -> tuple[Passage, ...]:
-    """Times in which a person is below something, in order.
+    """Times in which a person, with highest points of one part or more, is below something, in order.
 
     All tops have to be below a bar, any part or the centre of mass below a box.
-
-    Raises:
-        InputError: If the motion has no tops.
     """
     if not clip.tops:
         raise InputError(f"clip {clip.name!r} has no highest points; valid: those of one part or more")
-    if overhead.x is None:
-        heights = np.max([top[:, 2] for top in clip.tops.values()], axis=0) - clip.floor
-        under = heights < overhead.height
-    else:
-        under = np.any([overhead.above(place) for place in (clip.com, *clip.tops.values())], axis=0)
-    found = [(first, stop, _passage(clip, first, stop, overhead)) for first, stop in mask_runs(under)]
     last, box = len(clip.time), overhead.x is not None
+    if box:
+        under = np.any([overhead.above(place) for place in (clip.com, *clip.tops.values())], axis=0)
+    else:
+        under = np.max([top[:, 2] for top in clip.tops.values()], axis=0) - clip.floor < overhead.height
+    found = [(first, stop, _passage(clip, first, stop, overhead)) for first, stop in mask_runs(under)]
     return tuple(one for a, b, one in found if box or (a > 0 and b < last and one.travelled >= CROSSED))
 
 

@@ -29,10 +29,9 @@ STANCES = ("", "SS", "DS")
 
 @dataclass(frozen=True)
 class PhaseSequence:
-    """Phases of one motion, each beginning where the one before it ends.
+    """Phases of one motion of a group, each beginning where the one before it ends.
 
     Attributes:
-        group: What it is compared with: a person, a condition.
         end_seen: Whether the last phase ends with a change of the supports, not with the recording. The first
             one begins with it.
     """
@@ -71,8 +70,7 @@ class PhaseSequence:
     @cached_property
     def labels(self) -> tuple[str, ...]:
         """Kind and number of each phase: DS-1, SS-1, DS-2 and so on ([Qiu2012]_ Fig. 3.8)."""
-        kinds = self.kinds
-        return tuple(f"{kind}-{kinds[: number + 1].count(kind)}" for number, kind in enumerate(kinds))
+        return tuple(f"{kind}-{self.kinds[:end].count(kind)}" for end, kind in enumerate(self.kinds, start=1))
 
     @property
     def whole(self) -> tuple[bool, ...]:
@@ -83,16 +81,14 @@ class PhaseSequence:
     @property
     def first_step(self) -> str | None:
         """The effector that touches down first; None if none does."""
-        pairs = ((before.effectors, after.effectors) for before, after in pairwise(self.phases))
-        steps = (name for before, after in pairs for name in after if name not in before)
-        return next(steps, None)
+        pairs = pairwise(phase.effectors for phase in self.phases)
+        return next((name for before, after in pairs for name in after if name not in before), None)
 
 
 def kind_of(effectors: Iterable[str]) -> str:
     """Name of the kind of a phase: ``DS`` or ``SS`` by the feet, the others after a plus, or ``flight``."""
     names = list(effectors)
-    feet = sum(name in FEET for name in names)
-    parts = [STANCES[feet], *(name for name in names if name not in FEET)]
+    parts = [STANCES[sum(name in FEET for name in names)], *(name for name in names if name not in FEET)]
     return "+".join(part for part in parts if part) or FLIGHT
 
 
@@ -123,11 +119,8 @@ BYS: tuple[By, ...] = ("number", "kind", "effectors")
 def phase_durations(sequences: Sequence[PhaseSequence], by: By = "number") -> dict[str, Spread]:
     """Durations of the phases of the same name over all motions ([Qiu2012]_ Table 3.4, Fig. 3.11) [s].
 
-    Names, by the rule ``by``, are in the order in which they appear. Phases that begin or
-    end with the recording do not count.
-
-    Raises:
-        InputError: If ``by`` is unknown.
+    Names, by a rule of :data:`BYS`, are in the order in which they appear. Phases that begin or end with the
+    recording do not count.
     """
     if by not in BYS:
         raise InputError(f"phases by {by!r}; valid: {', '.join(BYS)}")
@@ -141,11 +134,9 @@ def phase_durations(sequences: Sequence[PhaseSequence], by: By = "number") -> di
 
 def names_of(one: PhaseSequence, by: By) -> tuple[str, ...]:
     """Name of each phase of a motion."""
-    if by == "number":
-        return one.labels
-    if by == "kind":
-        return one.kinds
-    return tuple("+".join(phase.effectors) or "flight" for phase in one.phases)
+    if by == "effectors":
+        return tuple("+".join(phase.effectors) or FLIGHT for phase in one.phases)
+    return one.labels if by == "number" else one.kinds
 
 
 def by_group(sequences: Sequence[PhaseSequence]) -> dict[str, tuple[PhaseSequence, ...]]:
@@ -213,9 +204,8 @@ def sequence_consistency(
             one that is seen from its beginning. None for the first phase of all.
     """
     lasting = [one.without_short(shortest) for one in motions]
-    sequences = Counter(
-        tuple(frozenset(phase.effectors) for phase in _from(one, start)[:phases]) for one in lasting
-    )
+    compared = (_from(one, start)[:phases] for one in lasting)
+    sequences = Counter(tuple(frozenset(phase.effectors) for phase in part) for part in compared)
     steps = Counter(one.first_step for one in lasting if one.first_step is not None)
     return SequenceConsistency(dict(sequences.most_common()), dict(steps.most_common()))
 
@@ -227,9 +217,7 @@ def mirror_image(sequence: Supporting) -> Supporting:
 
 def initials(sequence: Supporting) -> str:
     """A sequence in short: ``LR R LR L``, hands in small letters, others by name, ``-`` in flight."""
-    each = [
-        sorted(map(_initial, one), key=lambda initial: (not initial.isupper(), initial)) for one in sequence
-    ]
+    each = (sorted(map(_initial, one), key=lambda letter: (not letter.isupper(), letter)) for one in sequence)
     return " ".join("".join(letters) or "-" for letters in each)
 
 
@@ -256,11 +244,9 @@ _FEET = {"LR": _BOTH, "L": _BOTH[:1], "R": _BOTH[1:]}
 
 @dataclass(frozen=True)
 class PublishedHeights:
-    """Heights quoted in [Qiu2012]_ 3.2.3 ("about"), by beam H1, H2 and H3 [m].
+    """Heights quoted in [Qiu2012]_ 3.2.3 ("about"), of the beams H1, H2 and H3 [m].
 
-    Attributes:
-        standing: Of the centre of mass before the motion.
-        lowest: Of the centre of mass under each beam.
+    Of the centre of mass they are ``standing`` before the motion, and ``lowest`` under each beam.
     """
 
     standing: float
@@ -286,9 +272,8 @@ def published_consistency() -> SequenceConsistency:
     counts, steps = {}, {}
     for row in _published()["table_3_2"]:
         sequence = tuple(frozenset(_FEET[feet]) for feet in row["phases"])
-        counts[sequence] = row["motions"]
         (first,) = sequence[0] - sequence[1]
-        steps[first] = row["motions"]
+        counts[sequence] = steps[first] = row["motions"]
     return SequenceConsistency(counts, steps)
 
 
@@ -314,10 +299,8 @@ def _published() -> dict[str, Any]:
 
 def _sequence(name: str, frames: Sequence[int]) -> PhaseSequence:
     data = _published()
-    ends = [*accumulate(frames, initial=1)]
     last = data["end_frames"].get(name)
-    if last is not None:
-        ends.append(last)
+    ends = [*accumulate(frames, initial=1), *([] if last is None else [last])]
     shorter, *_, longer = sorted((row["phases"] for row in data["table_3_2"]), key=len)
     feet = shorter if len(frames) < len(shorter) else longer
     phases = tuple(

@@ -82,13 +82,11 @@ class Support:
     end_seen: bool
 
     def __post_init__(self) -> None:
+        where = f"support of {self.effector}"
         if self.end < self.start:
-            raise InputError(
-                f"support of {self.effector} from {self.start:g} to {self.end:g} s; valid: an end behind"
-            )
+            raise InputError(f"{where} from {self.start:g} to {self.end:g} s; valid: an end behind")
         for name in ("place", "first_contact", "last_contact"):
-            where = f"support of {self.effector} {name}"
-            object.__setattr__(self, name, frozen_array(getattr(self, name), where, (3,)))
+            object.__setattr__(self, name, frozen_array(getattr(self, name), f"{where} {name}", (3,)))
 
     @property
     def duration(self) -> float:
@@ -181,6 +179,7 @@ class RecordedSupports(Displayed):
 
 TRUNK = "pelvis"
 """Effector that stands for the whole trunk."""
+
 ROLLS, LEAVES = 0.20, 0.25
 """Speed up to which a knee, an elbow or a palm may stay, for what the body turns about is not one point, and
 from which it may leave [m/s]."""
@@ -206,20 +205,18 @@ def ground_supports(found: Reconstruction, floor: FloatArray, start: float) -> I
     The names are those of :func:`manikin.body.limbs.with_knees_and_elbows`, and ``pelvis``. Arguments are
     those of :func:`hand_supports`.
     """
-    stature = found.body.stature
+    stature, names = found.body.stature, (*JOINTS, TRUNK)
     if stature is None:
         return
-    names = (*JOINTS, TRUNK)
     for name, positions in zip(names, effector_places(found.body, found.q, names), strict=True):
         one = track(positions, found.rate)
         height = one.positions[:, 2] - floor
         slow, fast = slow_and_leaving(one)
+        low, high = height < LOW_LYING, height > AWAY
         if name == TRUNK:
             low = (height < LYING * stature) & lying(found)
-            touching = switch(slow & low, fast | ~low)
-        else:
-            touching = switch(slow & (height < LOW_LYING), fast | (height > AWAY))
-        for frames in lasting(touching, SHORTEST * one.rate):
+            high = ~low
+        for frames in lasting(switch(slow & low, fast | high), SHORTEST * one.rate):
             yield support_between(name, one, frames, start)
 
 
@@ -238,11 +235,9 @@ HANDS = ("left_hand", "right_hand")
 OWN = ("left_thigh", "left_leg", "right_thigh", "right_leg")
 """Segments at whose origins, hips and knees, a hand may rest on the own body."""
 
-PASSED = 0.12
-"""Way of the shoulder while a hand rests from which the body moves past it [m]."""
-
-STAYS = 0.45
-"""Share of the shoulder's way within which a hand that holds something stays."""
+PASSED, STAYS = 0.12, 0.45
+"""Way of the shoulder while a hand rests from which the body moves past it [m], and share of that way within
+which a hand that holds something stays."""
 
 SLIDES = 0.40
 """Median speed up to which a hand holds on to something, sliding along it; else it swings [m/s]."""
@@ -263,11 +258,8 @@ def hand_supports(
 ) -> Iterator[Support]:
     """Supports of the hands, by hand and in order; none for a body without hands.
 
-    Args:
-        found: At least four instants.
-        floor: (n,) height of the surface under the feet [m].
-        seats: Supports of the seat.
-        start: Instant of the first frame [s].
+    The floor is the (n,) height of the surface under the feet [m], the first of at least four frames is at
+    ``start`` [s].
     """
     if not set(HANDS) <= set(found.body.effectors):
         return
@@ -320,10 +312,7 @@ def seat_supports(
 ) -> tuple[Support, ...]:
     """Supports of the seat, in order; none for a body without buttocks, or while the person lies.
 
-    Args:
-        found: At least four instants.
-        soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
-        start: Instant of the first frame [s].
+    Of each foot there are (n, 3) heel and toes [m]; the first of at least four frames is at ``start`` [s].
     """
     body = found.body
     if SEAT not in body.effectors:
@@ -332,9 +321,9 @@ def seat_supports(
     standing = float(effector_places(body, body.standing_posture()[None], (SEAT,))[0, 0, 2])
     seat = track(buttocks, found.rate)
     height = seat.positions[:, 2]
-    floor = np.min([end[:, 2] for both in soles.values() for end in both], axis=0)
+    low = height - lowest_points(soles) < LOW * standing
     beside = np.min([_beyond(com, heel, toes) for heel, toes in soles.values()], axis=0)
-    rests = seat.resting & (height - floor < LOW * standing) & (beside > BESIDE) & ~lying(found)
+    rests = seat.resting & low & (beside > BESIDE) & ~lying(found)
     seated = np.zeros(len(height), dtype=bool)
     for first, stop in mask_runs(rests):
         if stop - first >= SHORTEST_REST * seat.rate:
@@ -345,6 +334,11 @@ def seat_supports(
     return tuple(
         support_between(SEAT, seat, frames, start) for frames in lasting(seated, SHORTEST_SEAT * seat.rate)
     )
+
+
+def lowest_points(soles: Mapping[str, tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """(n,) height of the lower end of the lower sole, by (n, 3) heel and toes of each foot [m]."""
+    return np.min([end[:, 2] for both in soles.values() for end in both], axis=0)
 
 
 def lying(found: Reconstruction) -> NDArray[np.bool_]:

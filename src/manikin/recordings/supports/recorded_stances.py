@@ -54,7 +54,6 @@ HEEL_SHARE = 0.25
 SHORTEST_PART = 0.04
 """Shorter changes between heel, full sole and toes are noise [s]."""
 
-
 _FULL, _HEEL, _TOES = 1, 2, 3  # what of an effector touches in one frame; 0 for nothing
 
 
@@ -79,21 +78,20 @@ def recorded_schedule(
     for column, support in enumerate(supports.supports):
         frames = slice(*support.frames(supports.start, rate, len(table)))
         table[frames, column] = _FULL
-        if support.effector in soles and found.body.sole_length and found.body.sole_width:
+        length, width = found.body.sole_length, found.body.sole_width
+        if support.effector in soles and length and width:
             ends = _SoleEnds(*soles[support.effector], frames, rate)
-            size = found.body.sole_length, found.body.sole_width
-            contacts.append(ends.contact(support, *size, friction))
+            contacts.append(ends.contact(support, length, width, friction))
             if rolling:
                 table[frames, column] = ends.parts()
         else:
             contacts.append(_other_contact(found, support, frames, friction, supports.surfaces))
     hinge = (TOE_HINGE_FROM_HEEL - 0.5) * (found.body.sole_length or 0.0)
     return schedule_of_support(
-        supports.start + found.time,
-        table,
+        supports.start + found.time, table,
         lambda column, row: _part(contacts[column], int(table[row, column]), hinge),
         STRONGEST * found.body.mass * GRAVITY,
-    )
+    )  # fmt: skip
 
 
 class _SoleEnds:

@@ -1,8 +1,7 @@
 """Supports corrected by the vertical force that the motion needs, as for runners and jumpers.
 
-A foot that is slow and near a surface need not be on it: in a jump it turns round where it is highest. By
-Newton's second law the supports give the centre of mass all the acceleration it has beside gravity, so
-nothing supports during a free fall.
+A foot that is slow and near a surface need not be on it: in a jump it turns round where it is highest.
+Supports give the centre of mass all the acceleration it has beside gravity: none is made in a free fall.
 
 Fast feet stop and start within a tenth of a second, which a low-pass of positions spreads; the centre of mass
 is slower. A support of a foot that ends (begins) within a fall therefore ends where the fall begins (begins
@@ -34,10 +33,7 @@ fall has about as much left after the low-pass."""
 
 
 def while_carried(supports: Sequence[Support], found: Reconstruction, start: float) -> Iterator[Support]:
-    """Those supports during which the centre of mass does not fall freely, in order.
-
-    The first frame is at ``start`` [s].
-    """
+    """Those supports in which the centre of mass does not fall freely; the first frame is at ``start`` [s]."""
     falls = -vertical_acceleration(found, SUPPORT_LEVELS_CUTOFF) / GRAVITY
     for one in supports:
         first, last = (round((instant - start) * found.rate) for instant in (one.start, one.end))
@@ -82,11 +78,8 @@ def by_the_force(
 ) -> tuple[Support, ...]:  # fmt: skip
     """Supports of feet cut at falls and extended to where the body is carried; missing ones are added.
 
-    Args:
-        supports: Of any effectors; those of feet change.
-        soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
-        surfaces: Heights on which feet stand [m].
-        start: Instant of the first frame [s].
+    Those of other effectors do not change. Of each foot are given (n, 3) heel and (n, 3) toes [m], of the
+    surfaces on which feet stand the heights [m], of the first frame the instant ``start`` [s].
     """
     n, rate = len(found.time), found.rate
     if rate <= 2.0 * CUTOFF or not surfaces:
@@ -156,11 +149,13 @@ class _Table:
             if self._names(before) & self._names(after):
                 self._add(begin, end, self._names(before) | self._names(after))
                 continue
-            change = self._change(before, after, begin, end) if before and after else None
+            until, since = end, begin
+            if before and after:
+                until = since = self._change(before, after, begin, end)
             for one in before:
-                self._until(one, end if change is None else change)
+                self._until(one, until)
             for one in after:
-                self._since(one, begin if change is None else change)
+                self._since(one, since)
             if (first < begin or first == 0) and (end < stop or stop == self.frames):
                 self._add(begin, end)
 
@@ -179,12 +174,9 @@ class _Table:
 
     def _beside(self, frame: int, edge: int) -> list[int]:
         """Indices of the supports of feet that end (edge 1) or begin (0) at a frame, or nearly so."""
-        return [
-            number
-            for number, one in enumerate(self.supports)
-            if one.effector in self.feet
-            and 0 <= (frame - self.span(one)[edge]) * (1 if edge else -1) <= TOGETHER * self.rate
-        ]
+        away = [(frame - self.span(one)[edge]) * (1 if edge else -1) for one in self.supports]
+        near = [number for number, frames in enumerate(away) if 0 <= frames <= TOGETHER * self.rate]
+        return [number for number in near if self.supports[number].effector in self.feet]
 
     def _until(self, number: int, end: int) -> None:
         """A support lasts up to a frame, or as long as its foot is low."""
@@ -223,9 +215,8 @@ class _Table:
         height = float(self.surfaces[np.argmin(np.abs(self.surfaces - low.min()))])
         if name in others or abs(low.min() - height) > AWAY or np.median(low) - height > AWAY:
             return
-        near = np.flatnonzero(low < low.min() + NEAR)
-        stop = begin + int(near[-1]) + 1 if end == self.frames else end
-        begin, end = int(near[0]) if begin == 0 else begin, stop
+        near = begin + np.flatnonzero(low < low.min() + NEAR)
+        begin, end = int(near[0]) if begin == 0 else begin, int(near[-1]) + 1 if end == self.frames else end
         if end - begin >= SHORTEST * self.rate:
             middle = 0.5 * (foot.heel.positions + foot.toes.positions)
             place = np.append(median_place(middle[begin:end])[:2], height)

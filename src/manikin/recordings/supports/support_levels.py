@@ -23,10 +23,7 @@ JOINTS = ("left_knee", "right_knee", "left_elbow", "right_elbow")
 def effector_places(body: BodyModel, q: FloatArray, names: Sequence[str]) -> FloatArray:
     """(k, n, 3) effectors, or else origins of segments, in postures (n, nq) in the world [m].
 
-    A human has its knees and elbows as effectors, too.
-
-    Raises:
-        BodyError: If the body has none of a name.
+    A human has its knees and elbows as effectors, too. BodyError if the body has none of a name.
     """
     if set(names) & set(JOINTS) - set(body.effectors):
         body = with_knees_and_elbows(body)
@@ -54,23 +51,16 @@ NEVER_AT_REST = (2.0 * REST, 4.0 * REST, 8.0 * REST, 16.0 * REST)
 SHIFT_SPEED, SHIFT_WAY = 0.6, 0.08
 """Highest speed and longest way of a shift, in contrast to a swing [m/s, m]."""
 
-LEVELS_APART = 0.08
-"""Heights of rest within less than this belong to the same surface [m]."""
-
-GAP = 0.03
-"""Difference between neighbouring heights of rest from which they may belong to two surfaces [m]."""
+LEVELS_APART, GAP = 0.08, 0.03
+"""Heights of rest within less than the first belong to the same surface; a gap between neighbouring ones from
+which they may belong to two [m]."""
 
 LEVEL = 0.04
 """Difference between heights of heel and toes up to which a foot is as level as another time [m]."""
 
-STEEP = 0.4
-"""Rise of a sole over its length from which it stands on its ball, the toes bent: in squatting."""
-
-UPRIGHT = 0.9
-"""Rise of a sole over its length from which it stands on the tips of its toes: in crawling and lying."""
-
-RAISED = 0.15
-"""Rise of a heel over the sole's length from which a foot turns about its ball."""
+RAISED, STEEP, UPRIGHT = 0.15, 0.4, 0.9
+"""Rise of a heel over the sole's length from which a foot turns about its ball; of a sole from which it
+stands on its ball, the toes bent, as in squatting, and on the tips of its toes, as in crawling and lying."""
 
 BALL = 0.75
 """Share of the sole that is behind the ball of the foot."""
@@ -133,20 +123,15 @@ class Track:
 
     def _shifts(self, first: int, stop: int, peak: float, shift: float) -> bool:
         last = len(self.speed)
-        whole = first > 0 and stop < last
         way = self.positions[min(stop, last - 1)] - self.positions[max(first - 1, 0)]
-        return peak < SHIFT_SPEED and float(np.linalg.norm(way)) < (shift if whole else SHIFT_WAY)
+        most = shift if first > 0 and stop < last else SHIFT_WAY
+        return peak < SHIFT_SPEED and float(np.linalg.norm(way)) < most
 
 
 def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
-    """Low-pass positions (n, 3) of a point [m] and take their speed by central differences.
+    """Low-pass four or more positions (n, 3) of a point [m] and take their speed by central differences.
 
-    Args:
-        rate: Frames per second [Hz].
-        cutoff: Where each of the two passes halves the power [Hz].
-
-    Raises:
-        InputError: If there are too few positions, or the cutoff is not below half the rate.
+    Each of the two passes halves the power at the cutoff, below half the frames per second [Hz].
     """
     if len(positions) < 4:
         raise InputError(f"{len(positions)} positions of an effector; valid: at least 4")
@@ -256,10 +241,9 @@ def _rests(feet: Sequence[RecordedSole], limit: float, lying: NDArray[np.bool_])
         for first, stop in mask_runs(resting[number]):
             if stop - first >= shortest:
                 here = slice(first, stop)
-                down = bool(np.median(lying[here]))
+                down, *heights = (float(np.median(each[here])) for each in (lying, height, tilt))
                 alone = not down and any(np.sum(moving[here]) >= shortest for moving in others)
-                heights = float(np.median(height[here])), float(np.median(tilt[here]))
-                found.append(_Rest(number, *heights, alone, down))
+                found.append(_Rest(number, *heights, alone, bool(down)))
     return found
 
 

@@ -28,6 +28,7 @@ from manikin.recordings.supports.body_supports import (
     Support,
     ground_supports,
     hand_supports,
+    lowest_points,
     lying,
     median_place,
     seat_supports,
@@ -47,12 +48,9 @@ from manikin.recordings.supports.support_levels import (
 
 FEET = ("left_foot", "right_foot")
 
-NEAR, AWAY = 0.05, 0.10
+NEAR, AWAY, NEAR_LYING, AWAY_LYING = 0.05, 0.10, 0.13, 0.18
 """Height above a surface within which a point touches down, and distance from it beyond which it has left
-it [m]: the sole of a model is stiff."""
-
-NEAR_LYING, AWAY_LYING = 0.13, 0.18
-"""NEAR and AWAY of a person who crawls or lies, whose feet lean on the ground with any side [m]."""
+it [m]: the sole of a model is stiff. The same of who crawls or lies, whose feet lean on the ground anyhow."""
 
 MOVES = 0.25
 """Speed of the slowest point of a sole above which the foot is on its way [m/s]."""
@@ -66,14 +64,10 @@ def supports_of(found: Reconstruction, *, start: float = 0.0, with_force: bool =
     """Supports of feet, seat, hands, knees, elbows and trunk of a reconstructed recording.
 
     Args:
-        found: At least four instants at an even rate, not yet smoothed.
+        found: At least four instants at an even rate above 10 Hz, not yet smoothed, of a body with soles.
         start: What the first frame of the recording is on its clock [s].
         with_force: Whether the force that the motion needs corrects the supports of the feet, see
             :mod:`manikin.recordings.supports.running_supports`.
-
-    Raises:
-        InputError: If the body has no feet with soles, or there are too few instants or too few of them in a
-            second.
     """
     soles, begin = sole_points(found), start + found.first_frame / found.rate
     feet = supports_of_points(soles, found.rate, start=begin, lying=lying(found))
@@ -89,15 +83,12 @@ def supports_of_points(
     soles: Mapping[str, tuple[FloatArray, FloatArray]], rate: float, *, start: float = 0.0,
     lying: NDArray[np.bool_] | None = None,
 ) -> RecordedSupports:  # fmt: skip
-    """Foot supports from heels and toes (n, 3) of each foot, by its name [m].
+    """Foot supports from heels and toes (n, 3) of each foot, by its name [m], with errors of :func:`track`.
 
     Args:
         rate: Frames per second [Hz].
         start: Instant of the first frame [s].
         lying: (n,) whether the person lies or crawls; None for never.
-
-    Raises:
-        InputError: If there are too few positions, or too few in a second.
     """
     tracks = {name: RecordedSole.of(ends, rate) for name, ends in soles.items()}
     frames = min(len(end.speed) for sole in tracks.values() for end in (sole.heel, sole.toes))
@@ -115,13 +106,11 @@ def supports_of_points(
         heel, toes = sole.heel.positions[:, 2] - offsets[0], sole.toes.positions[:, 2] - offsets[1]
         # Heel and toes of a foot that turns on the spot with its heel raised move about a resting ball.
         ball = _height_above((1.0 - BALL) * heel + BALL * toes, levels)
-        touching = np.array(
-            [
-                _touching(sole.heel, _height_above(heel, levels), near, away),
-                _touching(sole.toes, _toes_above(sole, toes, levels, down), near, away),
-                _touching(sole.ball, np.where(sole.heel_rise > RAISED, ball, np.inf), near, away),
-            ]
-        )
+        heights = (
+            (sole.heel, _height_above(heel, levels)), (sole.toes, _toes_above(sole, toes, levels, down)),
+            (sole.ball, np.where(sole.heel_rise > RAISED, ball, np.inf)),
+        )  # fmt: skip
+        touching = np.array([_touching(point, height, near, away) for point, height in heights])
         supports += _supports(name, sole, touching & ~_steps(sole, touching), surfaces, start)
     supports.sort(key=lambda support: (support.start, support.effector))
     heights = tuple(surface.height for surface in surfaces)
@@ -129,11 +118,7 @@ def supports_of_points(
 
 
 def sole_points(found: Reconstruction) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """(n, 3) heel and (n, 3) toes of each foot, the middles of the sole's ends [m].
-
-    Raises:
-        InputError: If the body has no feet with soles.
-    """
+    """(n, 3) heel and (n, 3) toes of each foot, middles of the sole's ends [m]; InputError without soles."""
     body = found.body
     if body.sole_length is None or not set(FEET) <= set(body.effectors):
         raise InputError(f"body {body.name!r} has no feet with soles; valid: a human")
@@ -150,11 +135,8 @@ def sole_points(found: Reconstruction) -> dict[str, tuple[FloatArray, FloatArray
 
 def floor_under(soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float]) -> FloatArray:
     """(n,) height of the surface under the lower foot [m]; under its sole where no surface is known."""
-    lowest = np.min([end[:, 2] for both in soles.values() for end in both], axis=0)
-    if not surfaces:
-        return lowest
-    levels = np.array(surfaces)
-    return levels[np.argmin(np.abs(lowest[:, None] - levels), axis=1)]
+    lowest, levels = lowest_points(soles), np.array(surfaces)
+    return levels[np.argmin(np.abs(lowest[:, None] - levels), axis=1)] if len(levels) else lowest
 
 
 def _offsets(
@@ -228,11 +210,9 @@ def _supports(
 SHORTEST_LOAD, LONGEST_BREAK = 0.2, 0.02
 """Shorter loads of a plate are no supports, and shorter breaks are noise about the least force [s]."""
 
-SEEN_FOR = 0.1
-"""Time after a plate's start, and before its end, whose centre of pressure identifies the foot [s]."""
-
-REACH = 0.3
-"""Distance of a foot's place from the centre of pressure within which it may be its foot [m]."""
+SEEN_FOR, REACH = 0.1, 0.3
+"""Time after a plate's start, and before its end, whose centre of pressure identifies the foot [s], and
+distance from it within which the foot's place is [m]."""
 
 OVERHANG = 0.05
 """How far a heel or toes may be beyond the edge of a plate that is to see them [m]."""
@@ -240,13 +220,10 @@ OVERHANG = 0.05
 
 @dataclass(frozen=True, eq=False)
 class PlateLoad:
-    """A time [s] for which a plate is loaded.
+    """A time [s] for which a plate is loaded, and whether its start and end are in the recording.
 
     Attributes:
-        first_cop: (3,) mean centre of pressure of the first tenth of a second [m].
-        last_cop: (3,) that of the last one [m].
-        start_seen: Whether the load begins during the recording.
-        end_seen: Whether it ends during the recording.
+        first_cop: (3,) mean centre of pressure of the first tenth of a second [m]; ``last_cop`` of the last.
     """
 
     start: float
@@ -300,12 +277,12 @@ def timing_errors(found: RecordedSupports, plates: Sequence[ForcePlate]) -> tupl
         for load in plate_loads(plate):
             inside = [one for one in found.supports if one.start < load.end and load.start < one.end]
             first, last = _nearest(inside, load.first_cop), _nearest(inside, load.last_cop)
-            lands = first and load.start_seen and first.start_seen and found.start < load.start
-            if first and lands and plate.below(first.first_contact, OVERHANG):
+            lands = load.start_seen and found.start < load.start
+            lifts = load.end_seen and load.end < found.end
+            if first and lands and first.start_seen and plate.below(first.first_contact, OVERHANG):
                 late = first.start - load.start
                 errors.append(TimingError(plate.name, first.effector, "touch-down", load.start, late))
-            lifts = last and load.end_seen and last.end_seen and load.end < found.end
-            if last and lifts and plate.below(last.last_contact, OVERHANG):
+            if last and lifts and last.end_seen and plate.below(last.last_contact, OVERHANG):
                 late = last.end - load.end
                 errors.append(TimingError(plate.name, last.effector, "lift-off", load.end, late))
     return tuple(sorted(errors, key=lambda error: error.time))

@@ -1,7 +1,6 @@
-"""Which cycles make up a walk of given velocities, and with what weights.
+"""Which cycles make up a walk of given velocities, with what weights, before feet are put on the floor.
 
-Blended postures are those before the feet are put on the floor. A walker's root follows a line or circle over
-one cycle, with a periodic error around it.
+A walker's root follows a line or circle over one cycle, with a periodic error around it.
 """
 
 from dataclasses import dataclass, replace
@@ -76,14 +75,12 @@ def steady_motion(place: FloatArray, period: float) -> SteadyMotion:
         [np.einsum("n,nij->ij", mean, back), np.einsum("n,nij->ij", mean, moved)],
         [back[-1] - back[0], moved[-1] - moved[0]],
     ])  # fmt: skip
-    wanted = np.concatenate([mean @ local, local[-1] - local[0]])
-    solution = np.linalg.solve(system, wanted)
+    solution = np.linalg.solve(system, np.concatenate([mean @ local, local[-1] - local[0]]))
     error = local - back @ solution[:2] - moved @ solution[2:]
     return SteadyMotion(
-        velocity=np.array([solution[2], solution[3], turn / period]),
-        start=np.array([solution[0], solution[1], start]),
-        error=np.column_stack([error, place[:, 2] - heading]),
-    )
+        np.append(solution[2:], turn / period), np.append(solution[:2], start),
+        np.column_stack([error, place[:, 2] - heading]),
+    )  # fmt: skip
 
 
 TURN_RADIUS = 0.5
@@ -123,11 +120,7 @@ class ControlSpace:
     """
 
     def __init__(self, library: MotionLibrary) -> None:
-        """Build the tetrahedra.
-
-        Raises:
-            InputError: If the velocities of the library span no volume.
-        """
+        """Build the tetrahedra; InputError if the velocities of the library span no volume."""
         self.library = library
         self.scale = np.array([1.0, 1.0, TURN_RADIUS])
         self._points = library.velocities * self.scale
@@ -143,44 +136,37 @@ class ControlSpace:
     @cached_property
     def on_hull(self) -> NDArray[np.bool_]:
         """(c,) whether a cycle is at the border of what the library reaches."""
-        on_hull = np.zeros(len(self.library), dtype=np.bool_)
-        on_hull[self._cells.convex_hull.ravel()] = True
-        return on_hull
+        return np.isin(np.arange(len(self.library)), self._cells.convex_hull)
 
     def blend(self, velocity: ArrayLike) -> Blend:
         """Weights for (n, 3) velocities; beyond the library, for the nearest ones that it reaches."""
         wanted = np.asarray(velocity, dtype=np.float64) * self.scale
         if self._partners is None:
-            cycles, weights, reached, outside = self._located(wanted)
-            return Blend(cycles, weights, reached / self.scale, outside)
-        n = len(wanted)
-        cycles, weights, reached, outside = self._located(np.concatenate([wanted, wanted * _REFLECTED]))
+            found = self._located(wanted)
+            return replace(found, velocity=found.velocity / self.scale)
+        n, both = len(wanted), self._located(np.concatenate([wanted, wanted * _REFLECTED]))
+        cycles, weights, reached = both.cycles, both.weights, both.velocity
         return Blend(
             np.hstack([cycles[:n], self._partners[cycles[n:]]]), 0.5 * np.hstack([weights[:n], weights[n:]]),
-            0.5 * (reached[:n] + reached[n:] * _REFLECTED) / self.scale, outside[:n],
+            0.5 * (reached[:n] + reached[n:] * _REFLECTED) / self.scale, both.outside[:n],
         )  # fmt: skip
 
-    def _located(
-        self, points: FloatArray
-    ) -> tuple[NDArray[np.int64], FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Vertices (n, 4), weights (n, 4), the points or the nearest ones (n, 3), and which are outside."""
+    def _located(self, points: FloatArray) -> Blend:
+        """Vertices (n, 4) with the points, or the nearest ones, as (n, 3) scaled velocities."""
         cell = self._cells.find_simplex(points)
         transform = self._cells.transform[cell]
         first = np.einsum("nij,nj->ni", transform[:, :3], points - transform[:, 3])
         weights = np.column_stack([first, 1.0 - first.sum(axis=1)])
         cycles = self._cells.simplices[cell].astype(np.int64)
         missed = (cell < 0) | ~np.isfinite(weights).all(axis=1)
-        outside = missed.copy()
-        reached = points
+        outside, reached = missed.copy(), points.copy()
         if missed.any():
             corners, shares = self._on_faces(points[missed])
             cycles[missed], weights[missed] = corners, shares
-            nearest = np.einsum("nk,nki->ni", shares, self._points[corners])
-            outside[missed] = np.linalg.norm(nearest - points[missed], axis=1) > 1e-9
-            reached = points.copy()
-            reached[missed] = nearest
+            reached[missed] = np.einsum("nk,nki->ni", shares, self._points[corners])
+            outside[missed] = np.linalg.norm(reached[missed] - points[missed], axis=1) > 1e-9
         weights = np.clip(weights, 0.0, 1.0)
-        return cycles, weights / weights.sum(axis=1, keepdims=True), reached, outside
+        return Blend(cycles, weights / weights.sum(axis=1, keepdims=True), reached, outside)
 
     def _on_faces(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
         """Corners (n, 4) and weights (n, 4) of the nearest points on the triangles of the hull."""
@@ -194,7 +180,6 @@ class ControlSpace:
 
 
 _control_space = lru_cache(maxsize=4)(ControlSpace)
-"""The control space of a library, built once."""
 
 
 def _partners(library: MotionLibrary) -> NDArray[np.int64] | None:
@@ -235,11 +220,9 @@ class GaitFrames:
 
     def swing(self) -> FloatArray:
         """(2, n) share of the swing of the left and the right foot, 0 to 1; -1 while they stand."""
-        phase = self.phase % 1.0
-        landing, off, other = self.events.T
-        left = phase / np.maximum(landing, 1e-9)
+        phase, (landing, off, other) = self.phase % 1.0, self.events.T
         right = ((phase - off) % 1.0) / np.maximum(other + 1.0 - off, 1e-9)
-        both = np.array([left, right])
+        both = np.array([phase / np.maximum(landing, 1e-9), right])
         return np.where(both < 1.0, both, -1.0)
 
 
@@ -247,11 +230,7 @@ class Gait:
     """Blends of a library's cycles on a body ([Truong2010]_ 6.6)."""
 
     def __init__(self, library: MotionLibrary, body: BodyModel) -> None:
-        """Prepare a human; places and velocities of the library are scaled with the length of the legs.
-
-        Raises:
-            BodyError: If the hinges are not those of the library.
-        """
+        """Take a human with the library's hinges; places and velocities scale with the length of the legs."""
         if body.joint_names != library.joint_names:
             raise BodyError(f"body {body.name!r} has not the hinges of the motion library; valid: a human")
         self.library, self.body = library, body
@@ -270,8 +249,7 @@ class Gait:
     def frames(self, blend: Blend, phase: FloatArray, place: FloatArray) -> GaitFrames:
         """Postures of a blend at n shares of the cycle (n,) and places (n, 3) of the line or circle."""
         signals = self._signals(blend, phase)
-        root = signals[:, : len(ROOT)]
-        heading = place[:, 2]
+        root, heading = signals[:, : len(ROOT)], place[:, 2]
         cosine, sine = np.cos(heading), np.sin(heading)
         ahead, left = self.scale * root[:, 0], self.scale * root[:, 1]
         origin = np.column_stack([
@@ -287,8 +265,7 @@ class Gait:
     def _signals(self, blend: Blend, phase: FloatArray) -> FloatArray:
         basis = fourier_basis(phase % 1.0, self.library.harmonics)
         if len(phase) == 1:
-            mixed = np.tensordot(blend.weights[0], self.library.coefficients[blend.cycles[0]], axes=1)
-            return basis @ mixed
+            return basis @ np.tensordot(blend.weights[0], self.library.coefficients[blend.cycles[0]], axes=1)
         signals = np.zeros((len(phase), self.library.coefficients.shape[2]))
         for cycles, weights in zip(blend.cycles.T, blend.weights.T, strict=True):
             signals += weights[:, None] * np.einsum("nk,nks->ns", basis, self.library.coefficients[cycles])

@@ -18,11 +18,11 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.kinematics.leg_kinematics import LegKinematics
-from manikin.numerics.signals import SHARES, fourier_basis, low_passed, shifted
+from manikin.numerics.signals import SHARES, fourier_basis, low_passed, mask_runs, shifted
 from manikin.numerics.spatial import FloatArray, quaternions, rotations
 from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.motion_library import ROOT, MotionLibrary
-from manikin.walking.gait.stance_foot import FootPlacement, Sole, borders
+from manikin.walking.gait.stance_foot import FootPlacement, Sole
 
 SLOW, SLOW_SHARE = 0.3, 0.15
 """A point slower than this [m/s], or than this share of its fastest [-], may stand on the floor."""
@@ -99,10 +99,10 @@ def cycle_cuts(events: Mapping[str, FootEvents], begin: float, end: float) -> li
     Of a window shorter than the cycle, half must be covered. Where a foot makes one step only, as in a single
     sidestep, the cycle ends when the other foot has followed.
     """
-    cuts = [cut for foot in SIDES for cut in (*_whole(events, foot), *_single(events, foot))]
     return [
         cut
-        for cut in cuts
+        for foot in SIDES
+        for cut in (*_whole(events, foot), *_single(events, foot))
         if SHORTEST_CYCLE <= cut.period <= LONGEST_CYCLE
         and min(cut.end, end) - max(cut.start, begin) >= 0.5 * min(cut.period, end - begin)
     ]
@@ -150,8 +150,8 @@ def _stands(point: FloatArray, rate: float) -> NDArray[np.bool_]:
 def _without_short(values: NDArray[np.bool_], kind: bool, least: int) -> NDArray[np.bool_]:
     """Runs of ``kind`` shorter than this many frames, apart from those at the ends, become the other kind."""
     kept = values.copy()
-    for first, last in pairwise(borders(values)):
-        if values[first] == kind and last - first < least and first > 0 and last < len(values):
+    for first, last in mask_runs(values == kind):
+        if last - first < least and first > 0 and last < len(values):
             kept[first:last] = not kind
     return kept
 
@@ -175,17 +175,20 @@ def spread(body: BodyModel, coefficients: FloatArray) -> FloatArray:
     for legs. Legs that cross in a turn may still touch.
     """
     coefficients = np.array(coefficients)
-    data, geometry = body.pinocchio.createData(), pin.GeometryData(body.geometry)
     shoulders, hips = (
         [len(ROOT) + body.joint_index(f"{side}_{name}_abduction") for side in SIDES]
         for name in ("shoulder", "hip")
     )
     coefficients[0, shoulders] += ARMS
     coefficients[0, hips] += LEGS
-    pairs = _pairs(body)
+    names = [shape.name.split("/")[0] for shape in body.geometry.geometryObjects]
+    pairs = [(names[pair.first], names[pair.second]) for pair in body.geometry.collisionPairs]
+    armed = np.array([any(name.endswith(_ARMS) for name in pair) for pair in pairs])
+    legged = np.array([all(name.endswith(_LEGS) for name in pair) for pair in pairs]) & ~armed
+    data, geometry = body.pinocchio.createData(), pin.GeometryData(body.geometry)
     for _ in range(5):
         touching = _touching(body, coefficients, data, geometry)
-        arms, legs = (bool(np.any(touching[chosen])) for chosen in pairs)
+        arms, legs = np.any(touching[armed]), np.any(touching[legged])
         if not arms and not legs:
             break
         coefficients[0, shoulders] += ARM_STEP * arms
@@ -193,17 +196,8 @@ def spread(body: BodyModel, coefficients: FloatArray) -> FloatArray:
     return coefficients
 
 
-def _pairs(body: BodyModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(pairs,) whether a pair of shapes has an arm, and whether it is one of legs."""
-    names = [shape.name.split("/")[0] for shape in body.geometry.geometryObjects]
-    both = [(names[pair.first], names[pair.second]) for pair in body.geometry.collisionPairs]
-    arms = np.array([any(name.endswith(_ARMS) for name in pair) for pair in both])
-    legs = np.array([all(name.endswith(_LEGS) for name in pair) for pair in both])
-    return arms, legs & ~arms
-
-
 def _touching(body: BodyModel, coefficients: FloatArray, data: Any, geometry: Any) -> NDArray[np.bool_]:
-    """(pairs,) whether they touch at any instant."""
+    """(pairs,) whether shapes touch at any instant."""
     signals, angles = _signals(body, coefficients, np.arange(INSTANTS) / INSTANTS)
     turns = quaternions(signals[:, 5], signals[:, 4], signals[:, 3])
     touching = np.zeros(len(body.geometry.collisionPairs), dtype=np.bool_)
@@ -242,17 +236,15 @@ def as_one_person(
     """
     everyone = sorted(set(persons))
     main = Counter(persons).most_common(1)[0][0]
-    velocities = np.concatenate([cycle.velocities for cycle in cycles])
     means = np.concatenate([cycle.coefficients[:, 0] for cycle in cycles])
     reflected = np.concatenate([cycle.mirrored(body).coefficients[:, 0] for cycle in cycles])
-    even, odd = _trends(velocities)
+    even, odd = _trends(np.concatenate([cycle.velocities for cycle in cycles]))
     equal = _offsets(even, persons, [name for name in everyone if name != main], 0.5 * (means + reflected))
     opposite = _offsets(odd, persons, everyone, 0.5 * (means - reflected))
     alike = []
     for cycle, person in zip(cycles, persons, strict=True):
         coefficients = np.array(cycle.coefficients)
-        offset = equal.get(person, 0.0) + opposite[person]
-        coefficients[:, 0, _FIRST:] -= offset[_FIRST:]
+        coefficients[:, 0, _FIRST:] -= (equal.get(person, 0.0) + opposite[person])[_FIRST:]
         alike.append(replace(cycle, coefficients=coefficients))
     return alike
 
@@ -306,13 +298,12 @@ def tilted(body: BodyModel, q: FloatArray, within: NDArray[np.bool_] | None = No
     hinges of hips and lumbar spine are parallel to the axis of the tilt and undo it. The mean is over the
     postures ``within`` (n,), all if omitted.
     """
-    pelvis = Rotation.from_quat(q[:, 3:7])
+    pelvis, tilted_q = Rotation.from_quat(q[:, 3:7]), q.copy()
     lumbar, thorax = (7 + body.joint_index(f"{name}_flexion") for name in ("lumbar", "thorax"))
     counted = np.ones(len(q), dtype=np.bool_) if within is None else within
     pitch = pelvis.as_euler("ZYX")[counted, 1].mean()
     lean = pitch + (q[:, lumbar] + q[:, thorax])[counted].mean()
     turn = TILT + TILT_SHARE * lean - pitch
-    tilted_q = q.copy()
     tilted_q[:, 3:7] = (pelvis * Rotation.from_rotvec([0.0, turn, 0.0])).as_quat()
     tilted_q[:, lumbar] -= turn
     for side in SIDES:
@@ -327,18 +318,14 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
     lower, and at other angles; the means of ankle and height make up for it. Events are (3,) phases as of
     :class:`manikin.walking.gait.motion_library.MotionLibrary`.
     """
-    level = np.array(coefficients)
-    landing, off, other = events
+    level, (landing, off, other) = np.array(coefficients), events
     spans = ((landing, 1.0), (other, off))
     for number, (first, last) in enumerate(spans):
-        middle = first + np.linspace(MIDDLE[0], MIDDLE[1], 16) * (last - first)
+        middle = first + np.linspace(*MIDDLE, 16) * (last - first)
         pitch = float(np.median(_feet(body, level, middle).pitch[number]))
         slot = len(ROOT) + body.joint_index(f"{SIDES[number]}_ankle_dorsiflexion")
         level[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
-    stances = [
-        _feet(body, level, np.linspace(first, last, 64)).clearance[number]
-        for number, (first, last) in enumerate(spans)
-    ]
+    stances = [_feet(body, level, np.linspace(*ends, 64)).clearance[k] for k, ends in enumerate(spans)]
     level[0, _HEIGHT] -= np.median(np.concatenate(stances))
     return level
 
@@ -352,11 +339,10 @@ def on_the_floor(
     where the left sole leaves the floor.
     """
     landing, off, other = events
+    phases = np.linspace(landing, 1.0, 257), np.linspace(other, off, 257)
     (left_on, left_off), (right_on, right_off) = (
         _standing(_feet(body, coefficients, phase).clearance[number], phase)
-        for number, phase in enumerate(
-            np.linspace(first, last, 257) for first, last in ((landing, 1.0), (other, off))
-        )
+        for number, phase in enumerate(phases)
     )
     earlier = 1.0 - left_off
     return shifted(coefficients, -earlier), np.array([left_on, right_off, right_on]) + earlier

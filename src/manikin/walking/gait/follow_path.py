@@ -7,7 +7,6 @@ chapter 6).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -17,12 +16,13 @@ from manikin.body import BodyModel
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.dynamics import centroidal_motion
+from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.blend import Blend, Gait, travelled
 from manikin.walking.gait.cycles import sole_points
 from manikin.walking.gait.motion_library import MotionLibrary, load_library, reference_body
-from manikin.walking.gait.stance_foot import FootState, Legs, borders, corrected, poses, put_in_place
+from manikin.walking.gait.stance_foot import FootState, Legs, corrected, poses, put_in_place
 from manikin.walking.path.route import WalkRoute
 from manikin.walking.path.walking_model import to_world
 from manikin.walking.path.walking_path import WalkingPath
@@ -40,8 +40,8 @@ def stance_slides(body: BodyModel, q: FloatArray, standing: NDArray[np.bool_]) -
         moved = np.diff(ends[..., :2], axis=0)
         lower = (ends[1:, :, 2] + ends[:-1, :, 2]).argmin(axis=1)
         moved = moved[np.arange(len(lower)), lower]
-        for first, last in pairwise(borders(stands)):
-            if stands[first] and last - first > 1:
+        for first, last in mask_runs(stands):
+            if last - first > 1:
                 way = np.cumsum(moved[first : last - 1], axis=0)
                 slides.append(float(np.hypot(*way.T).max()))
     return np.array(slides)
@@ -101,16 +101,13 @@ class WalkController:
         place: ArrayLike = (0.0, 0.0, 0.0),
         acceleration: Sequence[float] = ACCELERATION,
     ) -> None:
-        """Stand somewhere.
+        """Stand somewhere; InputError if an argument is not usable.
 
         Args:
             body: A human; that of the library if omitted.
             library: Cycles; those that come with this package if omitted.
             place: (3,) x, y [m], heading [rad].
             acceleration: Limits, forward, left [m/s^2] and angular [rad/s^2].
-
-        Raises:
-            InputError: If an argument is not usable.
         """
         self.body = reference_body() if body is None else body
         self._gait = Gait(load_library() if library is None else library, self.body)
@@ -120,27 +117,22 @@ class WalkController:
         if np.any(self._limit <= 0.0):
             raise InputError(f"walking acceleration is {self._limit.tolist()}; valid: numbers > 0")
         self._velocity, self._phase, self._sink = np.zeros(3), FIRST_PHASE, 0.0
-        blend = self._gait.blend(np.zeros((1, 3)))
+        none, blend = np.zeros(3), self._gait.blend(np.zeros((1, 3)))
         frames = self._gait.frames(blend, np.array([self._phase]), self._place[None])
-        none = np.zeros(3)
         self._feet = [FootState(pose, none, none, none) for pose in poses(self._legs.feet(frames))[:, 0]]
         self._asked: tuple[bytes, Blend] | None = None
 
     def step(self, dt: float, directive: ArrayLike) -> WalkFrame:
-        """Walk on for a moment.
+        """Walk on for a moment; InputError if an argument is not usable.
 
         Args:
             dt: Time to go on [s], at most :data:`LONGEST_STEP`.
             directive: (3,) wanted forward, left [m/s] and angular velocity [rad/s].
-
-        Raises:
-            InputError: If an argument is not usable.
         """
         dt = finite_number(dt, "walking time step [s]", above=0.0, at_most=LONGEST_STEP)
         wanted = frozen_array(directive, "walking directive [m/s, m/s, rad/s]", (3,))
-        asked = self._blend_of(wanted)
+        blend = asked = self._blend_of(wanted)
         change = asked.velocity[0] - self._velocity
-        blend = asked
         if np.any(np.abs(change) > dt * self._limit):
             change = np.clip(change, -dt * self._limit, dt * self._limit)
             blend = self._gait.blend((self._velocity + change)[None])
@@ -169,22 +161,20 @@ class WalkController:
     def _frame(self, blend: Blend, dt: float, notice: str | None) -> WalkFrame:
         frames = self._gait.frames(blend, np.array([self._phase]), self._place[None])
         swing, wanted = frames.swing(), self._legs.feet(frames)
-        path = poses(wanted)[:, 0]
-        for number, state in enumerate(self._feet):
-            share = float(swing[number, 0])
+        path, shares = poses(wanted)[:, 0], swing[:, 0].tolist()
+        for number, (state, share) in enumerate(zip(self._feet, shares, strict=True)):
             if share >= 0.0 and state.standing:
                 state.lifted(share, self._next_offset(blend, number, frames.events[0]))
             state.update(path[number], share)
         offset = np.array([[state.offset] for state in self._feet])
         distance = np.array([[np.hypot(*(state.after - state.before)[:2])] for state in self._feet])
-        feet = corrected(wanted, swing, offset, distance)
         least = self._sink * float(np.exp(-dt / RISE_TIME))
-        q, sink = self._legs.reached(frames, feet, least)
+        q, sink = self._legs.reached(frames, corrected(wanted, swing, offset, distance), least)
         self._sink = float(sink[0])
         for array in (q, self._place, self._velocity):
             array.setflags(write=False)
-        left, right = (bool(standing) for standing in swing[:, 0] < 0.0)
-        return WalkFrame(q[0], self._place, self._velocity, self._phase, (left, right), notice)
+        standing = (shares[0] < 0.0, shares[1] < 0.0)
+        return WalkFrame(q[0], self._place, self._velocity, self._phase, standing, notice)
 
     def _next_offset(self, blend: Blend, foot: int, events: FloatArray) -> FloatArray:
         """Correction at landing that puts the foot at the mean of its poses in the next stance."""
@@ -193,10 +183,9 @@ class WalkController:
         ahead = (first - self._phase) % 1.0
         phase = self._phase + np.linspace(ahead, ahead + last - first, count)
         time = (phase - self._phase) * self._gait.period(blend)[0]
-        moved = travelled(np.broadcast_to(blend.velocity[0], (count, 3)), time)
-        place = self._place + to_world(self._place[2], moved)
         same = np.zeros(count, dtype=np.int64)
         several = Blend(blend.cycles[same], blend.weights[same], blend.velocity[same], blend.outside[same])
+        place = self._place + to_world(self._place[2], travelled(several.velocity, time))
         path = poses(self._legs.feet(self._gait.frames(several, phase, place)))[foot]
         return path.mean(axis=0) - path[0]
 
@@ -255,11 +244,9 @@ class Walk:
         """Where the path is faster than any walk of the library; None if it nowhere is."""
         if not self.outside.any():
             return None
-        first = self.time[int(np.argmax(self.outside))]
-        return (
-            f"{100 * np.mean(self.outside):.0f} % of the path, from {first:.2f} s on, are beyond the motion "
-            "library; legs move there as in the nearest walk"
-        )
+        share, first = 100 * np.mean(self.outside), self.time[int(np.argmax(self.outside))]
+        beyond = f"{share:.0f} % of the path, from {first:.2f} s on, are beyond the motion library"
+        return f"{beyond}; legs move there as in the nearest walk"
 
     @property
     def feet(self) -> tuple[str, ...]:

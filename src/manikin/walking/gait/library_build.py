@@ -36,13 +36,10 @@ TABLE = "clips_locomotion.csv"
 
 @dataclass(frozen=True)
 class Window:
-    """A part of a recording to take a cycle from.
+    """A part of a recording, of a file below the folder, from a first frame up to, not with, a last one.
 
     Attributes:
         kind: Class of the motion.
-        file: The recording, below the folder.
-        first: First frame.
-        last: Frame after the last one.
     """
 
     kind: str
@@ -52,11 +49,7 @@ class Window:
 
 
 def read_windows(folder: Path) -> list[Window]:
-    """Windows named by a folder's table.
-
-    Raises:
-        InputError: If it has none, or a row cannot be read.
-    """
+    """Windows named by a folder's table; InputError if it has none, or a row cannot be read."""
     table = folder / TABLE
     if not table.is_file():
         raise InputError(f"{folder} has no {TABLE}; valid: a folder with this table and the recordings")
@@ -65,13 +58,12 @@ def read_windows(folder: Path) -> list[Window]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{table} cannot be read: {error}; valid: a table in UTF-8") from None
     windows = []
-    for number, row in enumerate(rows, 2):
-        try:
+    try:
+        for row in rows:
             windows.append(_window(row))
-        except (KeyError, TypeError, ValueError, AttributeError):
-            raise InputError(
-                f"{table} line {number} is not usable; valid: class, file, first_frame0, end_frame0"
-            ) from None
+    except (KeyError, TypeError, ValueError, AttributeError):
+        wrong = f"line {len(windows) + 2} is not usable"
+        raise InputError(f"{table} {wrong}; valid: class, file, first_frame0, end_frame0") from None
     return windows
 
 
@@ -109,10 +101,9 @@ SYMMETRIC = ("walk straight", "run straight", "backward", STAND)
 
 @dataclass(frozen=True, eq=False)
 class LibraryBuild:
-    """A library and the windows that were not used for it.
+    """A library, with the mirror images, and the windows that were not used for it.
 
     Attributes:
-        library: The library with the mirror images.
         without_cycle: Windows in which no cycle was found, or none that closes and whose feet stand.
         near_others: Windows whose cycle is as fast as one that was taken.
     """
@@ -154,9 +145,8 @@ def build_library(
     alike = as_one_person(body, [cycle for _, cycle in ordered], persons)
     level = [_levelled(body, _symmetric(body, cycle)) for cycle in alike]
     kept = _apart(level)
-    library = _joined(body, [level[i] for i in kept])
     near = tuple(window for i, (window, _) in enumerate(ordered) if i not in kept)
-    return LibraryBuild(library, tuple(without), near)
+    return LibraryBuild(_joined(body, [level[i] for i in kept]), tuple(without), near)
 
 
 def _person(body: BodyModel, file: Path) -> tuple[FloatArray, float]:
@@ -171,17 +161,12 @@ def _person(body: BodyModel, file: Path) -> tuple[FloatArray, float]:
 
 
 def _cycle(body: BodyModel, window: Window, q: FloatArray, rate: float) -> MotionLibrary | None:
-    """The cycle of a window that closes best, or None.
-
-    Raises:
-        InputError: If the recording ends before the window does.
-    """
+    """The cycle of a window that closes best, or None; InputError if the recording ends before the window."""
     if window.last > len(q):
         raise InputError(f"{window.file} has {len(q)} frames; valid: at least {window.last}, by {TABLE}")
     if window.kind == STAND:
         return _standing(body, window, q)
-    events = foot_events(body, q, rate)
-    cuts = cycle_cuts(events, window.first / rate, window.last / rate)
+    cuts = cycle_cuts(foot_events(body, q, rate), window.first / rate, window.last / rate)
     time = np.arange(len(q)) / rate
     signals = CubicSpline(time, _signals(q))
     inside = [cut for cut in cuts if cut.end <= time[-1]]
@@ -216,8 +201,7 @@ def _coded(
     values[:, [0, 1, 5]] = steady.error
     values -= (share - 0.5)[:, None] * (values[-1] - values[0])
     coefficients = fourier_coefficients(values[:-1])
-    events = np.array([cut.landing - cut.start, cut.other_off - cut.start, cut.other_landing - cut.start])
-    events = events / cut.period
+    events = (np.array([cut.landing, cut.other_off, cut.other_landing]) - cut.start) / cut.period
     if cut.foot == "right":
         # Begun at the right toe-off: that of the other foot is the left one, which becomes the begin.
         strike, off, other = events
@@ -231,8 +215,7 @@ def _coded(
 def _slide(body: BodyModel, cycle: MotionLibrary) -> float:
     """Largest slide of a standing foot in some steps of a single cycle [m]."""
     phase, period = np.arange(3 * SAMPLES + 1) / SAMPLES, cycle.periods[0]
-    n = len(phase)
-    velocity = np.tile(cycle.velocities, (n, 1))
+    n, velocity = len(phase), np.tile(cycle.velocities, (len(phase), 1))
     blend = Blend(np.zeros((n, 1), np.int64), np.ones((n, 1)), velocity, np.zeros(n, dtype=np.bool_))
     frames = Gait(cycle, body).frames(blend, phase, travelled(velocity, phase * period))
     return float(stance_slides(body, frames.q, frames.swing() < 0.0).max())
@@ -251,10 +234,10 @@ def _one_cycle(
     body: BodyModel, window: Window, name: str, velocity: FloatArray, period: float, events: FloatArray,
     coefficients: FloatArray,
 ) -> MotionLibrary:  # fmt: skip
-    source = next((text for key, text in ACKNOWLEDGEMENTS.items() if window.file.startswith(key)), None)
+    sources = [text for key, text in ACKNOWLEDGEMENTS.items() if window.file.startswith(key)]
     return MotionLibrary(
         (name,), (window.kind,), velocity[None], np.array([period]), events[None], coefficients[None],
-        body.joint_names, leg_length(body), () if source is None else (source,),
+        body.joint_names, leg_length(body), tuple(sources[:1]),
     )  # fmt: skip
 
 
@@ -290,7 +273,7 @@ def _apart(cycles: list[MotionLibrary]) -> list[int]:
     scale, kept = np.array([1.0, 1.0, TURN_RADIUS]), list[int]()
     for i, cycle in enumerate(cycles):
         away = [np.linalg.norm((cycle.velocities - cycles[j].velocities) * scale) for j in kept]
-        if all(distance >= NEAR for distance in away):
+        if min(away, default=NEAR) >= NEAR:
             kept.append(i)
     return kept
 

@@ -77,25 +77,22 @@ class MotionLibrary:
     acknowledgements: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        c, signals = len(self.names), len(ROOT) + len(self.joint_names)
+        c, signals, where = len(self.names), len(ROOT) + len(self.joint_names), "motion library"
         wanted = {"velocities": (c, 3), "periods": (c,), "events": (c, 3), "coefficients": (c, None, signals)}
         for name, shape in wanted.items():
-            array = frozen_array(getattr(self, name), f"motion library {name}", shape)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, frozen_array(getattr(self, name), f"{where} {name}", shape))
         if len(self.kinds) != c:
-            raise InputError(f"motion library has {len(self.kinds)} kinds; valid: {c}, one a cycle")
-        if self.coefficients.shape[1] % 2 == 0 or self.coefficients.shape[1] < 3:
-            raise InputError(
-                f"motion library has {self.coefficients.shape[1]} coefficients a signal; valid: 3, 5, 7, ..."
-            )
+            raise InputError(f"{where} has {len(self.kinds)} kinds; valid: {c}, one a cycle")
+        count = self.coefficients.shape[1]
+        if count % 2 == 0 or count < 3:
+            raise InputError(f"{where} has {count} coefficients a signal; valid: 3, 5, 7, ...")
         if c == 0 or self.periods.min() <= 0.0 or not self.leg > 0.0:
-            raise InputError("motion library has no cycle, or no duration or leg length; valid: all > 0")
+            raise InputError(f"{where} has no cycle, or no duration or leg length; valid: all > 0")
         landing, off, other = self.events.T
         ordered = (landing > 0.0) & (landing < 1.0) & (off > 0.0) & (off < 1.0)
         if not np.all(ordered & (other < off) & (other > off - 1.0)):
-            raise InputError(
-                "motion library has events out of order; valid: 0 < landing, off < 1, other before off"
-            )
+            valid = "0 < landing, off < 1, other before off"
+            raise InputError(f"{where} has events out of order; valid: {valid}")
 
     def __len__(self) -> int:
         return len(self.names)
@@ -115,20 +112,17 @@ class MotionLibrary:
 
     def mirrored(self, body: BodyModel) -> Self:
         """The library of the mirror images, which begin at the left toe-off again; of the body's hinges."""
-        indices, factors = mirrored_hinges(body)
-        hinges = slice(len(ROOT), None)
+        (indices, factors), hinges = mirrored_hinges(body), slice(len(ROOT), None)
         coefficients = np.array(self.coefficients)
         coefficients[:, :, : len(ROOT)] *= _ROOT_MIRROR
         coefficients[:, :, hinges] = factors * self.coefficients[:, :, hinges][:, :, indices]
         strike, off, other = self.events.T
-        coefficients = np.array([shifted(c, p) for c, p in zip(coefficients, off, strict=True)])
         return replace(
-            self,
-            names=tuple(name + MIRRORED for name in self.names),
+            self, names=tuple(name + MIRRORED for name in self.names),
             velocities=self.velocities * [1.0, -1.0, -1.0],
             events=np.column_stack([other + 1.0 - off, 1.0 - off, strike - off]),
-            coefficients=coefficients,
-        )
+            coefficients=np.array([shifted(c, p) for c, p in zip(coefficients, off, strict=True)]),
+        )  # fmt: skip
 
     def with_cycles(self, other: "MotionLibrary") -> Self:
         """Both libraries in one."""
@@ -150,24 +144,18 @@ _WORDS = {"format": 0, "names": 1, "kinds": 1, "joint_names": 1, "acknowledgemen
 def save_library(library: MotionLibrary, path: str | Path) -> None:
     """Write a library; mirror images are left out and made again when it is read.
 
-    The coefficients are rounded to single precision, some 1e-7 rad.
-
-    Raises:
-        InputError: If the file (``.npz``) cannot be written.
+    The coefficients are rounded to single precision, some 1e-7 rad. InputError if the file (``.npz``) cannot
+    be written.
     """
     kept = [i for i, name in enumerate(library.names) if not name.endswith(MIRRORED)]
-    sided = np.array([library.names[i] + MIRRORED in library.names for i in kept])
+    part = library.chosen(kept)
     arrays: dict[str, Any] = {
-        "format": np.array(FORMAT),
-        "names": np.array([library.names[i] for i in kept]),
-        "kinds": np.array([library.kinds[i] for i in kept]),
-        "sided": sided,
-        **{name: getattr(library, name)[kept] for name in _SERIES},
-        "coefficients": library.coefficients[kept].astype(np.float32),
-        "joint_names": np.array(library.joint_names),
-        "leg": np.array(library.leg),
-        "acknowledgements": np.array(library.acknowledgements),
-    }
+        "format": np.array(FORMAT), "names": np.array(part.names), "kinds": np.array(part.kinds),
+        "sided": np.array([name + MIRRORED in library.names for name in part.names]),
+        **{name: getattr(part, name) for name in _SERIES},
+        "coefficients": part.coefficients.astype(np.float32), "joint_names": np.array(library.joint_names),
+        "leg": np.array(library.leg), "acknowledgements": np.array(library.acknowledgements),
+    }  # fmt: skip
     try:
         with atomic_path(path) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
@@ -178,11 +166,8 @@ def save_library(library: MotionLibrary, path: str | Path) -> None:
 def load_library(path: str | Path | None = None) -> MotionLibrary:
     """Read a library, with its mirror images.
 
-    Args:
-        path: A file written by :func:`save_library`; the library that comes with this package if omitted.
-
-    Raises:
-        InputError: If it is no such file, or what it holds does not fit together.
+    It is in a file written by :func:`save_library`, or comes with this package if the path is omitted.
+    InputError if it is no such file, or what it holds does not fit together.
     """
     return _shipped() if path is None else _read(Path(path))
 
@@ -205,9 +190,8 @@ def _read(file: Path) -> MotionLibrary:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(
-            f"{file} cannot be read: {error.strerror or error}; valid: a motion library"
-        ) from None
+        wrong = f"cannot be read: {error.strerror or error}"
+        raise InputError(f"{file} {wrong}; valid: a motion library") from None
     except Exception:  # numpy, zipfile and zlib raise a dozen kinds for damaged bytes
         raise InputError(f"{file} is damaged or no motion library; valid: a file of this package") from None
     return _library(file, given)
@@ -217,12 +201,10 @@ def _library(file: Path, given: dict[str, Any]) -> MotionLibrary:
     for name, dimensions in (*_ARRAYS.items(), *_WORDS.items(), ("sided", 1)):
         if name not in given:
             raise InputError(f"{file} has no {name!r}; valid: a motion library")
-        kind = "U" if name in _WORDS else "b" if name == "sided" else "f"
-        if given[name].dtype.kind != kind or given[name].ndim != dimensions:
-            raise InputError(
-                f"{file} {name} is {given[name].dtype} of {given[name].ndim} dimensions; "
-                f"valid: kind {kind!r}, {dimensions} dimensions"
-            )
+        kind, array = "U" if name in _WORDS else "b" if name == "sided" else "f", given[name]
+        if array.dtype.kind != kind or array.ndim != dimensions:
+            wrong, valid = f"{array.dtype} of {array.ndim} dimensions", f"{dimensions} dimensions"
+            raise InputError(f"{file} {name} is {wrong}; valid: kind {kind!r}, {valid}")
     if str(given["format"]) != FORMAT:
         raise InputError(f"{file} has the format {str(given['format'])!r}; valid: {FORMAT!r}")
     sided, names = given["sided"], tuple(given["names"].tolist())
@@ -230,9 +212,8 @@ def _library(file: Path, given: dict[str, Any]) -> MotionLibrary:
         raise InputError(f"{file} names are not unique, or their number is not that of 'sided'")
     body = reference_body()
     if tuple(given["joint_names"].tolist()) != body.joint_names:
-        raise InputError(
-            f"{file} is for other hinges than those of our human; valid: a library of this version"
-        )
+        wrong = "is for other hinges than those of our human"
+        raise InputError(f"{file} {wrong}; valid: a library of this version")
     try:
         library = MotionLibrary(
             names, tuple(given["kinds"].tolist()), joint_names=body.joint_names, leg=float(given["leg"]),

@@ -1,21 +1,19 @@
 """Feet that do not slide: where they stand, how they get there, and the legs that follow.
 
-The thesis leaves this open (6.8). Blended cycles let the standing foot slide, for their steps do not quite
-fit the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
-from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the
-next. Legs follow by inverse kinematics in closed form.
+The thesis leaves this open (6.8): steps of blended cycles do not quite fit the blended velocity. Here a foot
+has one place on the floor from landing to toe-off, over which it rolls from heel to ball; in the swing the
+correction goes over, smoothly, from one step's to the next. Legs follow by inverse kinematics in closed form.
 """
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.errors import BodyError
 from manikin.kinematics.leg_kinematics import HINGES, LegKinematics
+from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, dot, rotations
 from manikin.recordings.readers.marker_sets import SIDES
 from manikin.walking.gait.blend import GaitFrames
@@ -41,8 +39,7 @@ class FootState:
 
     def lifted(self, swing: float, target: FloatArray) -> None:
         """Begin a swing to a correction (3,); after half of it the foot, which just stood, keeps its own."""
-        self.standing = False
-        self.before = self.offset
+        self.standing, self.before = False, self.offset
         self.after = self.offset if swing > 0.5 else target
 
     def update(self, wanted: FloatArray, swing: float) -> None:
@@ -82,12 +79,9 @@ class Sole:
         """Sole of a human; a body without measured soles is refused."""
         if body.sole_length is None or body.sole_width is None:
             raise BodyError(f"body {body.name!r} has no soles; valid: a human")
-        centre = body.effector("left_foot").translation
-        heel, ball = float(centre[0]) - 0.5 * body.sole_length, float(body.segment("left_toes").origin[0])
-        return cls(
-            centre=float(centre[0]), heel=heel, ball=ball, toes=heel + body.sole_length - ball,
-            depth=-float(centre[2]), half_width=0.5 * body.sole_width,
-        )  # fmt: skip
+        centre, _, height = body.effector("left_foot").translation.tolist()
+        heel, ball = centre - 0.5 * body.sole_length, float(body.segment("left_toes").origin[0])
+        return cls(centre, heel, ball, heel + body.sole_length - ball, -height, 0.5 * body.sole_width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +118,9 @@ class FootPlacement:
 
     def turned(self, sole: Sole, angle: FloatArray) -> Self:
         """The feet turned about the end they stand on, heel or ball, by (...) angles [rad]."""
-        pivot = np.where(self.pitch > 0.0, sole.ball, sole.heel)
-        yaw = self.yaw + angle
-        return replace(
-            self, point=self.point - _flat(sole, pivot, self.yaw) + _flat(sole, pivot, yaw), yaw=yaw
-        )
+        pivot, yaw = np.where(self.pitch > 0.0, sole.ball, sole.heel), self.yaw + angle
+        point = self.point - _flat(sole, pivot, self.yaw) + _flat(sole, pivot, yaw)
+        return replace(self, point=point, yaw=yaw)
 
     def to_foot(self, sole: Sole) -> tuple[FloatArray, FloatArray]:
         """(..., 3, 3) orientations, foot to world, and (..., 3) origins (ankles) [m]."""
@@ -186,10 +178,11 @@ class Legs:
 
     def __init__(self, body: BodyModel) -> None:
         """Take lengths and soles from a human."""
-        self._body = body
-        self._legs, self._sole = LegKinematics(body), Sole.of_body(body)
-        self._toes = np.array([body.joint_index(f"{side}_toe_extension") for side in SIDES])
-        self._hips = np.array([body.joint_index(f"{side}_hip_flexion") for side in SIDES])
+        self._body, self._legs, self._sole = body, LegKinematics(body), Sole.of_body(body)
+        self._toes, self._hips = (
+            np.array([body.joint_index(f"{side}_{hinge}") for side in SIDES])
+            for hinge in ("toe_extension", "hip_flexion")
+        )
         self._lumbar = body.joint_index("lumbar_flexion")
 
     def feet(self, frames: GaitFrames) -> FootPlacement:
@@ -199,21 +192,12 @@ class Legs:
     def reached(
         self, frames: GaitFrames, feet: FootPlacement, least: FloatArray | float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        """Postures with the feet at given placements.
+        """(n, nq) postures with the feet at (2, n) placements, and (n,) sinking of the pelvis [m].
 
-        The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough.
-        A foot whose ankle turns no further rolls over its edge, heel or ball.
-
-        Args:
-            frames: n instants of the gait.
-            feet: (2, n) placements of the feet.
-            least: Least sinking of the pelvis [m].
-
-        Returns:
-            Postures (n, nq) and sinking of the pelvis (n,) [m].
+        The pelvis sinks where a leg is too short, by ``least`` [m] or more, and tilts forward where a hip
+        does not extend far enough. A foot whose ankle turns no further rolls over its edge, heel or ball.
         """
-        angles = frames.angles
-        feet = self._with_heels_up(frames, feet)
+        angles, feet = frames.angles, self._with_heels_up(frames, feet)
         for last in (False, False, True):
             angles, sink = self._legs_to(frames, feet, angles, least)
             excess = angles - np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
@@ -287,25 +271,20 @@ class Legs:
             angles[:, self._hips] += tilt[:, None]
             angles[:, self._lumbar] -= tilt
             x, y, z, w = q[:, 3:7].T
-            sine, cosine = np.sin(0.5 * tilt), np.cos(0.5 * tilt)
-            q[:, 3:7] = np.column_stack([
-                x * cosine - z * sine, y * cosine + w * sine, z * cosine + x * sine, w * cosine - y * sine
-            ])  # fmt: skip
+            s, c = np.sin(0.5 * tilt), np.cos(0.5 * tilt)
+            q[:, 3:7] = np.column_stack([x * c - z * s, y * c + w * s, z * c + x * s, w * c - y * s])
 
 
 def corrected(
     wanted: FootPlacement, swing: FloatArray, offset: FloatArray, distance: FloatArray
 ) -> FootPlacement:
-    """Feet moved by their corrections, on the floor where they stand.
+    """Feet (...) of the gait moved by their corrections, on the floor where they stand.
 
-    Args:
-        wanted: (...) placements in the gait.
-        swing: (...) shares of the swing [-], -1 while they stand.
-        offset: (..., 3) x, y [m] and yaw [rad] to add.
-        distance: (...) correction of the whole step [m].
+    Of the swing are (...) shares [-], -1 while they stand; offsets are (..., 3) x, y [m] and yaw [rad],
+    distances (...) the correction of the whole step [m].
     """
-    standing = swing < 0.0
-    up = np.where(standing, 0.0, smooth_step(swing / LEAVING) * smooth_step((1.0 - swing) / LANDING))
+    rising = smooth_step(swing / LEAVING) * smooth_step((1.0 - swing) / LANDING)
+    up = np.where(swing < 0.0, 0.0, rising)
     flat = wanted.pitch - FLAT * np.tanh(wanted.pitch / FLAT)
     return FootPlacement(
         point=wanted.point + offset[..., :2],
@@ -335,22 +314,14 @@ def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
 def _steps(path: FloatArray, swing: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Corrections (n, 3) of one foot, and the correction of the whole step at each instant (n,) [m]."""
     n, standing = len(swing), swing < 0.0
-    spans = list(pairwise(borders(standing)))
     offset, distance = np.zeros((n, 3)), np.zeros(n)
-    for first, last in spans:
-        if standing[first]:
-            anchor = path[0] if first == 0 else path[-1] if last == n else path[first:last].mean(axis=0)
-            offset[first:last] = anchor - path[first:last]
-    for first, last in spans:
-        if not standing[first]:
-            before = offset[first - 1] if first else np.zeros(3)
-            after = offset[last] if last < n else np.zeros(3)
-            share = smooth_step(swing[first:last])[:, None]
-            offset[first:last] = (1.0 - share) * before + share * after
-            distance[first:last] = np.hypot(*(after - before)[:2])
+    for first, last in mask_runs(standing):
+        anchor = path[0] if first == 0 else path[-1] if last == n else path[first:last].mean(axis=0)
+        offset[first:last] = anchor - path[first:last]
+    for first, last in mask_runs(~standing):
+        before = offset[first - 1] if first else np.zeros(3)
+        after = offset[last] if last < n else np.zeros(3)
+        share = smooth_step(swing[first:last])[:, None]
+        offset[first:last] = (1.0 - share) * before + share * after
+        distance[first:last] = np.hypot(*(after - before)[:2])
     return offset, distance
-
-
-def borders(values: NDArray[np.bool_]) -> list[int]:
-    """Where runs of equal values begin, and the number of values."""
-    return [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]

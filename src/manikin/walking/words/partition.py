@@ -50,21 +50,17 @@ class WordGrid:
 
     def __post_init__(self) -> None:
         finite_number(self.step, "step of the grid of words [m]", at_least=0.05, at_most=10.0)
-        for name in ("x", "y"):
-            low, high = (
-                finite_number(end, f"{name} of the grid of words [m]") for end in getattr(self, name)
-            )
+        for name, ends in (("x", self.x), ("y", self.y)):
+            where = f"{name} of the grid of words"
+            low, high = (finite_number(end, f"{where} [m]") for end in ends)
             if not -20.0 <= low <= high <= 20.0:
-                raise InputError(
-                    f"{name} of the grid of words is {low:g} to {high:g} m; valid: -20 to 20, ascending"
-                )
+                raise InputError(f"{where} is {low:g} to {high:g} m; valid: -20 to 20, ascending")
         distances = np.hypot(self.columns[None], self.rows[:, None])
         nearest, farthest = float(distances.min()), float(distances.max())
         if nearest < NEAREST or farthest > FARTHEST:
-            raise InputError(
-                f"goals of the grid of words are {nearest:g} to {farthest:g} m from the start; "
-                f"valid: {NEAREST:g} to {FARTHEST:g} m"
-            )
+            wrong = f"{nearest:g} to {farthest:g} m from the start"
+            valid = f"{NEAREST:g} to {FARTHEST:g} m"
+            raise InputError(f"goals of the grid of words are {wrong}; valid: {valid}")
 
     @property
     def columns(self) -> FloatArray:
@@ -140,10 +136,8 @@ def bent_to(path: WordPath, goal: FloatArray) -> WordPath | None:
 def equal_paths(one: WordPath, other: WordPath) -> EqualPaths:
     """Find the goal between two goals that both ways to go reach at the same cost, by bisection.
 
-    Both are best paths from the same start, to goals that are near each other, of two branches.
-
-    Raises:
-        InputError: If both bend into each other, or one ends before the other's goal.
+    Both are best paths from the same start, to goals that are near each other, of two branches. InputError if
+    both bend into each other, or one ends before the other's goal.
     """
     whole = 2.0 * np.pi * np.round((other.goal[2] - one.goal[2]) / (2.0 * np.pi))
     lift = np.array([0.0, 0.0, whole])
@@ -186,8 +180,7 @@ class WordSlice:
         heading_deg: Final heading modulo whole turns [deg].
         turns: (n,) final less initial heading of the path [rad].
         shapes: (n, degree) coefficients of the paths' headings [rad].
-        lengths: (n,) of the paths [m].
-        costs: (n,) of the paths [m]; infinite where none was found.
+        lengths: (n,) of the paths [m], and their ``costs`` (n,) [m], infinite where none was found.
     """
 
     grid: WordGrid
@@ -258,19 +251,14 @@ class WordSlice:
 def solve_slice(heading_deg: float, grid: WordGrid = THESIS_GRID) -> WordSlice:
     """Best paths to all places of a grid with one final heading; 90 deg is that of the start.
 
-    After all guesses, the paths of neighbours are bent to each place until nothing gets cheaper.
-
-    Raises:
-        InputError: If a place was not reached by any guess.
+    After all guesses, the paths of neighbours are bent to each place until nothing gets cheaper. InputError
+    if a place was not reached by any guess.
     """
     goals = grid.goals(finite_number(heading_deg, "heading of a slice [deg]"))
-    turned, best = cheapest(_START, goals, guesses())
-    turned, best = _from_neighbours(grid, turned, best)
-    if not np.all(best.found):
-        place = goals[np.flatnonzero(~best.found)[0]]
-        raise InputError(
-            f"no path was found to ({place[0]:g}, {place[1]:g}) m at {heading_deg:g} deg; valid: another grid"
-        )
+    turned, best = _from_neighbours(grid, *cheapest(_START, goals, guesses()))
+    for x, y, _ in goals[~best.found]:
+        where = f"({x:g}, {y:g}) m at {heading_deg:g} deg"
+        raise InputError(f"no path was found to {where}; valid: another grid")
     return WordSlice(grid, float(heading_deg), turned[:, 2] - START[2], best.shapes, best.length, best.cost)
 
 
@@ -278,14 +266,12 @@ def _from_neighbours(grid: WordGrid, turned: FloatArray, best: Minima) -> tuple[
     """Minima improved by bending the paths of neighbours."""
     turned, shapes = turned.copy(), best.shapes.copy()
     cost, length = best.cost.copy(), best.length.copy()
-    rows, columns = grid.shape
-    index = np.arange(rows * columns).reshape(rows, columns)
-    for _ in range(rows + columns):
+    index = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape)
+    pairs = [(index[1:], index[:-1]), (index[:-1], index[1:])]
+    pairs += [(index[:, 1:], index[:, :-1]), (index[:, :-1], index[:, 1:])]
+    for _ in range(sum(grid.shape)):
         improved = False
-        for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            keep = (slice(None), slice(1, None) if shift > 0 else slice(None, -1))
-            inside = keep if axis == 1 else keep[::-1]
-            to, by = index[inside].ravel(), np.roll(index, shift, axis)[inside].ravel()
+        for to, by in ((at.ravel(), beside.ravel()) for at, beside in pairs):
             ends = turned[to].copy()
             ends[:, 2] = turned[by, 2]
             bent = minimise(Goals.of(_START, ends), shapes[by])
@@ -317,12 +303,8 @@ def solve_slices(
 ) -> Iterator[WordSlice]:
     """Solve the slices of final headings [deg] side by side; yield them in the order in which they are done.
 
-    Each depends on nothing but itself, so any number of jobs (:func:`manikin.runtime.parallel.side_by_side`)
-    finds the same.
-
-    Raises:
-        InputError: If ``jobs`` is less than 1, or a slice cannot be solved.
-        ManikinError: If a process ends before its slice.
+    Each depends on nothing but itself, so any number of jobs, at least 1, finds the same; errors are those of
+    :func:`solve_slice` and :func:`manikin.runtime.parallel.side_by_side`.
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; valid: at least 1")

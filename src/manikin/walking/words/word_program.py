@@ -34,8 +34,7 @@ def basis(share: FloatArray, integrals: int, degree: int = DEGREE) -> FloatArray
 
 @cache
 def _integrated(number: int, integrals: int) -> Legendre:
-    polynomial = Legendre.basis(number, domain=[0.0, 1.0])
-    return polynomial.integ(integrals, lbnd=0.0) if integrals else polynomial
+    return Legendre.basis(number, domain=[0.0, 1.0]).integ(integrals, lbnd=0.0)
 
 
 @cache
@@ -141,13 +140,13 @@ def minimise(goals: Goals, shapes: FloatArray) -> Minima:
             good[done] = _definite(hessian[done], values.q_gradient[done])
             cost[active[good]] = values.cost[good]
             length[active[good]] = some[good].distance / _integrals(some[good], b[good])[0].sum(axis=1)
-        trial = b + step
-        tried = _values(some, trial)
+        tried = _values(some, b + step)
         penalty = 1.5 * np.abs(multiplier) + 1e-3
         merit, before = (v.cost + penalty * np.abs(v.q) for v in (tried, values))
         better = tried.valid & (merit <= before + 1e-13 * np.abs(before)) & np.all(np.isfinite(step), axis=1)
-        shapes[active[better]] = trial[better]
-        values = _either(better, tried, values)
+        shapes[active[better]] = (b + step)[better]
+        pairs = zip(tried, values, strict=True)
+        values = _Values(*(np.where(better if a.ndim == 1 else better[:, None], a, b) for a, b in pairs))
         damping[active] = np.where(better, damping[active] * 0.15, np.maximum(damping[active], 1e-4) * 8.0)
         damping[active] = np.where(damping[active] < 1e-6, 0.0, damping[active])
         going_on = ~done & (damping[active] < 1e8)
@@ -186,13 +185,11 @@ def _step(
     normal = values.q_gradient
     now = -np.einsum("ki,ki->k", values.gradient, normal) / np.einsum("ki,ki->k", normal, normal)
     hessian, diagonal = _hessian(goals, b, now)
-    index = np.arange(n)
-    system = np.zeros((size, n + 1, n + 1))
+    index, system = np.arange(n), np.zeros((size, n + 1, n + 1))
     system[:, :n, :n] = hessian
     system[:, index, index] += damping[:, None] * diagonal
     system[:, :n, n] = system[:, n, :n] = normal
-    right = np.concatenate([-values.gradient, -values.q[:, None]], axis=1)
-    solved = _solved(system, right)
+    solved = _solved(system, np.concatenate([-values.gradient, -values.q[:, None]], axis=1))
     step = np.concatenate([np.zeros((size, 1)), solved[:, :n]], axis=1)
     # Coefficients of higher degrees bend less: compare gradients in the measure of the cost itself.
     rest = np.abs(values.gradient + now[:, None] * normal)
@@ -252,9 +249,3 @@ def _definite(hessian: FloatArray, normal: FloatArray) -> NDArray[np.bool_]:
 
 def _only(values: _Values, index: NDArray[np.bool_]) -> _Values:
     return _Values._make(part[index] for part in values)
-
-
-def _either(better: NDArray[np.bool_], one: _Values, other: _Values) -> _Values:
-    """The first where it is better, and else the other."""
-    pairs = zip(one, other, strict=True)
-    return _Values._make(np.where(better if a.ndim == 1 else better[:, None], a, b) for a, b in pairs)

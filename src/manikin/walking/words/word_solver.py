@@ -119,9 +119,8 @@ class WordPath:
         steps = self.length / (2.0 * panels) * np.stack([np.cos(heading), np.sin(heading)], -1)
         way = np.cumsum(np.einsum("ijk,j->ik", steps, weights), axis=0)
         place = self.start[:2] + np.vstack([np.zeros((1, 2)), way])
-        return np.column_stack(
-            [place, self.start[2] + basis(share, 2, degree) @ self.shape, self.curvature(share)]
-        )
+        headings = self.start[2] + basis(share, 2, degree) @ self.shape
+        return np.column_stack([place, headings, self.curvature(share)])
 
 
 def words_of(shapes: FloatArray, lengths: FloatArray) -> list[str]:
@@ -168,10 +167,8 @@ def residuals(start: FloatArray, goals: FloatArray, shapes: FloatArray, lengths:
     state = np.tile(np.append(start, 0.0), (len(lengths), 1))
     states = runge_kutta(_derivative, state, rates.T, (lengths / _STEPS)[:, None])
     missed = np.abs(states[-1, :, :3] - goals)
-    adjoint, hamiltonian = _adjoint(states, rates[:, ::2], lengths)
-    return WordResiduals(
-        np.hypot(missed[:, 0], missed[:, 1]), missed[:, 2], np.abs(states[-1, :, 3]), adjoint, hamiltonian
-    )
+    position, curvature = np.hypot(missed[:, 0], missed[:, 1]), np.abs(states[-1, :, 3])
+    return WordResiduals(position, missed[:, 2], curvature, *_adjoint(states, rates[:, ::2], lengths))
 
 
 def _derivative(state: FloatArray, control: FloatArray) -> FloatArray:
@@ -188,17 +185,13 @@ def _adjoint(states: FloatArray, rates: FloatArray, lengths: FloatArray) -> tupl
     for k, length in enumerate(lengths):
         x, y, heading, curvature = states[:, k].T
         x, y, way, rate = x - x[0], y - y[0], np.linspace(0.0, length, len(x)), rates[k]
-        none, ones = np.zeros_like(way), np.ones_like(way)
-        # Columns: p_kappa(0), p_phi(0), p_x, p_y.
-        # Integrals from the start by a rule of fourth order.
+        # Columns: p_kappa(0), p_phi(0), p_x, p_y; integrals from the start by a rule of fourth order.
         x_primitive, y_primitive = (CubicSpline(way, line).antiderivative()(way) for line in (x, y))
-        p_curvature = np.column_stack([ones, -way, -y_primitive, x_primitive])
-        moving = np.column_stack(
-            [none, curvature, np.cos(heading) + y * curvature, np.sin(heading) - x * curvature]
-        )
+        p_curvature = np.column_stack([np.ones_like(way), -way, -y_primitive, x_primitive])
+        on_x, on_y = np.cos(heading) + y * curvature, np.sin(heading) - x * curvature
+        moving = np.column_stack([np.zeros_like(way), curvature, on_x, on_y])
         hamiltonian = moving + rate[:, None] * p_curvature
-        price = 1.0 + rate**2
-        rows, wanted = np.vstack([p_curvature / 2.0, hamiltonian]), np.concatenate([rate, price])
+        rows, wanted = np.vstack([p_curvature / 2.0, hamiltonian]), np.concatenate([rate, 1.0 + rate**2])
         missing = rows @ np.linalg.lstsq(rows, wanted, rcond=None)[0] - wanted
         misfit[k] = np.max(np.abs(missing[: len(way)])) / max(0.01, np.abs(rate).max())
         largest[k] = np.max(np.abs(missing[len(way) :]))
@@ -213,32 +206,24 @@ _CHEAPER = 1e-9
 
 
 def word_paths(goals: ArrayLike, start: ArrayLike = START) -> list[WordPath]:
-    """Best paths to goals, each the cheapest local minimum that any guess led to.
+    """Best paths to goals, each the cheapest local minimum that any guess led to; InputError if none did.
 
     Args:
         goals: (k, 3) x, y [m], heading [rad] modulo whole turns; 0.5 to 15 m from the start.
         start: (3,) the same; that of the thesis looks along y.
-
-    Raises:
-        InputError: If an argument is not usable, or no guess led to a path.
     """
     begin = frozen_array(start, "start of a word [m, m, rad]", (3,))
     ends = frozen_array(goals, "goals of words [m, m, rad]", (None, 3))
     distance = np.hypot(*(ends - begin)[:, :2].T)
     for number in np.flatnonzero((distance < NEAREST) | (distance > FARTHEST)):
-        raise InputError(
-            f"goal {number} of words is {distance[number]:g} m from the start; "
-            f"valid: {NEAREST:g} to {FARTHEST:g} m"
-        )
+        wrong = f"is {distance[number]:g} m from the start"
+        raise InputError(f"goal {number} of words {wrong}; valid: {NEAREST:g} to {FARTHEST:g} m")
     turned, best = cheapest(begin, ends, guesses())
     for number in np.flatnonzero(~best.found):
-        raise InputError(
-            f"goal {number} of words, {ends[number].tolist()}: no path was found; valid: another goal"
-        )
-    return [
-        WordPath(begin, *row)
-        for row in zip(turned, best.shapes, best.length.tolist(), best.cost.tolist(), strict=True)
-    ]
+        wrong = f"{ends[number].tolist()}: no path was found"
+        raise InputError(f"goal {number} of words, {wrong}; valid: another goal")
+    rows = zip(turned, best.shapes, best.length.tolist(), best.cost.tolist(), strict=True)
+    return [WordPath(begin, *row) for row in rows]
 
 
 def word_path(goal: ArrayLike, start: ArrayLike = START) -> WordPath:
