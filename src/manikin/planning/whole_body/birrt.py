@@ -27,11 +27,9 @@ RESOLUTION, STEP, CONNECT = 0.05, 0.2, 0.5
 """Metric distance between two checked points of an edge, and largest metric lengths of a new edge (d_lim) and
 of the one that joins the trees."""
 
-MARGIN, ABOVE = 0.3, 0.5
-"""Positions are drawn from the box around both ends, with these added to each side and above [m]."""
-
-SPREAD = 0.2
-"""Largest random turn about each axis away from the shortest turn between the ends [rad]."""
+MARGIN, ABOVE, SPREAD = 0.3, 0.5, 0.2
+"""Poses are drawn from the box around both ends, with these added to each side and above [m], and turned away
+from the shortest turn between the ends by up to this about each axis [rad]."""
 
 
 def slow_enough(

@@ -15,7 +15,7 @@ What is meant to be held is held exactly, so a variable decides: below :data:`RE
 in that phase, but only where the others keep the wanted balance without it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
@@ -37,9 +37,6 @@ from manikin.scene import Scene
 
 RELEASE, LEAST = 0.5, LEAST_VARIABLE**2
 """Variable below which a contact that is not needed is let go, and below which a force gets no costlier."""
-
-TOUCHING = 0.02
-"""Distance to a surface up to which a contact counts as lying on it [m]."""
 
 Variables = tuple[Mapping[str, float], ...]
 """Contact variable of each effector in contact, for each phase."""
@@ -182,11 +179,12 @@ class VariableChoice:
 
     def _distance_off(self, contact: Contact) -> float:
         """Distance of a contact from the nearest obstacle; 0 where it lies on one [m]."""
+        touching = 0.02  # distance to a surface up to which a contact counts as lying on it [m]
         try:
-            self._scene.touched_obstacles(contact, TOUCHING)
+            self._scene.touched_obstacles(contact, touching)
         except ContactError:
             near = abs(self._scene.nearest(contact.position)[1]) if self._scene.obstacles else np.inf
-            return max(near, TOUCHING)
+            return max(near, touching)
         return 0.0
 
 
@@ -236,9 +234,3 @@ def mean_cost(
     shared = forces.share(wrench, np.tile(np.sqrt(c), (len(wrench), 1)), tolerance=tolerance, force=force)
     by_contact = np.bincount(forces.columns, np.mean(shared.magnitude**2, axis=0) / force**2, len(c))
     return float(shared.cost.value.mean()), -0.5 * by_contact / c**2
-
-
-def released(given: ContactSchedule, kept: ContactSchedule) -> Iterator[tuple[int, str]]:
-    """Phase and effector of every contact that was let go."""
-    for number, (before, after) in enumerate(zip(given.sequence, kept.sequence, strict=True)):
-        yield from ((number, name) for name in before.stance.effectors if name not in after.stance)

@@ -166,9 +166,8 @@ class FitJob:
         knots = self.knots(goal.schedule, fine)
         time, basis = self.samples(knots)
         objective = goal.objective(time, basis, scales)
-        fit = MotionFit(objective, knots)
         guess = objective.targets.reference if near is None else near.evaluate(time).q
-        start = spline_through(guess, basis, knots)
+        fit, start = MotionFit(objective, knots), spline_through(guess, basis, knots)
         return fit, fit.solve(start, scales, further=near is not None)
 
     def attempt(

@@ -83,10 +83,6 @@ class FitScales(MotionScales):
         return replace(super().loosened(factor), com=self.com * factor)
 
 
-PERSON_ROOT, PERSON_MASS = 0.92, 75.0
-"""Height of the root [m] and mass [kg] of the person whose scales these are."""
-
-
 @dataclass(frozen=True)
 class RefineScales(MotionScales):
     """Size at which each residual of the refinement costs one unit.
@@ -144,9 +140,9 @@ class RefineScales(MotionScales):
         plain = cls()
         if body.stature is not None:
             return plain
-        length = float(body.standing_posture()[2]) / PERSON_ROOT
-        # Least factor on distances for safety.
-        force, near = body.mass / PERSON_MASS, max(length, 0.25)
+        # Height of the root [m] and mass [kg] of that person, and the least factor on distances for safety.
+        length, force = float(body.standing_posture()[2]) / 0.92, body.mass / 75.0
+        near = max(length, 0.25)
         return replace(
             plain,
             safe_distance=plain.safe_distance * near, softness=plain.softness * near,

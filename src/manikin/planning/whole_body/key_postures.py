@@ -119,7 +119,8 @@ def find_key_postures(
     """
     schedule = trajectory.schedule
     time = schedule.instants[trajectory.binds(schedule.instants)]
-    com, rolls = trajectory.position(time), rolls_of(body, schedule)
+    feet = ((swing.effector, foot_roll(body, schedule, swing)) for swing in schedule.sequence.swings())
+    com, rolls = trajectory.position(time), [(name, roll) for name, roll in feet if roll is not None]
     if known is None:
         references = reference_motion(body, trajectory, time, manner)
         lay_toes_flat(toe_angles(body, rolls, time), references)
@@ -180,19 +181,13 @@ def _explained(
     return replace(posture, reason=reason, nearest_com=com)
 
 
-def rolls_of(body: BodyModel, schedule: ContactSchedule) -> tuple[tuple[str, FootRoll], ...]:
-    """Rolls of the feet about their flights."""
-    found = ((swing.effector, foot_roll(body, schedule, swing)) for swing in schedule.sequence.swings())
-    return tuple((name, roll) for name, roll in found if roll is not None)
-
-
 def requirements_at(
     schedule: ContactSchedule, key: int, rolls: Rolls = ()
 ) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
     """Contacts of both phases that meet at a key instant, and placements of the other effectors.
 
     A sole that lies flat in one of them lies flat; one that only touches with an edge has the pitch of its
-    roll, of :func:`rolls_of`.  A contact that has yet to settle is only wished at its place.
+    roll.  A contact that has yet to settle is only wished at its place.
     """
     time, held = float(schedule.instants[key]), dict[str, Contact]()
     for phase in schedule.sequence.phases[max(key - 1, 0) : key + 1]:

@@ -313,7 +313,8 @@ class _Planner:
         scales, first = replace(self.settings.fit, moment_share=share), None
         ways = (self.known,) if self.waypoints is None else (self.known, self.waypoints)
         for restarts, known in product((False, True), ways):
-            if restarts and not self.guide(swings, manner, known, False).misses_many:
+            quick = self.guide(swings, manner, known, False)
+            if restarts and len(quick.failures) <= 0.1 * len(quick.time):
                 continue
             goal = _Goal(self, swings, self.guide(swings, manner, known, restarts), manner, straight_toes)
             progress(0.4)

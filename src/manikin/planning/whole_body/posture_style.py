@@ -40,11 +40,6 @@ class Guide:
     configurations: FloatArray
     failures: tuple[tuple[float, str], ...]
 
-    @property
-    def misses_many(self) -> bool:
-        """Whether so many postures could not be found that they may be worth a search with restarts."""
-        return len(self.failures) > 0.1 * len(self.time)
-
     def at(self, time: FloatArray) -> FloatArray:
         """(n, nq) linear interpolation; quaternions are normalised."""
         rows = np.stack([np.interp(time, self.time, column) for column in self.configurations.T], axis=1)
@@ -55,8 +50,7 @@ class Guide:
 def plan_guide(
     body: BodyModel, proximity: Proximity, schedule: ContactSchedule, time: FloatArray,
     effectors: dict[str, EffectorTarget], com: FloatArray, ignored: tuple[Ignored, ...],
-    reference: FloatArray, clearance: float, preferences: Preferences | None = None,
-    exact: Sequence[int] = (), restarts: bool = False,
+    reference: FloatArray, clearance: float, preferences: Preferences, exact: Sequence[int], restarts: bool,
 ) -> Guide:  # fmt: skip
     """Find a posture at each time, each one starting from the one before.
 
@@ -67,7 +61,7 @@ def plan_guide(
         ignored: Pairs that may touch, per time.
         reference: (k, nq) preferred postures, the first of which starts the search.
         clearance: Wanted distance to everything [m].
-        preferences: What the postures should look like; the generator's own when omitted.
+        preferences: What the postures should look like.
         exact: Joints that keep to the reference whatever the posture before.
         restarts: Whether a posture that is not found from the one before is sought from others as well.
     """
@@ -83,8 +77,7 @@ def plan_guide(
             wanted[exactly] = reference[k][exactly]
         problem = PostureProblem(
             body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
-            self_clearance=clearance, ignore=ignored[k], reference=wanted,
-            preferences=preferences or Preferences(),
+            self_clearance=clearance, ignore=ignored[k], reference=wanted, preferences=preferences,
         )  # fmt: skip
         result = generate_posture(problem, q, settings=settings)
         flying = [name for name in placements if effectors[name].weight[k] < 1.0]

@@ -30,7 +30,7 @@ from manikin.planning.whole_body.certificate import (
     WholeBodyRequirements,
     certify_refined,
 )
-from manikin.planning.whole_body.contact_variables import VariableChoice, Variables, VariableSamples, released
+from manikin.planning.whole_body.contact_variables import VariableChoice, Variables, VariableSamples
 from manikin.planning.whole_body.fit import DEGREE, spline_through
 from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress
 from manikin.planning.whole_body.fit_objective import MotionObjective
@@ -342,10 +342,15 @@ class Refinement:
         broken, failure = table.first_broken, None
         if broken is not None:
             failure = WholeBodyFailure.at(schedule, broken.time_s or 0.0, broken.reason)
+        released = tuple(
+            (number, name)
+            for number, (one, kept) in enumerate(zip(given.sequence, schedule.sequence, strict=True))
+            for name in one.stance.effectors if name not in kept.stance
+        )  # fmt: skip
         return RefineResult(
             found.motion, spline, schedule, before, start, after, found.certificate, table, slack, failure,
-            self.variables, tuple(released(given, schedule)), path.duration / duration,
-            self._job.iterations, clock.perf_counter() - began,
+            self.variables, released, path.duration / duration, self._job.iterations,
+            clock.perf_counter() - began,
         )  # fmt: skip
 
 

@@ -62,11 +62,9 @@ def limb_directions(
         if limb.effector not in schedule.sequence.effectors:
             continue
         direction = forward[phases] if task is None else np.tile(task.reaction_on(limb.name), (len(time), 1))
-        normal = np.zeros((len(time), 3))
-        for number, phase in enumerate(schedule.sequence):
-            if limb.effector in phase.stance:
-                normal[phases == number] = phase.stance[limb.effector].normal
-        found[limb.effector] = LimbDirections(limb_slots(body, limb) - 1, direction, normal)
+        held = (phase.stance if limb.effector in phase.stance else None for phase in schedule.sequence)
+        normals = np.array([np.zeros(3) if one is None else one[limb.effector].normal for one in held])
+        found[limb.effector] = LimbDirections(limb_slots(body, limb) - 1, direction, normals[phases])
     return found
 
 

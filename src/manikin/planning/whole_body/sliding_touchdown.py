@@ -24,15 +24,14 @@ from manikin.scene.distance import ProximitySamples, considered
 Ignored = frozenset[tuple[str, str]]
 """Pairs of segment and obstacle (or segment) whose distance does not count."""
 
-Samples = NDArray[np.bool_]
-"""(n,) whether something counts at each sample."""
-
 SITTING_DOWN = 0.15
 """Time before a seat is touched in which the trunk may come close to it [s]."""
 
 
-def with_pairs(held: Sequence[Ignored], more: Sequence[tuple[Ignored, Samples]]) -> tuple[Ignored, ...]:
-    """The pairs held at each sample, with further ones where these count."""
+def with_pairs(
+    held: Sequence[Ignored], more: Sequence[tuple[Ignored, NDArray[np.bool_]]]
+) -> tuple[Ignored, ...]:
+    """The pairs held at each of n samples, with further ones where these count (n,)."""
 
     @cache
     def union(own: Ignored, *near: bool) -> Ignored:
@@ -53,8 +52,8 @@ class SlidingTouchdown:
     """
 
     pairs: Ignored
-    near: Samples
-    sliding: Samples
+    near: NDArray[np.bool_]
+    sliding: NDArray[np.bool_]
 
     def without(self, ignored: Sequence[Ignored]) -> tuple[Ignored, ...]:
         """The pairs that are ignored at each sample, but for those that meet there."""

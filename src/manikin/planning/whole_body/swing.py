@@ -157,12 +157,12 @@ def _first_clear(family: Iterator[SwingCurve], clearance: Clearance, limits: Swi
     it. Instants at which curves were given up are looked at first.
     """
     best, least = None, -np.inf
-    # Instants at which a curve of the family is looked at before it is checked densely.
-    coarse, dense = _Slack(clearance, limits, 13), _Slack(clearance, limits)
+    # Order of few instants at which a curve is looked at before it is checked densely, and of the dense ones.
+    coarse, dense = list[int](), list[int]()
     for curve in family:
-        slack = coarse.least(curve, least)
+        slack = _least_slack(curve, clearance, limits, least, coarse, 13)
         if slack >= -TOLERANCE and curve.haste(limits.speed, limits.angular_speed) is None:
-            slack = dense.least(curve, least)
+            slack = _least_slack(curve, clearance, limits, least, dense)
             if slack >= -TOLERANCE:
                 return check_swing(curve, clearance, limits)
         if best is None or min(slack, 0.0) > least:
@@ -171,30 +171,29 @@ def _first_clear(family: Iterator[SwingCurve], clearance: Clearance, limits: Swi
     return check_swing(best, clearance, limits)
 
 
-class _Slack:
-    """Smallest slack of curves over the same instants, those first that were the nearest before."""
+def _least_slack(
+    curve: SwingCurve, clearance: Clearance, limits: SwingLimits, known: float, order: list[int],
+    count: int | None = None,
+) -> float:  # fmt: skip
+    """Smallest slack [m]; of what is neither clear nor better than ``known``, the first that shows it.
 
-    def __init__(self, clearance: Clearance, limits: SwingLimits, count: int | None = None) -> None:
-        self._clearance, self._limits, self._count = clearance, limits, count
-        self._order: list[int] = []
+    That instant becomes the first in the order in which they are looked at.
+    """
+    state = curve.evaluate(_instants(curve, limits, count))
 
-    def least(self, curve: SwingCurve, known: float) -> float:
-        """Smallest slack [m]; of what is neither clear nor better than ``known``, the first that shows it."""
-        state = curve.evaluate(_instants(curve, self._limits, self._count))
-        last = len(state.time) - 1
-        self._order = self._order or list(range(1, last))
-        at_contact = self._distance(state, 0), self._distance(state, last)
-        required = _required(curve, state, at_contact, self._limits)
-        smallest, enough = np.inf, min(known + TOLERANCE, -TOLERANCE)
-        for place, index in enumerate(self._order):
-            smallest = min(smallest, self._distance(state, index) - float(required[index]))
-            if smallest < enough:
-                self._order.insert(0, self._order.pop(place))
-                break
-        return smallest
+    def distance(index: int) -> float:
+        return clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
 
-    def _distance(self, state: SwingState, index: int) -> float:
-        return self._clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
+    last = len(state.time) - 1
+    order[:] = order or range(1, last)
+    required = _required(curve, state, (distance(0), distance(last)), limits)
+    smallest, enough = np.inf, min(known + TOLERANCE, -TOLERANCE)
+    for place, index in enumerate(order):
+        smallest = min(smallest, distance(index) - float(required[index]))
+        if smallest < enough:
+            order.insert(0, order.pop(place))
+            break
+    return smallest
 
 
 def _exertion(choice: tuple[float, float, float]) -> float:

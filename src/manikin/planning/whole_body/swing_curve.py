@@ -230,8 +230,7 @@ def _spline(controls: int, derivative: int) -> BSpline:
 
 
 def _knots(controls: int) -> FloatArray:
-    inner = np.linspace(0.0, 1.0, controls - DEGREE + 1)
-    return np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
+    return np.pad(np.linspace(0.0, 1.0, controls - DEGREE + 1), DEGREE, mode="edge")
 
 
 def _greville(controls: int) -> FloatArray:
