@@ -35,26 +35,15 @@ CRAWLING = (0.2, 0.05, 0.45)  # radius, lowest and highest end of what is free t
 APART = {"knee": 0.10, "fist": 0.17}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
 WHEELBASE = {"knee": -0.65, "fist": 0.65}  # place of limbs along the way, of a body of 1.75 m, twice [m]
 
-RESTING = (0.35, 0.2, 0.5)
-"""Places of the centre of mass that are tried, as shares of the way from the knees to the fists: arms are
-weaker than thighs."""
-
+RESTING = (0.35, 0.2, 0.5)  # shares of the way from knees to fists at which the body rests: arms are weaker
 EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
 ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
+# Tried in turn, at 1.75 m [m]: strides with distances of hands before knees; to kneel down and get up,
+# those distances with those of knees before the feet; shares of a limb's step with ways outwards.
 GAITS = ((0.42, 0.60), (0.42, 0.70), (0.28, 0.52), (0.28, 0.70))
-"""Strides and distances of hands before knees that are tried, at 1.75 m [m]."""
-
 KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
-"""Distances of hands before knees, and of knees before the feet, with which the body kneels down and gets up
-that are tried, of a body of 1.75 m [m]."""
-
 NEARBY = ((1.0, 0.0), (0.6, 0.0), (1.0, -0.05), (1.0, 0.05), (0.6, -0.05))
-"""Shares of a step, and ways outwards [m], that are tried for a limb."""
-
-BEFORE, BEHIND = 0.85, 0.45
-"""Distances of feet before what is low and behind it at which the body kneels and gets up, of a body of
-1.75 m [m]."""
-
+BEFORE, BEHIND = 0.85, 0.45  # ways from the feet to what is low when a body kneels, gets up, at 1.75 m [m]
 NEAR_END = 0.8  # way to the start or goal up to which the body kneels or gets up there, and does not walk [m]
 TURNED = math.radians(25.0)  # angle up to which it does so with feet as they are
 STEEPEST = math.radians(30.0)  # largest slope of a surface for hands and knees

@@ -38,12 +38,7 @@ class Habit(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Endpoint:
-    """A start or goal, or why there is none.
-
-    Attributes:
-        stage: Contacts and posture at rest on them, or None.
-        failure: None, or the reason in one line.
-    """
+    """A start or goal: contacts and a posture at rest on them; or None, and the reason in one line."""
 
     stage: Stage | None
     failure: str | None = None
@@ -201,8 +196,7 @@ def starts_on_limbs(
         q: (nq,) where the body should be, each limb where it should be relative to the root.
         duration: Shortest time for which the contacts are held [s].
     """
-    offered = {item.effector: item.nearest(q[:7], PLACES) for item in holds}
-    offered = {name: items for name, items in offered.items() if items}
+    offered = {item.effector: found for item in holds if (found := item.nearest(q[:7], PLACES))}
     if not offered:
         yield Endpoint(None, "no limb has a contact")
         return

@@ -5,9 +5,8 @@ body passes from one to the other.  What a step costs is about the time that a p
 estimate of the cost that is left is the length of the shortest way over the ground for a thin column, so that
 ways round obstacles, over steps and across gaps are known from the start.
 
-Tests of the foot and the trunk come when a step is about to be taken (lazily).  Whether a pair of footholds
-has postures is tested by the caller; a pair without is closed with :meth:`FootstepSearch.close`, and the next
-best way is found.
+Tests of the foot and the trunk come when a step is about to be taken.  The caller tests whether a pair of
+footholds has postures, closes one without with :meth:`FootstepSearch.close`, and asks for the next best way.
 """
 
 import math
@@ -50,11 +49,8 @@ LOW_RISE = 0.2  # largest difference in height of its cells [m]
 BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothing may stand in it
 
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
-"""Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.
-
-No bound on the cost of a way follows: the estimate counts turns, and may be more than the least cost.
-"""
-
+"""Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.  They bound
+no cost: the estimate counts turns, and may be more than the least cost."""
 SAME_GREED = 3  # ways after which the search for another one begins with the factor that found the last
 ALIKE = 0.08  # distance of footholds up to which a step is much like one that was refused [m]; our choice
 SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1  # up to which steps are as hard [m, rad, 1]; our choice
@@ -74,10 +70,6 @@ class _Node:
     ends: bool = False
 
 
-PairCost = Callable[[Foothold, Foothold], float]
-"""Cost of a body between two footholds, left and right [s]; infinite where it has no room."""
-
-
 @dataclass
 class FootstepSearch:
     """Search for footsteps of one body in one scene.
@@ -90,7 +82,7 @@ class FootstepSearch:
         holds: All footholds, by their numbers; the first four are those of start and goal.
         scale: Size of the body relative to one of 1.75 m.
         reach: Places of one foot relative to the other that the body reaches.
-        pair_cost: Cost of the body between two footholds.
+        pair_cost: Cost of the body between two footholds, left and right [s]; infinite where it has no room.
         column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
         stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
         highest: Largest difference in height of two soles, of a body of 1.75 m [m].
@@ -102,7 +94,7 @@ class FootstepSearch:
     goal: tuple[Foothold, Foothold]
     scale: float
     reach: StepReach
-    pair_cost: PairCost
+    pair_cost: Callable[[Foothold, Foothold], float]
     column: tuple[float, float, float]
     stride: float = 0.4
     highest: float = HIGHEST

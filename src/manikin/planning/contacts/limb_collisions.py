@@ -26,10 +26,8 @@ from manikin.scene.collision import collision_parts, local_box
 
 TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]
 YIELD = 0.8
-"""Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius.
-
-The wrist of our shapes is thicker than the hand, so that a palm flat on a wall has it in the wall.
-"""
+"""Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius:
+the wrist of our shapes is thicker than the hand, so that a palm flat on a wall has it in the wall."""
 
 
 class LimbCollisions:

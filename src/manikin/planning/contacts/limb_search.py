@@ -1,13 +1,11 @@
 """Contacts of any limbs from start to goal: a best-first search over sets of contacts.
 
 A state is the set of contacts that are held; a move breaks one of them and makes one of the same limb
-elsewhere.  Of each state the pose of the root is known that suits its contacts best; reach of every limb from
-there, and balance on the contacts that stay, are the cheap tests.  Whole postures are looked for along the
-best way only: one that still holds the old contact and rests on the others, one with the limb off the line
-between its contacts, and one that already holds the new one ([Tonneau2015]_ 7.2).  What has no posture is
-closed, what is much like it costs more, and the search goes on with the next best way.
-
-A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
+elsewhere.  Cheap tests are the reach of every limb from the pose of the root that suits a state best, and
+balance on the contacts that stay.  Whole postures are looked for along the best way only: one that still
+holds the old contact and rests on the others, one with the limb off the line between its contacts, and one
+that already holds the new one ([Tonneau2015]_ 7.2).  What has no posture is closed, what is much like it
+costs more.  A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
 """
 
 import heapq

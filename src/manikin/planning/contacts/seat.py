@@ -1,11 +1,10 @@
 """Sit on a seat and leave it: where the buttocks and feet are, and the stages up to standing.
 
-A start that suits the body and the seat decides whether a person can rise: feet drawn back below the knees,
-thighs that do not press on the seat's edge, buttocks far enough in front.  Legs on a seat are two triangles
-seen from the side, so that all places on the seat and all slopes of the shanks are compared in closed form
-(:class:`Sitter`), and only the best few are tried with the whole body.  The body leaves the seat at rest
-where it can lean so far that its weight is over its feet, else in motion (:mod:`.transition`), else with
-hands that push on armrests, a table or the seat.
+Whether a person can rise depends on the start: feet drawn back below the knees, thighs that do not press on
+the seat's edge, buttocks far enough in front.  Legs on a seat are two triangles seen from the side, so that
+all places and slopes of the shanks are compared in closed form (:class:`Sitter`), and only the best few are
+tried with the whole body.  The body leaves the seat at rest where it can lean until its weight is over its
+feet, else in motion (:mod:`.transition`), else with hands that push on armrests, a table or the seat.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,7 +37,6 @@ APART = 0.07  # distance of the middle of a sole from the body's middle plane [s
 LIKED = (0.05, float(np.deg2rad(12.0)), 0.012)
 """Way forward [statures], deviation of the shank's slope [rad] and gap between the farthest lean and the
 heels [statures] that count alike; our choice."""
-
 CALF_ROOM = 0.016  # distance of the calves to the edge of the seat [m]
 SEAT_THICKNESS = 0.05  # depth below the top of a seat at which calves keep that distance [m]; our choice
 FEET_SPACING = 0.01  # distance of the places that are tried for the feet [m]
@@ -191,7 +189,6 @@ LEANING_TIMES = (1.3, 0.9)  # time of that way, to rest over the feet and to whe
 SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
 """Distances of the centre of mass to the edge of where it may rest on the feet when a seat is left, tried in
 order [m]; the first is inside the smaller soles on which it is planned."""
-
 BEHIND = (0.0, 0.02, 0.04)  # ways behind where the centre of mass could rest as a seat is left [m]
 LEAN_WEIGHT = 300.0  # of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice
 RISING_TIME = 0.9  # shortest time from there to standing [s]; the pace of the joints mostly asks for more

@@ -3,7 +3,6 @@
 Footsteps are searched for with cheap tests (:mod:`manikin.planning.contacts.footsteps`); whole postures are
 looked for along the best way only, two for each pair of footholds: one that rests on the foot that stands,
 the other already down, and one that rests on the other, the first about to leave.
-A pair without a posture is closed, and the search goes on with the next best way.
 """
 
 import math
@@ -37,10 +36,8 @@ COLUMN = (0.12, 0.5, 0.9)  # radius, lowest and highest end above the ground of 
 
 
 STRONG_TRIES = 16
-"""Ways that are refused because a posture at rest asks for more than the strength.
-
-A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so
-after that many ways the later stages decide."""
+"""Ways that are refused because a posture at rest asks for more than the strength; then later stages decide,
+as a motion may need less than its postures at rest, whose knees and trunk are not bent for least torque."""
 
 EASIER_MOVES = 8
 EASIER_TURN = 0.2  # moves towards a posture of less strength, and a joint's largest turn in each [rad]
