@@ -118,8 +118,6 @@ def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
 
 
 COM_ROOM = (0.06, 0.06, 0.03)  # way of the centre of mass off its posture when a phase begins [m]; our choice
-
-
 HINGE_PACE = 1.3  # mean speed of the hinge that turns most between two postures [rad/s]; our choice
 COM_PACE = 0.4  # mean speed of the centre of mass between two postures [m/s]; our choice
 

@@ -34,7 +34,6 @@ ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")  # order in which
 CRAWLING = (0.2, 0.05, 0.45)  # radius, lowest and highest end of what is free to crawl, at 1.75 m [m]
 APART = {"knee": 0.10, "fist": 0.17}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
 WHEELBASE = {"knee": -0.65, "fist": 0.65}  # place of limbs along the way, of a body of 1.75 m, twice [m]
-
 RESTING = (0.35, 0.2, 0.5)  # shares of the way from knees to fists at which the body rests: arms are weaker
 EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
 ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
@@ -52,7 +51,6 @@ LIFT = 0.05  # height of a limb in flight [m]
 LEVEL = {"knee": 0.3, "fist": 6.0}  # weights with which shanks are level and hands upright [1/rad^2]
 TILT = 0.19  # sine of the largest angle of a hand on its fist: its edge is not pressed into the ground
 TURNING = 1.2  # time in which a leg goes from its knee onto its foot or back [s]
-
 _ON_ALL_FOURS = {
     "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 80.0,
     "elbow_flexion": 10.0, "wrist_flexion": -65.0, "neck_flexion": -30.0,

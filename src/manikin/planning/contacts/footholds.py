@@ -28,7 +28,6 @@ STEEPEST = math.radians(30.0)  # largest slope of a surface to stand on [rad]; o
 FOOT_HEIGHT = 0.10  # height above a sole that has to be free for the foot [m]; our choice
 FOOT_CLEARANCE = 0.015  # distance of the foot to what stands beside it [m]; our choice
 ON_PLANE = 0.02  # height up to which a neighbouring surface does not hinder a foot [m]
-
 _REQUEST = coal.CollisionRequest()
 _CLEAR = coal.CollisionRequest()
 _CLEAR.security_margin = FOOT_CLEARANCE

@@ -34,20 +34,17 @@ HIGHEST = 0.48  # largest difference in height of two soles, of a body of 1.75 m
 HELD_HIGHEST = 0.80  # the same of a body that has something to hold on to or lean on [m]
 HELD_COST = 4.0 * STEP  # cost of a step that is higher than :data:`HIGHEST`: hands come and go [s]
 NARROWEST = 0.115  # least distance of the middles of two soles across, of a body of 1.75 m [m]
-
 ALONG = (-0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
 ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
 TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
 """Steps that are tried from a foot: ahead and to its side [m], and turned outwards [rad]."""
 CELL = 0.1  # width of the cells of the ground on which the estimate is computed [m]
 GAP = 0.7  # longest way over no ground that the estimate takes [m]
-
 MERGED = 0.06
 MERGED_TURN = math.radians(15.0)  # places [m] and headings [rad] this close together count as one foothold
 LOW_STEP = 0.05  # distance of places on a way for one who crawls [m]
 LOW_RISE = 0.2  # largest difference in height of its cells [m]
 BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothing may stand in it
-
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.  They bound
 no cost: the estimate counts turns, and may be more than the least cost."""
@@ -57,7 +54,6 @@ SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1  # up to which steps are as ha
 TURN_COST = 0.9  # cost of a turn [s/rad]: two steps turn a body by a right angle
 TURN_WAY = 0.6  # way on which going backwards costs as much as a turn by two radians [m]
 LOOK = 5  # cells of the way that tell where it leads
-
 _REQUEST = coal.CollisionRequest()
 
 

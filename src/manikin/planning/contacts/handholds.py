@@ -26,7 +26,6 @@ STOOP = 0.45  # how far shoulders go down to a hold that is low [m]
 APART = 0.15  # distance between two places that are offered [m]
 PALM = 0.05  # half the size of what has to be level below a palm [m]
 LEVEL = math.radians(20.0)  # largest slope of a surface to lean on [rad]
-
 _GRID = np.array([[i, j] for i in range(-5, 6) for j in range(-5, 6)]) * 0.08
 _CORNERS = PALM * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
 

@@ -45,7 +45,6 @@ RUNG_APART = 0.025  # distance on the sole between two places of a rung below it
 PALM_ROOM = 0.01  # distance of a palm's middle from the bar that its fingers close round [m]
 STEEP_BAR = 0.85  # rise of a bar over its length from which on a hand takes it from the side; our choice
 RUNG_SPACING = 0.045  # distance of neighbouring places of a foot along a rung [m]; our choice
-
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
 

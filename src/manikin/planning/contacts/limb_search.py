@@ -50,7 +50,6 @@ SOLES_APART = 0.02  # least distance of two soles side by side; our choice [m]
 SOLE_ABOVE = 0.1  # distance of two soles of which one may be above the other; our choice [m]
 TURN = 0.2  # distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice
 FREE = -1  # row of a hand that has let go
-
 State = tuple[int, ...]
 """Place of each limb, by its row among those of the limb; the first is that of the start, if it has one."""
 

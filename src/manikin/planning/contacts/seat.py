@@ -33,7 +33,6 @@ SHANK_SLOPE = float(np.deg2rad(12.0))  # slope that is liked, knee before ankle 
 SLOPES = np.deg2rad(np.arange(-25.0, 28.1, 1.0))  # slopes of the shank that are compared [rad]
 FORWARD = np.arange(0.0, 0.161, 0.01)  # ways of the buttocks towards the seat's edge [statures]
 APART = 0.07  # distance of the middle of a sole from the body's middle plane [statures]
-
 LIKED = (0.05, float(np.deg2rad(12.0)), 0.012)
 """Way forward [statures], deviation of the shank's slope [rad] and gap between the farthest lean and the
 heels [statures] that count alike; our choice."""
@@ -41,7 +40,6 @@ CALF_ROOM = 0.016  # distance of the calves to the edge of the seat [m]
 SEAT_THICKNESS = 0.05  # depth below the top of a seat at which calves keep that distance [m]; our choice
 FEET_SPACING = 0.01  # distance of the places that are tried for the feet [m]
 TRIED = 6  # sittings that are tried with the whole body
-
 LEAN = {
     "hip_flexion": 1.5, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1, "lumbar_flexion": 0.8,
     "thorax_flexion": 0.5, "neck_flexion": -0.4,
@@ -49,8 +47,6 @@ LEAN = {
 """Angles of a body that leans far forward on a seat, its pelvis flat [rad]."""
 
 LEAN_PITCH = 0.5  # pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]
-
-
 Sitting = tuple[dict[str, Contact], FloatArray]
 """Contacts of buttocks and feet, and a posture (nq,) near one that holds them."""
 
@@ -185,7 +181,6 @@ def _room_ahead(seat: Surface, at: FloatArray, heading: FloatArray) -> float:
 
 LEANING = (0.25, 0.5, 0.75, 0.92)  # shares of the way of the centre of mass to the feet that have a posture
 LEANING_TIMES = (1.3, 0.9)  # time of that way, to rest over the feet and to where it goes on in motion [s]
-
 SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
 """Distances of the centre of mass to the edge of where it may rest on the feet when a seat is left, tried in
 order [m]; the first is inside the smaller soles on which it is planned."""

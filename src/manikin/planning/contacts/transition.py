@@ -29,7 +29,6 @@ MARGIN = 3.0  # least one of the way about the centre of mass, at 75 kg and 1.75
 STEEPEST_LIFT = 4.0  # largest vertical acceleration on the way [m/s^2]; people who rise reach 3; our choice
 CARRIED_ROOM = 0.03  # how far outside of where it could rest the velocity may seem to carry the body [m]
 SAMPLES = 12  # instants of the way at which balance is imposed
-
 _DEGREE = 5
 
 

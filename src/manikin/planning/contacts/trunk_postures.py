@@ -37,13 +37,11 @@ from manikin.scene.covering import cover
 from manikin.scene.scene import FLOOR
 
 CEILINGS = (0.92, 0.84, 0.76, 0.68, 0.61, 0.55)  # over a folded body [statures]; a duck-walk is the last
-
 RECORDED_COM = ((0.55, 0.63, 0.743, 0.83, 1.0), (0.31, 0.371, 0.457, 0.486, 0.56))
 """Ceilings and the heights of the CoM below them [statures] of people who pass beams of 1.10, 1.30 and 1.45 m
 ([Qiu2012]_ 3.2.3, taken for 1.75 m); the lowest is extrapolated."""
 
 SKIN = 0.02  # distance of a posture to the walls and ceilings between which it is found [m]
-
 ARMS_CLOSE_COST = 1.05
 TURNED_COST = 1.3  # costs of arms held close and of a trunk turned against the feet; our choice
 _WALL = 1.0  # thickness of the walls [m]

@@ -33,8 +33,6 @@ from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostur
 from manikin.scene import Scene
 
 COLUMN = (0.12, 0.5, 0.9)  # radius, lowest and highest end above the ground of what is free, at 1.75 m [m]
-
-
 STRONG_TRIES = 16
 """Ways that are refused because a posture at rest asks for more than the strength; then later stages decide,
 as a motion may need less than its postures at rest, whose knees and trunk are not bent for least torque."""
