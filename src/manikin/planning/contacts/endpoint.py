@@ -168,18 +168,12 @@ class Endpoints:
         """Surfaces below and above a place with their heights, the lowest first; those near one given."""
         found: list[tuple[float, Surface]] = []
         for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
-            level = _height_at(surface, at)
-            if level is not None and (height is None or abs(level - height) < 0.05):
+            base, normal = surface.polygon[0], surface.normal
+            level = base[2] - float((at - base[:2]) @ normal[:2]) / normal[2]
+            near = height is None or abs(level - height) < 0.05
+            if near and float(surface.outside(np.array([[at[0], at[1], level]]))[0]) <= 1e-9:
                 found.append((level, surface))
         return sorted(found, key=lambda item: item[0])
-
-
-def _height_at(surface: Surface, at: FloatArray) -> float | None:
-    """Height of a surface above or below a place on the ground [m], or None beside it."""
-    base = surface.polygon[0]
-    height = base[2] - float((at - base[:2]) @ surface.normal[:2]) / surface.normal[2]
-    point = np.array([[at[0], at[1], height]])
-    return height if float(surface.outside(point)[0]) <= 1e-9 else None
 
 
 PLACES = 6  # places of each limb among which a start is sought

@@ -342,8 +342,8 @@ class _Field:
         ends = self._points[pairs]
         ends[..., 2] = ends[..., 2].max(axis=1, keepdims=True)
         between = ends[:, :1] + BETWEEN[:, None] * (ends[:, 1:] - ends[:, :1])
-        free = _column_is_free(scene, between.reshape(-1, 3), column).reshape(len(pairs), -1)
-        return np.asarray(free.all(axis=1))
+        free = _column_is_free(scene, between.reshape(-1, 3), column)
+        return np.asarray(free.reshape(len(pairs), -1).all(axis=1))
 
     def way(self, place: FloatArray) -> FloatArray | None:
         """(n, 3) cells from a place (3,) to the goal [m]; None where none lead there."""

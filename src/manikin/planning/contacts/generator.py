@@ -38,16 +38,11 @@ NATURAL_SLACK = 0.1  # normalised distance out of the learnt range that the alig
 class Hindrance(StrEnum):
     """Cause that kept a limb from making a contact."""
 
-    REACH = "reach"
-    """No surface is within reach of the limb."""
-    SURFACE = "surface"
-    """Surfaces are within reach, but no sample of the limb lies on one."""
-    COLLISION = "collision"
-    """Every contact that was tried collides."""
-    ALIGNMENT = "alignment"
-    """No effector that was tried can be put flat onto its surface."""
-    DIRECTION = "direction"
-    """Surfaces are within reach, but none has a usable EFORT in the direction that is asked for."""
+    REACH = "reach"  # no surface is within reach of the limb
+    SURFACE = "surface"  # surfaces are within reach, but no sample of the limb lies on one
+    COLLISION = "collision"  # every contact that was tried collides
+    ALIGNMENT = "alignment"  # no effector that was tried can be put flat onto its surface
+    DIRECTION = "direction"  # no surface within reach has a usable EFORT in the direction that is asked for
 
 
 @dataclass(frozen=True)

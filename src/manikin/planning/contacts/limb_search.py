@@ -365,7 +365,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         ]  # fmt: skip
         # A limb that is still free comes first ([Tonneau2015]_ 7.2), as long as it finds a place.
         whole = all(self._held(k, row) for k, row in enumerate(state))
-        fills = {after for after, _ in moves if not whole and self._fills(state, after)}
+        fills = set[State]()
+        for after, _ in moves if not whole else ():
+            k = self._moved(state, after)
+            if after[k] != FREE and not self._held(k, state[k]) and self._has_room(k, after[k]):
+                fills.add(after)
         self._later[state] = [item for item in moves if item[0] not in fills] if fills else []
         self._next[state] = [item for item in moves if item[0] in fills] or moves
         return self._next[state]
@@ -452,11 +456,6 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             ):
                 return False
         return True
-
-    def _fills(self, before: State, after: State) -> bool:
-        """Whether a move gives a contact to a limb that has none."""
-        k = self._moved(before, after)
-        return after[k] != FREE and not self._held(k, before[k]) and self._has_room(k, after[k])
 
     def _moved(self, before: State, after: State) -> int:
         return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)

@@ -96,7 +96,9 @@ class Sitter:
             floor: Height of what the feet stand on [m].
         """
         size, turn = self.stature, rotation_from_yaw(heading)
-        room = _room_ahead(seat, at, turn[:, 0])
+        steps = np.linspace(0.0, 1.0, 201)
+        inside = seat.outside(at + steps[:, None] * turn[:, 0]) <= 1e-9
+        room = float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
         tried: list[tuple[float, float]] = []
         feet: dict[int, dict[str, Contact]] = {}
         for forward, ahead in self._compared(float(at[2]) - floor, room):
@@ -170,13 +172,6 @@ _SITTING = {"hip_flexion": 1.4, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1}
 def of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
     """Angles by the full names of a body's hinges, of both sides where a name has none."""
     return {name: value for name in body.joint_names for key, value in angles.items() if name.endswith(key)}
-
-
-def _room_ahead(seat: Surface, at: FloatArray, heading: FloatArray) -> float:
-    """Distance from a place on a surface forward to its edge [m]."""
-    steps = np.linspace(0.0, 1.0, 201)
-    inside = seat.outside(at + steps[:, None] * heading) <= 1e-9
-    return float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
 
 
 LEANING = (0.25, 0.5, 0.75, 0.92)  # shares of the way of the centre of mass to the feet that have a posture

@@ -53,12 +53,6 @@ _TURNED = {"lumbar_rotation": 0.15, "thorax_rotation": 0.55, "left_hip_rotation"
 _TURNED_YAW = 0.4
 
 
-def stooping_cost(height: float) -> float:
-    """Cost of a metre at a height over stature, relative to upright walking; see the module."""
-    lost = max(0.0, 1.0 - height)
-    return 1.0 + 0.35 * lost + 3.25 * lost**2
-
-
 @dataclass(frozen=True, eq=False)
 class TrunkPosture:
     """One posture of the trunk and arms.
@@ -154,9 +148,9 @@ def _folded(body: BodyModel, q: FloatArray) -> Iterator[TrunkPosture]:
             found = _between(body, q, height=height, reference=q)
         if found is None:
             return
-        q = found
-        name = f"bent to {round(100 * share)} % of stature"
-        yield TrunkPosture.of(name, body, q, stooping_cost(share))
+        q, lost = found, 1.0 - share
+        cost = 1.0 + 0.35 * lost + 3.25 * lost**2  # see the module
+        yield TrunkPosture.of(f"bent to {round(100 * share)} % of stature", body, q, cost)
 
 
 def _between(
