@@ -33,6 +33,9 @@ from manikin.planning.contacts.transition import Momentum
 from manikin.runtime.requirement import Requirement, RequirementTable, Sense
 from manikin.scene import Proximity, Scene
 
+Contacts = Mapping[str, Contact]
+"""Contacts by their effectors."""
+
 _RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
 
@@ -160,7 +163,7 @@ class Stage:
             None where they can.
     """
 
-    contacts: Mapping[str, Contact]
+    contacts: Contacts
     q: FloatArray
     com: FloatArray
     min_duration: float
@@ -170,7 +173,7 @@ class Stage:
 
     @classmethod
     def of(
-        cls, body: BodyModel, contacts: Mapping[str, Contact], q: FloatArray, min_duration: float,
+        cls, body: BodyModel, contacts: Contacts, q: FloatArray, min_duration: float,
         com_room: tuple[float, float, float] = COM_ROOM, via: FloatArray | None = None,
         momentum: Momentum | None = None,
     ) -> "Stage":  # fmt: skip
@@ -306,9 +309,7 @@ def certify_plan(
     """
     model = model or ContactModel.of_body(body.mass)
     postures, proximity = _postures(plan), Proximity(body, scene)
-    measured, pairs = zip(
-        *(_measured(body, scene, proximity, item, model) for item in postures), strict=True
-    )  # fmt: skip
+    measured, pairs = zip(*(_measured(body, scene, proximity, item, model) for item in postures), strict=True)
     rows = []
     for (key, name, unit, sense, limit), values in zip(_QUANTITIES, zip(*measured, strict=True), strict=True):
         worst = int(np.argmax(values) if sense == "<=" else np.argmin(values))

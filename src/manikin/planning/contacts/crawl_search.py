@@ -19,7 +19,7 @@ from manikin.contact import Contact, point
 from manikin.kinematics import Placement, Preferences
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Extension
-from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage, onto_normal
 from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
@@ -207,7 +207,7 @@ class CrawlSearch:
         return f"cannot kneel down at {_text(middle)}: {reason}"
 
     def _got_up(
-        self, held: dict[str, Contact], feet: Mapping[str, Contact], lead: str, standing: FloatArray
+        self, held: dict[str, Contact], feet: Contacts, lead: str, standing: FloatArray
     ) -> "_Rise | str":
         """From four contacts onto two feet, the leading one first."""
         other = "left" if lead == "right" else "right"
@@ -265,7 +265,7 @@ class CrawlSearch:
 
     def _stepped(
         self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None,
-        contacts: Mapping[str, Contact], q: FloatArray,
+        contacts: Contacts, q: FloatArray,
     ) -> tuple[float, Stage, Stage] | str:  # fmt: skip
         """New place and stages of a limb that goes to a contact, where the way has it, or near there."""
         staying = {other: contact for other, contact in contacts.items() if other != name}
@@ -301,7 +301,7 @@ class CrawlSearch:
                 yield along, contact
 
     def _between(
-        self, staying: Mapping[str, Contact], name: str, ends: tuple[Contact, Contact],
+        self, staying: Contacts, name: str, ends: tuple[Contact, Contact],
         postures: tuple[FloatArray, FloatArray],
     ) -> FloatArray | None:  # fmt: skip
         """(nq,) posture in the middle of a flight, the limb off the line between its contacts."""
@@ -341,7 +341,7 @@ class CrawlSearch:
                 best = point(name, spot, friction=self._friction, rotation=frame)
         return best
 
-    def _guide(self, contacts: Mapping[str, Contact]) -> FloatArray:
+    def _guide(self, contacts: Contacts) -> FloatArray:
         """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
         knees, hands = _middles(contacts)
         ahead, q = hands - knees, np.array(self._reference)
@@ -353,7 +353,7 @@ class CrawlSearch:
         return q
 
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
+        self, held: Contacts, carrying: Contacts, start: FloatArray,
         wishes: Mapping[str, Placement] | None = None, *, guided: bool = False,
     ) -> Posed:  # fmt: skip
         """A posture that the strength can hold, palms flat and shanks level as far as they can be.
@@ -378,9 +378,7 @@ class CrawlSearch:
             first = first or posed
         return first or Posed(None)
 
-    def _held_easily(
-        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact]
-    ) -> Posed:
+    def _held_easily(self, posed: Posed, held: Contacts, carrying: Contacts) -> Posed:
         """The posture, or that a hand is not upright in it, or that it asks for too much of the strength."""
         if posed.q is not None:
             state = Configuration(self._body, posed.q)
@@ -391,7 +389,7 @@ class CrawlSearch:
         return within_strength(self._body, posed, carrying, EASE)
 
 
-def _middles(contacts: Mapping[str, Contact]) -> tuple[FloatArray, FloatArray]:
+def _middles(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
     """(3,) middles of the knees and of the fists [m]."""
     knees, fists = (
         np.mean([contact.position for name, contact in contacts.items() if name.endswith(part)], axis=0)
@@ -400,7 +398,7 @@ def _middles(contacts: Mapping[str, Contact]) -> tuple[FloatArray, FloatArray]:
     return knees, fists
 
 
-def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
+def _level(held: Contacts) -> dict[str, Placement]:
     """Wishes for shanks that are level and hands that are upright."""
     return {
         name: Placement(None, contact.rotation_contact_to_world, LEVEL[name.partition("_")[2]])

@@ -27,7 +27,7 @@ from manikin.kinematics import Placement
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
-from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 from manikin.planning.contacts.samples import LimbSamples
 
@@ -151,9 +151,7 @@ class LimbHolds:
         return self.samples.reach.residual((places - at) @ turn)
 
 
-def within_strength(
-    body: BodyModel, posed: Posed, carrying: Mapping[str, Contact], most: float = 1.0
-) -> Posed:
+def within_strength(body: BodyModel, posed: Posed, carrying: Contacts, most: float = 1.0) -> Posed:
     """The posture, or that resting on some contacts in it asks for more than a share of the strength."""
     if posed.q is None:
         return posed
@@ -556,7 +554,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._close((before, after))
 
     def _between(
-        self, staying: Mapping[str, Contact], lifting: FloatArray, landing: FloatArray,
+        self, staying: Contacts, lifting: FloatArray, landing: FloatArray,
         ends: tuple[Contact, Contact], move: tuple[State, State],
     ) -> FloatArray | None:  # fmt: skip
         """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
@@ -583,7 +581,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             yield middle + self.settings.lift * out / max(float(np.linalg.norm(out)), 1e-9)
 
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact],
+        self, held: Contacts, carrying: Contacts,
         guesses: Iterable[tuple[FloatArray, FloatArray]], key: tuple[object, ...],
         wishes: Mapping[str, Placement] | None = None,
     ) -> Posed:  # fmt: skip

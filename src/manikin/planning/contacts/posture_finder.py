@@ -19,6 +19,7 @@ from manikin.kinematics import (
     touching_pairs,
 )
 from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
 
 ROOT = 7  # numbers of a posture that are the pose of its root
@@ -74,7 +75,7 @@ class Posed:
     too_hard: bool = False
 
 
-def upright_points(held: Mapping[str, Contact]) -> dict[str, Placement]:
+def upright_points(held: Contacts) -> dict[str, Placement]:
     """Wishes for what touches at a point to stand upright on its surface, by effector."""
     return {
         name: Placement(None, contact.rotation_contact_to_world, 0.05)
@@ -110,7 +111,7 @@ class PostureFinder:
         self._touched: dict[Contact, tuple[str, ...]] = {}
 
     def pose(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
+        self, held: Contacts, carrying: Contacts, start: FloatArray,
         guide: FloatArray | None = None, *, place: FloatArray | None = None, inset: float | None = None,
         com_weight: float | None = None, restarts: bool = False,
         placements: Mapping[str, Placement] | None = None, preferences: Preferences | None = None,
@@ -160,9 +161,7 @@ class PostureFinder:
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
 
-    def resting_place(
-        self, carrying: Mapping[str, Contact], near: FloatArray, inset: float
-    ) -> FloatArray | None:
+    def resting_place(self, carrying: Contacts, near: FloatArray, inset: float) -> FloatArray | None:
         """(2,) place nearest to another where the centre of mass can rest on contacts; None without any.
 
         It keeps a distance ``inset`` to the edges of where it may rest [m].
@@ -179,14 +178,14 @@ class PostureFinder:
         wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
         return {self._root: wish}
 
-    def _touched_by(self, held: Mapping[str, Contact]) -> list[tuple[str, str]]:
+    def _touched_by(self, held: Contacts) -> list[tuple[str, str]]:
         """Effectors with what each touches."""
         for contact in held.values():
             if contact not in self._touched:
                 self._touched[contact] = self.scene.touched_obstacles(contact)
         return [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
 
-    def _beside(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
+    def _beside(self, held: Contacts) -> frozenset[tuple[str, str]]:
         """Pairs that may be as near as touching: shanks on their tips, and forearms at what hands hold."""
         wrists = {
             (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)

@@ -7,7 +7,7 @@ tried with the whole body.  The body leaves the seat at rest where it can lean u
 feet, else in motion (:mod:`.transition`), else with hands that push on armrests, a table or the seat.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
-from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage, onto_normal
 from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder
@@ -227,9 +227,7 @@ _Lean = tuple[FloatArray, Momentum | None] | str
 """Posture (nq,) in which a seat is left for the feet, with its motion, None at rest; or why not there."""
 
 
-def _leans(
-    poser: PostureFinder, start: Stage, held: Mapping[str, Contact], risen: FloatArray
-) -> Iterator[_Lean]:
+def _leans(poser: PostureFinder, start: Stage, held: Contacts, risen: FloatArray) -> Iterator[_Lean]:
     """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
     rest = Configuration(poser.body, risen).com
     over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSETS[-1])
@@ -260,9 +258,7 @@ def _leans(
     yield f"{lean}; at rest: {reason}" if isinstance(lean, str) else lean
 
 
-def _lean(
-    poser: PostureFinder, q: FloatArray, held: Mapping[str, Contact], rest: FloatArray, *, moving: bool
-) -> _Lean:
+def _lean(poser: PostureFinder, q: FloatArray, held: Contacts, rest: FloatArray, *, moving: bool) -> _Lean:
     """A posture with its motion to rest, where the joints are strong enough."""
     body, momentum = poser.body, None
     if moving:
@@ -276,9 +272,8 @@ def _lean(
 
 
 def _pushed_up(
-    poser: PostureFinder, start: Stage, pushing: Mapping[str, Contact], held: Mapping[str, Contact],
-    risen: FloatArray,
-) -> Leaving:  # fmt: skip
+    poser: PostureFinder, start: Stage, pushing: Contacts, held: Contacts, risen: FloatArray
+) -> Leaving:
     """Leave a seat with hands that push, until the weight is over the feet."""
     # The arms push until they are long: what is left to rise alone is as little as they let.
     failure = None
@@ -300,7 +295,7 @@ def _pushed_up(
 
 
 def _too_weak(
-    poser: PostureFinder, q: FloatArray, carrying: Mapping[str, Contact], momentum: Momentum | None = None
+    poser: PostureFinder, q: FloatArray, carrying: Contacts, momentum: Momentum | None = None
 ) -> str | None:
     """Message that the joints are too weak for a posture; None where they are not."""
     acceleration = None if momentum is None else momentum.acceleration
@@ -315,7 +310,7 @@ def _too_weak(
 
 def _rising(
     poser: PostureFinder, start: Stage,
-    changes: Sequence[tuple[Mapping[str, Contact], FloatArray, Momentum | None]], risen: FloatArray,
+    changes: Sequence[tuple[Contacts, FloatArray, Momentum | None]], risen: FloatArray,
 ) -> Leaving:  # fmt: skip
     """Stages that lean up to the first change and then have the contacts of each, up to standing."""
     body, stages, moving = poser.body, [start], changes[0][2] is not None

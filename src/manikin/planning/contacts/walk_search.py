@@ -22,7 +22,7 @@ from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
-from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.footholds import FEET, Foothold, Footholds, feet_of
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
@@ -255,9 +255,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return self._near[key]
 
     def _moved(
-        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
-        q: FloatArray,
-    ) -> "tuple[list[Stage], dict[str, Contact], _Step]":  # fmt: skip
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact], q: FloatArray
+    ) -> "tuple[list[Stage], dict[str, Contact], _Step]":
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
         first: _Step | None = None
         for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
@@ -268,9 +267,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return [], hands, first or _Step(None, None, f"{' and '.join(hands)} cannot be left")
 
     def _hands_before(
-        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
-        q: FloatArray,
-    ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:  # fmt: skip
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact], q: FloatArray
+    ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:
         """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
         standing = {foot.effector: foot for foot in feet}
         bare = self._left({**standing, **hands}, before, hands, q)
@@ -298,9 +296,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             else:
                 yield stages, held, at
 
-    def _left(
-        self, contacts: Mapping[str, Contact], place: _Place, hands: Mapping[str, Contact], q: FloatArray
-    ) -> list[Stage] | None:
+    def _left(self, contacts: Contacts, place: _Place, hands: Contacts, q: FloatArray) -> list[Stage] | None:
         """Stages in which hands leave one after the other; None where they cannot."""
         held, stages = dict(contacts), list[Stage]()
         for hand in hands:
@@ -312,13 +308,12 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             stages.append(self._reached(held, q))
         return stages
 
-    def _reached(self, contacts: Mapping[str, Contact], q: FloatArray) -> Stage:
+    def _reached(self, contacts: Contacts, q: FloatArray) -> Stage:
         return Stage.of(self.poser.body, contacts, q, self.settings.reach_duration)
 
     def _step(
-        self, feet: Sequence[Contact], before: _Place, after: _Place, q: FloatArray,
-        hands: Mapping[str, Contact],
-    ) -> "_Step":  # fmt: skip
+        self, feet: Sequence[Contact], before: _Place, after: _Place, q: FloatArray, hands: Contacts
+    ) -> "_Step":
         """Postures in which a foot leaves one place and lands on another, the other one stands."""
         leaving, standing, landing = feet
         carrying = {standing.effector: standing, **hands}
@@ -329,9 +324,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         why = f"{landing.effector} cannot be put down: {landed.reason}"
         return _Step(lifted.q, landed.q, why if landed.q is None else "", landed.too_hard)
 
-    def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: _Place, q: FloatArray
-    ) -> Posed:
+    def _posed(self, held: Contacts, carrying: Contacts, place: _Place, q: FloatArray) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
         key = frozenset(map(id, held.values())), frozenset(carrying), place.trunk
         if key in self._postures:
@@ -349,9 +342,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return posed
 
     def _easier(
-        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact],
-        flat: Mapping[str, Placement],
-    ) -> Posed:  # fmt: skip
+        self, posed: Posed, held: Contacts, carrying: Contacts, flat: Mapping[str, Placement]
+    ) -> Posed:
         """A posture that the joints can hold at rest: the given one, or one near it that asks for less.
 
         Each move is the shortest that keeps contacts and joint ranges and takes the share of the strength to
