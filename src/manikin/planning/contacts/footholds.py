@@ -59,7 +59,11 @@ class Foothold:
     surface: int = -1
 
 
-def feet_of(contacts: Mapping[str, Contact]) -> tuple[Foothold, Foothold]:
+Feet = tuple[Foothold, Foothold]
+"""Left and right foothold."""
+
+
+def feet_of(contacts: Mapping[str, Contact]) -> Feet:
     """Left and right foothold of contacts that are given."""
     left, right = (contacts[foot] for foot in FEET)
     turns = left.rotation_contact_to_world, right.rotation_contact_to_world

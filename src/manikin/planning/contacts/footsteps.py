@@ -11,7 +11,7 @@ footholds has postures, closes one without with :meth:`FootstepSearch.close`, an
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise, product
 
 import coal
@@ -23,7 +23,7 @@ from scipy.spatial import cKDTree
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import Graph
-from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.planning.contacts.footholds import Feet, Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import collision_parts, local_box
 
@@ -66,38 +66,32 @@ class _Node:
     ends: bool = False
 
 
-@dataclass
 class FootstepSearch:
     """Search for footsteps of one body in one scene.
 
     Attributes:
-        scene: What is around.
-        footholds: Finds footholds.
-        start: Left and right foothold at the start.
-        goal: At the goal.
         holds: All footholds, by their numbers; the first four are those of start and goal.
-        scale: Size of the body relative to one of 1.75 m.
-        reach: Places of one foot relative to the other that the body reaches.
-        pair_cost: Cost of the body between two footholds, left and right [s]; infinite where it has no room.
-        column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
-        stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
-        highest: Largest difference in height of two soles, of a body of 1.75 m [m].
+        expanded: Footholds from which steps were tried.
     """
 
-    scene: Scene
-    footholds: Footholds
-    start: tuple[Foothold, Foothold]
-    goal: tuple[Foothold, Foothold]
-    scale: float
-    reach: StepReach
-    pair_cost: Callable[[Foothold, Foothold], float]
-    column: tuple[float, float, float]
-    stride: float = 0.4
-    highest: float = HIGHEST
-    expanded: int = field(init=False, default=0)
+    def __init__(
+        self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet, scale: float, reach: StepReach,
+        pair_cost: Callable[[Foothold, Foothold], float], column: tuple[float, float, float], stride: float,
+        highest: float,
+    ) -> None:  # fmt: skip
+        """Prepare a search.
 
-    def __post_init__(self) -> None:
-        self.holds = [*self.start, *self.goal]
+        Args:
+            scale: Size of the body relative to one of 1.75 m.
+            reach: Places of one foot relative to the other that the body reaches.
+            pair_cost: Cost of the body between two footholds, left and right [s]; infinite without room.
+            column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
+            stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
+            highest: Largest difference in height of two soles, of a body of 1.75 m [m].
+        """
+        self._footholds, self._scale, self._reach, self._pair_cost = footholds, scale, reach, pair_cost
+        self._stride, self._highest, self.expanded = stride, highest, 0
+        self.holds = [*start, *goal]
         self._keys: dict[tuple[int, ...], int] = {}
         self._free: dict[int, bool] = dict.fromkeys(range(4), True)
         self._pairs: dict[tuple[int, int], float] = {}
@@ -105,12 +99,10 @@ class FootstepSearch:
         self._closed: set[tuple[int, int]] = set()
         self._refused: list[tuple[FloatArray, FloatArray]] = []
         self._too_hard: list[FloatArray] = []
-        self._offsets = _offsets(self.scale)
+        self._offsets = _offsets(scale)
         self._first_greed = self._ways = 0
-        self._field = _Field(
-            self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale,
-            (HIGHEST * self.scale, self.highest * self.scale),
-        )  # fmt: skip
+        heights = HIGHEST * scale, highest * scale
+        self._field = _Field(scene, footholds, start, goal, column, stride * scale, heights)
         places = np.array([hold.position for hold in self.holds])
         yaws = np.array([hold.yaw for hold in self.holds])
         self._ahead: list[float] = self._field.costs(places, yaws).tolist()
@@ -191,9 +183,9 @@ class FootstepSearch:
         if pair not in self._pairs:
             both = [self.holds[number] for number in pair]
             if node.hold not in self._free:
-                self._free[node.hold] = self.footholds.is_free(both[1])
+                self._free[node.hold] = self._footholds.is_free(both[1])
             left, right = both if parent.side > 0 else both[::-1]
-            self._pairs[pair] = self.pair_cost(left, right) if self._free[node.hold] else math.inf
+            self._pairs[pair] = self._pair_cost(left, right) if self._free[node.hold] else math.inf
         return self._pairs[pair]
 
     def _is_refused(self, stand: int, step: int) -> bool:
@@ -217,7 +209,7 @@ class FootstepSearch:
         places = stand.position[:2] + ahead[:, None] * turn + across[:, None] * side
         yaws = stand.yaw + out * turns
         goal = 3 if node.side > 0 else 2
-        found = self.footholds.lay(places, yaws, float(stand.position[2]), self.highest * self.scale)
+        found = self._footholds.lay(places, yaws, float(stand.position[2]), self._highest * self._scale)
         ends = self.holds[goal]
         costs = self._step_costs(
             stand, out,
@@ -238,7 +230,7 @@ class FootstepSearch:
         for row, label in zip(rows.tolist(), map(tuple, keys.tolist()), strict=True):
             number = self._keys.setdefault(label, len(self.holds))
             if number == len(self.holds):
-                self.holds.append(self.footholds.hold(found, row))
+                self.holds.append(self._footholds.hold(found, row))
                 fresh.append(row)
             # A place close by stands for the one that was asked for.
             steps[number] = min(steps.get(number, math.inf), float(costs[1 + row]))
@@ -254,13 +246,13 @@ class FootstepSearch:
         c, s = math.cos(stand.yaw), math.sin(stand.yaw)
         ahead, aside = c * away[:, 0] + s * away[:, 1], out * (c * away[:, 1] - s * away[:, 0])
         turned = out * (np.mod(yaws - stand.yaw + math.pi, 2.0 * math.pi) - math.pi)
-        rise, size = np.abs(away[:, 2]), self.scale
+        rise, size = np.abs(away[:, 2]), self._scale
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
         apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
-        made = self.reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
-        made &= (rise <= self.highest * size) & (turned >= -0.8) & (turned <= 1.1)
+        made = self._reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
+        made &= (rise <= self._highest * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
-        cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
+        cost = STEP * (1.0 + (way / (EASY * self._stride * size)) ** 4)
         steep = 8.0 * np.maximum(0.0, rise - 0.2 * size)
         cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + 3.0 * (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
@@ -286,9 +278,8 @@ class _Field:
     """Cost to the goal over cells of the ground, for a thin column in place of the body."""
 
     def __init__(
-        self, scene: Scene, footholds: Footholds, start: tuple[Foothold, Foothold],
-        goal: tuple[Foothold, Foothold], column: tuple[float, float, float], stride: float,
-        highest: tuple[float, float], gap: float = GAP,
+        self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet,
+        column: tuple[float, float, float], stride: float, highest: tuple[float, float], gap: float = GAP,
     ) -> None:  # fmt: skip
         easy, self._highest = highest
         ends = np.array([hold.position for hold in (*start, *goal)])
@@ -388,8 +379,8 @@ class _Field:
 
 
 def low_way(
-    scene: Scene, footholds: Footholds, ends: tuple[tuple[Foothold, Foothold], tuple[Foothold, Foothold]],
-    low: tuple[float, float, float], high: tuple[float, float, float],
+    scene: Scene, footholds: Footholds, ends: tuple[Feet, Feet], low: tuple[float, float, float],
+    high: tuple[float, float, float],
 ) -> tuple[FloatArray, np.ndarray] | None:  # fmt: skip
     """Way over the ground for a body that crawls, straight where it can be.
 

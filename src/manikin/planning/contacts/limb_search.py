@@ -558,27 +558,21 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         ends: tuple[Contact, Contact], move: tuple[State, State],
     ) -> FloatArray | None:  # fmt: skip
         """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
-        before, after = ends
+        (before, after), lift = ends, self.settings.lift
         middle = 0.5 * (before.position + after.position)
-        start = np.concatenate(
-            [0.5 * (lifting[:3] + landing[:3]), landing[3:7], 0.5 * (lifting + landing)[7:]]
-        )
-        for number, place in enumerate(self._off_the_line(middle, before, after, start[:3])):
-            wish = {before.effector: Placement(place, None, None, 0.5 / self.settings.lift**2)}
+        start = 0.5 * (lifting + landing)
+        start[3:7] = landing[3:7]
+        # What stands out of a wall is passed on the body's side.
+        inward = (start[:3] - middle) * [1.0, 1.0, 0.0]
+        inward /= max(float(np.linalg.norm(inward)), 1e-9)
+        for number, share in enumerate((0.7, 0.0, 2.0)):
+            out = 0.5 * (before.normal + after.normal) + share * inward
+            place = middle + lift * out / max(float(np.linalg.norm(out)), 1e-9)
+            wish = {before.effector: Placement(place, None, None, 0.5 / lift**2)}
             posed = self._posed(staying, staying, self._guesses(start[:7], start), (*move, number), wish)
             if posed.q is not None:
                 return posed.q
         return None
-
-    def _off_the_line(
-        self, middle: FloatArray, before: Contact, after: Contact, root: FloatArray
-    ) -> Iterator[FloatArray]:
-        """Places for a limb in flight: what stands out of a wall is passed on the body's side."""
-        inward = (root - middle) * [1.0, 1.0, 0.0]
-        inward /= max(float(np.linalg.norm(inward)), 1e-9)
-        for share in (0.7, 0.0, 2.0):
-            out = 0.5 * (before.normal + after.normal) + share * inward
-            yield middle + self.settings.lift * out / max(float(np.linalg.norm(out)), 1e-9)
 
     def _posed(
         self, held: Contacts, carrying: Contacts,
