@@ -87,13 +87,15 @@ class SurfaceTable:
         self.offsets = np.array([item.polygon[0] @ item.normal for item in surfaces])
         self._low = np.array([item.polygon.min(axis=0) for item in surfaces]).reshape(-1, 3)
         self._high = np.array([item.polygon.max(axis=0) for item in surfaces]).reshape(-1, 3)
-        self._group_surfaces()
         walls = [_walls(item) for item in surfaces]
         self._convex = np.array([item is not None for item in walls], dtype=bool)
-        self._walls, self._wall_offsets = _padded(walls)
-
-    def _group_surfaces(self) -> None:
-        """Sort surfaces by their normals, of which the faces of boxes have few, and bound them sideways."""
+        # Missing walls hold everything inside.
+        most = max((len(item[1]) for item in walls if item is not None), default=1)
+        self._walls, self._wall_offsets = np.zeros((len(walls), most, 3)), np.full((len(walls), most), np.inf)
+        for number, item in enumerate(walls):
+            if item is not None:
+                self._walls[number, : len(item[1])], self._wall_offsets[number, : len(item[1])] = item
+        # Of normals the faces of boxes have few; sideways the surfaces are bounded.
         rounded = np.round(self.normals, 9)
         _, first, group = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
         self.group: IntArray = group.ravel()
@@ -246,13 +248,3 @@ def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:
     offsets = np.einsum("ei,ei->e", out, corners)
     convex = bool((corners @ out.T <= offsets + 1e-9 * max(1.0, float(np.abs(corners).max()))).all())
     return (out, offsets) if convex else None
-
-
-def _padded(walls: Sequence[tuple[FloatArray, FloatArray] | None]) -> tuple[FloatArray, FloatArray]:
-    """Walls of all surfaces in one array (m, e, 3), (m, e); missing ones hold everything inside."""
-    most = max((len(item[1]) for item in walls if item is not None), default=1)
-    normals, offsets = np.zeros((len(walls), most, 3)), np.full((len(walls), most), np.inf)
-    for number, item in enumerate(walls):
-        if item is not None:
-            normals[number, : len(item[1])], offsets[number, : len(item[1])] = item
-    return normals, offsets

@@ -119,9 +119,27 @@ class Endpoints:
 
         The buttocks are on the lowest seat there on which it can, at the place or before it.
         """
+        reasons: list[str] = []
+        for contacts, guess in self._sittings(at, heading, height):
+            # A body that sits has its weight where its upright trunk puts it, not over the root.
+            place = Configuration(self._body, guess).com[:2]
+            posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
+            if posed.q is None:
+                reasons.append(posed.reason)
+                continue
+            start = Stage.of(self._body, contacts, posed.q, SITTING_TIME)
+            leaving = leave_seat(self._poser, start, frozenset(FEET))
+            if leaving.failure is None:
+                return Endpoint(start)
+            reasons.append(leaving.failure)
+        nothing = "there is no surface at the height of a seat with room for both feet before it"
+        why = "; ".join(dict.fromkeys([reasons[0], reasons[-1]])) if reasons else nothing
+        return Endpoint(None, f"no posture seated at {np.round(at, 3).tolist()} m: {why}")
+
+    def _sittings(self, at: FloatArray, heading: float, height: float | None) -> Iterator[Sitting]:
+        """Ways to sit on each seat, the lowest first; then each with hands that push, where they can."""
         low, high = (share * self._stature for share in SEAT_HEIGHTS)
         sitter = Sitter(self._body, self._footholds, self._friction, rolls=self._rolls)
-        reasons: list[str] = []
         # Below the seat there may be no floor: it is looked for where the feet may be.
         forward = self._stature * rotation_from_yaw(heading)[:2, 0]
         ahead = [at + distance * forward for distance in FEET_BEFORE_SEAT]
@@ -130,35 +148,14 @@ class Endpoints:
                 if not low <= level - floor <= high:
                     continue
                 sittings = list(sitter.sittings(np.array([*at, level]), heading, seat, floor))
-                for contacts, guess in self._with_hands(sittings):
-                    result = self._sat(contacts, guess)
-                    if result.stage is not None:
-                        return result
-                    reasons.append(result.failure or "")
-        nothing = "there is no surface at the height of a seat with room for both feet before it"
-        why = "; ".join(dict.fromkeys([reasons[0], reasons[-1]])) if reasons else nothing
-        return Endpoint(None, f"no posture seated at {np.round(at, 3).tolist()} m: {why}")
-
-    def _with_hands(self, sittings: list[Sitting]) -> Iterator[Sitting]:
-        """Each way to sit, then each with hands that push, where they can."""
-        yield from sittings
-        for contacts, guess in sittings:
-            hands = hand_supports(
-                self._scene, contacts["buttocks"], self._stature, self._friction, self._footholds.steepest
-            )
-            if hands:
-                yield {**contacts, **hands}, guess
-
-    def _sat(self, contacts: dict[str, Contact], guess: FloatArray) -> Endpoint:
-        """A way to sit with its posture, where the body can rise from it."""
-        # A body that sits has its weight where its upright trunk puts it, not over the root.
-        place = Configuration(self._body, guess).com[:2]
-        posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
-        if posed.q is None:
-            return Endpoint(None, posed.reason)
-        start = Stage.of(self._body, contacts, posed.q, SITTING_TIME)
-        leaving = leave_seat(self._poser, start, frozenset(FEET))
-        return Endpoint(None, leaving.failure) if leaving.failure is not None else Endpoint(start)
+                yield from sittings
+                for contacts, guess in sittings:
+                    hands = hand_supports(
+                        self._scene, contacts["buttocks"], self._stature, self._friction,
+                        self._footholds.steepest,
+                    )  # fmt: skip
+                    if hands:
+                        yield {**contacts, **hands}, guess
 
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""

@@ -93,11 +93,7 @@ class Footholds:
         self, body: BodyModel, scene: Scene, size: tuple[float, float] | None = None,
         steepest: float = STEEPEST,
     ) -> None:  # fmt: skip
-        """Prepare a scene.
-
-        Args:
-            size: Length and width of the soles [m]; the body's when omitted.
-            steepest: Largest slope of a surface to stand on [rad].
+        """Prepare a scene; the size of the soles is the body's when omitted.
 
         Raises:
             ContactError: If the body has no soles.

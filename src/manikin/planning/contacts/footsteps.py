@@ -263,13 +263,10 @@ class FootstepSearch:
 def _offsets(scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(k,) ways ahead and across [m] and turns [rad] of steps; the farther one goes, the less one turns."""
     rows = [
-        (ahead, across, turn)
-        for ahead, across, turn in product(ALONG, ACROSS, TURNS)
-        if (abs(turn) < 0.3 or ahead <= 0.3)
-        and (across < 0.3 or (abs(ahead) <= 0.15 and abs(turn) < 0.3))
-        and (across > 0.16 or turn >= 0.0)
-        and (ahead >= 0.0 or abs(turn) < 0.3)
-    ]
+        (ahead, across, turn) for ahead, across, turn in product(ALONG, ACROSS, TURNS)
+        if (abs(turn) < 0.3 or ahead <= 0.3) and (across < 0.3 or (abs(ahead) <= 0.15 and abs(turn) < 0.3))
+        and (across > 0.16 or turn >= 0.0) and (ahead >= 0.0 or abs(turn) < 0.3)
+    ]  # fmt: skip
     ahead, across, turns = np.array(rows).T
     return scale * ahead, scale * across, turns
 

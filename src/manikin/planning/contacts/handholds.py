@@ -38,12 +38,7 @@ class Handholds:
     """
 
     def __init__(self, body: BodyModel, scene: Scene, friction: float, max_force: float = 400.0) -> None:
-        """Prepare a scene.
-
-        Args:
-            friction: Coulomb coefficient of palms.
-            max_force: Largest force of a grasp along each axis [N].
-        """
+        """Prepare a scene, with a Coulomb coefficient of palms and a largest force of grasps by axis [N]."""
         self._size, self._friction, self._force = stature_of(body) / 1.75, friction, max_force
         self._bars = scene.grasp_lines
         self._level = [item for item in scene.surfaces_facing((0.0, 0.0, 1.0), LEVEL) if len(item.polygon)]

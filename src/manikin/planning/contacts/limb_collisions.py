@@ -194,11 +194,7 @@ class DeepSamples:
     def __init__(
         self, body: BodyModel, chain: LimbKinematics, samples: LimbSamples, collisions: LimbCollisions
     ) -> None:
-        """Place the balls of all samples.
-
-        Args:
-            collisions: Its exact collision test, whose pairs these are.
-        """
+        """Place the balls of all samples; the pairs are those of the limb's exact collision test."""
         self._collisions = collisions
         self._centres, radii, shapes = _balls(body, chain, samples.angles, collisions.soft)
         self.shapes = frozenset(shapes)

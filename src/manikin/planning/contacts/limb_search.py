@@ -536,10 +536,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
         """Poses (7,) of the root, with postures (nq,): as it should be, as it is, and farther back.
 
-        Farther from what a climber holds on to, knees that bend have room before them.
-
-        Args:
-            landing: A limb that reaches for a contact from there.
+        Farther from what a climber holds on to, knees that bend have room before them.  A limb that lands
+        reaches for its contact from there.
         """
         back, roots = pin.XYZQUATToSE3(guide).rotation[:, 0], [guide]
         if self.settings.retreats:
@@ -581,8 +579,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     ) -> Posed:  # fmt: skip
         """A posture whose points stand upright on their surfaces, as far as they can; looked for once.
 
-        Args:
-            guesses: Poses (7,) of the root to be near, each with a posture (nq,) to begin with.
+        It is near one of some poses (7,) of the root, each with a posture (nq,) to begin with.
         """
         if key not in self._postures:
             posed, placements = Posed(None), {**upright_points(held), **(wishes or {})}

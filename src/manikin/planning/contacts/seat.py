@@ -133,9 +133,7 @@ class Sitter:
     def _compared(self, height: float, room: float) -> list[tuple[float, float]]:
         """Way of the buttocks forward and place of the soles before them [m], the cheapest first.
 
-        Args:
-            height: Of the seat above the floor [m].
-            room: From the wanted place forward to the seat's edge [m].
+        The seat has a height above the floor, and room from the wanted place forward to its edge [m].
         """
         size, (toes, ankle) = self.stature, self._sole
         forward, slope = (axis.ravel() for axis in np.meshgrid(FORWARD * size, SLOPES, indexing="ij"))

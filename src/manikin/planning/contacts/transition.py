@@ -63,7 +63,6 @@ def momentum_to_rest(staying: Stance, mass: float, com: FloatArray, rest: FloatA
     """Slowest motion with which contacts may be left at ``com``, to come to rest on the others.
 
     Args:
-        staying: Contacts that stay.
         mass: Of the body [kg].
         com: (3,) centre of mass at the start [m].
         rest: (3,) where it comes to rest, in balance there [m].

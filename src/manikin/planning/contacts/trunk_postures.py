@@ -239,7 +239,6 @@ class TrunkClearance:
     """
 
     def __init__(self, postures: TrunkPostures, scene: Scene, margin: float = 0.015) -> None:
-        """Prepare a scene."""
         self.postures, self.margin = postures, margin
         self._parts = parts = tuple(part for item in scene for part in collision_parts(item))
         self._placed = [coal.Transform3s(part.rotation, part.translation) for part in parts]

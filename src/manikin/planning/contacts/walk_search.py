@@ -88,7 +88,6 @@ class BodyRoom:
     """Room for the trunk of a body between its feet, in one of a few postures."""
 
     def __init__(self, body: BodyModel, scene: Scene) -> None:
-        """Prepare a scene."""
         self._postures = TrunkPostures.of(body)
         self._clearance = TrunkClearance(self._postures, scene)
         self._costs = self._postures.costs - 1.0
