@@ -8,7 +8,7 @@ same backwards, as every posture at rest is at rest backwards as well.
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -155,7 +155,7 @@ class CrawlSearch:
             crawl = self._on_hands_and_knees(way, down, up, gait)
             if not isinstance(crawl, str):
                 # The crawl begins with the stage that kneeling down ends with.
-                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages]
+                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages[1:]]
                 return self._joined(before, crawled, behind)
             reason = reason or crawl
         return reason
@@ -200,24 +200,23 @@ class CrawlSearch:
         for (base, behind), lead in product(KNEELING, ("right", "left")):
             at = along + behind * self._size
             held = self._contacts(way, (at, at + base * self._size))
-            rise = held if isinstance(held, str) else self._got_up(held, feet, lead, standing.q)
-            if isinstance(rise, _Rise):
-                return replace(rise, along=at, base=base * self._size)
-            reason = reason or rise
+            stages = held if isinstance(held, str) else self._got_up(held, feet, lead)
+            if not isinstance(stages, str):
+                return _Rise(stages, standing.q, at, base * self._size)
+            reason = reason or stages
         return f"cannot kneel down at {_text(middle)}: {reason}"
 
-    def _got_up(
-        self, held: dict[str, Contact], feet: Contacts, lead: str, standing: FloatArray
-    ) -> "_Rise | str":
+    def _got_up(self, held: dict[str, Contact], feet: Contacts, lead: str) -> list[Stage] | str:
         """From four contacts onto two feet, the leading one first."""
         other = "left" if lead == "right" else "right"
-        posed = self._posed(held, held, self._guide(held), guided=True)
-        stages: list[Stage] = []
+        posed, stages = self._posed(held, held, self._guide(held), guided=True), list[Stage]()
+        if posed.q is not None:
+            stages = [Stage.of(self._body, held, posed.q, self._settings.shift_duration)]
         changes = [
             (f"{lead}_knee", None), (None, f"{lead}_foot"), (f"{other}_knee", None), (None, f"{other}_foot"),
             ("left_fist", None), ("right_fist", None),
         ]  # fmt: skip
-        contacts, first = dict(held), posed.q
+        contacts = dict(held)
         for leaving, landing in changes:
             after = {name: contact for name, contact in contacts.items() if name != leaving}
             if landing is not None:
@@ -231,9 +230,7 @@ class CrawlSearch:
             contacts = after
             time = TURNING if len(after) == 3 and landing is None else self._settings.reach_duration
             stages.append(Stage.of(self._body, contacts, posed.q, time))
-        assert first is not None
-        kneeling = Stage.of(self._body, held, first, self._settings.shift_duration)
-        return _Rise(kneeling, tuple(stages), standing)
+        return stages
 
     # --- on hands and knees -----------------------------------------------------------------------
 
@@ -242,8 +239,8 @@ class CrawlSearch:
     ) -> list[Stage] | str:
         """Stages from one place on hands and knees to another, or why there are none."""
         stride, base = (self._size * value for value in gait)
-        total, contacts, q = up.along - down.along, dict(down.kneeling.contacts), down.kneeling.q
-        stages = [down.kneeling]
+        stages, goal = down.stages[:1], up.stages[0].contacts
+        total, contacts, q = up.along - down.along, dict(stages[0].contacts), stages[0].q
         begin = {"knee": down.along, "fist": down.along + base}
         end = {"knee": up.along, "fist": up.along + up.base}
         reached = {name: down.along + down.base * name.endswith("fist") for name in ORDER}
@@ -251,7 +248,7 @@ class CrawlSearch:
             name = ORDER[number % 4]
             part = name.partition("_")[2]
             ahead = begin[part] + 0.25 * (number + 1) * stride
-            target = up.kneeling.contacts[name] if ahead >= end[part] else None
+            target = goal[name] if ahead >= end[part] else None
             if contacts[name] is not target:
                 step = self._stepped(way, name, (reached[name], min(ahead, end[part])), target, contacts, q)
                 if isinstance(step, str):
@@ -259,7 +256,7 @@ class CrawlSearch:
                 reached[name], *made = step
                 stages += made
                 q, contacts = made[-1].q, dict(made[-1].contacts)
-            if all(contacts[each] is up.kneeling.contacts[each] for each in ORDER):
+            if all(contacts[each] is goal[each] for each in ORDER):
                 return stages
         return "does not arrive on hands and knees"
 
@@ -413,21 +410,17 @@ class _Rise:
     The knees are at ``along`` on the way, the hands ``base`` before them [m].
     """
 
-    kneeling: Stage
-    stages: tuple[Stage, ...]
+    stages: list[Stage]
     q: FloatArray
-    along: float = 0.0
-    base: float = 0.0
+    along: float
+    base: float
 
 
 def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
     """Kneeling down: the stages of getting up in the other order of time."""
-    stages = [rise.kneeling, *rise.stages]
-    begins = [*(stage.q for stage in stages[1:]), rise.q]
-    return [
-        Stage.of(body, stage.contacts, q, stage.min_duration)
-        for stage, q in zip(reversed(stages), reversed(begins), strict=True)
-    ]
+    begins = [*(stage.q for stage in rise.stages[1:]), rise.q]
+    stages = zip(reversed(rise.stages), reversed(begins), strict=True)
+    return [Stage.of(body, stage.contacts, q, stage.min_duration) for stage, q in stages]
 
 
 def _text(place: FloatArray) -> str:

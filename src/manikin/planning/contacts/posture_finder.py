@@ -94,7 +94,7 @@ class PostureFinder:
         self, body: BodyModel, scene: Scene, reference: FloatArray | None = None,
         settings: PostureFinderSettings | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a scene; postures are like a reference (nq,), or standing, where the task leaves freedom."""
+        """Prepare a scene; postures are like a reference (nq,), or standing, where there is freedom."""
         self.body, self._root = with_root(body)
         self.scene, self._reference = scene, reference
         self.settings = settings or PostureFinderSettings()
