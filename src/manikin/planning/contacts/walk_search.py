@@ -201,16 +201,17 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if leaving.same_place(landing):
                 continue
             before, after = (replace(places[j], trunk=trunks[j]) for j in (k, k + 1))
-            changes, held, step = self._moved((leaving, standing, landing), before, after, hands, q)
-            if step.lifted is None or step.landed is None:
-                first = k if step.lifted is None else k + 1
-                return self._refuse(way[first], way[first + 1], step.reason, too_hard=step.too_hard)
+            feet_moved = leaving, standing, landing
+            changes, held, start, landed = self._moved(feet_moved, before, after, hands, q)
+            if start is None or landed.q is None:
+                first = k if start is None else k + 1
+                return self._refuse(way[first], way[first + 1], landed.reason, too_hard=landed.too_hard)
             flight = self.settings.flight(leaving, landing)
-            lifted = Stage.of(body, {standing.effector: standing, **held}, step.lifted, flight)
+            lifted = Stage.of(body, {standing.effector: standing, **held}, start, flight)
             both = {standing.effector: standing, landing.effector: landing, **held}
-            stages += [*changes, lifted, Stage.of(body, both, step.landed, self.settings.shift_duration)]
+            stages += [*changes, lifted, Stage.of(body, both, landed.q, self.settings.shift_duration)]
             self._moves += [(way[k + 1], way[k + 2])] * (2 + len(changes))
-            q, hands = step.landed, held
+            q, hands = landed.q, held
         if hands:
             left = self._left(stages[-1].contacts, places[-1], hands, q)
             if left is None:
@@ -255,15 +256,15 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _moved(
         self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact], q: FloatArray
-    ) -> "tuple[list[Stage], dict[str, Contact], _Step]":
+    ) -> tuple[list[Stage], dict[str, Contact], FloatArray | None, Posed]:
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
-        first: _Step | None = None
+        failed: tuple[FloatArray | None, Posed] | None = None
         for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
-            step = self._step(feet, before, after, start, held)
-            if step.landed is not None:
-                return changes, held, step
-            first = first or step
-        return [], hands, first or _Step(None, None, f"{' and '.join(hands)} cannot be left")
+            lifted, landed = self._step(feet, before, after, start, held)
+            if landed.q is not None:
+                return changes, held, lifted, landed
+            failed = failed or (lifted, landed)
+        return [], hands, *(failed or (None, Posed(None, f"{' and '.join(hands)} cannot be left")))
 
     def _hands_before(
         self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact], q: FloatArray
@@ -312,16 +313,15 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _step(
         self, feet: Sequence[Contact], before: _Place, after: _Place, q: FloatArray, hands: Contacts
-    ) -> "_Step":
+    ) -> tuple[FloatArray | None, Posed]:
         """Postures in which a foot leaves one place and lands on another, the other one stands."""
         leaving, standing, landing = feet
         carrying = {standing.effector: standing, **hands}
         lifted = self._posed({leaving.effector: leaving, **carrying}, carrying, before, q)
         if lifted.q is None:
-            return _Step(None, None, f"{leaving.effector} cannot be lifted: {lifted.reason}", lifted.too_hard)
+            return None, replace(lifted, reason=f"{leaving.effector} cannot be lifted: {lifted.reason}")
         landed = self._posed({**carrying, landing.effector: landing}, carrying, after, lifted.q)
-        why = f"{landing.effector} cannot be put down: {landed.reason}"
-        return _Step(lifted.q, landed.q, why if landed.q is None else "", landed.too_hard)
+        return lifted.q, replace(landed, reason=f"{landing.effector} cannot be put down: {landed.reason}")
 
     def _posed(self, held: Contacts, carrying: Contacts, place: _Place, q: FloatArray) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
@@ -382,13 +382,3 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
             return Posed(None, why, too_hard=True)
         return Posed(q)
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Postures as a foot leaves and lands, as far as there are any, and why not."""
-
-    lifted: FloatArray | None
-    landed: FloatArray | None
-    reason: str = ""
-    too_hard: bool = False
