@@ -96,8 +96,7 @@ class SurfaceTable:
             if item is not None:
                 self._walls[number, : len(item[1])], self._wall_offsets[number, : len(item[1])] = item
         # Of normals the faces of boxes have few; sideways the surfaces are bounded.
-        rounded = np.round(self.normals, 9)
-        _, first, group = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        _, first, group = np.unique(np.round(self.normals, 9), axis=0, return_index=True, return_inverse=True)
         self.group: IntArray = group.ravel()
         sides = np.array([self.surfaces[number].rotation[:, :2].T for number in first]).reshape(-1, 2, 3)
         self.frames = np.concatenate([self.normals[first][:, None], sides], axis=1)
@@ -242,8 +241,7 @@ def _near_planes(
 def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:
     """Outward normals (e, 3) and offsets (e,) of a convex polygon's edges, or None if it is not convex."""
     corners = surface.polygon
-    edges = np.roll(corners, -1, axis=0) - corners
-    out = np.cross(edges, surface.normal)
+    out = np.cross(np.roll(corners, -1, axis=0) - corners, surface.normal)
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     offsets = np.einsum("ei,ei->e", out, corners)
     convex = bool((corners @ out.T <= offsets + 1e-9 * max(1.0, float(np.abs(corners).max()))).all())

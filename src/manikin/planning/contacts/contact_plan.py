@@ -331,8 +331,7 @@ def _measured(
             moved, turned = contact.rolled_away(rotation, position)
             turn = max(turn, turned)
         elif contact.kind is ContactKind.SOLE:
-            off = rotation.T @ contact.rotation_contact_to_world
-            turn = max(turn, float(np.linalg.norm(pin.log3(off))))
+            turn = max(turn, float(np.linalg.norm(pin.log3(rotation.T @ contact.rotation_contact_to_world))))
         error = max(error, moved)
     touched = [(contact.effector, name) for contact in item.held for name in scene.touched_obstacles(contact)]
     near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched) - pairs_beside(body, touched))

@@ -73,8 +73,7 @@ def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
         held[name] = point(name, place, friction=1.0, rotation=np.eye(3))
     ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * ROOM + 0.5))
     finder = PostureFinder(body, Scene([ceiling]), q, settings)
-    at = np.zeros(2)
-    return finder.pose(held, held, q, place=at, placements=_level(held), preferences=_PREFERENCES)
+    return finder.pose(held, held, q, place=np.zeros(2), placements=_level(held), preferences=_PREFERENCES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,8 +304,7 @@ class CrawlSearch:
         middle = 0.5 * (ends[0].position + ends[1].position) + LIFT * ends[1].normal
         start = 0.5 * (postures[0] + postures[1])
         start[3:7] = postures[1][3:7]
-        wish = {name: Placement(middle, None, None, 0.5 / LIFT**2)}
-        return self._posed(staying, staying, start, wish).q
+        return self._posed(staying, staying, start, {name: Placement(middle, None, None, 0.5 / LIFT**2)}).q
 
     # --- contacts and postures --------------------------------------------------------------------
 

@@ -244,8 +244,7 @@ class ContactGenerator:
             tolerance=self.settings.tolerance, max_tilt=self.settings.max_tilt, footprint=reached.footprint,
         )  # fmt: skip
         if reached.kind is ContactKind.GRASP and len(candidates):
-            palms = self._scene.palms(candidates.surfaces, candidates.points)
-            candidates = replace(candidates, points=palms)
+            candidates = replace(candidates, points=self._scene.palms(candidates.surfaces, candidates.points))
         return candidates
 
     def _none_lies(self, reached: "_WithinReach", usable: UsableEfort | None) -> GeneratedContact:

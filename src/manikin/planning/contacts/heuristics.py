@@ -38,8 +38,7 @@ def cached_score(
     wanted = np.ones(len(first), dtype=bool)
     if asked is not None:
         wanted = np.isin(np.arange(len(first)), group[asked])
-    values = np.array([value(int(row)) if w else 0.0 for row, w in zip(first, wanted, strict=True)])
-    return values[group]
+    return np.array([value(int(row)) if w else 0.0 for row, w in zip(first, wanted, strict=True)])[group]
 
 
 def contact_at(

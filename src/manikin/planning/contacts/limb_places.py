@@ -187,8 +187,7 @@ class _Grid:
         ahead = ahead * np.sign(ahead @ turn[:, 0])
         frame = np.column_stack([ahead, np.cross(surface.normal, ahead), surface.normal])
         across, room = float(lengths.min()), 0.5 * (float(lengths.max()) - np.ptp(points[:, 1])) - RUNG_SIDE
-        heel = float(points[:, 0].min())
-        if ahead @ turn[:, 0] < np.cos(RUNG_TURN) or room < 0.0 or across > stiff - heel:
+        if ahead @ turn[:, 0] < np.cos(RUNG_TURN) or room < 0.0 or across > stiff - float(points[:, 0].min()):
             return
         half, side = 0.5 * across, 0.5 * float(np.ptp(points[:, 1]))
         front = stiff - half

@@ -127,8 +127,7 @@ class LimbHolds:
         off -= TURN * (self.samples.upward @ frame[:, 2])
         if contact.kind is not ContactKind.POINT:
             off -= TURN * (self.samples.rotations[:, :, 0] @ frame[:, 0])
-        row = int(np.argmin(off))
-        guess[limb_slots(state.body, limb)] = self.samples.angles[row]
+        guess[limb_slots(state.body, limb)] = self.samples.angles[int(np.argmin(off))]
         return guess
 
     def nearest(self, root: FloatArray, most: int) -> list[tuple[float, Contact]]:
@@ -516,8 +515,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                     via = self._between(staying, lifted.q, q, (old, new), (before, after))
                     if via is None:
                         return self._refused(before, after, f"{name} finds no way around")
-                    flight = self.settings.flight(old, new)
-                    stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
+                    stages.append(Stage.of(body, staying, lifted.q, self.settings.flight(old, new), via=via))
             stages.append(Stage.of(body, landed, q, self.settings.shift_duration))
             self._moves += [(before, after)] * (len(stages) - len(self._moves))
         contacts = stages[-1].contacts

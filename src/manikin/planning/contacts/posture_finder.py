@@ -137,12 +137,12 @@ class PostureFinder:
         self.searches += 1
         settings, led = self.settings, {} if guide is None else self.led(guide[:ROOT])
         whole = guide is not None and len(guide) > ROOT
+        ignore, beside = self._near(held)
         problem = PostureProblem(
             self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
-            self_clearance=settings.clearance, ignore=touching_pairs(self.body, self._touched_by(held)),
-            beside=self._beside(held), range_margin=settings.range_margin,
-            learnt_margin=LEARNT_MARGIN if settings.natural else None,
+            self_clearance=settings.clearance, ignore=ignore, beside=beside,
+            range_margin=settings.range_margin, learnt_margin=LEARNT_MARGIN if settings.natural else None,
             reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
         once = SolverSettings(
@@ -174,18 +174,15 @@ class PostureFinder:
         wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
         return {self._root: wish}
 
-    def _touched_by(self, held: Contacts) -> list[tuple[str, str]]:
-        """Effectors with what each touches."""
+    def _near(self, held: Contacts) -> tuple[frozenset[tuple[str, str]], frozenset[tuple[str, str]]]:
+        """Pairs that touch, or may be as near: shanks on their tips, and forearms at what hands hold."""
         for contact in held.values():
             if contact not in self._touched:
                 self._touched[contact] = self.scene.touched_obstacles(contact)
-        return [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
-
-    def _beside(self, held: Contacts) -> frozenset[tuple[str, str]]:
-        """Pairs that may be as near as touching: shanks on their tips, and forearms at what hands hold."""
+        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
         wrists = {
             (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)
             for name, item in held.items() if item.kind is ContactKind.GRASP
             for obstacle in self._touched[item]
         }  # fmt: skip
-        return pairs_beside(self.body, self._touched_by(held)) | wrists
+        return touching_pairs(self.body, touched), pairs_beside(self.body, touched) | wrists

@@ -359,8 +359,7 @@ def hand_supports(
     turn = buttocks.rotation_contact_to_world
     result: dict[str, Contact] = {}
     for hand, side in (("left_hand", 1.0), ("right_hand", -1.0)):
-        ideal = np.array([HAND_AHEAD, side * HAND_ASIDE, HAND_ABOVE])
-        wanted = buttocks.position + turn @ (stature * ideal)
+        wanted = buttocks.position + turn @ (stature * np.array([HAND_AHEAD, side * HAND_ASIDE, HAND_ABOVE]))
         best = HAND_ROOM * stature
         for surface in scene.surfaces_facing((0.0, 0.0, 1.0), steepest):
             if float(surface.polygon[:, 2].max()) < buttocks.position[2] - 0.02:

@@ -165,8 +165,7 @@ def _ask(
     farthest = max(range(len(answers)), key=lambda row: _FARTHEST.index(answers[row].failure or "collision"))
     does = "to move the body", "to act on an object"  # both roles are asked where there are two answers
     causes = [f"{what}, {item.message}" for what, item in zip(does, answers, strict=False)]
-    same = len({item.message for item in answers}) == 1
-    message = result.message if same else "; ".join(causes)
+    message = result.message if len({item.message for item in answers}) == 1 else "; ".join(causes)
     return roles[farthest], replace(answers[farthest], message=message), None
 
 

@@ -201,8 +201,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if leaving.same_place(landing):
                 continue
             before, after = (replace(places[j], trunk=trunks[j]) for j in (k, k + 1))
-            feet_moved = leaving, standing, landing
-            changes, held, start, landed = self._moved(feet_moved, before, after, hands, q)
+            changes, held, start, landed = self._moved((leaving, standing, landing), before, after, hands, q)
             if start is None or landed.q is None:
                 first = k if start is None else k + 1
                 return self._refuse(way[first], way[first + 1], landed.reason, too_hard=landed.too_hard)
