@@ -65,8 +65,7 @@ def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
     q = body.posture(of_both_sides(body, angles))
     q[3:7] = quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
     q[2] = -Configuration(body, q).effector_placement(ORDER[0])[1][2]
-    size = stature_of(body) / 1.75
-    held = {}
+    size, held = stature_of(body) / 1.75, dict[str, Contact]()
     for name in ORDER:
         side, _, part = name.partition("_")
         place = size * np.array([0.5 * WHEELBASE[part], (1.0 if side == "left" else -1.0) * APART[part], 0.0])

@@ -420,8 +420,7 @@ def _column_is_free(scene: Scene, places: FloatArray, column: tuple[float, float
     """(k,) whether a vertical capsule above each place meets nothing."""
     radius, bottom, top = column
     shape = coal.Capsule(radius, max(top - bottom - 2.0 * radius, 1e-3))
-    free = np.ones(len(places), dtype=bool)
-    lift = np.array([0.0, 0.0, 0.5 * (bottom + top)])
+    free, lift = np.ones(len(places), dtype=bool), np.array([0.0, 0.0, 0.5 * (bottom + top)])
     for part in (part for item in scene for part in collision_parts(item)):
         there = coal.Transform3s(part.rotation, part.translation)
         low, high = _bounds(part.geometry, there)

@@ -284,11 +284,9 @@ class ContactGenerator:
                 break
             tried, point = tried + 1, candidates.points[row]
             aligned = tools.aligner.align(*goal, allowed)
-            if not aligned.lies(allowed, gap):
-                faults[_TILTED] += 1
-                continue
-            if not tools.natural(aligned.angles):
-                faults[_UNNATURAL] += 1
+            lies = aligned.lies(allowed, gap)
+            if not lies or not tools.natural(aligned.angles):
+                faults[_UNNATURAL if lies else _TILTED] += 1
                 continue
             q[tools.chain.slots] = aligned.angles
             surface = int(candidates.surfaces[row])
@@ -356,8 +354,7 @@ class _LimbTools:
 
     def __init__(self, body: BodyModel, limb: Limb, scene: Scene, samples: LimbSamples) -> None:
         self.limb, self.samples, self.chain = limb, samples, LimbKinematics(body, limb)
-        self.aligner = Aligner(self.chain)
-        self.collisions = LimbCollisions(body, limb, scene)
+        self.aligner, self.collisions = Aligner(self.chain), LimbCollisions(body, limb, scene)
         self.deep = DeepSamples(body, self.chain, samples, self.collisions)
         self._range = NaturalRange(body, limb) if samples.natural else None
         # Made now, not during a request.
@@ -371,9 +368,7 @@ class _LimbTools:
 
     def natural(self, angles: FloatArray) -> bool:
         """Whether a limb at angles (k,) is hardly beyond a learnt range of motion; so where none counts."""
-        if self._range is None:
-            return True
-        return bool(self._range.volume_distance(angles[None])[0] >= -NATURAL_SLACK)
+        return self._range is None or bool(self._range.volume_distance(angles[None])[0] >= -NATURAL_SLACK)
 
 
 def _order(scores: FloatArray) -> IntArray:

@@ -268,9 +268,7 @@ def _balls(
     body: BodyModel, chain: LimbKinematics, angles: FloatArray, soft: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray, list[str]]:
     """Centres (n, b, 3) in the limb's frame, radii (b,) and shapes of balls along a limb at angles (n, k)."""
-    centres: list[FloatArray] = []
-    radii: list[float] = []
-    names: list[str] = []
+    centres, radii, names = list[FloatArray](), list[float](), list[str]()
     for name, turns, places in chain.segment_placements(angles):
         if name in soft or name == chain.limb.segments[-1]:
             continue
@@ -291,6 +289,4 @@ def _round_box(geometry: coal.CollisionGeometry) -> tuple[FloatArray, float] | N
         return np.array(geometry.halfSide), 0.0
     if isinstance(geometry, coal.Capsule):
         return np.array([0.0, 0.0, geometry.halfLength]), float(geometry.radius)
-    if isinstance(geometry, coal.Sphere):
-        return np.zeros(3), float(geometry.radius)
-    return None
+    return (np.zeros(3), float(geometry.radius)) if isinstance(geometry, coal.Sphere) else None

@@ -67,8 +67,7 @@ def limb_holds(
         item for item in scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
         if (item.polygon.min(axis=0) <= high).all() and (item.polygon.max(axis=0) >= low).all()
     ]  # fmt: skip
-    grid = _Grid(scene, surfaces, (low, high), SPACING * size)
-    heading = heading_of(ends[1])
+    grid, heading = _Grid(scene, surfaces, (low, high), SPACING * size), heading_of(ends[1])
     known: dict[tuple[object, ...], list[_Place]] = {}
     found: list[LimbHolds] = []
     for limb in limbs:

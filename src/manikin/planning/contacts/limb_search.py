@@ -336,8 +336,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         (root, turn, onward), stride = self._trunks[state], self.settings.stride
         away = onward - root
         onward = min(1.0, 0.5 * stride / max(float(np.linalg.norm(away)), 1e-9)) * away
-        states: list[State] = []
-        steps: list[float] = []
+        states, steps = list[State](), list[float]()
         for k, tree in enumerate(self._trees):
             if tree is None or (state, k) in self._stuck or state[k] == FREE:
                 continue

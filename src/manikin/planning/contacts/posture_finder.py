@@ -97,8 +97,7 @@ class PostureFinder:
         """Prepare a scene; postures are like a reference (nq,), or standing, where there is freedom."""
         self.body, self._root = with_root(body)
         self.scene, self._reference = scene, reference
-        self.settings = settings or PostureFinderSettings()
-        self.searches = 0
+        self.settings, self.searches = settings or PostureFinderSettings(), 0
         standing = np.array(body.standing_posture())
         self.model = ContactModel.of_body(body.mass, self.settings.friction_model)
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]

@@ -99,8 +99,7 @@ class Sitter:
         steps = np.linspace(0.0, 1.0, 201)
         inside = seat.outside(at + steps[:, None] * turn[:, 0]) <= 1e-9
         room = float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
-        tried: list[tuple[float, float]] = []
-        feet: dict[int, dict[str, Contact]] = {}
+        tried, feet = list[tuple[float, float]](), dict[int, dict[str, Contact]]()
         for forward, ahead in self._compared(float(at[2]) - floor, room):
             if len(tried) == TRIED:
                 return
@@ -356,8 +355,7 @@ def hand_supports(
         friction: Coulomb coefficient.
         steepest: Largest slope of a surface to push on [rad].
     """
-    turn = buttocks.rotation_contact_to_world
-    result: dict[str, Contact] = {}
+    turn, result = buttocks.rotation_contact_to_world, dict[str, Contact]()
     for hand, side in (("left_hand", 1.0), ("right_hand", -1.0)):
         wanted = buttocks.position + turn @ (stature * np.array([HAND_AHEAD, side * HAND_ASIDE, HAND_ABOVE]))
         best = HAND_ROOM * stature

@@ -328,8 +328,7 @@ class TrunkClearance:
         return np.linalg.norm(middles[:, None] - middles[None, :], axis=3).mean(axis=2)
 
     def _free(self, places: FloatArray) -> NDArray[np.bool_]:
-        free = np.ones((len(places), len(self.postures)), dtype=bool)
-        near = self._near(places)
+        free, near = np.ones((len(places), len(self.postures)), dtype=bool), self._near(places)
         for first in range(0, len(places) if len(near) else 0, _TOGETHER):
             some = slice(first, first + _TOGETHER)
             self._block(places[some], near, free[some])
