@@ -12,6 +12,7 @@ footholds has postures, closes one without with :meth:`FootstepSearch.close`, an
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise, product
 
 import coal
@@ -93,7 +94,7 @@ class FootstepSearch:
         self._stride, self._highest, self.expanded = stride, highest, 0
         self.holds = [*start, *goal]
         self._keys: dict[tuple[int, ...], int] = {}
-        self._free: dict[int, bool] = dict.fromkeys(range(4), True)
+        self._is_free = cache(lambda number: number < 4 or footholds.is_free(self.holds[number]))
         self._pairs: dict[tuple[int, int], float] = {}
         self._next: dict[tuple[int, int], list[tuple[int, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
@@ -181,11 +182,8 @@ class FootstepSearch:
         if pair in self._closed or self._is_refused(*pair):
             return math.inf
         if pair not in self._pairs:
-            both = [self.holds[number] for number in pair]
-            if node.hold not in self._free:
-                self._free[node.hold] = self._footholds.is_free(both[1])
-            left, right = both if parent.side > 0 else both[::-1]
-            self._pairs[pair] = self._pair_cost(left, right) if self._free[node.hold] else math.inf
+            both = [self.holds[number] for number in (pair if parent.side > 0 else pair[::-1])]
+            self._pairs[pair] = self._pair_cost(*both) if self._is_free(node.hold) else math.inf
         return self._pairs[pair]
 
     def _is_refused(self, stand: int, step: int) -> bool:

@@ -12,7 +12,7 @@ import heapq
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -192,11 +192,12 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._places = [np.vstack([at, item.positions, at]) for at, item in zip(first, holds, strict=True)]
         self._trees = [cKDTree(item.positions) if len(item.positions) else None for item in holds]
         self._wanted = np.array([item.wanted for item in holds])
-        self._contacts: dict[tuple[int, int], Contact] = {}
+        # Each of these is asked again and again.
+        self._contact, self._has_room = cache(self._made), cache(lambda k, row: holds[k].is_free(row - 1))
+        self._beyond, self._resting = cache(self._overreached), cache(self._rest_without)
         kinds = [self._contact(k, 1).kind if len(item.positions) else None for k, item in enumerate(holds)]
         self._grasps = [kind is ContactKind.GRASP for kind in kinds]
         self._tips = [kind is ContactKind.POINT for kind in kinds]
-        self._free: dict[tuple[int, int], bool] = {}
         self._next: dict[State, list[tuple[State, float]]] = {}
         self._later: dict[State, list[tuple[State, float]]] = {}
         self._ahead: dict[State, float] = {}
@@ -205,8 +206,6 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         # Place and rotation of the root, and the place a stride on.
         self._trunks: dict[State, tuple[FloatArray, FloatArray, FloatArray]] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
-        self._beyond: dict[tuple[State, State], float] = {}
-        self._resting: dict[tuple[State, int], tuple[tuple[FloatArray, FloatArray] | None, float]] = {}
         self._state = Configuration(poser.body, start.q)
 
     def _best(self) -> list[State] | str:
@@ -375,9 +374,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         if (before, k) in self._stuck:
             return math.inf
-        if (before, after) not in self._beyond:
-            self._beyond[before, after] = self._overreached(before, after, k)
-        cost = self._beyond[before, after]
+        cost = self._beyond(before, after, k)
         proven = self._postures.get((after, k, True))
         if proven is not None and proven.q is not None and math.isfinite(cost):
             cost = -PROVEN
@@ -392,9 +389,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """What a move of limb k costs whose limbs come to the ends of their reach; infinite without room."""
         if after[k] != FREE and not (self._has_room(k, after[k]) and self._beside(k, after)):
             return math.inf
-        if (before, k) not in self._resting:
-            self._resting[before, k] = self._rest_without(k, before)
-        rest, cost = self._resting[before, k]
+        rest, cost = self._resting(k, before)
         return cost if rest is None or math.isinf(cost) else cost + self._stretched(after, *rest)
 
     def _rest_without(self, k: int, before: State) -> tuple[tuple[FloatArray, FloatArray] | None, float]:
@@ -428,11 +423,6 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         local = (self._at(state) - shifted) @ turn
         beyond = [-float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])]
         return OVERREACH * max(0.0, *beyond) / self.size
-
-    def _has_room(self, k: int, row: int) -> bool:
-        if (k, row) not in self._free:
-            self._free[k, row] = self.holds[k].is_free(row - 1)
-        return self._free[k, row]
 
     def _beside(self, k: int, state: State) -> bool:
         """Whether a sole lies beside the others, or above or below them, and on its own side of them."""
@@ -469,12 +459,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     # --- whole postures -------------------------------------------------------------------------
 
-    def _contact(self, k: int, row: int) -> Contact:
+    def _made(self, k: int, row: int) -> Contact:
         if row == 0:
             return self.start.contacts[self.holds[k].effector]
-        if (k, row) not in self._contacts:
-            self._contacts[k, row] = replace(self.holds[k].contact(row - 1), oriented=False)
-        return self._contacts[k, row]
+        return replace(self.holds[k].contact(row - 1), oriented=False)
 
     def _contacts_of(self, state: State) -> dict[str, Contact]:
         return {

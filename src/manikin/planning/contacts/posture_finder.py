@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -103,7 +104,7 @@ class PostureFinder:
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
-        self._touched: dict[Contact, tuple[str, ...]] = {}
+        self._touched = cache(scene.touched_obstacles)
 
     def pose(
         self, held: Contacts, carrying: Contacts, start: FloatArray,
@@ -175,13 +176,10 @@ class PostureFinder:
 
     def _near(self, held: Contacts) -> tuple[frozenset[tuple[str, str]], frozenset[tuple[str, str]]]:
         """Pairs that touch, or may be as near: shanks on their tips, and forearms at what hands hold."""
-        for contact in held.values():
-            if contact not in self._touched:
-                self._touched[contact] = self.scene.touched_obstacles(contact)
-        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
+        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched(item)]
         wrists = {
             (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)
             for name, item in held.items() if item.kind is ContactKind.GRASP
-            for obstacle in self._touched[item]
+            for obstacle in self._touched(item)
         }  # fmt: skip
         return touching_pairs(self.body, touched), pairs_beside(self.body, touched) | wrists
