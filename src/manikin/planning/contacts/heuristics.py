@@ -1,7 +1,7 @@
 """What makes one contact better than another: interchangeable scores of candidates."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -103,9 +103,7 @@ class StrongEfort:
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`Heuristic`."""
         products = self.products[situation.limb.name][candidates.samples]
-        direction = situation.reaction @ situation.rotation
-        alpha = efort(products, direction, candidates.normals @ situation.rotation)
-        return -alpha if self.pulling else alpha
+        return Efort(self.pulling).score(situation, replace(candidates, products=products))
 
 
 @dataclass(frozen=True)

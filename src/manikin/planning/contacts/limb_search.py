@@ -214,9 +214,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             return self._walled_off
         self._frame_costs([first])
         graph = Graph(
-            lambda state: self._ahead[state], self._followers, self._tested,
-            lambda state: self._ahead[state] <= 0.0,
-        )  # fmt: skip
+            self._ahead.__getitem__, self._followers, self._tested, lambda state: self._ahead[state] <= 0.0
+        )
         return graph.best([first], GREED)[0] or "no contacts lead to the goal"
 
     @cached_property

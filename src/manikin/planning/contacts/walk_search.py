@@ -142,8 +142,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         steepest = min(math.radians(30.0), math.atan(0.8 * friction))
         self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
         self._contacts: dict[tuple[str, int], Contact] = {}
-        self._postures: dict[tuple[frozenset[int], frozenset[str], int], Posed] = {}
-        self._kept: list[Contact] = []
+        self._postures: dict[tuple[frozenset[Contact], frozenset[str], int], Posed] = {}
         self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
         ends = feet_of(start.contacts), feet_of(goal.contacts)
@@ -271,14 +270,14 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
         standing = {foot.effector: foot for foot in feet}
         bare = self._left({**standing, **hands}, before, hands, q)
+        start = bare[-1].q if bare else q
         if bare is not None:
-            yield bare, {}, bare[-1].q if bare else q
+            yield bare, {}, start
         if hands:
             yield [], hands, q
         rise = np.ptp([hold.position[2] for place in (before, after) for hold in (place.left, place.right)])
         if bare is None or (rise < HIGH * self._scale and self.replanned < HAND_TRIES):
             return
-        start = bare[-1].q if bare else q
         holds = self._holds_near(before, after)
         pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector != b.effector]
         for contacts in [*((hold,) for hold in holds), *pairs[:2]]:
@@ -324,7 +323,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _posed(self, held: Contacts, carrying: Contacts, place: _Place, q: FloatArray) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
-        key = frozenset(map(id, held.values())), frozenset(carrying), place.trunk
+        key = frozenset(held.values()), frozenset(carrying), place.trunk
         if key in self._postures:
             return self._postures[key]
         guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
@@ -336,7 +335,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if posed.q is not None:
             posed = self._easier(posed, held, carrying, flat)
         self._postures[key] = posed
-        self._kept += held.values()  # so that no other contact gets its id
         return posed
 
     def _easier(
