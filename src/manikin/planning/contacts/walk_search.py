@@ -8,6 +8,7 @@ the other already down, and one that rests on the other, the first about to leav
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -141,7 +142,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         first = goal.contacts[FEET[0]]
         steepest = min(math.radians(30.0), math.atan(0.8 * friction))
         self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
-        self._contacts: dict[tuple[str, int], Contact] = {}
+        self._contact = cache(self._made)
         self._postures: dict[tuple[frozenset[Contact], frozenset[str], int], Posed] = {}
         self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
@@ -150,8 +151,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             scene, self._footholds, *ends, scale, StepReach.of(body), self._pair_cost, (radius, low, high),
             self.settings.stride, HELD_HIGHEST if self._handholds.exist else HIGHEST,
         )  # fmt: skip
-        for number, (stage, foot) in enumerate((s, f) for s in (start, goal) for f in FEET):
-            self._contacts[foot, number] = stage.contacts[foot]
         self._risen: tuple[Stage, ...] = ()
 
     def _best(self) -> list[int] | str:
@@ -177,11 +176,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         place = self.search.farthest()[1].position
         return f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
 
-    def _contact(self, foot: str, number: int) -> Contact:
-        if (foot, number) not in self._contacts:
-            hold = self.search.holds[number]
-            self._contacts[foot, number] = self._footholds.contact(foot, hold, self.friction)
-        return self._contacts[foot, number]
+    def _made(self, foot: str, number: int) -> Contact:
+        """Contact on a foothold; the first two footholds are those of the start, the next two the goal's."""
+        if number < 4:
+            return (self.start if number < 2 else self.goal).contacts[foot]
+        return self._footholds.contact(foot, self.search.holds[number], self.friction)
 
     def _planned(self, way: list[int]) -> ContactPlan | None:
         stages = list(self._risen)
@@ -262,7 +261,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if landed.q is not None:
                 return changes, held, lifted, landed
             failed = failed or (lifted, landed)
-        return [], hands, *(failed or (None, Posed(None, f"{' and '.join(hands)} cannot be left")))
+        lifted, landed = failed or (None, Posed(None, f"{' and '.join(hands)} cannot be left"))
+        return [], hands, lifted, landed
 
     def _hands_before(
         self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact], q: FloatArray
