@@ -131,20 +131,14 @@ class SurfaceTable:
         meets &= (self.side_low[near] - sides <= high[group, 1:]).all(axis=1)
         return near[meets]
 
-    def over(
-        self, points: FloatArray, numbers: IntArray, margin: FloatArray | float = 0.0
-    ) -> NDArray[np.bool_]:
-        """(n,) whether world points (n, 3) [m] project into the polygons of their surfaces, (n,) indices.
-
-        They may lie outside by a margin, one or (n,) [m].
-        """
+    def over(self, points: FloatArray, numbers: IntArray) -> NDArray[np.bool_]:
+        """(n,) whether world points (n, 3) [m] project into the polygons of their surfaces, (n,) indices."""
         beyond = np.einsum("nei,ni->ne", self._walls[numbers], points) - self._wall_offsets[numbers]
-        inside = (beyond <= np.asarray(margin)[..., None]).all(axis=1)
+        inside = (beyond <= 0.0).all(axis=1)
         loose = np.flatnonzero(~self._convex[numbers])
         for number in np.unique(numbers[loose]):
             mine = loose[numbers[loose] == number]
-            allowed = np.broadcast_to(margin, len(points))[mine]
-            inside[mine] = self.surfaces[number].outside(points[mine]) <= allowed
+            inside[mine] = self.surfaces[number].outside(points[mine]) <= 0.0
         return inside
 
     def carries(

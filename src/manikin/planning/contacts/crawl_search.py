@@ -7,9 +7,9 @@ same backwards, as every posture at rest is at rest backwards as well.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 import pinocchio as pin
@@ -82,10 +82,6 @@ class _Way:
     places: FloatArray
     along: FloatArray
 
-    @classmethod
-    def of(cls, places: FloatArray) -> "_Way":
-        return cls(places, np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))))
-
     def at(self, along: float) -> tuple[FloatArray, float]:
         """Place (3,) [m] and heading [rad], on the straight beyond both ends."""
         row = int(np.clip(np.searchsorted(self.along, along) - 1, 0, len(self.along) - 2))
@@ -137,7 +133,8 @@ class CrawlSearch:
         found = low_way(self._scene, footholds, ends, low, high)
         if found is None:
             return "no way over the ground has room for the body on hands and knees"
-        way, under = _Way.of(found[0]), np.flatnonzero(~found[1])
+        steps = np.linalg.norm(np.diff(found[0], axis=0), axis=1)
+        way, under = _Way(found[0], np.append(0.0, np.cumsum(steps))), np.flatnonzero(~found[1])
         if not len(under):
             return "the body can walk all the way"
         first, last = float(way.along[under[0]]), float(way.along[under[-1]])
@@ -268,7 +265,11 @@ class CrawlSearch:
         if lifted.q is None:
             return f"{name} cannot leave {_text(contacts[name].position)}: {lifted.reason}"
         reason = f"there is nothing to put {name} on beyond {_text(contacts[name].position)}"
-        for along, contact in self._offers(way, name, ends, target):
+        spots = ((ends[0] + share * (ends[1] - ends[0]), out) for share, out in NEARBY)
+        offers = ((along, self._contact(way, name, along, out)) for along, out in spots)
+        for along, contact in chain([(ends[1], target)], offers):
+            if contact is None:
+                continue
             landed = {**staying, name: contact}
             landing = self._posed(landed, staying, lifted.q, guided=True)
             if landing.q is None:
@@ -282,18 +283,6 @@ class CrawlSearch:
             flying = Stage.of(self._body, staying, lifted.q, flight, via=via)
             return along, flying, Stage.of(self._body, landed, landing.q, self._settings.shift_duration)
         return reason
-
-    def _offers(
-        self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None
-    ) -> Iterator[tuple[float, Contact]]:
-        """Contacts for a limb, where it should be first."""
-        if target is not None:
-            yield ends[1], target
-        for share, out in NEARBY:
-            along = ends[0] + share * (ends[1] - ends[0])
-            contact = self._contact(way, name, along, out)
-            if contact is not None:
-                yield along, contact
 
     def _between(
         self, staying: Contacts, name: str, ends: tuple[Contact, Contact],
