@@ -31,11 +31,7 @@ _CORNERS = PALM * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
 
 
 class Handholds:
-    """Offers holds for hands around places of the body in one scene.
-
-    Attributes:
-        exist: Whether there is any.
-    """
+    """Offers holds for hands around places of the body in one scene, where any ``exist``."""
 
     def __init__(self, body: BodyModel, scene: Scene, friction: float, max_force: float = 400.0) -> None:
         """Prepare a scene, with a Coulomb coefficient of palms and a largest force of grasps by axis [N]."""

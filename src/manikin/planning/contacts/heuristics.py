@@ -59,11 +59,7 @@ class Heuristic(Protocol):
 
 @dataclass(frozen=True)
 class Efort:
-    """Extended force transmission ratio ([Tonneau2015]_ 5.12), with the limb's own direction.
-
-    Attributes:
-        pulling: Whether the limb holds on and pulls at the surface (5.13).
-    """
+    """Extended force transmission ratio ([Tonneau2015]_ 5.12, pulling 5.13) in the limb's own direction."""
 
     pulling: bool = False
 
@@ -127,11 +123,7 @@ class Manipulability:
 
 @dataclass(frozen=True, eq=False)
 class Comfort:
-    """Preference for angles far from the ends of the :class:`NaturalRange` ([Tonneau2015]_ 4.3.3).
-
-    Attributes:
-        samples: The samples that are asked, by limb.
-    """
+    """Preference for angles of samples inside the ends of a :class:`NaturalRange` ([Tonneau2015]_ 4.3.3)."""
 
     samples: Mapping[str, LimbSamples]
 
@@ -248,11 +240,7 @@ class BalanceScore:
 
 @dataclass(frozen=True, eq=False)
 class WeightedSum:
-    """Sum of weighted scores ([Tonneau2015]_ 7.7); the weights carry the units.
-
-    Attributes:
-        terms: (weight, heuristic) pairs.
-    """
+    """Sum of scores of (weight, heuristic) terms ([Tonneau2015]_ 7.7); the weights carry the units."""
 
     terms: Sequence[tuple[float, Heuristic]]
 

@@ -184,11 +184,8 @@ _ALONG = np.array([0.0, 0.5])  # shares of a capsule's axis with a ball, from it
 class DeepSamples:
     """Tells which samples of one limb have a ball deep in something.
 
-    The balls are on the axes of the limb's capsules, but for those of the segment that makes contact and
-    those that give way in what they touch.
-
-    Attributes:
-        shapes: Names of these capsules.
+    The balls are on the axes of the limb's capsules, whose names are its ``shapes``, but for those of the
+    segment that makes contact and those that give way in what they touch.
     """
 
     def __init__(

@@ -85,11 +85,7 @@ def upright_points(held: Contacts) -> dict[str, Placement]:
 
 
 class PostureFinder:
-    """Finds postures of a body in a scene, and counts them.
-
-    Attributes:
-        searches: Postures looked for so far.
-    """
+    """Finds postures of a body in a scene; ``searches`` counts those looked for so far."""
 
     def __init__(
         self, body: BodyModel, scene: Scene, reference: FloatArray | None = None,
