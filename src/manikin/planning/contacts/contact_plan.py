@@ -86,11 +86,7 @@ def make_contact(
     body: BodyModel, limb: Limb, kind: ContactKind, position: FloatArray, rotation: FloatArray,
     rules: ContactRules,
 ) -> Contact:  # fmt: skip
-    """Contact of a limb's effector.
-
-    Args:
-        position: (3,) in the world [m].
-        rotation: (3, 3) effector-to-world; its z column is the normal.
+    """Contact of a limb's effector at (3,) [m], turned by (3, 3) effector-to-world, whose z is the normal.
 
     Raises:
         ContactError: If a value is out of its range, or a sole is asked for of a body without.
@@ -302,11 +298,7 @@ class _Held:
 def certify_plan(
     body: BodyModel, scene: Scene, plan: ContactPlan, model: ContactModel | None = None
 ) -> PlanCertificate:
-    """Measure every posture of a plan.
-
-    Args:
-        model: Contact model; with the default cap of the body when omitted.
-    """
+    """Measure every posture of a plan; the contact model is that with the body's default cap when omitted."""
     model = model or ContactModel.of_body(body.mass)
     postures, proximity = _postures(plan), Proximity(body, scene)
     measured, pairs = zip(*(_measured(body, scene, proximity, item, model) for item in postures), strict=True)

@@ -139,10 +139,7 @@ class ContactGenerator:
         self, body: BodyModel, scene: Scene, samples: Mapping[str, LimbSamples],
         settings: GeneratorSettings | None = None, rules: ContactRules | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a scene.
-
-        Args:
-            samples: Samples by name of the limb, see :func:`manikin.planning.contacts.sample_limbs`.
+        """Prepare a scene for samples by name of the limb (:func:`manikin.planning.contacts.sample_limbs`).
 
         Raises:
             BodyError: If samples belong to no limb of the body.

@@ -44,9 +44,7 @@ class Handholds:
     def near(self, roots: Sequence[FloatArray], ground: float, most: int) -> list[Contact]:
         """Holds of both hands that are in reach from all of some (7,) poses of the root, the best first.
 
-        Args:
-            ground: Height of the lower foot [m].
-            most: Largest number of them.
+        There are ``most`` of them at most; the height of the lower foot is ``ground`` [m].
         """
         size, offers = self._size, list[tuple[float, Contact]]()
         for hand, side in zip(HANDS, (1.0, -1.0), strict=True):

@@ -123,7 +123,7 @@ class Manipulability:
 
 @dataclass(frozen=True, eq=False)
 class Comfort:
-    """Preference for angles of samples inside the ends of a :class:`NaturalRange` ([Tonneau2015]_ 4.3.3)."""
+    """Preference for samples' angles far from the ends of a :class:`NaturalRange` ([Tonneau2015]_ 4.3.3)."""
 
     samples: Mapping[str, LimbSamples]
 

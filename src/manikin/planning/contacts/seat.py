@@ -55,10 +55,7 @@ class Sitter:
     """Compares ways to sit of one human body."""
 
     def __init__(self, body: BodyModel, footholds: Footholds, friction: float, *, rolls: bool = True) -> None:
-        """Take the lengths of the body; the friction is that of the soles.
-
-        Args:
-            rolls: Whether the pelvis may roll forward on the front of the buttocks; it lies flat otherwise.
+        """Take the lengths of the body, whose pelvis lies flat if it may not roll; the friction is of soles.
 
         Raises:
             BodyError: If its legs are not a human's.
@@ -387,16 +384,9 @@ def _nearest_inside(surface: Surface, wanted: FloatArray, inset: float) -> Float
 
 
 def take_seat(poser: PostureFinder, way: ContactPlan, sat: Stage) -> ContactPlan | str:
-    """A way to before a seat, and the body sits down on it: rising backwards in time.
+    """A way to the feet of a stage on a seat, or near them, and the body sits down there; or why it cannot.
 
-    Every balanced motion is balanced backwards as well, with the same forces.
-
-    Args:
-        way: Ends on the feet of ``sat``, or near them.
-        sat: Contacts and posture on the seat.
-
-    Returns:
-        The plan, whose last stage is that on the seat; or why there is none.
+    It rises backwards in time: every balanced motion is balanced backwards as well, with the same forces.
     """
     body, feet = poser.body, way.stages[-1].contacts
     contacts = {name: contact for name, contact in sat.contacts.items() if name not in feet} | dict(feet)

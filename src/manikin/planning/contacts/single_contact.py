@@ -115,10 +115,7 @@ class ContactAnswer:
 def find_contact(
     body: BodyModel, scene: Scene, q: FloatArray, question: ContactQuestion, rules: ContactRules | None = None
 ) -> ContactAnswer:
-    """Answer one question about a body in a scene.
-
-    Args:
-        q: (nq,) the body; all but the limb stays as it is.
+    """Answer one question about a body (nq,) in a scene, of which all but the limb stays as it is.
 
     Raises:
         InputError: If the limb or the heuristic is not known, the direction is zero, or the limb has

@@ -265,10 +265,9 @@ class TrunkClearance:
         self._known: dict[bytes, NDArray[np.bool_]] = {}
 
     def free(self, places: FloatArray) -> NDArray[np.bool_]:
-        """Whether each posture is free at each place, (k, m).
+        """(k, m) whether each posture is free at each of (k, 4) places.
 
-        Args:
-            places: (k, 4) x, y and height of the ground between the feet [m], heading of the feet [rad].
+        They are x, y and height of the ground between the feet [m], and the heading of the feet [rad].
         """
         rows = np.ascontiguousarray(places, dtype=np.float64).reshape(-1, 4)
         keys = [row.tobytes() for row in rows]
