@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -284,8 +285,7 @@ class PlanCertificate(RequirementTable):
     changes: int
 
 
-@dataclass(frozen=True, eq=False)
-class _Held:
+class _Held(NamedTuple):
     """A posture, what it holds, what carries it; its motion if it could not rest, and what it holds then."""
 
     q: FloatArray

@@ -8,8 +8,8 @@ same backwards, as every posture at rest is at rest backwards as well.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from itertools import chain, product
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -75,8 +75,7 @@ def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
     return finder.pose(held, held, q, place=np.zeros(2), placements=_level(held), preferences=_PREFERENCES)
 
 
-@dataclass(frozen=True, eq=False)
-class _Way:
+class _Way(NamedTuple):
     """Way over the ground: places (n, 3) and its length (n,) up to each [m]."""
 
     places: FloatArray
@@ -389,8 +388,7 @@ def _level(held: Contacts) -> dict[str, Placement]:
     }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class _Rise:
+class _Rise(NamedTuple):
     """Getting up: on hands and knees, then up to two feet, with the posture (nq,) at the end.
 
     The knees are at ``along`` on the way, the hands ``base`` before them [m].

@@ -11,9 +11,9 @@ footholds has postures, closes one without with :meth:`FootstepSearch.close`, an
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise, product
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -58,8 +58,7 @@ LOOK = 5  # cells of the way that tell where it leads
 _REQUEST = coal.CollisionRequest()
 
 
-@dataclass(frozen=True)
-class _Node:
+class _Node(NamedTuple):
     """A foot on a foothold, ``side`` +1 for the left one; ``ends`` where the other one is at its goal."""
 
     hold: int

@@ -1,8 +1,9 @@
 """Places on which limbs can make contacts: what is level, rungs, edges and bars for hands."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -100,8 +101,7 @@ def _sole(body: BodyModel, limb: Limb, rules: ContactRules) -> FloatArray:
     return np.column_stack([np.where(points[:, 0] > points[:, 0].mean(), toes, points[:, 0]), points[:, 1:]])
 
 
-@dataclass(frozen=True, eq=False)
-class _Place:
+class _Place(NamedTuple):
     """Where an effector may touch: (3,) place [m], (3, 3) rotation, (k, 3) points on a rung [m] or None."""
 
     position: FloatArray
