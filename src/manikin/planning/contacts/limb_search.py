@@ -435,10 +435,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 continue
             off = np.abs((other.position - mine.position) @ mine.rotation_contact_to_world)
             side = (other.position - mine.position) @ rotation_from_yaw(self._yaws[1])[:, 1]
-            if (
-                side * (self._wanted[j, 1] - self._wanted[k, 1]) < 0.0
-                or (off < [body.sole_length, body.sole_width + SOLES_APART, SOLE_ABOVE]).all()
-            ):
+            beside = (off < [body.sole_length, body.sole_width + SOLES_APART, SOLE_ABOVE]).all()
+            if beside or side * (self._wanted[j, 1] - self._wanted[k, 1]) < 0.0:
                 return False
         return True
 
