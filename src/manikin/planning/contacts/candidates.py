@@ -87,15 +87,16 @@ class SurfaceTable:
         self.offsets = np.array([item.polygon[0] @ item.normal for item in surfaces])
         self._low = np.array([item.polygon.min(axis=0) for item in surfaces]).reshape(-1, 3)
         self._high = np.array([item.polygon.max(axis=0) for item in surfaces]).reshape(-1, 3)
-        self._group_surfaces()
         walls = [_walls(item) for item in surfaces]
         self._convex = np.array([item is not None for item in walls], dtype=bool)
-        self._walls, self._wall_offsets = _padded(walls)
-
-    def _group_surfaces(self) -> None:
-        """Sort surfaces by their normals, of which the faces of boxes have few, and bound them sideways."""
-        rounded = np.round(self.normals, 9)
-        _, first, group = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        # Missing walls hold everything inside.
+        most = max((len(item[1]) for item in walls if item is not None), default=1)
+        self._walls, self._wall_offsets = np.zeros((len(walls), most, 3)), np.full((len(walls), most), np.inf)
+        for number, item in enumerate(walls):
+            if item is not None:
+                self._walls[number, : len(item[1])], self._wall_offsets[number, : len(item[1])] = item
+        # Of normals the faces of boxes have few; sideways the surfaces are bounded.
+        _, first, group = np.unique(np.round(self.normals, 9), axis=0, return_index=True, return_inverse=True)
         self.group: IntArray = group.ravel()
         sides = np.array([self.surfaces[number].rotation[:, :2].T for number in first]).reshape(-1, 2, 3)
         self.frames = np.concatenate([self.normals[first][:, None], sides], axis=1)
@@ -130,20 +131,14 @@ class SurfaceTable:
         meets &= (self.side_low[near] - sides <= high[group, 1:]).all(axis=1)
         return near[meets]
 
-    def over(
-        self, points: FloatArray, numbers: IntArray, margin: FloatArray | float = 0.0
-    ) -> NDArray[np.bool_]:
-        """(n,) whether world points (n, 3) [m] project into the polygons of their surfaces, (n,) indices.
-
-        They may lie outside by a margin, one or (n,) [m].
-        """
+    def over(self, points: FloatArray, numbers: IntArray) -> NDArray[np.bool_]:
+        """(n,) whether world points (n, 3) [m] project into the polygons of their surfaces, (n,) indices."""
         beyond = np.einsum("nei,ni->ne", self._walls[numbers], points) - self._wall_offsets[numbers]
-        inside = (beyond <= np.asarray(margin)[..., None]).all(axis=1)
+        inside = (beyond <= 0.0).all(axis=1)
         loose = np.flatnonzero(~self._convex[numbers])
         for number in np.unique(numbers[loose]):
             mine = loose[numbers[loose] == number]
-            allowed = np.broadcast_to(margin, len(points))[mine]
-            inside[mine] = self.surfaces[number].outside(points[mine]) <= allowed
+            inside[mine] = self.surfaces[number].outside(points[mine]) <= 0.0
         return inside
 
     def carries(
@@ -240,19 +235,8 @@ def _near_planes(
 def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:
     """Outward normals (e, 3) and offsets (e,) of a convex polygon's edges, or None if it is not convex."""
     corners = surface.polygon
-    edges = np.roll(corners, -1, axis=0) - corners
-    out = np.cross(edges, surface.normal)
+    out = np.cross(np.roll(corners, -1, axis=0) - corners, surface.normal)
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     offsets = np.einsum("ei,ei->e", out, corners)
     convex = bool((corners @ out.T <= offsets + 1e-9 * max(1.0, float(np.abs(corners).max()))).all())
     return (out, offsets) if convex else None
-
-
-def _padded(walls: Sequence[tuple[FloatArray, FloatArray] | None]) -> tuple[FloatArray, FloatArray]:
-    """Walls of all surfaces in one array (m, e, 3), (m, e); missing ones hold everything inside."""
-    most = max((len(item[1]) for item in walls if item is not None), default=1)
-    normals, offsets = np.zeros((len(walls), most, 3)), np.full((len(walls), most), np.inf)
-    for number, item in enumerate(walls):
-        if item is not None:
-            normals[number, : len(item[1])], offsets[number, : len(item[1])] = item
-    return normals, offsets

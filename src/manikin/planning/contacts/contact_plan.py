@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -32,6 +33,9 @@ from manikin.numerics.spatial import FloatArray, frozen_array, skew
 from manikin.planning.contacts.transition import Momentum
 from manikin.runtime.requirement import Requirement, RequirementTable, Sense
 from manikin.scene import Proximity, Scene
+
+Contacts = Mapping[str, Contact]
+"""Contacts by their effectors."""
 
 _RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
@@ -83,11 +87,7 @@ def make_contact(
     body: BodyModel, limb: Limb, kind: ContactKind, position: FloatArray, rotation: FloatArray,
     rules: ContactRules,
 ) -> Contact:  # fmt: skip
-    """Contact of a limb's effector.
-
-    Args:
-        position: (3,) in the world [m].
-        rotation: (3, 3) effector-to-world; its z column is the normal.
+    """Contact of a limb's effector at (3,) [m], turned by (3, 3) effector-to-world, whose z is the normal.
 
     Raises:
         ContactError: If a value is out of its range, or a sole is asked for of a body without.
@@ -118,8 +118,6 @@ def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
 
 
 COM_ROOM = (0.06, 0.06, 0.03)  # way of the centre of mass off its posture when a phase begins [m]; our choice
-
-
 HINGE_PACE = 1.3  # mean speed of the hinge that turns most between two postures [rad/s]; our choice
 COM_PACE = 0.4  # mean speed of the centre of mass between two postures [m/s]; our choice
 
@@ -162,7 +160,7 @@ class Stage:
             None where they can.
     """
 
-    contacts: Mapping[str, Contact]
+    contacts: Contacts
     q: FloatArray
     com: FloatArray
     min_duration: float
@@ -172,7 +170,7 @@ class Stage:
 
     @classmethod
     def of(
-        cls, body: BodyModel, contacts: Mapping[str, Contact], q: FloatArray, min_duration: float,
+        cls, body: BodyModel, contacts: Contacts, q: FloatArray, min_duration: float,
         com_room: tuple[float, float, float] = COM_ROOM, via: FloatArray | None = None,
         momentum: Momentum | None = None,
     ) -> "Stage":  # fmt: skip
@@ -287,8 +285,7 @@ class PlanCertificate(RequirementTable):
     changes: int
 
 
-@dataclass(frozen=True, eq=False)
-class _Held:
+class _Held(NamedTuple):
     """A posture, what it holds, what carries it; its motion if it could not rest, and what it holds then."""
 
     q: FloatArray
@@ -301,16 +298,10 @@ class _Held:
 def certify_plan(
     body: BodyModel, scene: Scene, plan: ContactPlan, model: ContactModel | None = None
 ) -> PlanCertificate:
-    """Measure every posture of a plan.
-
-    Args:
-        model: Contact model; with the default cap of the body when omitted.
-    """
+    """Measure every posture of a plan; the contact model is that with the body's default cap when omitted."""
     model = model or ContactModel.of_body(body.mass)
     postures, proximity = _postures(plan), Proximity(body, scene)
-    measured, pairs = zip(
-        *(_measured(body, scene, proximity, item, model) for item in postures), strict=True
-    )  # fmt: skip
+    measured, pairs = zip(*(_measured(body, scene, proximity, item, model) for item in postures), strict=True)
     rows = []
     for (key, name, unit, sense, limit), values in zip(_QUANTITIES, zip(*measured, strict=True), strict=True):
         worst = int(np.argmax(values) if sense == "<=" else np.argmin(values))
@@ -332,8 +323,7 @@ def _measured(
             moved, turned = contact.rolled_away(rotation, position)
             turn = max(turn, turned)
         elif contact.kind is ContactKind.SOLE:
-            off = rotation.T @ contact.rotation_contact_to_world
-            turn = max(turn, float(np.linalg.norm(pin.log3(off))))
+            turn = max(turn, float(np.linalg.norm(pin.log3(rotation.T @ contact.rotation_contact_to_world))))
         error = max(error, moved)
     touched = [(contact.effector, name) for contact in item.held for name in scene.touched_obstacles(contact)]
     near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched) - pairs_beside(body, touched))

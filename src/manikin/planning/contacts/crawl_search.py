@@ -7,9 +7,9 @@ same backwards, as every posture at rest is at rest backwards as well.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from itertools import product
+from collections.abc import Callable, Mapping
+from itertools import chain, product
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +19,7 @@ from manikin.contact import Contact, point
 from manikin.kinematics import Placement, Preferences
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Extension
-from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage, onto_normal
 from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
@@ -34,27 +34,15 @@ ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")  # order in which
 CRAWLING = (0.2, 0.05, 0.45)  # radius, lowest and highest end of what is free to crawl, at 1.75 m [m]
 APART = {"knee": 0.10, "fist": 0.17}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
 WHEELBASE = {"knee": -0.65, "fist": 0.65}  # place of limbs along the way, of a body of 1.75 m, twice [m]
-
-RESTING = (0.35, 0.2, 0.5)
-"""Places of the centre of mass that are tried, as shares of the way from the knees to the fists: arms are
-weaker than thighs."""
-
+RESTING = (0.35, 0.2, 0.5)  # shares of the way from knees to fists at which the body rests: arms are weaker
 EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
 ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
+# Tried in turn, at 1.75 m [m]: strides with distances of hands before knees; to kneel down and get up,
+# those distances with those of knees before the feet; shares of a limb's step with ways outwards.
 GAITS = ((0.42, 0.60), (0.42, 0.70), (0.28, 0.52), (0.28, 0.70))
-"""Strides and distances of hands before knees that are tried, at 1.75 m [m]."""
-
 KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
-"""Distances of hands before knees, and of knees before the feet, with which the body kneels down and gets up
-that are tried, of a body of 1.75 m [m]."""
-
 NEARBY = ((1.0, 0.0), (0.6, 0.0), (1.0, -0.05), (1.0, 0.05), (0.6, -0.05))
-"""Shares of a step, and ways outwards [m], that are tried for a limb."""
-
-BEFORE, BEHIND = 0.85, 0.45
-"""Distances of feet before what is low and behind it at which the body kneels and gets up, of a body of
-1.75 m [m]."""
-
+BEFORE, BEHIND = 0.85, 0.45  # ways from the feet to what is low when a body kneels, gets up, at 1.75 m [m]
 NEAR_END = 0.8  # way to the start or goal up to which the body kneels or gets up there, and does not walk [m]
 TURNED = math.radians(25.0)  # angle up to which it does so with feet as they are
 STEEPEST = math.radians(30.0)  # largest slope of a surface for hands and knees
@@ -63,7 +51,6 @@ LIFT = 0.05  # height of a limb in flight [m]
 LEVEL = {"knee": 0.3, "fist": 6.0}  # weights with which shanks are level and hands upright [1/rad^2]
 TILT = 0.19  # sine of the largest angle of a hand on its fist: its edge is not pressed into the ground
 TURNING = 1.2  # time in which a leg goes from its knee onto its foot or back [s]
-
 _ON_ALL_FOURS = {
     "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 80.0,
     "elbow_flexion": 10.0, "wrist_flexion": -65.0, "neck_flexion": -30.0,
@@ -78,28 +65,21 @@ def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
     q = body.posture(of_both_sides(body, angles))
     q[3:7] = quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
     q[2] = -Configuration(body, q).effector_placement(ORDER[0])[1][2]
-    size = stature_of(body) / 1.75
-    held = {}
+    size, held = stature_of(body) / 1.75, dict[str, Contact]()
     for name in ORDER:
         side, _, part = name.partition("_")
         place = size * np.array([0.5 * WHEELBASE[part], (1.0 if side == "left" else -1.0) * APART[part], 0.0])
         held[name] = point(name, place, friction=1.0, rotation=np.eye(3))
     ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * ROOM + 0.5))
     finder = PostureFinder(body, Scene([ceiling]), q, settings)
-    at = np.zeros(2)
-    return finder.pose(held, held, q, place=at, placements=_level(held), preferences=_PREFERENCES)
+    return finder.pose(held, held, q, place=np.zeros(2), placements=_level(held), preferences=_PREFERENCES)
 
 
-@dataclass(frozen=True, eq=False)
-class _Way:
+class _Way(NamedTuple):
     """Way over the ground: places (n, 3) and its length (n,) up to each [m]."""
 
     places: FloatArray
     along: FloatArray
-
-    @classmethod
-    def of(cls, places: FloatArray) -> "_Way":
-        return cls(places, np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))))
 
     def at(self, along: float) -> tuple[FloatArray, float]:
         """Place (3,) [m] and heading [rad], on the straight beyond both ends."""
@@ -152,7 +132,8 @@ class CrawlSearch:
         found = low_way(self._scene, footholds, ends, low, high)
         if found is None:
             return "no way over the ground has room for the body on hands and knees"
-        way, under = _Way.of(found[0]), np.flatnonzero(~found[1])
+        steps = np.linalg.norm(np.diff(found[0], axis=0), axis=1)
+        way, under = _Way(found[0], np.append(0.0, np.cumsum(steps))), np.flatnonzero(~found[1])
         if not len(under):
             return "the body can walk all the way"
         first, last = float(way.along[under[0]]), float(way.along[under[-1]])
@@ -168,7 +149,7 @@ class CrawlSearch:
             crawl = self._on_hands_and_knees(way, down, up, gait)
             if not isinstance(crawl, str):
                 # The crawl begins with the stage that kneeling down ends with.
-                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages]
+                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages[1:]]
                 return self._joined(before, crawled, behind)
             reason = reason or crawl
         return reason
@@ -213,24 +194,23 @@ class CrawlSearch:
         for (base, behind), lead in product(KNEELING, ("right", "left")):
             at = along + behind * self._size
             held = self._contacts(way, (at, at + base * self._size))
-            rise = held if isinstance(held, str) else self._got_up(held, feet, lead, standing.q)
-            if isinstance(rise, _Rise):
-                return replace(rise, along=at, base=base * self._size)
-            reason = reason or rise
+            stages = held if isinstance(held, str) else self._got_up(held, feet, lead)
+            if not isinstance(stages, str):
+                return _Rise(stages, standing.q, at, base * self._size)
+            reason = reason or stages
         return f"cannot kneel down at {_text(middle)}: {reason}"
 
-    def _got_up(
-        self, held: dict[str, Contact], feet: Mapping[str, Contact], lead: str, standing: FloatArray
-    ) -> "_Rise | str":
+    def _got_up(self, held: dict[str, Contact], feet: Contacts, lead: str) -> list[Stage] | str:
         """From four contacts onto two feet, the leading one first."""
         other = "left" if lead == "right" else "right"
-        posed = self._posed(held, held, self._guide(held), guided=True)
-        stages: list[Stage] = []
+        posed, stages = self._posed(held, held, self._guide(held), guided=True), list[Stage]()
+        if posed.q is not None:
+            stages = [Stage.of(self._body, held, posed.q, self._settings.shift_duration)]
         changes = [
             (f"{lead}_knee", None), (None, f"{lead}_foot"), (f"{other}_knee", None), (None, f"{other}_foot"),
             ("left_fist", None), ("right_fist", None),
         ]  # fmt: skip
-        contacts, first = dict(held), posed.q
+        contacts = dict(held)
         for leaving, landing in changes:
             after = {name: contact for name, contact in contacts.items() if name != leaving}
             if landing is not None:
@@ -244,9 +224,7 @@ class CrawlSearch:
             contacts = after
             time = TURNING if len(after) == 3 and landing is None else self._settings.reach_duration
             stages.append(Stage.of(self._body, contacts, posed.q, time))
-        assert first is not None
-        kneeling = Stage.of(self._body, held, first, self._settings.shift_duration)
-        return _Rise(kneeling, tuple(stages), standing)
+        return stages
 
     # --- on hands and knees -----------------------------------------------------------------------
 
@@ -255,8 +233,8 @@ class CrawlSearch:
     ) -> list[Stage] | str:
         """Stages from one place on hands and knees to another, or why there are none."""
         stride, base = (self._size * value for value in gait)
-        total, contacts, q = up.along - down.along, dict(down.kneeling.contacts), down.kneeling.q
-        stages = [down.kneeling]
+        stages, goal = down.stages[:1], up.stages[0].contacts
+        total, contacts, q = up.along - down.along, dict(stages[0].contacts), stages[0].q
         begin = {"knee": down.along, "fist": down.along + base}
         end = {"knee": up.along, "fist": up.along + up.base}
         reached = {name: down.along + down.base * name.endswith("fist") for name in ORDER}
@@ -264,7 +242,7 @@ class CrawlSearch:
             name = ORDER[number % 4]
             part = name.partition("_")[2]
             ahead = begin[part] + 0.25 * (number + 1) * stride
-            target = up.kneeling.contacts[name] if ahead >= end[part] else None
+            target = goal[name] if ahead >= end[part] else None
             if contacts[name] is not target:
                 step = self._stepped(way, name, (reached[name], min(ahead, end[part])), target, contacts, q)
                 if isinstance(step, str):
@@ -272,13 +250,13 @@ class CrawlSearch:
                 reached[name], *made = step
                 stages += made
                 q, contacts = made[-1].q, dict(made[-1].contacts)
-            if all(contacts[each] is up.kneeling.contacts[each] for each in ORDER):
+            if all(contacts[each] is goal[each] for each in ORDER):
                 return stages
         return "does not arrive on hands and knees"
 
     def _stepped(
         self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None,
-        contacts: Mapping[str, Contact], q: FloatArray,
+        contacts: Contacts, q: FloatArray,
     ) -> tuple[float, Stage, Stage] | str:  # fmt: skip
         """New place and stages of a limb that goes to a contact, where the way has it, or near there."""
         staying = {other: contact for other, contact in contacts.items() if other != name}
@@ -286,7 +264,11 @@ class CrawlSearch:
         if lifted.q is None:
             return f"{name} cannot leave {_text(contacts[name].position)}: {lifted.reason}"
         reason = f"there is nothing to put {name} on beyond {_text(contacts[name].position)}"
-        for along, contact in self._offers(way, name, ends, target):
+        spots = ((ends[0] + share * (ends[1] - ends[0]), out) for share, out in NEARBY)
+        offers = ((along, self._contact(way, name, along, out)) for along, out in spots)
+        for along, contact in chain([(ends[1], target)], offers):
+            if contact is None:
+                continue
             landed = {**staying, name: contact}
             landing = self._posed(landed, staying, lifted.q, guided=True)
             if landing.q is None:
@@ -301,28 +283,15 @@ class CrawlSearch:
             return along, flying, Stage.of(self._body, landed, landing.q, self._settings.shift_duration)
         return reason
 
-    def _offers(
-        self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None
-    ) -> Iterator[tuple[float, Contact]]:
-        """Contacts for a limb, where it should be first."""
-        if target is not None:
-            yield ends[1], target
-        for share, out in NEARBY:
-            along = ends[0] + share * (ends[1] - ends[0])
-            contact = self._contact(way, name, along, out)
-            if contact is not None:
-                yield along, contact
-
     def _between(
-        self, staying: Mapping[str, Contact], name: str, ends: tuple[Contact, Contact],
+        self, staying: Contacts, name: str, ends: tuple[Contact, Contact],
         postures: tuple[FloatArray, FloatArray],
     ) -> FloatArray | None:  # fmt: skip
         """(nq,) posture in the middle of a flight, the limb off the line between its contacts."""
         middle = 0.5 * (ends[0].position + ends[1].position) + LIFT * ends[1].normal
         start = 0.5 * (postures[0] + postures[1])
         start[3:7] = postures[1][3:7]
-        wish = {name: Placement(middle, None, None, 0.5 / LIFT**2)}
-        return self._posed(staying, staying, start, wish).q
+        return self._posed(staying, staying, start, {name: Placement(middle, None, None, 0.5 / LIFT**2)}).q
 
     # --- contacts and postures --------------------------------------------------------------------
 
@@ -354,7 +323,7 @@ class CrawlSearch:
                 best = point(name, spot, friction=self._friction, rotation=frame)
         return best
 
-    def _guide(self, contacts: Mapping[str, Contact]) -> FloatArray:
+    def _guide(self, contacts: Contacts) -> FloatArray:
         """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
         knees, hands = _middles(contacts)
         ahead, q = hands - knees, np.array(self._reference)
@@ -366,7 +335,7 @@ class CrawlSearch:
         return q
 
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
+        self, held: Contacts, carrying: Contacts, start: FloatArray,
         wishes: Mapping[str, Placement] | None = None, *, guided: bool = False,
     ) -> Posed:  # fmt: skip
         """A posture that the strength can hold, palms flat and shanks level as far as they can be.
@@ -391,9 +360,7 @@ class CrawlSearch:
             first = first or posed
         return first or Posed(None)
 
-    def _held_easily(
-        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact]
-    ) -> Posed:
+    def _held_easily(self, posed: Posed, held: Contacts, carrying: Contacts) -> Posed:
         """The posture, or that a hand is not upright in it, or that it asks for too much of the strength."""
         if posed.q is not None:
             state = Configuration(self._body, posed.q)
@@ -404,7 +371,7 @@ class CrawlSearch:
         return within_strength(self._body, posed, carrying, EASE)
 
 
-def _middles(contacts: Mapping[str, Contact]) -> tuple[FloatArray, FloatArray]:
+def _middles(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
     """(3,) middles of the knees and of the fists [m]."""
     knees, fists = (
         np.mean([contact.position for name, contact in contacts.items() if name.endswith(part)], axis=0)
@@ -413,7 +380,7 @@ def _middles(contacts: Mapping[str, Contact]) -> tuple[FloatArray, FloatArray]:
     return knees, fists
 
 
-def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
+def _level(held: Contacts) -> dict[str, Placement]:
     """Wishes for shanks that are level and hands that are upright."""
     return {
         name: Placement(None, contact.rotation_contact_to_world, LEVEL[name.partition("_")[2]])
@@ -421,28 +388,23 @@ def _level(held: Mapping[str, Contact]) -> dict[str, Placement]:
     }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class _Rise:
+class _Rise(NamedTuple):
     """Getting up: on hands and knees, then up to two feet, with the posture (nq,) at the end.
 
     The knees are at ``along`` on the way, the hands ``base`` before them [m].
     """
 
-    kneeling: Stage
-    stages: tuple[Stage, ...]
+    stages: list[Stage]
     q: FloatArray
-    along: float = 0.0
-    base: float = 0.0
+    along: float
+    base: float
 
 
 def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
     """Kneeling down: the stages of getting up in the other order of time."""
-    stages = [rise.kneeling, *rise.stages]
-    begins = [*(stage.q for stage in stages[1:]), rise.q]
-    return [
-        Stage.of(body, stage.contacts, q, stage.min_duration)
-        for stage, q in zip(reversed(stages), reversed(begins), strict=True)
-    ]
+    begins = [*(stage.q for stage in rise.stages[1:]), rise.q]
+    stages = zip(reversed(rise.stages), reversed(begins), strict=True)
+    return [Stage.of(body, stage.contacts, q, stage.min_duration) for stage, q in stages]
 
 
 def _text(place: FloatArray) -> str:

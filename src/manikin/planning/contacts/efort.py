@@ -119,8 +119,7 @@ def usable_efort(body: BodyModel, limb: Limb) -> float:
     hinges = limb_hinges(body, limb)
     if not hinges:
         return MOST_RATIO * weight / (GRAVITY * body.mass)
-    strengths = [max(-hinge.torque_lower, hinge.torque_upper) for hinge in hinges]
-    return weight / float(np.linalg.norm(strengths))
+    return weight / float(np.linalg.norm([max(-hinge.torque_lower, hinge.torque_upper) for hinge in hinges]))
 
 
 @dataclass(frozen=True, eq=False)

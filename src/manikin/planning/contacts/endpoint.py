@@ -38,12 +38,7 @@ class Habit(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Endpoint:
-    """A start or goal, or why there is none.
-
-    Attributes:
-        stage: Contacts and posture at rest on them, or None.
-        failure: None, or the reason in one line.
-    """
+    """A start or goal: contacts and a posture at rest on them; or None, and the reason in one line."""
 
     stage: Stage | None
     failure: str | None = None
@@ -124,9 +119,27 @@ class Endpoints:
 
         The buttocks are on the lowest seat there on which it can, at the place or before it.
         """
+        reasons: list[str] = []
+        for contacts, guess in self._sittings(at, heading, height):
+            # A body that sits has its weight where its upright trunk puts it, not over the root.
+            place = Configuration(self._body, guess).com[:2]
+            posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
+            if posed.q is None:
+                reasons.append(posed.reason)
+                continue
+            start = Stage.of(self._body, contacts, posed.q, SITTING_TIME)
+            leaving = leave_seat(self._poser, start, frozenset(FEET))
+            if leaving.failure is None:
+                return Endpoint(start)
+            reasons.append(leaving.failure)
+        nothing = "there is no surface at the height of a seat with room for both feet before it"
+        why = "; ".join(dict.fromkeys([reasons[0], reasons[-1]])) if reasons else nothing
+        return Endpoint(None, f"no posture seated at {np.round(at, 3).tolist()} m: {why}")
+
+    def _sittings(self, at: FloatArray, heading: float, height: float | None) -> Iterator[Sitting]:
+        """Ways to sit on each seat, the lowest first; then each with hands that push, where they can."""
         low, high = (share * self._stature for share in SEAT_HEIGHTS)
         sitter = Sitter(self._body, self._footholds, self._friction, rolls=self._rolls)
-        reasons: list[str] = []
         # Below the seat there may be no floor: it is looked for where the feet may be.
         forward = self._stature * rotation_from_yaw(heading)[:2, 0]
         ahead = [at + distance * forward for distance in FEET_BEFORE_SEAT]
@@ -135,35 +148,14 @@ class Endpoints:
                 if not low <= level - floor <= high:
                     continue
                 sittings = list(sitter.sittings(np.array([*at, level]), heading, seat, floor))
-                for contacts, guess in self._with_hands(sittings):
-                    result = self._sat(contacts, guess)
-                    if result.stage is not None:
-                        return result
-                    reasons.append(result.failure or "")
-        nothing = "there is no surface at the height of a seat with room for both feet before it"
-        why = "; ".join(dict.fromkeys([reasons[0], reasons[-1]])) if reasons else nothing
-        return Endpoint(None, f"no posture seated at {np.round(at, 3).tolist()} m: {why}")
-
-    def _with_hands(self, sittings: list[Sitting]) -> Iterator[Sitting]:
-        """Each way to sit, then each with hands that push, where they can."""
-        yield from sittings
-        for contacts, guess in sittings:
-            hands = hand_supports(
-                self._scene, contacts["buttocks"], self._stature, self._friction, self._footholds.steepest
-            )
-            if hands:
-                yield {**contacts, **hands}, guess
-
-    def _sat(self, contacts: dict[str, Contact], guess: FloatArray) -> Endpoint:
-        """A way to sit with its posture, where the body can rise from it."""
-        # A body that sits has its weight where its upright trunk puts it, not over the root.
-        place = Configuration(self._body, guess).com[:2]
-        posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
-        if posed.q is None:
-            return Endpoint(None, posed.reason)
-        start = Stage.of(self._body, contacts, posed.q, SITTING_TIME)
-        leaving = leave_seat(self._poser, start, frozenset(FEET))
-        return Endpoint(None, leaving.failure) if leaving.failure is not None else Endpoint(start)
+                yield from sittings
+                for contacts, guess in sittings:
+                    hands = hand_supports(
+                        self._scene, contacts["buttocks"], self._stature, self._friction,
+                        self._footholds.steepest,
+                    )  # fmt: skip
+                    if hands:
+                        yield {**contacts, **hands}, guess
 
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""
@@ -173,18 +165,12 @@ class Endpoints:
         """Surfaces below and above a place with their heights, the lowest first; those near one given."""
         found: list[tuple[float, Surface]] = []
         for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
-            level = _height_at(surface, at)
-            if level is not None and (height is None or abs(level - height) < 0.05):
+            base, normal = surface.polygon[0], surface.normal
+            level = base[2] - float((at - base[:2]) @ normal[:2]) / normal[2]
+            near = height is None or abs(level - height) < 0.05
+            if near and float(surface.outside(np.array([[at[0], at[1], level]]))[0]) <= 1e-9:
                 found.append((level, surface))
         return sorted(found, key=lambda item: item[0])
-
-
-def _height_at(surface: Surface, at: FloatArray) -> float | None:
-    """Height of a surface above or below a place on the ground [m], or None beside it."""
-    base = surface.polygon[0]
-    height = base[2] - float((at - base[:2]) @ surface.normal[:2]) / surface.normal[2]
-    point = np.array([[at[0], at[1], height]])
-    return height if float(surface.outside(point)[0]) <= 1e-9 else None
 
 
 PLACES = 6  # places of each limb among which a start is sought
@@ -201,8 +187,7 @@ def starts_on_limbs(
         q: (nq,) where the body should be, each limb where it should be relative to the root.
         duration: Shortest time for which the contacts are held [s].
     """
-    offered = {item.effector: item.nearest(q[:7], PLACES) for item in holds}
-    offered = {name: items for name, items in offered.items() if items}
+    offered = {item.effector: found for item in holds if (found := item.nearest(q[:7], PLACES))}
     if not offered:
         yield Endpoint(None, "no limb has a contact")
         return

@@ -28,7 +28,6 @@ STEEPEST = math.radians(30.0)  # largest slope of a surface to stand on [rad]; o
 FOOT_HEIGHT = 0.10  # height above a sole that has to be free for the foot [m]; our choice
 FOOT_CLEARANCE = 0.015  # distance of the foot to what stands beside it [m]; our choice
 ON_PLANE = 0.02  # height up to which a neighbouring surface does not hinder a foot [m]
-
 _REQUEST = coal.CollisionRequest()
 _CLEAR = coal.CollisionRequest()
 _CLEAR.security_margin = FOOT_CLEARANCE
@@ -60,7 +59,11 @@ class Foothold:
     surface: int = -1
 
 
-def feet_of(contacts: Mapping[str, Contact]) -> tuple[Foothold, Foothold]:
+Feet = tuple[Foothold, Foothold]
+"""Left and right foothold."""
+
+
+def feet_of(contacts: Mapping[str, Contact]) -> Feet:
     """Left and right foothold of contacts that are given."""
     left, right = (contacts[foot] for foot in FEET)
     turns = left.rotation_contact_to_world, right.rotation_contact_to_world
@@ -90,11 +93,7 @@ class Footholds:
         self, body: BodyModel, scene: Scene, size: tuple[float, float] | None = None,
         steepest: float = STEEPEST,
     ) -> None:  # fmt: skip
-        """Prepare a scene.
-
-        Args:
-            size: Length and width of the soles [m]; the body's when omitted.
-            steepest: Largest slope of a surface to stand on [rad].
+        """Prepare a scene; the size of the soles is the body's when omitted.
 
         Raises:
             ContactError: If the body has no soles.

@@ -5,15 +5,15 @@ body passes from one to the other.  What a step costs is about the time that a p
 estimate of the cost that is left is the length of the shortest way over the ground for a thin column, so that
 ways round obstacles, over steps and across gaps are known from the start.
 
-Tests of the foot and the trunk come when a step is about to be taken (lazily).  Whether a pair of footholds
-has postures is tested by the caller; a pair without is closed with :meth:`FootstepSearch.close`, and the next
-best way is found.
+Tests of the foot and the trunk come when a step is about to be taken.  The caller tests whether a pair of
+footholds has postures, closes one without with :meth:`FootstepSearch.close`, and asks for the next best way.
 """
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from functools import cache
 from itertools import pairwise, product
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import Graph
-from manikin.planning.contacts.footholds import Foothold, Footholds
+from manikin.planning.contacts.footholds import Feet, Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import collision_parts, local_box
 
@@ -33,40 +33,32 @@ EASY = 3.0**0.25  # way at twice the cost of a short step, over that of the chea
 REACH_MARGIN = 0.02  # distance that steps keep to the end of what the body reaches [m]; our choice
 HIGHEST = 0.48  # largest difference in height of two soles, of a body of 1.75 m [m]
 HELD_HIGHEST = 0.80  # the same of a body that has something to hold on to or lean on [m]
-HELD_COST = 4.0 * STEP  # cost of a step that is higher than :data:`HIGHEST`: hands come and go [s]
+HELD_COST = 4.0 * STEP  # cost of a step that is higher than HIGHEST: hands come and go [s]
 NARROWEST = 0.115  # least distance of the middles of two soles across, of a body of 1.75 m [m]
-
 ALONG = (-0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
 ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
 TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
 """Steps that are tried from a foot: ahead and to its side [m], and turned outwards [rad]."""
 CELL = 0.1  # width of the cells of the ground on which the estimate is computed [m]
 GAP = 0.7  # longest way over no ground that the estimate takes [m]
-
 MERGED = 0.06
 MERGED_TURN = math.radians(15.0)  # places [m] and headings [rad] this close together count as one foothold
 LOW_STEP = 0.05  # distance of places on a way for one who crawls [m]
 LOW_RISE = 0.2  # largest difference in height of its cells [m]
 BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothing may stand in it
-
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
-"""Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.
-
-No bound on the cost of a way follows: the estimate counts turns, and may be more than the least cost.
-"""
-
+"""Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.  They bound
+no cost: the estimate counts turns, and may be more than the least cost."""
 SAME_GREED = 3  # ways after which the search for another one begins with the factor that found the last
 ALIKE = 0.08  # distance of footholds up to which a step is much like one that was refused [m]; our choice
 SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1  # up to which steps are as hard [m, rad, 1]; our choice
 TURN_COST = 0.9  # cost of a turn [s/rad]: two steps turn a body by a right angle
 TURN_WAY = 0.6  # way on which going backwards costs as much as a turn by two radians [m]
 LOOK = 5  # cells of the way that tell where it leads
-
 _REQUEST = coal.CollisionRequest()
 
 
-@dataclass(frozen=True)
-class _Node:
+class _Node(NamedTuple):
     """A foot on a foothold, ``side`` +1 for the left one; ``ends`` where the other one is at its goal."""
 
     hold: int
@@ -74,55 +66,43 @@ class _Node:
     ends: bool = False
 
 
-PairCost = Callable[[Foothold, Foothold], float]
-"""Cost of a body between two footholds, left and right [s]; infinite where it has no room."""
-
-
-@dataclass
 class FootstepSearch:
     """Search for footsteps of one body in one scene.
 
     Attributes:
-        scene: What is around.
-        footholds: Finds footholds.
-        start: Left and right foothold at the start.
-        goal: At the goal.
         holds: All footholds, by their numbers; the first four are those of start and goal.
-        scale: Size of the body relative to one of 1.75 m.
-        reach: Places of one foot relative to the other that the body reaches.
-        pair_cost: Cost of the body between two footholds.
-        column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
-        stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
-        highest: Largest difference in height of two soles, of a body of 1.75 m [m].
+        expanded: Footholds from which steps were tried.
     """
 
-    scene: Scene
-    footholds: Footholds
-    start: tuple[Foothold, Foothold]
-    goal: tuple[Foothold, Foothold]
-    scale: float
-    reach: StepReach
-    pair_cost: PairCost
-    column: tuple[float, float, float]
-    stride: float = 0.4
-    highest: float = HIGHEST
-    expanded: int = field(init=False, default=0)
+    def __init__(
+        self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet, scale: float, reach: StepReach,
+        pair_cost: Callable[[Foothold, Foothold], float], column: tuple[float, float, float], stride: float,
+        highest: float,
+    ) -> None:  # fmt: skip
+        """Prepare a search.
 
-    def __post_init__(self) -> None:
-        self.holds = [*self.start, *self.goal]
+        Args:
+            scale: Size of the body relative to one of 1.75 m.
+            reach: Places of one foot relative to the other that the body reaches.
+            pair_cost: Cost of the body between two footholds, left and right [s]; infinite without room.
+            column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
+            stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
+            highest: Largest difference in height of two soles, of a body of 1.75 m [m].
+        """
+        self._footholds, self._scale, self._reach, self._pair_cost = footholds, scale, reach, pair_cost
+        self._stride, self._highest, self.expanded = stride, highest, 0
+        self.holds = [*start, *goal]
         self._keys: dict[tuple[int, ...], int] = {}
-        self._free: dict[int, bool] = dict.fromkeys(range(4), True)
+        self._is_free = cache(lambda number: number < 4 or footholds.is_free(self.holds[number]))
         self._pairs: dict[tuple[int, int], float] = {}
         self._next: dict[tuple[int, int], list[tuple[int, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
         self._refused: list[tuple[FloatArray, FloatArray]] = []
         self._too_hard: list[FloatArray] = []
-        self._offsets = _offsets(self.scale)
+        self._offsets = _offsets(scale)
         self._first_greed = self._ways = 0
-        self._field = _Field(
-            self.scene, self.footholds, self.start, self.goal, self.column, self.stride * self.scale,
-            (HIGHEST * self.scale, self.highest * self.scale),
-        )  # fmt: skip
+        heights = HIGHEST * scale, highest * scale
+        self._field = _Field(scene, footholds, start, goal, column, stride * scale, heights)
         places = np.array([hold.position for hold in self.holds])
         yaws = np.array([hold.yaw for hold in self.holds])
         self._ahead: list[float] = self._field.costs(places, yaws).tolist()
@@ -201,11 +181,8 @@ class FootstepSearch:
         if pair in self._closed or self._is_refused(*pair):
             return math.inf
         if pair not in self._pairs:
-            both = [self.holds[number] for number in pair]
-            if node.hold not in self._free:
-                self._free[node.hold] = self.footholds.is_free(both[1])
-            left, right = both if parent.side > 0 else both[::-1]
-            self._pairs[pair] = self.pair_cost(left, right) if self._free[node.hold] else math.inf
+            both = [self.holds[number] for number in (pair if parent.side > 0 else pair[::-1])]
+            self._pairs[pair] = self._pair_cost(*both) if self._is_free(node.hold) else math.inf
         return self._pairs[pair]
 
     def _is_refused(self, stand: int, step: int) -> bool:
@@ -229,7 +206,7 @@ class FootstepSearch:
         places = stand.position[:2] + ahead[:, None] * turn + across[:, None] * side
         yaws = stand.yaw + out * turns
         goal = 3 if node.side > 0 else 2
-        found = self.footholds.lay(places, yaws, float(stand.position[2]), self.highest * self.scale)
+        found = self._footholds.lay(places, yaws, float(stand.position[2]), self._highest * self._scale)
         ends = self.holds[goal]
         costs = self._step_costs(
             stand, out,
@@ -250,7 +227,7 @@ class FootstepSearch:
         for row, label in zip(rows.tolist(), map(tuple, keys.tolist()), strict=True):
             number = self._keys.setdefault(label, len(self.holds))
             if number == len(self.holds):
-                self.holds.append(self.footholds.hold(found, row))
+                self.holds.append(self._footholds.hold(found, row))
                 fresh.append(row)
             # A place close by stands for the one that was asked for.
             steps[number] = min(steps.get(number, math.inf), float(costs[1 + row]))
@@ -266,13 +243,13 @@ class FootstepSearch:
         c, s = math.cos(stand.yaw), math.sin(stand.yaw)
         ahead, aside = c * away[:, 0] + s * away[:, 1], out * (c * away[:, 1] - s * away[:, 0])
         turned = out * (np.mod(yaws - stand.yaw + math.pi, 2.0 * math.pi) - math.pi)
-        rise, size = np.abs(away[:, 2]), self.scale
+        rise, size = np.abs(away[:, 2]), self._scale
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
         apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
-        made = self.reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
-        made &= (rise <= self.highest * size) & (turned >= -0.8) & (turned <= 1.1)
+        made = self._reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
+        made &= (rise <= self._highest * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
-        cost = STEP * (1.0 + (way / (EASY * self.stride * size)) ** 4)
+        cost = STEP * (1.0 + (way / (EASY * self._stride * size)) ** 4)
         steep = 8.0 * np.maximum(0.0, rise - 0.2 * size)
         cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + 3.0 * (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
@@ -283,13 +260,10 @@ class FootstepSearch:
 def _offsets(scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(k,) ways ahead and across [m] and turns [rad] of steps; the farther one goes, the less one turns."""
     rows = [
-        (ahead, across, turn)
-        for ahead, across, turn in product(ALONG, ACROSS, TURNS)
-        if (abs(turn) < 0.3 or ahead <= 0.3)
-        and (across < 0.3 or (abs(ahead) <= 0.15 and abs(turn) < 0.3))
-        and (across > 0.16 or turn >= 0.0)
-        and (ahead >= 0.0 or abs(turn) < 0.3)
-    ]
+        (ahead, across, turn) for ahead, across, turn in product(ALONG, ACROSS, TURNS)
+        if (abs(turn) < 0.3 or ahead <= 0.3) and (across < 0.3 or (abs(ahead) <= 0.15 and abs(turn) < 0.3))
+        and (across > 0.16 or turn >= 0.0) and (ahead >= 0.0 or abs(turn) < 0.3)
+    ]  # fmt: skip
     ahead, across, turns = np.array(rows).T
     return scale * ahead, scale * across, turns
 
@@ -298,9 +272,8 @@ class _Field:
     """Cost to the goal over cells of the ground, for a thin column in place of the body."""
 
     def __init__(
-        self, scene: Scene, footholds: Footholds, start: tuple[Foothold, Foothold],
-        goal: tuple[Foothold, Foothold], column: tuple[float, float, float], stride: float,
-        highest: tuple[float, float], gap: float = GAP,
+        self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet,
+        column: tuple[float, float, float], stride: float, highest: tuple[float, float], gap: float = GAP,
     ) -> None:  # fmt: skip
         easy, self._highest = highest
         ends = np.array([hold.position for hold in (*start, *goal)])
@@ -354,8 +327,8 @@ class _Field:
         ends = self._points[pairs]
         ends[..., 2] = ends[..., 2].max(axis=1, keepdims=True)
         between = ends[:, :1] + BETWEEN[:, None] * (ends[:, 1:] - ends[:, :1])
-        free = _column_is_free(scene, between.reshape(-1, 3), column).reshape(len(pairs), -1)
-        return np.asarray(free.all(axis=1))
+        free = _column_is_free(scene, between.reshape(-1, 3), column)
+        return np.asarray(free.reshape(len(pairs), -1).all(axis=1))
 
     def way(self, place: FloatArray) -> FloatArray | None:
         """(n, 3) cells from a place (3,) to the goal [m]; None where none lead there."""
@@ -400,8 +373,8 @@ class _Field:
 
 
 def low_way(
-    scene: Scene, footholds: Footholds, ends: tuple[tuple[Foothold, Foothold], tuple[Foothold, Foothold]],
-    low: tuple[float, float, float], high: tuple[float, float, float],
+    scene: Scene, footholds: Footholds, ends: tuple[Feet, Feet], low: tuple[float, float, float],
+    high: tuple[float, float, float],
 ) -> tuple[FloatArray, np.ndarray] | None:  # fmt: skip
     """Way over the ground for a body that crawls, straight where it can be.
 
@@ -444,8 +417,7 @@ def _column_is_free(scene: Scene, places: FloatArray, column: tuple[float, float
     """(k,) whether a vertical capsule above each place meets nothing."""
     radius, bottom, top = column
     shape = coal.Capsule(radius, max(top - bottom - 2.0 * radius, 1e-3))
-    free = np.ones(len(places), dtype=bool)
-    lift = np.array([0.0, 0.0, 0.5 * (bottom + top)])
+    free, lift = np.ones(len(places), dtype=bool), np.array([0.0, 0.0, 0.5 * (bottom + top)])
     for part in (part for item in scene for part in collision_parts(item)):
         there = coal.Transform3s(part.rotation, part.translation)
         low, high = _bounds(part.geometry, there)

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration, Limb, limb_named
 from manikin.body.natural_range import NaturalRange
@@ -16,7 +16,13 @@ from manikin.errors import BodyError
 from manikin.kinematics import LimbKinematics
 from manikin.kinematics.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Aligner
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.contacts.candidates import Candidates, Situation, SurfaceTable, find_candidates
+from manikin.planning.contacts.candidates import (
+    Candidates,
+    IntArray,
+    Situation,
+    SurfaceTable,
+    find_candidates,
+)
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
 from manikin.planning.contacts.efort import Task, efort
 from manikin.planning.contacts.heuristics import Efort, Heuristic
@@ -31,6 +37,7 @@ _NO_DIRECTION = np.zeros(3)
 _LOOKED_AT = 8  # candidates for each that may be tried
 Alpha = TypeVar("Alpha", float, FloatArray)
 
+_Faults = Counter[tuple[str, str]]
 _TILTED, _UNNATURAL, _WEAK = ("", "tilted"), ("", "unnatural"), ("", "weak")
 NATURAL_SLACK = 0.1  # normalised distance out of the learnt range that the alignment may leave
 
@@ -38,16 +45,11 @@ NATURAL_SLACK = 0.1  # normalised distance out of the learnt range that the alig
 class Hindrance(StrEnum):
     """Cause that kept a limb from making a contact."""
 
-    REACH = "reach"
-    """No surface is within reach of the limb."""
-    SURFACE = "surface"
-    """Surfaces are within reach, but no sample of the limb lies on one."""
-    COLLISION = "collision"
-    """Every contact that was tried collides."""
-    ALIGNMENT = "alignment"
-    """No effector that was tried can be put flat onto its surface."""
-    DIRECTION = "direction"
-    """Surfaces are within reach, but none has a usable EFORT in the direction that is asked for."""
+    REACH = "reach"  # no surface is within reach of the limb
+    SURFACE = "surface"  # surfaces are within reach, but no sample of the limb lies on one
+    COLLISION = "collision"  # every contact that was tried collides
+    ALIGNMENT = "alignment"  # no effector that was tried can be put flat onto its surface
+    DIRECTION = "direction"  # no surface within reach has a usable EFORT in the direction that is asked for
 
 
 @dataclass(frozen=True)
@@ -137,10 +139,7 @@ class ContactGenerator:
         self, body: BodyModel, scene: Scene, samples: Mapping[str, LimbSamples],
         settings: GeneratorSettings | None = None, rules: ContactRules | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a scene.
-
-        Args:
-            samples: Samples by name of the limb, see :func:`manikin.planning.contacts.sample_limbs`.
+        """Prepare a scene for samples by name of the limb (:func:`manikin.planning.contacts.sample_limbs`).
 
         Raises:
             BodyError: If samples belong to no limb of the body.
@@ -217,12 +216,13 @@ class ContactGenerator:
         """Steps 2 to 4 for one task; surfaces that face another way are not looked at."""
         tools, numbers = reached.tools, reached.surfaces
         situation = replace(reached.situation, reaction=task.reaction_on(tools.limb.name))
+        reached = replace(reached, situation=situation)
         if usable is not None:
             most_efort = tools.samples.largest_ratio * (self._table.normals[numbers] @ situation.reaction)
             numbers = numbers[usable.signed(most_efort) >= usable.least]
         candidates = self._samples_in_contact(reached, numbers)
         if not len(candidates):
-            return self._none_lies(reached, situation, usable)
+            return self._none_lies(reached, usable)
         if usable is None:
             scores, rows = heuristic.score(situation, candidates), np.arange(len(candidates))
         else:
@@ -231,30 +231,27 @@ class ContactGenerator:
             rows = np.flatnonzero(values >= usable.least)
             scores = values if heuristic == order else heuristic.score(situation, candidates)
         if not len(rows):
-            return self._none_lies(reached, situation, usable)
-        return self._choose(reached, situation, candidates, scores, rows, usable)
+            return self._none_lies(reached, usable)
+        return self._choose(reached, candidates, scores, rows, usable)
 
-    def _samples_in_contact(self, reached: "_WithinReach", numbers: NDArray[np.int64]) -> Candidates:
+    def _samples_in_contact(self, reached: "_WithinReach", numbers: IntArray) -> Candidates:
         """Step 2: samples on some of the surfaces within reach."""
         candidates = find_candidates(
             self._table, numbers, reached.situation, reached.tools.samples,
             tolerance=self.settings.tolerance, max_tilt=self.settings.max_tilt, footprint=reached.footprint,
         )  # fmt: skip
         if reached.kind is ContactKind.GRASP and len(candidates):
-            palms = self._scene.palms(candidates.surfaces, candidates.points)
-            candidates = replace(candidates, points=palms)
+            candidates = replace(candidates, points=self._scene.palms(candidates.surfaces, candidates.points))
         return candidates
 
-    def _none_lies(
-        self, reached: "_WithinReach", situation: Situation, usable: UsableEfort | None
-    ) -> GeneratedContact:
+    def _none_lies(self, reached: "_WithinReach", usable: UsableEfort | None) -> GeneratedContact:
         """Failure of a limb of which no sample lies on a surface, or on none that pushes it the asked way."""
         limb, near = reached.tools.limb.name, reached.surfaces
         candidates = self._samples_in_contact(reached, near)
         if usable is None or not len(candidates):
             where = f"flat on a surface of {self._names(near)}, though these are near"
             return _failure(limb, Hindrance.SURFACE, f"no sample of {limb} lies {where}")
-        best = float(Efort(usable.pulling).score(situation, candidates).max())
+        best = float(Efort(usable.pulling).score(reached.situation, candidates).max())
         does = "holds" if usable.pulling else "pushes"
         message = (
             f"no surface in reach of {limb} ({self._names(candidates.surfaces)}) {does} it that way: "
@@ -262,33 +259,31 @@ class ContactGenerator:
         )
         return _failure(limb, Hindrance.DIRECTION, message, len(candidates))
 
-    def _names(self, surfaces: NDArray[np.int64]) -> str:
+    def _names(self, surfaces: IntArray) -> str:
         """Names of the obstacles of some surfaces."""
         near = (self._table.surfaces[number].obstacles for number in np.unique(surfaces))
         return ", ".join(sorted(set[str]().union(*near)))
 
     def _choose(
-        self, reached: "_WithinReach", situation: Situation, candidates: Candidates, scores: FloatArray,
-        rows: NDArray[np.int64], usable: UsableEfort | None,
+        self, reached: "_WithinReach", candidates: Candidates, scores: FloatArray, rows: IntArray,
+        usable: UsableEfort | None,
     ) -> GeneratedContact:  # fmt: skip
         """Steps 3 and 4: of some rows best first, the first that can be aligned, are usable and free."""
-        tools, kind = reached.tools, reached.kind
-        faults: Counter[tuple[str, str]] = Counter()
+        tools, situation, kind = reached.tools, reached.situation, reached.kind
+        faults: _Faults = Counter()
         tried, flat = 0, kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
         tools.collisions.begin(situation)
         q, direction = np.array(situation.state.q), situation.reaction @ situation.rotation
         order = rows[_order(scores[rows])[: _LOOKED_AT * self.settings.tries]]
-        for row, goal in self._worth_trying(tools, situation, candidates, order, faults):
+        for row, goal in self._worth_trying(reached, candidates, order, faults):
             if tried == self.settings.tries:
                 break
             tried, point = tried + 1, candidates.points[row]
             aligned = tools.aligner.align(*goal, allowed)
-            if not aligned.lies(allowed, gap):
-                faults[_TILTED] += 1
-                continue
-            if not tools.natural(aligned.angles):
-                faults[_UNNATURAL] += 1
+            lies = aligned.lies(allowed, gap)
+            if not lies or not tools.natural(aligned.angles):
+                faults[_UNNATURAL if lies else _TILTED] += 1
                 continue
             q[tools.chain.slots] = aligned.angles
             surface = int(candidates.surfaces[row])
@@ -304,9 +299,8 @@ class ContactGenerator:
             if usable is not None and usable.signed(alpha) < usable.least:
                 faults[_WEAK] += 1
                 continue
-            contact = make_contact(
-                self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
-            )
+            frame = onto_normal(turn, candidates.normals[row])
+            contact = make_contact(self.body, tools.limb, kind, point, frame, self.rules)
             return GeneratedContact(
                 tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacles,
                 float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
@@ -315,14 +309,14 @@ class ContactGenerator:
         return _none_fits(tools.limb.name, faults, len(candidates), usable)
 
     def _worth_trying(
-        self, tools: "_LimbTools", situation: Situation, candidates: Candidates, order: NDArray[np.int64],
-        faults: Counter[tuple[str, str]],
-    ) -> Iterator[tuple[int, tuple[FloatArray, FloatArray, FloatArray]]]:  # fmt: skip
-        """Rows in order with what to align there.
+        self, reached: "_WithinReach", candidates: Candidates, order: IntArray, faults: _Faults
+    ) -> Iterator[tuple[int, tuple[FloatArray, FloatArray, FloatArray]]]:
+        """Rows in order with angles to begin with, and point and normal in the limb's frame.
 
         As soon as the limb itself, not its end, has collided a few times, candidates that are deep in
         something are left out; they count as collisions.
         """
+        tools, situation = reached.tools, reached.situation
         start, size, around = 0, _FEW, None
         while start < len(order):
             rows = order[start : start + size]
@@ -332,7 +326,11 @@ class ContactGenerator:
                 deep = tools.deep.pairs(around, candidates.samples[rows], self.settings.tolerance)
                 faults.update(tools.collisions.names[pair] for pair in deep[deep >= 0].tolist())
                 rows, size = rows[deep < 0], _BLOCK
-            goals = tools.goals(situation, candidates, rows)
+            goals = (
+                tools.samples.angles.take(candidates.samples[rows], axis=0),
+                (candidates.points.take(rows, axis=0) - situation.origin) @ situation.rotation,
+                candidates.normals.take(rows, axis=0) @ situation.rotation,
+            )
             yield from zip(rows.tolist(), zip(*goals, strict=True), strict=True)
             size = max(size, _SOME)
 
@@ -343,7 +341,7 @@ class _WithinReach:
 
     tools: "_LimbTools"
     situation: Situation
-    surfaces: NDArray[np.int64]
+    surfaces: IntArray
     kind: ContactKind
     footprint: FloatArray
 
@@ -353,8 +351,7 @@ class _LimbTools:
 
     def __init__(self, body: BodyModel, limb: Limb, scene: Scene, samples: LimbSamples) -> None:
         self.limb, self.samples, self.chain = limb, samples, LimbKinematics(body, limb)
-        self.aligner = Aligner(self.chain)
-        self.collisions = LimbCollisions(body, limb, scene)
+        self.aligner, self.collisions = Aligner(self.chain), LimbCollisions(body, limb, scene)
         self.deep = DeepSamples(body, self.chain, samples, self.collisions)
         self._range = NaturalRange(body, limb) if samples.natural else None
         # Made now, not during a request.
@@ -368,22 +365,10 @@ class _LimbTools:
 
     def natural(self, angles: FloatArray) -> bool:
         """Whether a limb at angles (k,) is hardly beyond a learnt range of motion; so where none counts."""
-        if self._range is None:
-            return True
-        return bool(self._range.volume_distance(angles[None])[0] >= -NATURAL_SLACK)
-
-    def goals(
-        self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64]
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Angles to begin with, points and normals in the limb's frame of some candidates."""
-        return (
-            self.samples.angles.take(candidates.samples[rows], axis=0),
-            (candidates.points.take(rows, axis=0) - situation.origin) @ situation.rotation,
-            candidates.normals.take(rows, axis=0) @ situation.rotation,
-        )
+        return self._range is None or bool(self._range.volume_distance(angles[None])[0] >= -NATURAL_SLACK)
 
 
-def _order(scores: FloatArray) -> NDArray[np.int64]:
+def _order(scores: FloatArray) -> IntArray:
     """Candidates in the order of their trial: down the scores in ever longer steps, then those left out.
 
     Neighbours in the order are often neighbours in space and collide with the same thing.
@@ -395,15 +380,11 @@ def _order(scores: FloatArray) -> NDArray[np.int64]:
     return order[np.concatenate([steps, np.flatnonzero(left)])]
 
 
-def _failure(
-    limb: str, kind: Hindrance, message: str, candidates: int = 0, tried: int = 0
-) -> GeneratedContact:
-    return GeneratedContact(limb, None, None, (), -np.inf, candidates, tried, kind, message)
+def _failure(limb: str, kind: Hindrance, why: str, candidates: int = 0, tried: int = 0) -> GeneratedContact:
+    return GeneratedContact(limb, None, None, (), -np.inf, candidates, tried, kind, why)
 
 
-def _none_fits(
-    limb: str, faults: Counter[tuple[str, str]], candidates: int, usable: UsableEfort | None
-) -> GeneratedContact:
+def _none_fits(limb: str, faults: _Faults, candidates: int, usable: UsableEfort | None) -> GeneratedContact:
     tried = sum(faults.values())
     tilted, unnatural, weak = (faults.pop(kind, 0) for kind in (_TILTED, _UNNATURAL, _WEAK))
     collided = sum(faults.values())

@@ -26,25 +26,15 @@ STOOP = 0.45  # how far shoulders go down to a hold that is low [m]
 APART = 0.15  # distance between two places that are offered [m]
 PALM = 0.05  # half the size of what has to be level below a palm [m]
 LEVEL = math.radians(20.0)  # largest slope of a surface to lean on [rad]
-
 _GRID = np.array([[i, j] for i in range(-5, 6) for j in range(-5, 6)]) * 0.08
 _CORNERS = PALM * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
 
 
 class Handholds:
-    """Offers holds for hands around places of the body in one scene.
-
-    Attributes:
-        exist: Whether there is any.
-    """
+    """Offers holds for hands around places of the body in one scene, where any ``exist``."""
 
     def __init__(self, body: BodyModel, scene: Scene, friction: float, max_force: float = 400.0) -> None:
-        """Prepare a scene.
-
-        Args:
-            friction: Coulomb coefficient of palms.
-            max_force: Largest force of a grasp along each axis [N].
-        """
+        """Prepare a scene, with a Coulomb coefficient of palms and a largest force of grasps by axis [N]."""
         self._size, self._friction, self._force = stature_of(body) / 1.75, friction, max_force
         self._bars = scene.grasp_lines
         self._level = [item for item in scene.surfaces_facing((0.0, 0.0, 1.0), LEVEL) if len(item.polygon)]
@@ -54,9 +44,7 @@ class Handholds:
     def near(self, roots: Sequence[FloatArray], ground: float, most: int) -> list[Contact]:
         """Holds of both hands that are in reach from all of some (7,) poses of the root, the best first.
 
-        Args:
-            ground: Height of the lower foot [m].
-            most: Largest number of them.
+        There are ``most`` of them at most; the height of the lower foot is ``ground`` [m].
         """
         size, offers = self._size, list[tuple[float, Contact]]()
         for hand, side in zip(HANDS, (1.0, -1.0), strict=True):

@@ -1,7 +1,7 @@
 """What makes one contact better than another: interchangeable scores of candidates."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -38,8 +38,7 @@ def cached_score(
     wanted = np.ones(len(first), dtype=bool)
     if asked is not None:
         wanted = np.isin(np.arange(len(first)), group[asked])
-    values = np.array([value(int(row)) if w else 0.0 for row, w in zip(first, wanted, strict=True)])
-    return values[group]
+    return np.array([value(int(row)) if w else 0.0 for row, w in zip(first, wanted, strict=True)])[group]
 
 
 def contact_at(
@@ -60,11 +59,7 @@ class Heuristic(Protocol):
 
 @dataclass(frozen=True)
 class Efort:
-    """Extended force transmission ratio ([Tonneau2015]_ 5.12), with the limb's own direction.
-
-    Attributes:
-        pulling: Whether the limb holds on and pulls at the surface (5.13).
-    """
+    """Extended force transmission ratio ([Tonneau2015]_ 5.12, pulling 5.13) in the limb's own direction."""
 
     pulling: bool = False
 
@@ -104,9 +99,7 @@ class StrongEfort:
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`Heuristic`."""
         products = self.products[situation.limb.name][candidates.samples]
-        direction = situation.reaction @ situation.rotation
-        alpha = efort(products, direction, candidates.normals @ situation.rotation)
-        return -alpha if self.pulling else alpha
+        return Efort(self.pulling).score(situation, replace(candidates, products=products))
 
 
 @dataclass(frozen=True)
@@ -130,11 +123,7 @@ class Manipulability:
 
 @dataclass(frozen=True, eq=False)
 class Comfort:
-    """Preference for angles far from the ends of the :class:`NaturalRange` ([Tonneau2015]_ 4.3.3).
-
-    Attributes:
-        samples: The samples that are asked, by limb.
-    """
+    """Preference for samples' angles far from the ends of a :class:`NaturalRange` ([Tonneau2015]_ 4.3.3)."""
 
     samples: Mapping[str, LimbSamples]
 
@@ -251,11 +240,7 @@ class BalanceScore:
 
 @dataclass(frozen=True, eq=False)
 class WeightedSum:
-    """Sum of weighted scores ([Tonneau2015]_ 7.7); the weights carry the units.
-
-    Attributes:
-        terms: (weight, heuristic) pairs.
-    """
+    """Sum of scores of (weight, heuristic) terms ([Tonneau2015]_ 7.7); the weights carry the units."""
 
     terms: Sequence[tuple[float, Heuristic]]
 

@@ -26,10 +26,8 @@ from manikin.scene.collision import collision_parts, local_box
 
 TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]
 YIELD = 0.8
-"""Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius.
-
-The wrist of our shapes is thicker than the hand, so that a palm flat on a wall has it in the wall.
-"""
+"""Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius:
+the wrist of our shapes is thicker than the hand, so that a palm flat on a wall has it in the wall."""
 
 
 class LimbCollisions:
@@ -186,21 +184,14 @@ _ALONG = np.array([0.0, 0.5])  # shares of a capsule's axis with a ball, from it
 class DeepSamples:
     """Tells which samples of one limb have a ball deep in something.
 
-    The balls are on the axes of the limb's capsules, but for those of the segment that makes contact and
-    those that give way in what they touch.
-
-    Attributes:
-        shapes: Names of these capsules.
+    The balls are on the axes of the limb's capsules, whose names are its ``shapes``, but for those of the
+    segment that makes contact and those that give way in what they touch.
     """
 
     def __init__(
         self, body: BodyModel, chain: LimbKinematics, samples: LimbSamples, collisions: LimbCollisions
     ) -> None:
-        """Place the balls of all samples.
-
-        Args:
-            collisions: Its exact collision test, whose pairs these are.
-        """
+        """Place the balls of all samples; the pairs are those of the limb's exact collision test."""
         self._collisions = collisions
         self._centres, radii, shapes = _balls(body, chain, samples.angles, collisions.soft)
         self.shapes = frozenset(shapes)
@@ -274,9 +265,7 @@ def _balls(
     body: BodyModel, chain: LimbKinematics, angles: FloatArray, soft: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray, list[str]]:
     """Centres (n, b, 3) in the limb's frame, radii (b,) and shapes of balls along a limb at angles (n, k)."""
-    centres: list[FloatArray] = []
-    radii: list[float] = []
-    names: list[str] = []
+    centres, radii, names = list[FloatArray](), list[float](), list[str]()
     for name, turns, places in chain.segment_placements(angles):
         if name in soft or name == chain.limb.segments[-1]:
             continue
@@ -297,6 +286,4 @@ def _round_box(geometry: coal.CollisionGeometry) -> tuple[FloatArray, float] | N
         return np.array(geometry.halfSide), 0.0
     if isinstance(geometry, coal.Capsule):
         return np.array([0.0, 0.0, geometry.halfLength]), float(geometry.radius)
-    if isinstance(geometry, coal.Sphere):
-        return np.zeros(3), float(geometry.radius)
-    return None
+    return (np.zeros(3), float(geometry.radius)) if isinstance(geometry, coal.Sphere) else None

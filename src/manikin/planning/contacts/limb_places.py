@@ -1,8 +1,9 @@
 """Places on which limbs can make contacts: what is level, rungs, edges and bars for hands."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -45,7 +46,6 @@ RUNG_APART = 0.025  # distance on the sole between two places of a rung below it
 PALM_ROOM = 0.01  # distance of a palm's middle from the bar that its fingers close round [m]
 STEEP_BAR = 0.85  # rise of a bar over its length from which on a hand takes it from the side; our choice
 RUNG_SPACING = 0.045  # distance of neighbouring places of a foot along a rung [m]; our choice
-
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
 
@@ -68,8 +68,7 @@ def limb_holds(
         item for item in scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
         if (item.polygon.min(axis=0) <= high).all() and (item.polygon.max(axis=0) >= low).all()
     ]  # fmt: skip
-    grid = _Grid(scene, surfaces, (low, high), SPACING * size)
-    heading = heading_of(ends[1])
+    grid, heading = _Grid(scene, surfaces, (low, high), SPACING * size), heading_of(ends[1])
     known: dict[tuple[object, ...], list[_Place]] = {}
     found: list[LimbHolds] = []
     for limb in limbs:
@@ -102,8 +101,7 @@ def _sole(body: BodyModel, limb: Limb, rules: ContactRules) -> FloatArray:
     return np.column_stack([np.where(points[:, 0] > points[:, 0].mean(), toes, points[:, 0]), points[:, 1:]])
 
 
-@dataclass(frozen=True, eq=False)
-class _Place:
+class _Place(NamedTuple):
     """Where an effector may touch: (3,) place [m], (3, 3) rotation, (k, 3) points on a rung [m] or None."""
 
     position: FloatArray
@@ -188,8 +186,7 @@ class _Grid:
         ahead = ahead * np.sign(ahead @ turn[:, 0])
         frame = np.column_stack([ahead, np.cross(surface.normal, ahead), surface.normal])
         across, room = float(lengths.min()), 0.5 * (float(lengths.max()) - np.ptp(points[:, 1])) - RUNG_SIDE
-        heel = float(points[:, 0].min())
-        if ahead @ turn[:, 0] < np.cos(RUNG_TURN) or room < 0.0 or across > stiff - heel:
+        if ahead @ turn[:, 0] < np.cos(RUNG_TURN) or room < 0.0 or across > stiff - float(points[:, 0].min()):
             return
         half, side = 0.5 * across, 0.5 * float(np.ptp(points[:, 1]))
         front = stiff - half

@@ -1,20 +1,18 @@
 """Contacts of any limbs from start to goal: a best-first search over sets of contacts.
 
 A state is the set of contacts that are held; a move breaks one of them and makes one of the same limb
-elsewhere.  Of each state the pose of the root is known that suits its contacts best; reach of every limb from
-there, and balance on the contacts that stay, are the cheap tests.  Whole postures are looked for along the
-best way only: one that still holds the old contact and rests on the others, one with the limb off the line
-between its contacts, and one that already holds the new one ([Tonneau2015]_ 7.2).  What has no posture is
-closed, what is much like it costs more, and the search goes on with the next best way.
-
-A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
+elsewhere.  Cheap tests are the reach of every limb from the pose of the root that suits a state best, and
+balance on the contacts that stay.  Whole postures are looked for along the best way only: one that still
+holds the old contact and rests on the others, one with the limb off the line between its contacts, and one
+that already holds the new one ([Tonneau2015]_ 7.2).  What has no posture is closed, what is much like it
+costs more.  A body that goes on its feet has :mod:`manikin.planning.contacts.walk_search`.
 """
 
 import heapq
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -29,7 +27,7 @@ from manikin.kinematics import Placement
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
-from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 from manikin.planning.contacts.samples import LimbSamples
 
@@ -52,7 +50,6 @@ SOLES_APART = 0.02  # least distance of two soles side by side; our choice [m]
 SOLE_ABOVE = 0.1  # distance of two soles of which one may be above the other; our choice [m]
 TURN = 0.2  # distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice
 FREE = -1  # row of a hand that has let go
-
 State = tuple[int, ...]
 """Place of each limb, by its row among those of the limb; the first is that of the start, if it has one."""
 
@@ -130,8 +127,7 @@ class LimbHolds:
         off -= TURN * (self.samples.upward @ frame[:, 2])
         if contact.kind is not ContactKind.POINT:
             off -= TURN * (self.samples.rotations[:, :, 0] @ frame[:, 0])
-        row = int(np.argmin(off))
-        guess[limb_slots(state.body, limb)] = self.samples.angles[row]
+        guess[limb_slots(state.body, limb)] = self.samples.angles[int(np.argmin(off))]
         return guess
 
     def nearest(self, root: FloatArray, most: int) -> list[tuple[float, Contact]]:
@@ -154,9 +150,7 @@ class LimbHolds:
         return self.samples.reach.residual((places - at) @ turn)
 
 
-def within_strength(
-    body: BodyModel, posed: Posed, carrying: Mapping[str, Contact], most: float = 1.0
-) -> Posed:
+def within_strength(body: BodyModel, posed: Posed, carrying: Contacts, most: float = 1.0) -> Posed:
     """The posture, or that resting on some contacts in it asks for more than a share of the strength."""
     if posed.q is None:
         return posed
@@ -198,11 +192,12 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._places = [np.vstack([at, item.positions, at]) for at, item in zip(first, holds, strict=True)]
         self._trees = [cKDTree(item.positions) if len(item.positions) else None for item in holds]
         self._wanted = np.array([item.wanted for item in holds])
-        self._contacts: dict[tuple[int, int], Contact] = {}
+        # Each of these is asked again and again.
+        self._contact, self._has_room = cache(self._made), cache(lambda k, row: holds[k].is_free(row - 1))
+        self._beyond, self._resting = cache(self._overreached), cache(self._rest_without)
         kinds = [self._contact(k, 1).kind if len(item.positions) else None for k, item in enumerate(holds)]
         self._grasps = [kind is ContactKind.GRASP for kind in kinds]
         self._tips = [kind is ContactKind.POINT for kind in kinds]
-        self._free: dict[tuple[int, int], bool] = {}
         self._next: dict[State, list[tuple[State, float]]] = {}
         self._later: dict[State, list[tuple[State, float]]] = {}
         self._ahead: dict[State, float] = {}
@@ -211,8 +206,6 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         # Place and rotation of the root, and the place a stride on.
         self._trunks: dict[State, tuple[FloatArray, FloatArray, FloatArray]] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
-        self._beyond: dict[tuple[State, State], float] = {}
-        self._resting: dict[tuple[State, int], tuple[tuple[FloatArray, FloatArray] | None, float]] = {}
         self._state = Configuration(poser.body, start.q)
 
     def _best(self) -> list[State] | str:
@@ -221,9 +214,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             return self._walled_off
         self._frame_costs([first])
         graph = Graph(
-            lambda state: self._ahead[state], self._followers, self._tested,
-            lambda state: self._ahead[state] <= 0.0,
-        )  # fmt: skip
+            self._ahead.__getitem__, self._followers, self._tested, lambda state: self._ahead[state] <= 0.0
+        )
         return graph.best([first], GREED)[0] or "no contacts lead to the goal"
 
     @cached_property
@@ -342,8 +334,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         (root, turn, onward), stride = self._trunks[state], self.settings.stride
         away = onward - root
         onward = min(1.0, 0.5 * stride / max(float(np.linalg.norm(away)), 1e-9)) * away
-        states: list[State] = []
-        steps: list[float] = []
+        states, steps = list[State](), list[float]()
         for k, tree in enumerate(self._trees):
             if tree is None or (state, k) in self._stuck or state[k] == FREE:
                 continue
@@ -368,7 +359,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         ]  # fmt: skip
         # A limb that is still free comes first ([Tonneau2015]_ 7.2), as long as it finds a place.
         whole = all(self._held(k, row) for k, row in enumerate(state))
-        fills = {after for after, _ in moves if not whole and self._fills(state, after)}
+        fills = set[State]()
+        for after, _ in moves if not whole else ():
+            k = self._moved(state, after)
+            if after[k] != FREE and not self._held(k, state[k]) and self._has_room(k, after[k]):
+                fills.add(after)
         self._later[state] = [item for item in moves if item[0] not in fills] if fills else []
         self._next[state] = [item for item in moves if item[0] in fills] or moves
         return self._next[state]
@@ -378,9 +373,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         if (before, k) in self._stuck:
             return math.inf
-        if (before, after) not in self._beyond:
-            self._beyond[before, after] = self._overreached(before, after, k)
-        cost = self._beyond[before, after]
+        cost = self._beyond(before, after, k)
         proven = self._postures.get((after, k, True))
         if proven is not None and proven.q is not None and math.isfinite(cost):
             cost = -PROVEN
@@ -395,9 +388,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """What a move of limb k costs whose limbs come to the ends of their reach; infinite without room."""
         if after[k] != FREE and not (self._has_room(k, after[k]) and self._beside(k, after)):
             return math.inf
-        if (before, k) not in self._resting:
-            self._resting[before, k] = self._rest_without(k, before)
-        rest, cost = self._resting[before, k]
+        rest, cost = self._resting(k, before)
         return cost if rest is None or math.isinf(cost) else cost + self._stretched(after, *rest)
 
     def _rest_without(self, k: int, before: State) -> tuple[tuple[FloatArray, FloatArray] | None, float]:
@@ -432,11 +423,6 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         beyond = [-float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])]
         return OVERREACH * max(0.0, *beyond) / self.size
 
-    def _has_room(self, k: int, row: int) -> bool:
-        if (k, row) not in self._free:
-            self._free[k, row] = self.holds[k].is_free(row - 1)
-        return self._free[k, row]
-
     def _beside(self, k: int, state: State) -> bool:
         """Whether a sole lies beside the others, or above or below them, and on its own side of them."""
         body, mine = self.poser.body, self._contact(k, state[k])
@@ -449,17 +435,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 continue
             off = np.abs((other.position - mine.position) @ mine.rotation_contact_to_world)
             side = (other.position - mine.position) @ rotation_from_yaw(self._yaws[1])[:, 1]
-            if (
-                side * (self._wanted[j, 1] - self._wanted[k, 1]) < 0.0
-                or (off < [body.sole_length, body.sole_width + SOLES_APART, SOLE_ABOVE]).all()
-            ):
+            beside = (off < [body.sole_length, body.sole_width + SOLES_APART, SOLE_ABOVE]).all()
+            if beside or side * (self._wanted[j, 1] - self._wanted[k, 1]) < 0.0:
                 return False
         return True
-
-    def _fills(self, before: State, after: State) -> bool:
-        """Whether a move gives a contact to a limb that has none."""
-        k = self._moved(before, after)
-        return after[k] != FREE and not self._held(k, before[k]) and self._has_room(k, after[k])
 
     def _moved(self, before: State, after: State) -> int:
         return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b)
@@ -477,12 +456,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     # --- whole postures -------------------------------------------------------------------------
 
-    def _contact(self, k: int, row: int) -> Contact:
+    def _made(self, k: int, row: int) -> Contact:
         if row == 0:
             return self.start.contacts[self.holds[k].effector]
-        if (k, row) not in self._contacts:
-            self._contacts[k, row] = replace(self.holds[k].contact(row - 1), oriented=False)
-        return self._contacts[k, row]
+        return replace(self.holds[k].contact(row - 1), oriented=False)
 
     def _contacts_of(self, state: State) -> dict[str, Contact]:
         return {
@@ -522,8 +499,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                     via = self._between(staying, lifted.q, q, (old, new), (before, after))
                     if via is None:
                         return self._refused(before, after, f"{name} finds no way around")
-                    flight = self.settings.flight(old, new)
-                    stages.append(Stage.of(body, staying, lifted.q, flight, via=via))
+                    stages.append(Stage.of(body, staying, lifted.q, self.settings.flight(old, new), via=via))
             stages.append(Stage.of(body, landed, q, self.settings.shift_duration))
             self._moves += [(before, after)] * (len(stages) - len(self._moves))
         contacts = stages[-1].contacts
@@ -542,10 +518,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
         """Poses (7,) of the root, with postures (nq,): as it should be, as it is, and farther back.
 
-        Farther from what a climber holds on to, knees that bend have room before them.
-
-        Args:
-            landing: A limb that reaches for a contact from there.
+        Farther from what a climber holds on to, knees that bend have room before them.  A limb that lands
+        reaches for its contact from there.
         """
         back, roots = pin.XYZQUATToSE3(guide).rotation[:, 0], [guide]
         if self.settings.retreats:
@@ -560,41 +534,34 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._close((before, after))
 
     def _between(
-        self, staying: Mapping[str, Contact], lifting: FloatArray, landing: FloatArray,
+        self, staying: Contacts, lifting: FloatArray, landing: FloatArray,
         ends: tuple[Contact, Contact], move: tuple[State, State],
     ) -> FloatArray | None:  # fmt: skip
         """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
-        before, after = ends
+        (before, after), lift = ends, self.settings.lift
         middle = 0.5 * (before.position + after.position)
-        start = np.concatenate(
-            [0.5 * (lifting[:3] + landing[:3]), landing[3:7], 0.5 * (lifting + landing)[7:]]
-        )
-        for number, place in enumerate(self._off_the_line(middle, before, after, start[:3])):
-            wish = {before.effector: Placement(place, None, None, 0.5 / self.settings.lift**2)}
+        start = 0.5 * (lifting + landing)
+        start[3:7] = landing[3:7]
+        # What stands out of a wall is passed on the body's side.
+        inward = (start[:3] - middle) * [1.0, 1.0, 0.0]
+        inward /= max(float(np.linalg.norm(inward)), 1e-9)
+        for number, share in enumerate((0.7, 0.0, 2.0)):
+            out = 0.5 * (before.normal + after.normal) + share * inward
+            place = middle + lift * out / max(float(np.linalg.norm(out)), 1e-9)
+            wish = {before.effector: Placement(place, None, None, 0.5 / lift**2)}
             posed = self._posed(staying, staying, self._guesses(start[:7], start), (*move, number), wish)
             if posed.q is not None:
                 return posed.q
         return None
 
-    def _off_the_line(
-        self, middle: FloatArray, before: Contact, after: Contact, root: FloatArray
-    ) -> Iterator[FloatArray]:
-        """Places for a limb in flight: what stands out of a wall is passed on the body's side."""
-        inward = (root - middle) * [1.0, 1.0, 0.0]
-        inward /= max(float(np.linalg.norm(inward)), 1e-9)
-        for share in (0.7, 0.0, 2.0):
-            out = 0.5 * (before.normal + after.normal) + share * inward
-            yield middle + self.settings.lift * out / max(float(np.linalg.norm(out)), 1e-9)
-
     def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact],
+        self, held: Contacts, carrying: Contacts,
         guesses: Iterable[tuple[FloatArray, FloatArray]], key: tuple[object, ...],
         wishes: Mapping[str, Placement] | None = None,
     ) -> Posed:  # fmt: skip
         """A posture whose points stand upright on their surfaces, as far as they can; looked for once.
 
-        Args:
-            guesses: Poses (7,) of the root to be near, each with a posture (nq,) to begin with.
+        It is near one of some poses (7,) of the root, each with a posture (nq,) to begin with.
         """
         if key not in self._postures:
             posed, placements = Posed(None), {**upright_points(held), **(wishes or {})}

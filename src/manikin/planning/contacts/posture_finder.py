@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +20,7 @@ from manikin.kinematics import (
     touching_pairs,
 )
 from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
 
 ROOT = 7  # numbers of a posture that are the pose of its root
@@ -74,7 +76,7 @@ class Posed:
     too_hard: bool = False
 
 
-def upright_points(held: Mapping[str, Contact]) -> dict[str, Placement]:
+def upright_points(held: Contacts) -> dict[str, Placement]:
     """Wishes for what touches at a point to stand upright on its surface, by effector."""
     return {
         name: Placement(None, contact.rotation_contact_to_world, 0.05)
@@ -83,34 +85,25 @@ def upright_points(held: Mapping[str, Contact]) -> dict[str, Placement]:
 
 
 class PostureFinder:
-    """Finds postures of a body in a scene, and counts them.
-
-    Attributes:
-        searches: Postures looked for so far.
-    """
+    """Finds postures of a body in a scene; ``searches`` counts those looked for so far."""
 
     def __init__(
         self, body: BodyModel, scene: Scene, reference: FloatArray | None = None,
         settings: PostureFinderSettings | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a scene.
-
-        Args:
-            reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
-        """
+        """Prepare a scene; postures are like a reference (nq,), or standing, where there is freedom."""
         self.body, self._root = with_root(body)
         self.scene, self._reference = scene, reference
-        self.settings = settings or PostureFinderSettings()
-        self.searches = 0
+        self.settings, self.searches = settings or PostureFinderSettings(), 0
         standing = np.array(body.standing_posture())
         self.model = ContactModel.of_body(body.mass, self.settings.friction_model)
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
-        self._touched: dict[Contact, tuple[str, ...]] = {}
+        self._touched = cache(scene.touched_obstacles)
 
     def pose(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], start: FloatArray,
+        self, held: Contacts, carrying: Contacts, start: FloatArray,
         guide: FloatArray | None = None, *, place: FloatArray | None = None, inset: float | None = None,
         com_weight: float | None = None, restarts: bool = False,
         placements: Mapping[str, Placement] | None = None, preferences: Preferences | None = None,
@@ -140,12 +133,12 @@ class PostureFinder:
         self.searches += 1
         settings, led = self.settings, {} if guide is None else self.led(guide[:ROOT])
         whole = guide is not None and len(guide) > ROOT
+        ignore, beside = self._near(held)
         problem = PostureProblem(
             self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
-            self_clearance=settings.clearance, ignore=touching_pairs(self.body, self._touched_by(held)),
-            beside=self._beside(held), range_margin=settings.range_margin,
-            learnt_margin=LEARNT_MARGIN if settings.natural else None,
+            self_clearance=settings.clearance, ignore=ignore, beside=beside,
+            range_margin=settings.range_margin, learnt_margin=LEARNT_MARGIN if settings.natural else None,
             reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
         once = SolverSettings(
@@ -160,9 +153,7 @@ class PostureFinder:
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
 
-    def resting_place(
-        self, carrying: Mapping[str, Contact], near: FloatArray, inset: float
-    ) -> FloatArray | None:
+    def resting_place(self, carrying: Contacts, near: FloatArray, inset: float) -> FloatArray | None:
         """(2,) place nearest to another where the centre of mass can rest on contacts; None without any.
 
         It keeps a distance ``inset`` to the edges of where it may rest [m].
@@ -179,18 +170,12 @@ class PostureFinder:
         wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
         return {self._root: wish}
 
-    def _touched_by(self, held: Mapping[str, Contact]) -> list[tuple[str, str]]:
-        """Effectors with what each touches."""
-        for contact in held.values():
-            if contact not in self._touched:
-                self._touched[contact] = self.scene.touched_obstacles(contact)
-        return [(name, obstacle) for name, item in held.items() for obstacle in self._touched[item]]
-
-    def _beside(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
-        """Pairs that may be as near as touching: shanks on their tips, and forearms at what hands hold."""
+    def _near(self, held: Contacts) -> tuple[frozenset[tuple[str, str]], frozenset[tuple[str, str]]]:
+        """Pairs that touch, or may be as near: shanks on their tips, and forearms at what hands hold."""
+        touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched(item)]
         wrists = {
             (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)
             for name, item in held.items() if item.kind is ContactKind.GRASP
-            for obstacle in self._touched[item]
+            for obstacle in self._touched(item)
         }  # fmt: skip
-        return pairs_beside(self.body, self._touched_by(held)) | wrists
+        return touching_pairs(self.body, touched), pairs_beside(self.body, touched) | wrists

@@ -206,11 +206,9 @@ def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
     Raises:
         BodyError: If the limb is not the mirror image of the one that was sampled.
     """
-    if not are_mirrored(body, samples.limb, limb):
-        raise BodyError(
-            f"limb {limb.name!r} is no reflection of {samples.limb.name!r}; "
-            f"valid: {samples.limb.mirror or 'none'}"
-        )
+    if not are_mirrored(body, other := samples.limb, limb):
+        valid = other.mirror or "none"
+        raise BodyError(f"limb {limb.name!r} is no reflection of {other.name!r}; valid: {valid}")
     flip: NDArray[np.float64] = np.outer(REFLECTION, REFLECTION)
     return replace(
         samples, limb=limb, origin=samples.origin * REFLECTION, positions=samples.positions * REFLECTION,

@@ -1,14 +1,13 @@
 """Sit on a seat and leave it: where the buttocks and feet are, and the stages up to standing.
 
-A start that suits the body and the seat decides whether a person can rise: feet drawn back below the knees,
-thighs that do not press on the seat's edge, buttocks far enough in front.  Legs on a seat are two triangles
-seen from the side, so that all places on the seat and all slopes of the shanks are compared in closed form
-(:class:`Sitter`), and only the best few are tried with the whole body.  The body leaves the seat at rest
-where it can lean so far that its weight is over its feet, else in motion (:mod:`.transition`), else with
-hands that push on armrests, a table or the seat.
+Whether a person can rise depends on the start: feet drawn back below the knees, thighs that do not press on
+the seat's edge, buttocks far enough in front.  Legs on a seat are two triangles seen from the side, so that
+all places and slopes of the shanks are compared in closed form (:class:`Sitter`), and only the best few are
+tried with the whole body.  The body leaves the seat at rest where it can lean until its weight is over its
+feet, else in motion (:mod:`.transition`), else with hands that push on armrests, a table or the seat.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +19,7 @@ from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
-from manikin.planning.contacts.contact_plan import ContactPlan, Stage, onto_normal
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage, onto_normal
 from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder
@@ -34,16 +33,13 @@ SHANK_SLOPE = float(np.deg2rad(12.0))  # slope that is liked, knee before ankle 
 SLOPES = np.deg2rad(np.arange(-25.0, 28.1, 1.0))  # slopes of the shank that are compared [rad]
 FORWARD = np.arange(0.0, 0.161, 0.01)  # ways of the buttocks towards the seat's edge [statures]
 APART = 0.07  # distance of the middle of a sole from the body's middle plane [statures]
-
 LIKED = (0.05, float(np.deg2rad(12.0)), 0.012)
 """Way forward [statures], deviation of the shank's slope [rad] and gap between the farthest lean and the
 heels [statures] that count alike; our choice."""
-
 CALF_ROOM = 0.016  # distance of the calves to the edge of the seat [m]
 SEAT_THICKNESS = 0.05  # depth below the top of a seat at which calves keep that distance [m]; our choice
 FEET_SPACING = 0.01  # distance of the places that are tried for the feet [m]
 TRIED = 6  # sittings that are tried with the whole body
-
 LEAN = {
     "hip_flexion": 1.5, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1, "lumbar_flexion": 0.8,
     "thorax_flexion": 0.5, "neck_flexion": -0.4,
@@ -51,8 +47,6 @@ LEAN = {
 """Angles of a body that leans far forward on a seat, its pelvis flat [rad]."""
 
 LEAN_PITCH = 0.5  # pitch of the pelvis of a body that leans far, where it rolls on the buttocks [rad]
-
-
 Sitting = tuple[dict[str, Contact], FloatArray]
 """Contacts of buttocks and feet, and a posture (nq,) near one that holds them."""
 
@@ -61,10 +55,7 @@ class Sitter:
     """Compares ways to sit of one human body."""
 
     def __init__(self, body: BodyModel, footholds: Footholds, friction: float, *, rolls: bool = True) -> None:
-        """Take the lengths of the body; the friction is that of the soles.
-
-        Args:
-            rolls: Whether the pelvis may roll forward on the front of the buttocks; it lies flat otherwise.
+        """Take the lengths of the body, whose pelvis lies flat if it may not roll; the friction is of soles.
 
         Raises:
             BodyError: If its legs are not a human's.
@@ -102,9 +93,10 @@ class Sitter:
             floor: Height of what the feet stand on [m].
         """
         size, turn = self.stature, rotation_from_yaw(heading)
-        room = _room_ahead(seat, at, turn[:, 0])
-        tried: list[tuple[float, float]] = []
-        feet: dict[int, dict[str, Contact]] = {}
+        steps = np.linspace(0.0, 1.0, 201)
+        inside = seat.outside(at + steps[:, None] * turn[:, 0]) <= 1e-9
+        room = float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
+        tried, feet = list[tuple[float, float]](), dict[int, dict[str, Contact]]()
         for forward, ahead in self._compared(float(at[2]) - floor, room):
             if len(tried) == TRIED:
                 return
@@ -137,9 +129,7 @@ class Sitter:
     def _compared(self, height: float, room: float) -> list[tuple[float, float]]:
         """Way of the buttocks forward and place of the soles before them [m], the cheapest first.
 
-        Args:
-            height: Of the seat above the floor [m].
-            room: From the wanted place forward to the seat's edge [m].
+        The seat has a height above the floor, and room from the wanted place forward to its edge [m].
         """
         size, (toes, ankle) = self.stature, self._sole
         forward, slope = (axis.ravel() for axis in np.meshgrid(FORWARD * size, SLOPES, indexing="ij"))
@@ -178,20 +168,11 @@ def of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]
     return {name: value for name in body.joint_names for key, value in angles.items() if name.endswith(key)}
 
 
-def _room_ahead(seat: Surface, at: FloatArray, heading: FloatArray) -> float:
-    """Distance from a place on a surface forward to its edge [m]."""
-    steps = np.linspace(0.0, 1.0, 201)
-    inside = seat.outside(at + steps[:, None] * heading) <= 1e-9
-    return float(steps[-1] if inside.all() else steps[int(np.argmin(inside))])
-
-
 LEANING = (0.25, 0.5, 0.75, 0.92)  # shares of the way of the centre of mass to the feet that have a posture
 LEANING_TIMES = (1.3, 0.9)  # time of that way, to rest over the feet and to where it goes on in motion [s]
-
 SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
 """Distances of the centre of mass to the edge of where it may rest on the feet when a seat is left, tried in
 order [m]; the first is inside the smaller soles on which it is planned."""
-
 BEHIND = (0.0, 0.02, 0.04)  # ways behind where the centre of mass could rest as a seat is left [m]
 LEAN_WEIGHT = 300.0  # of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice
 RISING_TIME = 0.9  # shortest time from there to standing [s]; the pace of the joints mostly asks for more
@@ -240,9 +221,7 @@ _Lean = tuple[FloatArray, Momentum | None] | str
 """Posture (nq,) in which a seat is left for the feet, with its motion, None at rest; or why not there."""
 
 
-def _leans(
-    poser: PostureFinder, start: Stage, held: Mapping[str, Contact], risen: FloatArray
-) -> Iterator[_Lean]:
+def _leans(poser: PostureFinder, start: Stage, held: Contacts, risen: FloatArray) -> Iterator[_Lean]:
     """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
     rest = Configuration(poser.body, risen).com
     over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSETS[-1])
@@ -273,9 +252,7 @@ def _leans(
     yield f"{lean}; at rest: {reason}" if isinstance(lean, str) else lean
 
 
-def _lean(
-    poser: PostureFinder, q: FloatArray, held: Mapping[str, Contact], rest: FloatArray, *, moving: bool
-) -> _Lean:
+def _lean(poser: PostureFinder, q: FloatArray, held: Contacts, rest: FloatArray, *, moving: bool) -> _Lean:
     """A posture with its motion to rest, where the joints are strong enough."""
     body, momentum = poser.body, None
     if moving:
@@ -289,9 +266,8 @@ def _lean(
 
 
 def _pushed_up(
-    poser: PostureFinder, start: Stage, pushing: Mapping[str, Contact], held: Mapping[str, Contact],
-    risen: FloatArray,
-) -> Leaving:  # fmt: skip
+    poser: PostureFinder, start: Stage, pushing: Contacts, held: Contacts, risen: FloatArray
+) -> Leaving:
     """Leave a seat with hands that push, until the weight is over the feet."""
     # The arms push until they are long: what is left to rise alone is as little as they let.
     failure = None
@@ -313,7 +289,7 @@ def _pushed_up(
 
 
 def _too_weak(
-    poser: PostureFinder, q: FloatArray, carrying: Mapping[str, Contact], momentum: Momentum | None = None
+    poser: PostureFinder, q: FloatArray, carrying: Contacts, momentum: Momentum | None = None
 ) -> str | None:
     """Message that the joints are too weak for a posture; None where they are not."""
     acceleration = None if momentum is None else momentum.acceleration
@@ -328,7 +304,7 @@ def _too_weak(
 
 def _rising(
     poser: PostureFinder, start: Stage,
-    changes: Sequence[tuple[Mapping[str, Contact], FloatArray, Momentum | None]], risen: FloatArray,
+    changes: Sequence[tuple[Contacts, FloatArray, Momentum | None]], risen: FloatArray,
 ) -> Leaving:  # fmt: skip
     """Stages that lean up to the first change and then have the contacts of each, up to standing."""
     body, stages, moving = poser.body, [start], changes[0][2] is not None
@@ -376,11 +352,9 @@ def hand_supports(
         friction: Coulomb coefficient.
         steepest: Largest slope of a surface to push on [rad].
     """
-    turn = buttocks.rotation_contact_to_world
-    result: dict[str, Contact] = {}
+    turn, result = buttocks.rotation_contact_to_world, dict[str, Contact]()
     for hand, side in (("left_hand", 1.0), ("right_hand", -1.0)):
-        ideal = np.array([HAND_AHEAD, side * HAND_ASIDE, HAND_ABOVE])
-        wanted = buttocks.position + turn @ (stature * ideal)
+        wanted = buttocks.position + turn @ (stature * np.array([HAND_AHEAD, side * HAND_ASIDE, HAND_ABOVE]))
         best = HAND_ROOM * stature
         for surface in scene.surfaces_facing((0.0, 0.0, 1.0), steepest):
             if float(surface.polygon[:, 2].max()) < buttocks.position[2] - 0.02:
@@ -410,16 +384,9 @@ def _nearest_inside(surface: Surface, wanted: FloatArray, inset: float) -> Float
 
 
 def take_seat(poser: PostureFinder, way: ContactPlan, sat: Stage) -> ContactPlan | str:
-    """A way to before a seat, and the body sits down on it: rising backwards in time.
+    """A way to the feet of a stage on a seat, or near them, and the body sits down there; or why it cannot.
 
-    Every balanced motion is balanced backwards as well, with the same forces.
-
-    Args:
-        way: Ends on the feet of ``sat``, or near them.
-        sat: Contacts and posture on the seat.
-
-    Returns:
-        The plan, whose last stage is that on the seat; or why there is none.
+    It rises backwards in time: every balanced motion is balanced backwards as well, with the same forces.
     """
     body, feet = poser.body, way.stages[-1].contacts
     contacts = {name: contact for name, contact in sat.contacts.items() if name not in feet} | dict(feet)

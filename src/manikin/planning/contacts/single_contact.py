@@ -25,17 +25,9 @@ from manikin.scene import Scene
 class Role(StrEnum):
     """Use that a limb makes of its contact; it decides the sign of EFORT's direction."""
 
-    AUTO = "auto"
-    """The body where some contact is usable that way, else the object; feet: the body."""
-    BODY = "body"
-    """Moves or braces the body along the task."""
-    OBJECT = "object"
-    """Pushes an object along the task."""
-
-    @property
-    def infinitive(self) -> str:
-        """What is done, in words."""
-        return "to move the body" if self is Role.BODY else "to act on an object"
+    AUTO = "auto"  # the body where some contact is usable that way, else the object; feet: the body
+    BODY = "body"  # moves or braces the body along the task
+    OBJECT = "object"  # pushes an object along the task
 
 
 _FARTHEST = ("reach", "surface", "direction", "alignment", "collision")  # how far a request that failed came
@@ -123,10 +115,7 @@ class ContactAnswer:
 def find_contact(
     body: BodyModel, scene: Scene, q: FloatArray, question: ContactQuestion, rules: ContactRules | None = None
 ) -> ContactAnswer:
-    """Answer one question about a body in a scene.
-
-    Args:
-        q: (nq,) the body; all but the limb stays as it is.
+    """Answer one question about a body (nq,) in a scene, of which all but the limb stays as it is.
 
     Raises:
         InputError: If the limb or the heuristic is not known, the direction is zero, or the limb has
@@ -171,9 +160,9 @@ def _ask(
     if result.efort is not None:
         return roles[len(answers) - 1], result, usable.signed(result.efort)
     farthest = max(range(len(answers)), key=lambda row: _FARTHEST.index(answers[row].failure or "collision"))
-    causes = [f"{each.infinitive}, {item.message}" for each, item in zip(roles, answers, strict=False)]
-    same = len({item.message for item in answers}) == 1
-    message = result.message if same else "; ".join(causes)
+    does = "to move the body", "to act on an object"  # both roles are asked where there are two answers
+    causes = [f"{what}, {item.message}" for what, item in zip(does, answers, strict=False)]
+    message = result.message if len({item.message for item in answers}) == 1 else "; ".join(causes)
     return roles[farthest], replace(answers[farthest], message=message), None
 
 

@@ -10,6 +10,7 @@ more wrenches are admissible than without it: the test of the contacts that stay
 
 from dataclasses import dataclass, replace
 from itertools import product
+from math import comb
 
 import numpy as np
 from scipy.optimize import linprog
@@ -28,9 +29,7 @@ MARGIN = 3.0  # least one of the way about the centre of mass, at 75 kg and 1.75
 STEEPEST_LIFT = 4.0  # largest vertical acceleration on the way [m/s^2]; people who rise reach 3; our choice
 CARRIED_ROOM = 0.03  # how far outside of where it could rest the velocity may seem to carry the body [m]
 SAMPLES = 12  # instants of the way at which balance is imposed
-
 _DEGREE = 5
-_BINOMIAL = (1.0, 5.0, 10.0, 10.0, 5.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,23 +59,18 @@ class Momentum:
         return com + self.velocity * [1.0, 1.0, 0.0] * np.sqrt(max(height, 0.0) / GRAVITY)
 
 
-def momentum_to_rest(
-    staying: Stance, mass: float, com: FloatArray, rest: FloatArray, least: float | None = None
-) -> Momentum | None:
+def momentum_to_rest(staying: Stance, mass: float, com: FloatArray, rest: FloatArray) -> Momentum | None:
     """Slowest motion with which contacts may be left at ``com``, to come to rest on the others.
 
     Args:
-        staying: Contacts that stay.
         mass: Of the body [kg].
         com: (3,) centre of mass at the start [m].
         rest: (3,) where it comes to rest, in balance there [m].
-        least: Margin to keep [N.m]; :data:`MARGIN` scaled by the mass when omitted.
 
     Returns:
         The motion at the start; None where no speed leads to rest in balance.
     """
     polytope = wrench_polytope(staying.bounded(mass))
-    least = MARGIN * mass / 75.0 if least is None else least
     ahead = (rest - com) * [1.0, 1.0, 0.0]
     ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
     resting = admissible_com_polygon(polytope, mass)
@@ -88,7 +82,7 @@ def momentum_to_rest(
         if len(resting) < 3 or signed_distance(carried, resting) < -CARRIED_ROOM:
             continue
         way = _way(polytope, mass, com, velocity, rest, duration)
-        if way is not None and way.margin >= least:
+        if way is not None and way.margin >= MARGIN * mass / 75.0:
             return way
     return None
 
@@ -102,7 +96,7 @@ def _way(
     points = np.array([com, com + velocity * duration / _DEGREE, np.zeros(3), rest, rest, rest])
     points[[0, 1, 3, 4, 5]] -= origin
     share = np.linspace(0.0, 1.0, SAMPLES + 1)
-    place, bend = _basis(share), _second(share) / duration**2
+    place, bend = _bernstein(share, _DEGREE), _second(share) / duration**2
     gravity = np.array([0.0, 0.0, -GRAVITY])
     rows, bounds = [], []
     for number, (at, turn) in enumerate(zip(place, bend, strict=True)):
@@ -128,17 +122,16 @@ def _way(
     return Momentum(frozen_array(velocity, "velocity", (3,)), start, duration, float(solution.x[3]))
 
 
-def _basis(share: FloatArray) -> FloatArray:
-    """(n, 6) Bernstein polynomials of degree 5 at shares of the way."""
-    k = np.arange(_DEGREE + 1)
-    return np.array(_BINOMIAL) * share[:, None] ** k * (1.0 - share[:, None]) ** (_DEGREE - k)
+def _bernstein(share: FloatArray, degree: int) -> FloatArray:
+    """(n, degree + 1) Bernstein polynomials at shares of the way."""
+    k = np.arange(degree + 1)
+    binomial = np.array([float(comb(degree, number)) for number in k.tolist()])
+    return binomial * share[:, None] ** k * (1.0 - share[:, None]) ** (degree - k)
 
 
 def _second(share: FloatArray) -> FloatArray:
-    """(n, 6) their second derivatives by the share."""
-    k = np.arange(_DEGREE - 1)
-    lower = np.array([1.0, 3.0, 3.0, 1.0]) * share[:, None] ** k[:4] * (1.0 - share[:, None]) ** (3 - k[:4])
-    second = np.zeros((len(share), _DEGREE + 1))
+    """(n, 6) second derivatives of those of degree 5 by the share."""
+    second, lower = np.zeros((len(share), _DEGREE + 1)), _bernstein(share, _DEGREE - 2)
     for first, weight in ((0, 1.0), (1, -2.0), (2, 1.0)):
         second[:, first : first + 4] += 20.0 * weight * lower
     return second

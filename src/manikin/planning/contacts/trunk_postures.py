@@ -37,13 +37,11 @@ from manikin.scene.covering import cover
 from manikin.scene.scene import FLOOR
 
 CEILINGS = (0.92, 0.84, 0.76, 0.68, 0.61, 0.55)  # over a folded body [statures]; a duck-walk is the last
-
 RECORDED_COM = ((0.55, 0.63, 0.743, 0.83, 1.0), (0.31, 0.371, 0.457, 0.486, 0.56))
 """Ceilings and the heights of the CoM below them [statures] of people who pass beams of 1.10, 1.30 and 1.45 m
 ([Qiu2012]_ 3.2.3, taken for 1.75 m); the lowest is extrapolated."""
 
 SKIN = 0.02  # distance of a posture to the walls and ceilings between which it is found [m]
-
 ARMS_CLOSE_COST = 1.05
 TURNED_COST = 1.3  # costs of arms held close and of a trunk turned against the feet; our choice
 _WALL = 1.0  # thickness of the walls [m]
@@ -53,12 +51,6 @@ _ARMS_CLOSE = {"shoulder_flexion": 0.35, "shoulder_abduction": 0.1, "elbow_flexi
 _TURNED = {"lumbar_rotation": 0.15, "thorax_rotation": 0.55, "left_hip_rotation": 0.45,
            "right_hip_rotation": -0.45}  # fmt: skip
 _TURNED_YAW = 0.4
-
-
-def stooping_cost(height: float) -> float:
-    """Cost of a metre at a height over stature, relative to upright walking; see the module."""
-    lost = max(0.0, 1.0 - height)
-    return 1.0 + 0.35 * lost + 3.25 * lost**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,9 +148,9 @@ def _folded(body: BodyModel, q: FloatArray) -> Iterator[TrunkPosture]:
             found = _between(body, q, height=height, reference=q)
         if found is None:
             return
-        q = found
-        name = f"bent to {round(100 * share)} % of stature"
-        yield TrunkPosture.of(name, body, q, stooping_cost(share))
+        q, lost = found, 1.0 - share
+        cost = 1.0 + 0.35 * lost + 3.25 * lost**2  # see the module
+        yield TrunkPosture.of(f"bent to {round(100 * share)} % of stature", body, q, cost)
 
 
 def _between(
@@ -247,7 +239,6 @@ class TrunkClearance:
     """
 
     def __init__(self, postures: TrunkPostures, scene: Scene, margin: float = 0.015) -> None:
-        """Prepare a scene."""
         self.postures, self.margin = postures, margin
         self._parts = parts = tuple(part for item in scene for part in collision_parts(item))
         self._placed = [coal.Transform3s(part.rotation, part.translation) for part in parts]
@@ -274,10 +265,9 @@ class TrunkClearance:
         self._known: dict[bytes, NDArray[np.bool_]] = {}
 
     def free(self, places: FloatArray) -> NDArray[np.bool_]:
-        """Whether each posture is free at each place, (k, m).
+        """(k, m) whether each posture is free at each of (k, 4) places.
 
-        Args:
-            places: (k, 4) x, y and height of the ground between the feet [m], heading of the feet [rad].
+        They are x, y and height of the ground between the feet [m], and the heading of the feet [rad].
         """
         rows = np.ascontiguousarray(places, dtype=np.float64).reshape(-1, 4)
         keys = [row.tobytes() for row in rows]
@@ -337,8 +327,7 @@ class TrunkClearance:
         return np.linalg.norm(middles[:, None] - middles[None, :], axis=3).mean(axis=2)
 
     def _free(self, places: FloatArray) -> NDArray[np.bool_]:
-        free = np.ones((len(places), len(self.postures)), dtype=bool)
-        near = self._near(places)
+        free, near = np.ones((len(places), len(self.postures)), dtype=bool), self._near(places)
         for first in range(0, len(places) if len(near) else 0, _TOGETHER):
             some = slice(first, first + _TOGETHER)
             self._block(places[some], near, free[some])

@@ -3,12 +3,12 @@
 Footsteps are searched for with cheap tests (:mod:`manikin.planning.contacts.footsteps`); whole postures are
 looked for along the best way only, two for each pair of footholds: one that rests on the foot that stands,
 the other already down, and one that rests on the other, the first about to leave.
-A pair without a posture is closed, and the search goes on with the next best way.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -23,7 +23,7 @@ from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
-from manikin.planning.contacts.contact_plan import ContactPlan, Paces, Stage
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.footholds import FEET, Foothold, Footholds, feet_of
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
@@ -34,13 +34,9 @@ from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostur
 from manikin.scene import Scene
 
 COLUMN = (0.12, 0.5, 0.9)  # radius, lowest and highest end above the ground of what is free, at 1.75 m [m]
-
-
 STRONG_TRIES = 16
-"""Ways that are refused because a posture at rest asks for more than the strength.
-
-A motion may need less than its postures at rest, whose knees and trunk are not bent for least torque; so
-after that many ways the later stages decide."""
+"""Ways that are refused because a posture at rest asks for more than the strength; then later stages decide,
+as a motion may need less than its postures at rest, whose knees and trunk are not bent for least torque."""
 
 EASIER_MOVES = 8
 EASIER_TURN = 0.2  # moves towards a posture of less strength, and a joint's largest turn in each [rad]
@@ -93,7 +89,6 @@ class BodyRoom:
     """Room for the trunk of a body between its feet, in one of a few postures."""
 
     def __init__(self, body: BodyModel, scene: Scene) -> None:
-        """Prepare a scene."""
         self._postures = TrunkPostures.of(body)
         self._clearance = TrunkClearance(self._postures, scene)
         self._costs = self._postures.costs - 1.0
@@ -147,9 +142,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         first = goal.contacts[FEET[0]]
         steepest = min(math.radians(30.0), math.atan(0.8 * friction))
         self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
-        self._contacts: dict[tuple[str, int], Contact] = {}
-        self._postures: dict[tuple[frozenset[int], frozenset[str], int], Posed] = {}
-        self._kept: list[Contact] = []
+        self._contact = cache(self._made)
+        self._postures: dict[tuple[frozenset[Contact], frozenset[str], int], Posed] = {}
         self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
         ends = feet_of(start.contacts), feet_of(goal.contacts)
@@ -157,8 +151,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             scene, self._footholds, *ends, scale, StepReach.of(body), self._pair_cost, (radius, low, high),
             self.settings.stride, HELD_HIGHEST if self._handholds.exist else HIGHEST,
         )  # fmt: skip
-        for number, (stage, foot) in enumerate((s, f) for s in (start, goal) for f in FEET):
-            self._contacts[foot, number] = stage.contacts[foot]
         self._risen: tuple[Stage, ...] = ()
 
     def _best(self) -> list[int] | str:
@@ -184,11 +176,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         place = self.search.farthest()[1].position
         return f" beyond [{place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}] m"
 
-    def _contact(self, foot: str, number: int) -> Contact:
-        if (foot, number) not in self._contacts:
-            hold = self.search.holds[number]
-            self._contacts[foot, number] = self._footholds.contact(foot, hold, self.friction)
-        return self._contacts[foot, number]
+    def _made(self, foot: str, number: int) -> Contact:
+        """Contact on a foothold; the first two footholds are those of the start, the next two the goal's."""
+        if number < 4:
+            return (self.start if number < 2 else self.goal).contacts[foot]
+        return self._footholds.contact(foot, self.search.holds[number], self.friction)
 
     def _planned(self, way: list[int]) -> ContactPlan | None:
         stages = list(self._risen)
@@ -207,16 +199,16 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if leaving.same_place(landing):
                 continue
             before, after = (replace(places[j], trunk=trunks[j]) for j in (k, k + 1))
-            changes, held, step = self._moved((leaving, standing, landing), before, after, hands, q)
-            if step.lifted is None or step.landed is None:
-                first = k if step.lifted is None else k + 1
-                return self._refuse(way[first], way[first + 1], step.reason, too_hard=step.too_hard)
+            changes, held, start, landed = self._moved((leaving, standing, landing), before, after, hands, q)
+            if start is None or landed.q is None:
+                first = k if start is None else k + 1
+                return self._refuse(way[first], way[first + 1], landed.reason, too_hard=landed.too_hard)
             flight = self.settings.flight(leaving, landing)
-            lifted = Stage.of(body, {standing.effector: standing, **held}, step.lifted, flight)
+            lifted = Stage.of(body, {standing.effector: standing, **held}, start, flight)
             both = {standing.effector: standing, landing.effector: landing, **held}
-            stages += [*changes, lifted, Stage.of(body, both, step.landed, self.settings.shift_duration)]
+            stages += [*changes, lifted, Stage.of(body, both, landed.q, self.settings.shift_duration)]
             self._moves += [(way[k + 1], way[k + 2])] * (2 + len(changes))
-            q, hands = step.landed, held
+            q, hands = landed.q, held
         if hands:
             left = self._left(stages[-1].contacts, places[-1], hands, q)
             if left is None:
@@ -260,33 +252,32 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return self._near[key]
 
     def _moved(
-        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
-        q: FloatArray,
-    ) -> "tuple[list[Stage], dict[str, Contact], _Step]":  # fmt: skip
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact], q: FloatArray
+    ) -> tuple[list[Stage], dict[str, Contact], FloatArray | None, Posed]:
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
-        first: _Step | None = None
+        failed: tuple[FloatArray | None, Posed] | None = None
         for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
-            step = self._step(feet, before, after, start, held)
-            if step.landed is not None:
-                return changes, held, step
-            first = first or step
-        return [], hands, first or _Step(None, None, f"{' and '.join(hands)} cannot be left")
+            lifted, landed = self._step(feet, before, after, start, held)
+            if landed.q is not None:
+                return changes, held, lifted, landed
+            failed = failed or (lifted, landed)
+        lifted, landed = failed or (None, Posed(None, f"{' and '.join(hands)} cannot be left"))
+        return [], hands, lifted, landed
 
     def _hands_before(
-        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact],
-        q: FloatArray,
-    ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:  # fmt: skip
+        self, feet: Sequence[Contact], before: _Place, after: _Place, hands: dict[str, Contact], q: FloatArray
+    ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:
         """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
         standing = {foot.effector: foot for foot in feet}
         bare = self._left({**standing, **hands}, before, hands, q)
+        start = bare[-1].q if bare else q
         if bare is not None:
-            yield bare, {}, bare[-1].q if bare else q
+            yield bare, {}, start
         if hands:
             yield [], hands, q
         rise = np.ptp([hold.position[2] for place in (before, after) for hold in (place.left, place.right)])
         if bare is None or (rise < HIGH * self._scale and self.replanned < HAND_TRIES):
             return
-        start = bare[-1].q if bare else q
         holds = self._holds_near(before, after)
         pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector != b.effector]
         for contacts in [*((hold,) for hold in holds), *pairs[:2]]:
@@ -303,9 +294,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             else:
                 yield stages, held, at
 
-    def _left(
-        self, contacts: Mapping[str, Contact], place: _Place, hands: Mapping[str, Contact], q: FloatArray
-    ) -> list[Stage] | None:
+    def _left(self, contacts: Contacts, place: _Place, hands: Contacts, q: FloatArray) -> list[Stage] | None:
         """Stages in which hands leave one after the other; None where they cannot."""
         held, stages = dict(contacts), list[Stage]()
         for hand in hands:
@@ -317,28 +306,24 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             stages.append(self._reached(held, q))
         return stages
 
-    def _reached(self, contacts: Mapping[str, Contact], q: FloatArray) -> Stage:
+    def _reached(self, contacts: Contacts, q: FloatArray) -> Stage:
         return Stage.of(self.poser.body, contacts, q, self.settings.reach_duration)
 
     def _step(
-        self, feet: Sequence[Contact], before: _Place, after: _Place, q: FloatArray,
-        hands: Mapping[str, Contact],
-    ) -> "_Step":  # fmt: skip
+        self, feet: Sequence[Contact], before: _Place, after: _Place, q: FloatArray, hands: Contacts
+    ) -> tuple[FloatArray | None, Posed]:
         """Postures in which a foot leaves one place and lands on another, the other one stands."""
         leaving, standing, landing = feet
         carrying = {standing.effector: standing, **hands}
         lifted = self._posed({leaving.effector: leaving, **carrying}, carrying, before, q)
         if lifted.q is None:
-            return _Step(None, None, f"{leaving.effector} cannot be lifted: {lifted.reason}", lifted.too_hard)
+            return None, replace(lifted, reason=f"{leaving.effector} cannot be lifted: {lifted.reason}")
         landed = self._posed({**carrying, landing.effector: landing}, carrying, after, lifted.q)
-        why = f"{landing.effector} cannot be put down: {landed.reason}"
-        return _Step(lifted.q, landed.q, why if landed.q is None else "", landed.too_hard)
+        return lifted.q, replace(landed, reason=f"{landing.effector} cannot be put down: {landed.reason}")
 
-    def _posed(
-        self, held: Mapping[str, Contact], carrying: Mapping[str, Contact], place: _Place, q: FloatArray
-    ) -> Posed:
+    def _posed(self, held: Contacts, carrying: Contacts, place: _Place, q: FloatArray) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
-        key = frozenset(map(id, held.values())), frozenset(carrying), place.trunk
+        key = frozenset(held.values()), frozenset(carrying), place.trunk
         if key in self._postures:
             return self._postures[key]
         guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
@@ -350,13 +335,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if posed.q is not None:
             posed = self._easier(posed, held, carrying, flat)
         self._postures[key] = posed
-        self._kept += held.values()  # so that no other contact gets its id
         return posed
 
     def _easier(
-        self, posed: Posed, held: Mapping[str, Contact], carrying: Mapping[str, Contact],
-        flat: Mapping[str, Placement],
-    ) -> Posed:  # fmt: skip
+        self, posed: Posed, held: Contacts, carrying: Contacts, flat: Mapping[str, Placement]
+    ) -> Posed:
         """A posture that the joints can hold at rest: the given one, or one near it that asks for less.
 
         Each move is the shortest that keeps contacts and joint ranges and takes the share of the strength to
@@ -396,13 +379,3 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
             return Posed(None, why, too_hard=True)
         return Posed(q)
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Postures as a foot leaves and lands, as far as there are any, and why not."""
-
-    lifted: FloatArray | None
-    landed: FloatArray | None
-    reason: str = ""
-    too_hard: bool = False
