@@ -240,11 +240,8 @@ def height_below(name: str, surface: CeilingHeight) -> GeometricConstraint:
 
 
 def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
-    """Constraint that keeps the CoM out of a zone at any height; half its onset counts as inside.
+    """Constraint that keeps the CoM out of the zone below a named obstacle; half its onset counts as inside.
 
-    Args:
-        name: Name of the obstacle.
-        zone: Where the body would be below it.
-        reason: Why nothing passes, for the explanation of a failure.
+    The reason says why nothing passes, for the explanation of a failure.
     """
     return GeometricConstraint(f"way around '{name}'", _Outside(zone), reason)

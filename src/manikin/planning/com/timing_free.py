@@ -43,11 +43,11 @@ from manikin.runtime.display import Displayed
 
 @dataclass(frozen=True)
 class GuessStyle:
-    """Way of guessing a first trajectory; several are tried in order.
+    """Way of guessing a first trajectory.
 
     Attributes:
-        pull: 0 follows the straight line from start to goal, 1 goes over the supports. None is the motion of
-            a linear inverted pendulum on the supports.
+        pull: 0 is the straight line from start to goal, 1 goes over the supports, None is the motion of a
+            linear inverted pendulum on them.
         stretch: Durations as multiples of the lower bounds, before the bounds are applied.
     """
 
@@ -240,7 +240,10 @@ class CentroidalResult(Displayed):
         """
         if self.trajectory is None:
             raise ValueError("no trajectory to measure; valid: a result that succeeded")
-        return measure(self.problem, self.trajectory, self.polytopes)
+        return self._measured(self.trajectory)
+
+    def _measured(self, trajectory: CentroidalTrajectory) -> Residuals:
+        return measure(self.problem, trajectory, self.polytopes)
 
 
 def plan_com(problem: CentroidalProblem) -> CentroidalResult:

@@ -206,16 +206,14 @@ def walking_path(
         InputError: If an argument is not usable, or start or goal are in an obstacle.
     """
     task = WalkingTask(
-        start=frozen_array(start, "walking start [m, m, rad]", (3,)),
-        goal=frozen_array(goal, "walking goal [m, m, rad]", (3,)),
-        objective=objective,
-        obstacles=tuple(obstacles),
-        walker=Walker() if walker is None else walker,
-        room=finite_number(room, "walking room [m]", at_least=0.0),
-        max_speed=None if max_speed is None else finite_number(max_speed, "max_speed [m/s]", at_least=0.1),
-        start_velocity=frozen_array(start_velocity, "walking start_velocity [m/s, m/s, rad/s]", (3,)),
-        goal_velocity=frozen_array(goal_velocity, "walking goal_velocity [m/s, m/s, rad/s]", (3,)),
-    )
+        frozen_array(start, "walking start [m, m, rad]", (3,)),
+        frozen_array(goal, "walking goal [m, m, rad]", (3,)),
+        objective, tuple(obstacles), walker or Walker(),
+        finite_number(room, "walking room [m]", at_least=0.0),
+        None if max_speed is None else finite_number(max_speed, "max_speed [m/s]", at_least=0.1),
+        frozen_array(start_velocity, "walking start_velocity [m/s, m/s, rad/s]", (3,)),
+        frozen_array(goal_velocity, "walking goal_velocity [m/s, m/s, rad/s]", (3,)),
+    )  # fmt: skip
     _check(task)
     guesses = _guesses(task) if like is None else [Guess("like another", *bent(like, task))]
     free = cheapest([solve(replace(task, obstacles=()), guess) for guess in guesses])

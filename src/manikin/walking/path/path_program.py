@@ -250,8 +250,8 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
 def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
     """Optimise from one guess, again with more room where the path between the samples had too little.
 
-    The result is the last iterate, whose ``failure`` says if it is no solution. The pieces, and the guess's
-    control points, are ``finer`` than usual.
+    The result is the last iterate, whose ``failure`` says if it is no solution. Its pieces, and the guess's,
+    are ``finer`` times as many as usual.
     """
     programme = programme_of(task, finer)
     tightening = np.zeros(len(task.obstacles) + 1)
