@@ -1,5 +1,6 @@
 """Every requirement of a trajectory measured afresh, every millisecond, without the solver."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -119,7 +120,7 @@ class Residuals:
 def phase_times(trajectory: CentroidalTrajectory, step: float = STEP) -> list[FloatArray]:
     """Instants of each phase: both its ends and every multiple of ``step`` between them [s]."""
     times = []
-    for start, end in zip(trajectory.schedule.instants[:-1], trajectory.schedule.instants[1:], strict=True):
+    for start, end in itertools.pairwise(trajectory.schedule.instants):
         grid = step * np.arange(np.floor(start / step) + 1, np.ceil(end / step))
         times.append(np.concatenate([[start], grid[(grid > start) & (grid < end)], [end]]))
     return times

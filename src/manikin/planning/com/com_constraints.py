@@ -44,10 +44,10 @@ class KeyPlane:
             raise InputError(f"key plane normal is {vector.tolist()}; valid: not zero")
         if isinstance(key, bool) or not isinstance(key, (int, np.integer)) or key < 1:
             raise InputError(f"key plane is at key instant {key!r}; valid: an integer >= 1")
-        object.__setattr__(self, "key", int(key))
-        object.__setattr__(self, "normal", frozen_array(vector / length, "key plane normal", (3,)))
-        object.__setattr__(self, "offset", finite_number(offset, "key plane offset [m]") / length)
-        object.__setattr__(self, "lead", finite_number(lead, "key plane lead [s]", at_least=0.0))
+        unit = frozen_array(vector / length, "key plane normal", (3,))
+        away = finite_number(offset, "key plane offset [m]") / length
+        ahead = finite_number(lead, "key plane lead [s]", at_least=0.0)
+        vars(self).update(key=int(key), normal=unit, offset=away, lead=ahead)
 
     @classmethod
     def towards(cls, key: int, start: ArrayLike, goal: ArrayLike, beyond: float = 0.0) -> "KeyPlane":

@@ -303,8 +303,7 @@ class CentroidalProblem:
                 vector = getattr(self, f"{end}_{name}")
                 if name == "com" or vector is not None:
                     values[f"{end}_{name}"] = frozen_array(vector, f"centroidal {end}_{name} [{unit}]", (3,))
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(values)
 
     @property
     def reference(self) -> FloatArray:

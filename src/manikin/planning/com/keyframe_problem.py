@@ -84,8 +84,7 @@ class RecordedCom:
             ]),
             "angular_momentum_rate": turning,
         }  # fmt: skip
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(values)
 
     def with_angular_momentum_rate(self, rate: ArrayLike) -> "RecordedCom":
         """Recording with a rate of the angular momentum (n, 3) about the CoM at its samples [N.m]."""
@@ -169,12 +168,8 @@ class KeyframeProblem:
                 "valid: one of them, and smoothness, > 0"
             )
         spacing = finite_number(frame_spacing, "keyframes frame_spacing [s]", above=0.0)
-        values = {
-            "recording": recording, "requirements": asked,
-            "control_points": int(control_points), "frame_spacing": spacing,
-        }  # fmt: skip
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(recording=recording, requirements=asked, control_points=int(count))
+        vars(self).update(frame_spacing=spacing)
 
     @classmethod
     def of(

@@ -224,8 +224,7 @@ def _parameters(
 
 def _unknown_bounds(programme: ComProgram, problem: CentroidalProblem) -> tuple[FloatArray, FloatArray]:
     phases, k = programme.structure.phases, programme.structure.degree
-    points = np.full((phases, k + 1, 3), np.inf)
-    low, high = -points, points.copy()
+    low, high = (np.full((phases, k + 1, 3), bound) for bound in (-np.inf, np.inf))
     for bound in (low, high):
         bound[0, 0] = problem.start_com - problem.reference
         bound[-1, -1] = problem.goal_com - problem.reference

@@ -56,14 +56,18 @@ class SamplingRegion:
         self, lower: ArrayLike, upper: ArrayLike, yaw: Sequence[float] | None = None,
         pitch: Sequence[float] | None = None, roll: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        object.__setattr__(self, "lower", frozen_array(lower, "sampling region lower [m]", (3,)))
-        object.__setattr__(self, "upper", frozen_array(upper, "sampling region upper [m]", (3,)))
-        if not np.all(self.lower < self.upper):
-            raise InputError(
-                f"sampling region spans {self.lower.tolist()} to {self.upper.tolist()}; valid: lower < upper"
-            )
+        low, high = (
+            frozen_array(corner, f"sampling region {name} [m]", (3,))
+            for name, corner in (("lower", lower), ("upper", upper))
+        )
+        if not np.all(low < high):
+            raise InputError(f"sampling region spans {low.tolist()} to {high.tolist()}; valid: lower < upper")
+        vars(self).update(lower=low, upper=high)
         for name, pair in (("yaw", yaw), ("pitch", pitch), ("roll", roll)):
-            object.__setattr__(self, name, None if pair is None else _angle_range(pair, name))
+            if pair is not None:
+                least = finite_number(pair[0], f"sampling region {name}[0] [rad]")
+                pair = least, finite_number(pair[1], f"sampling region {name}[1] [rad]", at_least=least)
+            object.__setattr__(self, name, pair)
 
     def turns(self, count: int, rng: np.random.Generator) -> FloatArray:
         """(count, 4) random quaternions xyzw within the bounds."""
@@ -168,8 +172,3 @@ def _cut_plane(item: Obstacle, region: SamplingRegion) -> tuple[FloatArray, Floa
     square = np.array([(left, low), (right, low), (right, high), (left, high)]) @ axes + offset * normal
     triangles = square[[[0, 1, 2], [0, 2, 3]]]
     return triangles, np.stack([normal, normal]), np.full(2, isinstance(item.shape, HalfSpace))
-
-
-def _angle_range(pair: Sequence[float], name: str) -> tuple[float, float]:
-    low = finite_number(pair[0], f"sampling region {name}[0] [rad]")
-    return low, finite_number(pair[1], f"sampling region {name}[1] [rad]", at_least=low)

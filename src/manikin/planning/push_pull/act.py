@@ -58,10 +58,8 @@ class Act:
         unit = unit_direction(direction, "act direction")
         if abs(unit[2]) > 1e-6:
             raise InputError(f"act direction is {np.round(unit, 4).tolist()}; valid: a level one, its z 0")
-        object.__setattr__(self, "kind", ActKind(kind))
-        object.__setattr__(self, "obstacle", obstacle)
-        object.__setattr__(self, "direction", unit)
-        object.__setattr__(self, "force", finite_number(force, "act force [N]", above=0.0))
+        size = finite_number(force, "act force [N]", above=0.0)
+        vars(self).update(kind=ActKind(kind), obstacle=obstacle, direction=unit, force=size)
 
     @property
     def facing(self) -> FloatArray:

@@ -16,7 +16,7 @@ import numpy as np
 
 from manikin.numerics.spatial import FloatArray
 from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
-from manikin.walking.path.walk_obstacles import WalkObstacle, clearance
+from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_model import to_world
 from manikin.walking.path.walking_path import TOLERANCE, WalkingPath, WalkingTask
 
@@ -97,17 +97,6 @@ class PathProgram:
         last_but_one = goal - step * np.asarray(values["goal_rate"])
         points = np.vstack([start, second, inner, last_but_one, goal])
         return BSpline(DEGREE, self.structure.knots, points), duration
-
-
-def obstacle_parameters(index: int, obstacle: WalkObstacle) -> dict[str, FloatArray]:
-    """Parameters of one obstacle: its track is a place, first a velocity of zero, and changes of velocity."""
-    velocity = np.diff(obstacle.displacements, axis=0) / np.diff(obstacle.times)[:, None]
-    return {
-        f"corners{index}": obstacle.corners + obstacle.displacements[0],
-        f"radius{index}": np.array([obstacle.radius]),
-        f"times{index}": obstacle.times,
-        f"changes{index}": np.diff(np.pad(velocity, ((1, 1), (0, 0))), axis=0),
-    }
 
 
 class _Parameters(dict[str, ca.SX]):
@@ -242,8 +231,14 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
         "room": task.walker.depth / 2 + task.room + tightening[:-1],
         "max_speed": (task.max_speed or 0.0) - tightening[-1],
     }  # fmt: skip
-    for index, obstacle in enumerate(task.obstacles):
-        values |= obstacle_parameters(index, obstacle)
+    for index, item in enumerate(task.obstacles):
+        # A track is a place, first a velocity of zero, and changes of velocity.
+        velocity = np.diff(item.displacements, axis=0) / np.diff(item.times)[:, None]
+        values |= {
+            f"corners{index}": item.corners + item.displacements[0], f"radius{index}": [item.radius],
+            f"times{index}": item.times,
+            f"changes{index}": np.diff(np.pad(velocity, ((1, 1), (0, 0))), axis=0),
+        }  # fmt: skip
     return values
 
 
