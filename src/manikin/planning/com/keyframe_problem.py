@@ -138,11 +138,8 @@ class KeyframeProblem:
         """Put the problem together, of a body's mass [kg].
 
         Args:
-            mass: Mass of the body [kg].
-            recording: Samples, key frames and stances.
             control_points: At least one more than there are key frames and end conditions; the
                 number of key frames plus 7 when omitted.
-            frame_spacing: See above [s].
             requirements: Further arguments of :class:`CentroidalProblem`. An acceleration at an end needs a
                 velocity there; the weights of margin and duration play no part.
 

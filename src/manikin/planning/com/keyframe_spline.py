@@ -135,13 +135,7 @@ class _Room:
 
 @dataclass(frozen=True, eq=False)
 class KeyframeSolution:
-    """Optimum of a :class:`KeyframeProgramme`.
-
-    Attributes:
-        control_points: (n + 1, 3) [m].
-        multipliers: (m,) >= 0 of the balance rows.
-        iterations: Iterations of the solver.
-    """
+    """Optimum of a programme: (n + 1, 3) control points [m], (m,) multipliers >= 0 of the balance rows."""
 
     control_points: FloatArray
     multipliers: FloatArray

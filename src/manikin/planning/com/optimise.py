@@ -127,10 +127,8 @@ class Attempt:
     """Outcome of one optimisation, measured every millisecond against the whole problem.
 
     Attributes:
-        trajectory: Whatever the solver ended with.
         bezier: (phases, k + 1, 3) Bezier points [m], to start again from.
         durations: (phases,) [s].
-        iterations: Iterations of the solver.
         margin: d_min at the samples over the imposed facets [N.m] or [N].
         converged: Whether the solver reports an optimum.
     """

@@ -176,10 +176,9 @@ class CentroidalResult(Displayed):
     Attributes:
         polytopes: W_i of the phases about ``problem.reference``.
         feasibility: Upper bounds of the margin at the key instants.
-        trajectory: The trajectory; None when it failed.
+        trajectory: None when it failed.
         certificate: Requirements measured every millisecond; of the best attempt when it
             failed, None when nothing was attempted.
-        iterations: Iterations of the solver over all rounds.
         rounds: Number of optimisations.
         wall_time: Wall time of the search [s].
     """

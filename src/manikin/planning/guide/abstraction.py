@@ -107,12 +107,7 @@ class LimbReach:
 
 @dataclass(frozen=True, eq=False)
 class Abstraction:
-    """Trunk and reach of a creature in the frame of its root.
-
-    Attributes:
-        trunk: Shapes that must not meet the scene.
-        limbs: What each limb reaches.
-    """
+    """Trunk, which must not meet the scene, and reach of a creature's limbs in the frame of its root."""
 
     trunk: tuple[TrunkShape, ...]
     limbs: tuple[LimbReach, ...]

@@ -54,12 +54,7 @@ class GuideWorld:
 
 @dataclass(frozen=True, eq=False)
 class GuideTask:
-    """Start and goal of a guide, and its speed limits.
-
-    Attributes:
-        start: (7,) pose of the root.
-        goal: (7,) pose of the root.
-    """
+    """Start and goal of a guide, poses (7,) of the root, and its speed limits."""
 
     start: FloatArray
     goal: FloatArray

@@ -35,12 +35,7 @@ _SAFETY = 1.01  # speeds are known at three instants of each cell, this covers w
 
 @dataclass(frozen=True, eq=False)
 class RootLimits:
-    """Largest speeds of the root, one per coordinate.
-
-    Attributes:
-        linear: (3,) along the world axes [m/s].
-        angular: (3,) about the root's own axes [rad/s].
-    """
+    """Largest speeds of the root, (3,) along the world axes [m/s] and (3,) about its own axes [rad/s]."""
 
     linear: FloatArray
     angular: FloatArray

@@ -34,16 +34,10 @@ STEP = 0.6
 
 @dataclass(frozen=True, eq=False)
 class SamplingRegion:
-    """Box in which roots are drawn, and how they may be turned.
+    """Box with corners (3,) [m] in which roots are drawn, and how they may be turned.
 
-    The turn is ``Rz(yaw) Ry(pitch) Rx(roll)``; without bounds on it, it is uniform over all turns.
-
-    Attributes:
-        lower: (3,) lower corner of the box of positions [m].
-        upper: (3,) upper corner [m].
-        yaw: Smallest and largest angle [rad], or None.
-        pitch: Smallest and largest angle, positive leaning forward [rad], or None.
-        roll: Smallest and largest angle [rad], or None.
+    The turn is ``Rz(yaw) Ry(pitch) Rx(roll)``, each with a smallest and largest angle or None [rad], a
+    positive pitch leaning forward; without any bounds, it is uniform over all turns.
     """
 
     lower: FloatArray
@@ -84,11 +78,7 @@ class SamplingRegion:
 
 
 class PoseSampler:
-    """Draws poses for one checker and region (GENERATECONFIGURATION).
-
-    Attributes:
-        corners: (n, 3, 3) triangles drawn from [m].
-    """
+    """Draws poses for one checker and region (GENERATECONFIGURATION) from ``corners`` (n, 3, 3) [m]."""
 
     def __init__(
         self, checker: ReachabilityChecker, region: SamplingRegion, uniform_share: float = UNIFORM_SHARE

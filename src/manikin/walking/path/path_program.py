@@ -28,11 +28,7 @@ DEGREE = 4
 class PathStructure:
     """What the programme's expressions depend on; numbers are its parameters.
 
-    Attributes:
-        pieces: Number of pieces of the spline.
-        obstacles: Numbers of corners and of instants of each obstacle.
-        discs: Number of discs of the walker.
-        limited_speed: Whether the speed is limited.
+    Of each obstacle these are the numbers of corners and of instants, of the walker that of discs.
     """
 
     pieces: int
