@@ -203,15 +203,17 @@ class Guess:
     duration: float
 
 
-def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
-    """The compiled programme of a task, shared by all tasks of the same structure.
-
-    It has 20 pieces up to 10 m and 40 beyond, times ``finer``.
-    """
+def structure_of(task: WalkingTask, finer: int = 1) -> PathStructure:
+    """The structure of a task's programme, with 20 pieces up to 10 m and 40 beyond, times ``finer``."""
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
     obstacles = tuple((len(item.corners), len(item.times)) for item in task.obstacles)
     discs, pieces = len(task.walker.offsets) if obstacles else 1, finer * (20 if distance <= 10.0 else 40)
-    return transcribe(PathStructure(pieces, obstacles, discs, task.max_speed is not None))
+    return PathStructure(pieces, obstacles, discs, task.max_speed is not None)
+
+
+def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
+    """The compiled programme of a task, shared by all tasks of the same structure."""
+    return transcribe(structure_of(task, finer))
 
 
 def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatArray) -> dict[str, Any]:
@@ -285,8 +287,7 @@ def sharpened(path: WalkingPath) -> WalkingPath:
 
 def bent(path: WalkingPath, task: WalkingTask, finer: int = 1) -> tuple[FloatArray, float]:
     """Control points and duration of a path, its ends moved to those of another task."""
-    structure = programme_of(replace(task, obstacles=()), finer).structure
-    share = np.linspace(0.0, 1.0, structure.pieces + 4)[:, None]
+    share = np.linspace(0.0, 1.0, structure_of(task, finer).pieces + 4)[:, None]
     points = path.spline.control_points
     points = points if len(points) == len(share) else path.spline(share[:, 0])
     goal = task.goal.copy()
