@@ -117,11 +117,11 @@ class Residuals:
         return worst, -self.min_margin
 
 
-def phase_times(trajectory: CentroidalTrajectory, step: float = STEP) -> list[FloatArray]:
-    """Instants of each phase: both its ends and every multiple of ``step`` between them [s]."""
+def phase_times(trajectory: CentroidalTrajectory) -> list[FloatArray]:
+    """Instants of each phase: both its ends and every multiple of :data:`STEP` between them [s]."""
     times = []
     for start, end in itertools.pairwise(trajectory.schedule.instants):
-        grid = step * np.arange(np.floor(start / step) + 1, np.ceil(end / step))
+        grid = STEP * np.arange(np.floor(start / STEP) + 1, np.ceil(end / STEP))
         times.append(np.concatenate([[start], grid[(grid > start) & (grid < end)], [end]]))
     return times
 

@@ -9,7 +9,7 @@ is paid for by the toes. The pyramids never hold more than the circular cone: wi
 ``outer`` they are those of ``cone``.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -90,9 +90,9 @@ class Act:
         """(3,) force of the object on both hands [N], for the act's force or another one [N]."""
         return -(self.force if force is None else force) * self.direction
 
-    def load(self, hands: tuple[Contact, ...], force: float | None = None) -> FloatArray:
+    def load(self, hands: Iterable[Contact]) -> FloatArray:
         """(6,) force and moment about the world origin of the object on the hands, shared evenly."""
-        pull, place = self.reaction(force), np.mean([hand.position for hand in hands], axis=0)
+        pull, place = self.reaction(), np.mean([hand.position for hand in hands], axis=0)
         return np.concatenate([pull, np.cross(place, pull)])
 
 
