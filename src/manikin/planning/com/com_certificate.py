@@ -161,12 +161,8 @@ def measure(
     phase = int(np.argmin(lowest))
     time = float(times[phase][np.argmin(margins[phase])])
     lack, unit = problem.required_margin - lowest[phase], problem.margin_unit
-    items = (
-        Residual("balance margin", lack, unit, phase, time),
-        *_end_residuals(problem, trajectory),
-        *_position_residuals(problem, trajectory, times),
-        *_duration_residuals(problem, trajectory),
-    )
+    balance = Residual("balance margin", lack, unit, phase, time)
+    items = (balance, *_end_residuals(problem, trajectory), *_residuals(problem, trajectory, times))
     zmp = least_zmp_distance(
         (part.stance, trajectory.pseudo_wrench(instants, phase=number))
         for number, (part, instants) in enumerate(zip(problem.sequence, times, strict=True))
@@ -202,9 +198,10 @@ def position_excess(
         yield constraint.name, [constraint.violation(p) for p in positions]
 
 
-def _position_residuals(
+def _residuals(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
 ) -> Iterator[Residual]:
+    """Those of positions, then those of durations."""
     for requirement, excess in position_excess(problem, trajectory, times):
         phase = int(np.argmax([values.max() for values in excess]))
         worst = int(np.argmax(excess[phase]))
@@ -213,9 +210,6 @@ def _position_residuals(
         time = float(trajectory.schedule.instants[plane.key])
         beyond = plane.violation(trajectory.position(time) + plane.lead * trajectory.velocity(time))
         yield Residual(f"key plane {index} at T_{plane.key}", float(beyond), "m", plane.key - 1, time)
-
-
-def _duration_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
     durations, instants = trajectory.schedule.durations, trajectory.schedule.instants
     excess = np.maximum(problem.min_durations - durations, durations - problem.max_durations)
     phase = int(np.argmax(excess))

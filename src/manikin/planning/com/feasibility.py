@@ -51,10 +51,9 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
 
 
 def low_friction(
-    stances: Sequence[Stance],
-    problem: CentroidalProblem,
+    stances: Sequence[Stance], problem: CentroidalProblem,
     measure: Callable[[Sequence[WrenchPolytope]], float],
-) -> str:
+) -> str:  # fmt: skip
     """Message that firm friction would give some stances the required margin; empty where it would not.
 
     ``measure`` gives their margin from their polytopes.

@@ -86,8 +86,8 @@ class NearProgramme:
         self.smoothness = _squared(self.knots, duration, costs)
         self.turning = _turning(self.knots, duration, recording)
         # (m,) phases of the instants at which balance is imposed, (m, n) CoM and acceleration by points.
-        spans = itertools.pairwise(instants)
-        times = [np.linspace(a, b, int(np.ceil((b - a) / BALANCE_STEP)) + 1) for a, b in spans]
+        ends = itertools.pairwise(instants)
+        times = [np.linspace(a, b, int(np.ceil((b - a) / BALANCE_STEP)) + 1) for a, b in ends]
         self.phases = np.repeat(np.arange(len(times)), [len(part) for part in times])
         shares = np.minimum(np.concatenate(times) / duration, 1.0)
         self.position = basis_matrix(DEGREE, self.knots, shares)

@@ -50,10 +50,8 @@ class SamplingRegion:
         self, lower: ArrayLike, upper: ArrayLike, yaw: Sequence[float] | None = None,
         pitch: Sequence[float] | None = None, roll: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        low, high = (
-            frozen_array(corner, f"sampling region {name} [m]", (3,))
-            for name, corner in (("lower", lower), ("upper", upper))
-        )
+        low = frozen_array(lower, "sampling region lower [m]", (3,))
+        high = frozen_array(upper, "sampling region upper [m]", (3,))
         if not np.all(low < high):
             raise InputError(f"sampling region spans {low.tolist()} to {high.tolist()}; valid: lower < upper")
         vars(self).update(lower=low, upper=high)
