@@ -1,5 +1,6 @@
 """Every requirement of a trajectory measured afresh, every millisecond, without the solver."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -116,11 +117,11 @@ class Residuals:
         return worst, -self.min_margin
 
 
-def phase_times(trajectory: CentroidalTrajectory, step: float = STEP) -> list[FloatArray]:
-    """Instants of each phase: both its ends and every multiple of ``step`` between them [s]."""
+def phase_times(trajectory: CentroidalTrajectory) -> list[FloatArray]:
+    """Instants of each phase: both its ends and every multiple of :data:`STEP` between them [s]."""
     times = []
-    for start, end in zip(trajectory.schedule.instants[:-1], trajectory.schedule.instants[1:], strict=True):
-        grid = step * np.arange(np.floor(start / step) + 1, np.ceil(end / step))
+    for start, end in itertools.pairwise(trajectory.schedule.instants):
+        grid = STEP * np.arange(np.floor(start / STEP) + 1, np.ceil(end / STEP))
         times.append(np.concatenate([[start], grid[(grid > start) & (grid < end)], [end]]))
     return times
 
@@ -160,12 +161,8 @@ def measure(
     phase = int(np.argmin(lowest))
     time = float(times[phase][np.argmin(margins[phase])])
     lack, unit = problem.required_margin - lowest[phase], problem.margin_unit
-    items = (
-        Residual("balance margin", lack, unit, phase, time),
-        *_end_residuals(problem, trajectory),
-        *_position_residuals(problem, trajectory, times),
-        *_duration_residuals(problem, trajectory),
-    )
+    balance = Residual("balance margin", lack, unit, phase, time)
+    items = (balance, *_end_residuals(problem, trajectory), *_residuals(problem, trajectory, times))
     zmp = least_zmp_distance(
         (part.stance, trajectory.pseudo_wrench(instants, phase=number))
         for number, (part, instants) in enumerate(zip(problem.sequence, times, strict=True))
@@ -201,9 +198,10 @@ def position_excess(
         yield constraint.name, [constraint.violation(p) for p in positions]
 
 
-def _position_residuals(
+def _residuals(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
 ) -> Iterator[Residual]:
+    """Those of positions, then those of durations."""
     for requirement, excess in position_excess(problem, trajectory, times):
         phase = int(np.argmax([values.max() for values in excess]))
         worst = int(np.argmax(excess[phase]))
@@ -212,9 +210,6 @@ def _position_residuals(
         time = float(trajectory.schedule.instants[plane.key])
         beyond = plane.violation(trajectory.position(time) + plane.lead * trajectory.velocity(time))
         yield Residual(f"key plane {index} at T_{plane.key}", float(beyond), "m", plane.key - 1, time)
-
-
-def _duration_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
     durations, instants = trajectory.schedule.durations, trajectory.schedule.instants
     excess = np.maximum(problem.min_durations - durations, durations - problem.max_durations)
     phase = int(np.argmax(excess))

@@ -44,10 +44,10 @@ class KeyPlane:
             raise InputError(f"key plane normal is {vector.tolist()}; valid: not zero")
         if isinstance(key, bool) or not isinstance(key, (int, np.integer)) or key < 1:
             raise InputError(f"key plane is at key instant {key!r}; valid: an integer >= 1")
-        object.__setattr__(self, "key", int(key))
-        object.__setattr__(self, "normal", frozen_array(vector / length, "key plane normal", (3,)))
-        object.__setattr__(self, "offset", finite_number(offset, "key plane offset [m]") / length)
-        object.__setattr__(self, "lead", finite_number(lead, "key plane lead [s]", at_least=0.0))
+        unit = frozen_array(vector / length, "key plane normal", (3,))
+        away = finite_number(offset, "key plane offset [m]") / length
+        ahead = finite_number(lead, "key plane lead [s]", at_least=0.0)
+        vars(self).update(key=int(key), normal=unit, offset=away, lead=ahead)
 
     @classmethod
     def towards(cls, key: int, start: ArrayLike, goal: ArrayLike, beyond: float = 0.0) -> "KeyPlane":
@@ -240,11 +240,8 @@ def height_below(name: str, surface: CeilingHeight) -> GeometricConstraint:
 
 
 def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
-    """Constraint that keeps the CoM out of a zone at any height; half its onset counts as inside.
+    """Constraint that keeps the CoM out of the zone below a named obstacle; half its onset counts as inside.
 
-    Args:
-        name: Name of the obstacle.
-        zone: Where the body would be below it.
-        reason: Why nothing passes, for the explanation of a failure.
+    The reason says why nothing passes, for the explanation of a failure.
     """
     return GeometricConstraint(f"way around '{name}'", _Outside(zone), reason)

@@ -147,19 +147,14 @@ class CentroidalTrajectory(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Mass, degree, normalised knots, control points and key instants as plain lists and numbers."""
-        turning = self.turning
-        return {
-            "mass_kg": float(self.mass),
-            "degree": int(self.spline.degree),
-            "knots": self.spline.knots.tolist(),
-            "control_points_m": self.spline.control_points.tolist(),
-            "key_instants_s": self.schedule.instants.tolist(),
-            **({} if turning is None else {"turning": {
-                "degree": int(turning.degree),
-                "knots": turning.knots.tolist(),
-                "control_points_Nm": turning.control_points.tolist(),
-            }}),
-        }  # fmt: skip
+
+        def plain(spline: BSpline, unit: str) -> dict[str, Any]:
+            points = {f"control_points_{unit}": spline.control_points.tolist()}
+            return {"degree": int(spline.degree), "knots": spline.knots.tolist(), **points}
+
+        instants = {"key_instants_s": self.schedule.instants.tolist()}
+        turning = {} if self.turning is None else {"turning": plain(self.turning, "Nm")}
+        return {"mass_kg": float(self.mass), **plain(self.spline, "m"), **instants, **turning}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], sequence: StanceSequence) -> Self:
@@ -308,8 +303,7 @@ class CentroidalProblem:
                 vector = getattr(self, f"{end}_{name}")
                 if name == "com" or vector is not None:
                     values[f"{end}_{name}"] = frozen_array(vector, f"centroidal {end}_{name} [{unit}]", (3,))
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(values)
 
     @property
     def reference(self) -> FloatArray:

@@ -51,10 +51,9 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
 
 
 def low_friction(
-    stances: Sequence[Stance],
-    problem: CentroidalProblem,
+    stances: Sequence[Stance], problem: CentroidalProblem,
     measure: Callable[[Sequence[WrenchPolytope]], float],
-) -> str:
+) -> str:  # fmt: skip
     """Message that firm friction would give some stances the required margin; empty where it would not.
 
     ``measure`` gives their margin from their polytopes.
@@ -245,14 +244,9 @@ def _duration_failure(problem: CentroidalProblem) -> Failure | None:
 def misplaced(
     problem: CentroidalProblem, com: FloatArray, phases: Sequence[int], what: str, tolerance: float = ROUNDING
 ) -> Failure | None:
-    """Failure of a CoM position that is too far from a contact or breaks a constraint, or None.
+    """Failure of a CoM (3,) [m] that is too far from a contact or breaks a constraint in a phase, or None.
 
-    Args:
-        problem: Says what the position has to keep.
-        com: (3,) position [m].
-        phases: Phases in which it occurs.
-        what: The position in words.
-        tolerance: Largest violation that counts as none [m].
+    ``what`` is the position in words, and a violation up to the tolerance [m] counts as none.
     """
     limit = np.inf if problem.support_distance is None else problem.support_distance
     for phase in phases:

@@ -84,8 +84,7 @@ class RecordedCom:
             ]),
             "angular_momentum_rate": turning,
         }  # fmt: skip
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(values)
 
     def with_angular_momentum_rate(self, rate: ArrayLike) -> "RecordedCom":
         """Recording with a rate of the angular momentum (n, 3) about the CoM at its samples [N.m]."""
@@ -139,11 +138,8 @@ class KeyframeProblem:
         """Put the problem together, of a body's mass [kg].
 
         Args:
-            mass: Mass of the body [kg].
-            recording: Samples, key frames and stances.
             control_points: At least one more than there are key frames and end conditions; the
                 number of key frames plus 7 when omitted.
-            frame_spacing: See above [s].
             requirements: Further arguments of :class:`CentroidalProblem`. An acceleration at an end needs a
                 velocity there; the weights of margin and duration play no part.
 
@@ -169,12 +165,8 @@ class KeyframeProblem:
                 "valid: one of them, and smoothness, > 0"
             )
         spacing = finite_number(frame_spacing, "keyframes frame_spacing [s]", above=0.0)
-        values = {
-            "recording": recording, "requirements": asked,
-            "control_points": int(control_points), "frame_spacing": spacing,
-        }  # fmt: skip
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(recording=recording, requirements=asked, control_points=int(count))
+        vars(self).update(frame_spacing=spacing)
 
     @classmethod
     def of(

@@ -135,13 +135,7 @@ class _Room:
 
 @dataclass(frozen=True, eq=False)
 class KeyframeSolution:
-    """Optimum of a :class:`KeyframeProgramme`.
-
-    Attributes:
-        control_points: (n + 1, 3) [m].
-        multipliers: (m,) >= 0 of the balance rows.
-        iterations: Iterations of the solver.
-    """
+    """Optimum of a programme: (n + 1, 3) control points [m], (m,) multipliers >= 0 of the balance rows."""
 
     control_points: FloatArray
     multipliers: FloatArray
@@ -154,13 +148,8 @@ def build_keyframe_programme(
 ) -> KeyframeProgramme:  # fmt: skip
     """Write the programme of [Qiu2012]_ 5.3.2 for (f,) times of key frames, both ends among them [s].
 
-    Args:
-        problem: Mass, degree, weights, margin and end conditions.
-        polytopes: W_i of the phases about ``problem.reference``.
-        schedule: Stances with their recorded instants [s].
-        times: (f,) key frames [s].
-        positions: (f, 3) CoM there [m].
-        control_points: Number of control points.
+    The problem gives mass, degree, weights, margin and end conditions; the W_i of the phases are about its
+    reference. The CoM at the key frames is (f, 3) [m].
     """
     k, duration = problem.degree, float(schedule.instants[-1])
     # First and second derivative over normalised time at both ends, where imposed.

@@ -65,15 +65,8 @@ class KeyframeResult(CentroidalResult):
         """Instants of the added key frames [s], in the order of their addition."""
         return tuple(float(self.keyframes.recording.time[frame]) for frame in self.added)
 
-    def residuals(self) -> Residuals:
-        """Measure every requirement again, every millisecond, and the distance from the key frames.
-
-        Raises:
-            ValueError: If there is no trajectory.
-        """
-        if self.trajectory is None:
-            raise ValueError("no trajectory to measure; valid: a result that succeeded")
-        return _measure(self.keyframes, self.trajectory, self.polytopes, self.frames)
+    def _measured(self, trajectory: CentroidalTrajectory) -> Residuals:
+        return _measure(self.keyframes, trajectory, self.polytopes, self.frames)
 
 
 def plan_com_through_key_frames(problem: KeyframeProblem) -> KeyframeResult:

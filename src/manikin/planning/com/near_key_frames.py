@@ -22,13 +22,12 @@ from scipy import sparse
 
 from manikin.balance import WrenchPolytope
 from manikin.balance.margin import wrench_levers
-from manikin.contact import ContactSchedule
 from manikin.errors import InputError
 from manikin.numerics.qp import solve_sparse_qp
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
 from manikin.planning.com.com_certificate import TOLERANCE, Residuals, measure, phase_margins
-from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory, Weights
+from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
 from manikin.planning.com.feasibility import Failure, assess_feasibility, polytopes_of
 from manikin.planning.com.keyframe_problem import KeyframeProblem, RecordedCom
 from manikin.planning.com.keyframe_spline import quadrature
@@ -68,52 +67,31 @@ TURN_BEND = 1e-7
 """Cost of its mean squared second derivative, in that unit [s^4]."""
 
 
-@dataclass(frozen=True, eq=False)
 class NearProgramme:
-    """Quadratic programme of a CoM near key frames: what does not depend on the last solution.
+    """Quadratic programme of a CoM near key frames: what does not depend on the last solution."""
 
-    Attributes:
-        mass: Mass of the body [kg].
-        reference: (3,) point of the polytopes' moments [m].
-        polytopes: W_i of the phases about ``reference``.
-        knots: On [0, 1].
-        smoothness: (n, n) matrix of the objective of one axis, without the pull.
-        turning: (n, n) and (n, 3) objective of the rate of the angular momentum, in :data:`TURN`; None for a
-            point mass.
-        phases: (m,) phase of each instant at which balance is imposed; key instants count twice.
-        position: (m, n) CoM there by control points.
-        acceleration: (m, n) its acceleration.
-    """
-
-    mass: float
-    reference: FloatArray
-    polytopes: tuple[WrenchPolytope, ...]
-    knots: FloatArray
-    smoothness: FloatArray
-    turning: tuple[FloatArray, FloatArray] | None
-    phases: np.ndarray
-    position: FloatArray
-    acceleration: FloatArray
-
-    @classmethod
-    def of(
-        cls, mass: float, polytopes: Sequence[WrenchPolytope], recording: RecordedCom, weights: Weights
-    ) -> "NearProgramme":
-        """Lay out knots and instants for polytopes W_i of the phases about one point; the mass is in kg.
+    def __init__(
+        self, problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], recording: RecordedCom
+    ) -> None:
+        """Lay out knots and instants for polytopes W_i of the phases about one point.
 
         Of the weights, those of velocity, acceleration and jerk count, the first entry for all three axes.
         """
-        schedule = recording.schedule
-        duration = float(schedule.instants[-1])
-        knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, max(1, round(duration / KNOT_SPACING)) + 1))
+        weights, instants = problem.weights, recording.schedule.instants
+        duration = float(instants[-1])
+        self.mass, self.polytopes, self.reference = problem.mass, polytopes, polytopes[0].reference
+        self.knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, max(1, round(duration / KNOT_SPACING)) + 1))
+        # (n, n) objective of one axis without the pull; (n, n) and (n, 3) one of the turning, or None.
         costs = {1: weights.velocity[0], 2: weights.acceleration[0], 3: weights.jerk[0]}
-        times, phases = _instants(schedule)
-        shares = np.minimum(times / duration, 1.0)
-        return cls(
-            mass, polytopes[0].reference, tuple(polytopes), knots, _squared(knots, duration, costs),
-            _turning(knots, duration, recording), phases,
-            basis_matrix(DEGREE, knots, shares), basis_matrix(DEGREE, knots, shares, 2) / duration**2,
-        )  # fmt: skip
+        self.smoothness = _squared(self.knots, duration, costs)
+        self.turning = _turning(self.knots, duration, recording)
+        # (m,) phases of the instants at which balance is imposed, (m, n) CoM and acceleration by points.
+        ends = itertools.pairwise(instants)
+        times = [np.linspace(a, b, int(np.ceil((b - a) / BALANCE_STEP)) + 1) for a, b in ends]
+        self.phases = np.repeat(np.arange(len(times)), [len(part) for part in times])
+        shares = np.minimum(np.concatenate(times) / duration, 1.0)
+        self.position = basis_matrix(DEGREE, self.knots, shares)
+        self.acceleration = basis_matrix(DEGREE, self.knots, shares, 2) / duration**2
 
     def spline(self, points: FloatArray) -> BSpline:
         """CoM over [0, 1] of control points (n, 3 or 6)."""
@@ -132,11 +110,8 @@ class NearProgramme:
     ) -> tuple[FloatArray, int] | None:
         """Control points and iterations; None when the linearised programme has no solution.
 
-        Args:
-            shares: (f,) key frames on [0, 1].
-            wanted: (f, 3) CoM there [m].
-            margin: (phases,) to keep [N.m].
-            near: (n, 3 or 6) control points about which the wrench is linearised.
+        Key frames are (f,) ``shares`` of [0, 1] with (f, 3) ``wanted`` CoM [m]; the margin (phases,) is kept
+        [N.m], and the wrench linearised about (n, 3 or 6) control points ``near``.
         """
         parts = self._objectives(shares, wanted)
         linear = np.hstack([line for _, line in parts])
@@ -192,12 +167,6 @@ class NearProgramme:
                 spare = wished + (0.0 if turn is None else RESERVE)
                 bounds.append((bound[chosen] - spare * length[chosen]) / scale)
         return sparse.vstack(blocks).tocsc(), np.concatenate(bounds)
-
-
-def _instants(schedule: ContactSchedule) -> tuple[FloatArray, np.ndarray]:
-    spans = itertools.pairwise(schedule.instants)
-    times = [np.linspace(a, b, int(np.ceil((b - a) / BALANCE_STEP)) + 1) for a, b in spans]
-    return np.concatenate(times), np.repeat(np.arange(len(times)), [len(part) for part in times])
 
 
 def _turning(
@@ -296,7 +265,7 @@ class _NearSearch:
         asked, recording = problem.requirements, problem.recording
         self.problem, self.recording, self.iterations, self.rounds = problem, recording, 0, 0
         self.polytopes: tuple[WrenchPolytope, ...] = polytopes_of(asked)
-        self.programme = NearProgramme.of(asked.mass, self.polytopes, recording, asked.weights)
+        self.programme = NearProgramme(asked, self.polytopes, recording)
 
     def run(self) -> NearKeyFramesResult:
         began = clock.perf_counter()

@@ -127,10 +127,8 @@ class Attempt:
     """Outcome of one optimisation, measured every millisecond against the whole problem.
 
     Attributes:
-        trajectory: Whatever the solver ended with.
         bezier: (phases, k + 1, 3) Bezier points [m], to start again from.
         durations: (phases,) [s].
-        iterations: Iterations of the solver.
         margin: d_min at the samples over the imposed facets [N.m] or [N].
         converged: Whether the solver reports an optimum.
     """
@@ -146,20 +144,17 @@ class Attempt:
 
 def build_programme(problem: CentroidalProblem, facets: Rows, faces: Rows = ()) -> ComProgram:
     """The compiled optimisation of a problem, shared by all problems of the same structure."""
-    return transcribe(
-        ComStructure(
-            degree=problem.degree,
-            samples=problem.samples,
-            rows=tuple(len(indices) for indices in facets),
-            contacts=tuple(len(phase.stance) for phase in problem.sequence),
-            margin_space=problem.margin_space,
-            geometric=tuple(constraint.function for constraint in problem.geometric),
-            limited_distance=problem.support_distance is not None,
-            key_planes=tuple((plane.key, plane.lead) for plane in problem.key_planes),
-            loaded=tuple(number for number, phase in enumerate(problem.sequence) if phase.load is not None),
-            reach=tuple(len(rows) for rows in faces),
-        )
-    )
+    phases = problem.sequence
+    structure = ComStructure(
+        problem.degree, problem.samples, rows=tuple(map(len, facets)),
+        contacts=tuple(len(phase.stance) for phase in phases), margin_space=problem.margin_space,
+        geometric=tuple(constraint.function for constraint in problem.geometric),
+        limited_distance=problem.support_distance is not None,
+        key_planes=tuple((plane.key, plane.lead) for plane in problem.key_planes),
+        loaded=tuple(number for number, phase in enumerate(phases) if phase.load is not None),
+        reach=tuple(map(len, faces)),
+    )  # fmt: skip
+    return transcribe(structure)
 
 
 def optimise(
@@ -224,8 +219,7 @@ def _parameters(
 
 def _unknown_bounds(programme: ComProgram, problem: CentroidalProblem) -> tuple[FloatArray, FloatArray]:
     phases, k = programme.structure.phases, programme.structure.degree
-    points = np.full((phases, k + 1, 3), np.inf)
-    low, high = -points, points.copy()
+    low, high = (np.full((phases, k + 1, 3), bound) for bound in (-np.inf, np.inf))
     for bound in (low, high):
         bound[0, 0] = problem.start_com - problem.reference
         bound[-1, -1] = problem.goal_com - problem.reference
@@ -241,14 +235,10 @@ def _row_bounds(
 ) -> tuple[FloatArray, FloatArray]:
     limit = (problem.support_distance or 0.0) - targets.position
     bounds = {
-        "balance": (0.0, np.inf),
-        "distance": (-np.inf, limit**2),
-        "continuity": (0.0, 0.0),
-        "key_plane": (-np.inf, 0.0),
-        "reach": (-np.inf, -targets.position),
-        "total_duration": (0.0, 0.0),
+        "balance": (0.0, np.inf), "distance": (-np.inf, limit**2), "continuity": (0.0, 0.0),
+        "key_plane": (-np.inf, 0.0), "reach": (-np.inf, -targets.position), "total_duration": (0.0, 0.0),
         "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
-    }
+    }  # fmt: skip
     ends, rows = iter(END_CONDITIONS), []
     for group, _ in programme.groups:
         if group == "end":

@@ -43,11 +43,11 @@ from manikin.runtime.display import Displayed
 
 @dataclass(frozen=True)
 class GuessStyle:
-    """Way of guessing a first trajectory; several are tried in order.
+    """Way of guessing a first trajectory.
 
     Attributes:
-        pull: 0 follows the straight line from start to goal, 1 goes over the supports. None is the motion of
-            a linear inverted pendulum on the supports.
+        pull: 0 is the straight line from start to goal, 1 goes over the supports, None is the motion of a
+            linear inverted pendulum on them.
         stretch: Durations as multiples of the lower bounds, before the bounds are applied.
     """
 
@@ -176,10 +176,9 @@ class CentroidalResult(Displayed):
     Attributes:
         polytopes: W_i of the phases about ``problem.reference``.
         feasibility: Upper bounds of the margin at the key instants.
-        trajectory: The trajectory; None when it failed.
+        trajectory: None when it failed.
         certificate: Requirements measured every millisecond; of the best attempt when it
             failed, None when nothing was attempted.
-        iterations: Iterations of the solver over all rounds.
         rounds: Number of optimisations.
         wall_time: Wall time of the search [s].
     """
@@ -240,7 +239,10 @@ class CentroidalResult(Displayed):
         """
         if self.trajectory is None:
             raise ValueError("no trajectory to measure; valid: a result that succeeded")
-        return measure(self.problem, self.trajectory, self.polytopes)
+        return self._measured(self.trajectory)
+
+    def _measured(self, trajectory: CentroidalTrajectory) -> Residuals:
+        return measure(self.problem, trajectory, self.polytopes)
 
 
 def plan_com(problem: CentroidalProblem) -> CentroidalResult:

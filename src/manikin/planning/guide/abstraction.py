@@ -83,11 +83,9 @@ class LimbReach:
             ) from None
         rows = hull.equations
         centre, radius = inscribed_ball(rows[:, :3], -rows[:, 3])
-        arrays = (points[hull.vertices], rows[:, :3], -rows[:, 3], centre)
-        for key, value in zip(("vertices", "normals", "offsets", "centre"), arrays, strict=True):
-            object.__setattr__(self, key, frozen_array(value, key))
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "radius", radius)
+        arrays = {"vertices": points[hull.vertices], "normals": rows[:, :3], "offsets": -rows[:, 3]}
+        arrays = {key: frozen_array(value, key) for key, value in {**arrays, "centre": centre}.items()}
+        vars(self).update(name=name, radius=radius, **arrays)
 
     def coarse(self, directions: int) -> FloatArray:
         """(k, 3) vertices that are outermost in evenly spread directions, k <= ``directions``."""
@@ -109,12 +107,7 @@ class LimbReach:
 
 @dataclass(frozen=True, eq=False)
 class Abstraction:
-    """Trunk and reach of a creature in the frame of its root.
-
-    Attributes:
-        trunk: Shapes that must not meet the scene.
-        limbs: What each limb reaches.
-    """
+    """Trunk, which must not meet the scene, and reach of a creature's limbs in the frame of its root."""
 
     trunk: tuple[TrunkShape, ...]
     limbs: tuple[LimbReach, ...]

@@ -36,12 +36,7 @@ DIRECTIONS = 128
 
 @dataclass(frozen=True)
 class Margins:
-    """Reserves of planning, so that nothing is missed between checked poses.
-
-    Attributes:
-        trunk: Skin around the trunk's shapes [m].
-        reach: By how much the limbs' volumes are drawn in [m].
-    """
+    """Reserves of planning: skin around the trunk's shapes, and what limbs' volumes are drawn in by [m]."""
 
     trunk: float = TRUNK_MARGIN
     reach: float = REACH_MARGIN

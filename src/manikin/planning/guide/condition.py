@@ -46,8 +46,7 @@ class UsableSurface:
             "obstacles": None if obstacles is None else tuple(obstacles),
             "smallest_area": finite_number(smallest_area, "usable surface smallest_area [m^2]", **limits),
         }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(values)
 
     @property
     def key(self) -> str:

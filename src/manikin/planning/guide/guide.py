@@ -54,21 +54,15 @@ class GuideWorld:
 
 @dataclass(frozen=True, eq=False)
 class GuideTask:
-    """Start and goal of a guide, and its speed limits.
-
-    Attributes:
-        start: (7,) pose of the root.
-        goal: (7,) pose of the root.
-    """
+    """Start and goal of a guide, poses (7,) of the root, and its speed limits."""
 
     start: FloatArray
     goal: FloatArray
     limits: RootLimits
 
     def __init__(self, start: ArrayLike, goal: ArrayLike, limits: RootLimits | None = None) -> None:
-        object.__setattr__(self, "start", checked_pose(start, "guide start"))
-        object.__setattr__(self, "goal", checked_pose(goal, "guide goal"))
-        object.__setattr__(self, "limits", limits or RootLimits())
+        ends = checked_pose(start, "guide start"), checked_pose(goal, "guide goal")
+        vars(self).update(start=ends[0], goal=ends[1], limits=limits or RootLimits())
 
 
 @dataclass(frozen=True, eq=False)

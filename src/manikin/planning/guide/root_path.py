@@ -35,12 +35,7 @@ _SAFETY = 1.01  # speeds are known at three instants of each cell, this covers w
 
 @dataclass(frozen=True, eq=False)
 class RootLimits:
-    """Largest speeds of the root, one per coordinate.
-
-    Attributes:
-        linear: (3,) along the world axes [m/s].
-        angular: (3,) about the root's own axes [rad/s].
-    """
+    """Largest speeds of the root, (3,) along the world axes [m/s] and (3,) about its own axes [rad/s]."""
 
     linear: FloatArray
     angular: FloatArray
@@ -87,10 +82,9 @@ class RootPath:
         flips = np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0)
         unit[1:] *= np.cumprod(flips)[:, None]
         points[:, 3:] = unit
-        object.__setattr__(self, "degree", degree)
-        object.__setattr__(self, "knots", frozen_array(times, "root path knots"))
-        object.__setattr__(self, "control_points", frozen_array(points, "root path control_points"))
-        object.__setattr__(self, "limits", limits or RootLimits())
+        poses = frozen_array(points, "root path control_points")
+        vars(self).update(degree=degree, knots=frozen_array(times, "root path knots"), control_points=poses)
+        vars(self).update(limits=limits or RootLimits())
 
     @classmethod
     def through(
@@ -240,7 +234,9 @@ def approximate(
     poses: FloatArray, planner: LocalPlanner, limits: RootLimits, rng: np.random.Generator
 ) -> RootPath:
     """Spline close to a way of (n, 7) poses joined by straight ways; of degree 1 where no other was found."""
-    poses = _without_repeats(poses)
+    # Without those that equal the one before; two at least.
+    new = np.any(np.abs(np.diff(poses, axis=0)) > 1e-12, axis=1)
+    poses = poses[np.append(True, new)] if new.any() else poses[[0, -1]]
     times = traverse_times(poses, limits)
     count = max(DEGREE + 1, len(poses), int(np.ceil(times[-1] / SPACING)) + 1)
     while times[-1] > 0.0 and count <= _MOST_CONTROL_POSES:
@@ -300,10 +296,3 @@ def _with_small_turns(poses: FloatArray) -> FloatArray:
         count = max(1, int(np.ceil(float(angles_between(first, second)) / _SMALL_TURN)))
         pieces.append(between(first, second, np.arange(1, count + 1) / count))
     return np.vstack(pieces)
-
-
-def _without_repeats(poses: FloatArray) -> FloatArray:
-    """Poses without those that equal the one before; two at least."""
-    new = np.any(np.abs(np.diff(poses, axis=0)) > 1e-12, axis=1)
-    kept = poses[np.concatenate([[True], new])]
-    return kept if len(kept) > 1 else np.stack([poses[0], poses[-1]])

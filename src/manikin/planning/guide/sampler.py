@@ -34,16 +34,10 @@ STEP = 0.6
 
 @dataclass(frozen=True, eq=False)
 class SamplingRegion:
-    """Box in which roots are drawn, and how they may be turned.
+    """Box with corners (3,) [m] in which roots are drawn, and how they may be turned.
 
-    The turn is ``Rz(yaw) Ry(pitch) Rx(roll)``; without bounds on it, it is uniform over all turns.
-
-    Attributes:
-        lower: (3,) lower corner of the box of positions [m].
-        upper: (3,) upper corner [m].
-        yaw: Smallest and largest angle [rad], or None.
-        pitch: Smallest and largest angle, positive leaning forward [rad], or None.
-        roll: Smallest and largest angle [rad], or None.
+    The turn is ``Rz(yaw) Ry(pitch) Rx(roll)``, each with a smallest and largest angle or None [rad], a
+    positive pitch leaning forward; without any bounds, it is uniform over all turns.
     """
 
     lower: FloatArray
@@ -56,14 +50,16 @@ class SamplingRegion:
         self, lower: ArrayLike, upper: ArrayLike, yaw: Sequence[float] | None = None,
         pitch: Sequence[float] | None = None, roll: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        object.__setattr__(self, "lower", frozen_array(lower, "sampling region lower [m]", (3,)))
-        object.__setattr__(self, "upper", frozen_array(upper, "sampling region upper [m]", (3,)))
-        if not np.all(self.lower < self.upper):
-            raise InputError(
-                f"sampling region spans {self.lower.tolist()} to {self.upper.tolist()}; valid: lower < upper"
-            )
+        low = frozen_array(lower, "sampling region lower [m]", (3,))
+        high = frozen_array(upper, "sampling region upper [m]", (3,))
+        if not np.all(low < high):
+            raise InputError(f"sampling region spans {low.tolist()} to {high.tolist()}; valid: lower < upper")
+        vars(self).update(lower=low, upper=high)
         for name, pair in (("yaw", yaw), ("pitch", pitch), ("roll", roll)):
-            object.__setattr__(self, name, None if pair is None else _angle_range(pair, name))
+            if pair is not None:
+                least = finite_number(pair[0], f"sampling region {name}[0] [rad]")
+                pair = least, finite_number(pair[1], f"sampling region {name}[1] [rad]", at_least=least)
+            object.__setattr__(self, name, pair)
 
     def turns(self, count: int, rng: np.random.Generator) -> FloatArray:
         """(count, 4) random quaternions xyzw within the bounds."""
@@ -80,11 +76,7 @@ class SamplingRegion:
 
 
 class PoseSampler:
-    """Draws poses for one checker and region (GENERATECONFIGURATION).
-
-    Attributes:
-        corners: (n, 3, 3) triangles drawn from [m].
-    """
+    """Draws poses for one checker and region (GENERATECONFIGURATION) from ``corners`` (n, 3, 3) [m]."""
 
     def __init__(
         self, checker: ReachabilityChecker, region: SamplingRegion, uniform_share: float = UNIFORM_SHARE
@@ -168,8 +160,3 @@ def _cut_plane(item: Obstacle, region: SamplingRegion) -> tuple[FloatArray, Floa
     square = np.array([(left, low), (right, low), (right, high), (left, high)]) @ axes + offset * normal
     triangles = square[[[0, 1, 2], [0, 2, 3]]]
     return triangles, np.stack([normal, normal]), np.full(2, isinstance(item.shape, HalfSpace))
-
-
-def _angle_range(pair: Sequence[float], name: str) -> tuple[float, float]:
-    low = finite_number(pair[0], f"sampling region {name}[0] [rad]")
-    return low, finite_number(pair[1], f"sampling region {name}[1] [rad]", at_least=low)

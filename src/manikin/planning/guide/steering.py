@@ -38,12 +38,7 @@ class Way:
 
 
 class LocalPlanner:
-    """Straight and rotate-at-s ways between poses.
-
-    Attributes:
-        checker: Decides about poses, with the margins of planning.
-        ends: Poses near which the plain condition is enough.
-    """
+    """Straight and rotate-at-s ways between poses; near the ends of a task the plain condition is enough."""
 
     def __init__(self, checker: ReachabilityChecker, ends: Sequence[FloatArray] = ()) -> None:
         """Take a checker whose margins say how densely a way is checked.

@@ -9,7 +9,7 @@ is paid for by the toes. The pyramids never hold more than the circular cone: wi
 ``outer`` they are those of ``cone``.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -58,10 +58,8 @@ class Act:
         unit = unit_direction(direction, "act direction")
         if abs(unit[2]) > 1e-6:
             raise InputError(f"act direction is {np.round(unit, 4).tolist()}; valid: a level one, its z 0")
-        object.__setattr__(self, "kind", ActKind(kind))
-        object.__setattr__(self, "obstacle", obstacle)
-        object.__setattr__(self, "direction", unit)
-        object.__setattr__(self, "force", finite_number(force, "act force [N]", above=0.0))
+        size = finite_number(force, "act force [N]", above=0.0)
+        vars(self).update(kind=ActKind(kind), obstacle=obstacle, direction=unit, force=size)
 
     @property
     def facing(self) -> FloatArray:
@@ -92,9 +90,9 @@ class Act:
         """(3,) force of the object on both hands [N], for the act's force or another one [N]."""
         return -(self.force if force is None else force) * self.direction
 
-    def load(self, hands: tuple[Contact, ...], force: float | None = None) -> FloatArray:
+    def load(self, hands: Iterable[Contact]) -> FloatArray:
         """(6,) force and moment about the world origin of the object on the hands, shared evenly."""
-        pull, place = self.reaction(force), np.mean([hand.position for hand in hands], axis=0)
+        pull, place = self.reaction(), np.mean([hand.position for hand in hands], axis=0)
         return np.concatenate([pull, np.cross(place, pull)])
 
 

@@ -22,13 +22,7 @@ SETTLED = 0.3
 
 @dataclass(frozen=True)
 class Timing:
-    """Times at which the force of an act rises and is held.
-
-    Attributes:
-        start: When it begins to rise [s].
-        ramp: How long it rises [s].
-        hold: How long it is held then [s].
-    """
+    """When the force of an act begins to rise, how long it rises and how long it is held then [s]."""
 
     start: float
     ramp: float

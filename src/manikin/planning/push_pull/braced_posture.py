@@ -190,7 +190,7 @@ class _BraceSearch:
         posture, hands = self._hands(q, hands_by)
         if hands is None:
             return None
-        both = np.array([np.zeros(6), self._act.load(tuple(hands.values()))])
+        both = np.array([np.zeros(6), self._act.load(hands.values())])
         loads = Loads(self._body.mass, both, self._settings.friction_model)
         posture, feet = self._feet(posture, loads, feet_by)
         if feet is None:

@@ -20,13 +20,12 @@ from manikin.numerics.spline import BSpline
 from manikin.walking.path.path_program import (
     DEGREE,
     Guess,
-    PathStructure,
     bent,
     cheapest,
     lacking,
-    programme_of,
     sharpened,
     solve,
+    structure_of,
 )
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
 from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective
@@ -51,15 +50,13 @@ def kinds_of_guesses(start: FloatArray, goal: FloatArray) -> list[str]:
     return [*GUESSES[:2], *(kind for kind, turn in turns if abs(turn) >= _HALF_TURN)]
 
 
-def guess_path(
-    structure: PathStructure, kind: str, start: FloatArray, goal: FloatArray, via: Sequence[FloatArray] = ()
-) -> FloatArray:
+def guess_path(task: WalkingTask, kind: str, via: Sequence[FloatArray] = ()) -> FloatArray:
     """(n, 3) control points of a guess of one of :data:`GUESSES`, past places ``via`` (2,) in order [m].
 
     The last one's heading may differ from the goal's by whole turns.
     """
-    knots = structure.knots
-    shares = np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(structure.pieces + DEGREE)])
+    knots, start, goal = structure_of(task).knots, task.start, task.goal
+    shares = np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(len(knots) - DEGREE - 1)])
     corners = np.vstack([start[:2], *via, goal[:2]])
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     at = lengths[-1] * _smooth(shares)
@@ -206,16 +203,14 @@ def walking_path(
         InputError: If an argument is not usable, or start or goal are in an obstacle.
     """
     task = WalkingTask(
-        start=frozen_array(start, "walking start [m, m, rad]", (3,)),
-        goal=frozen_array(goal, "walking goal [m, m, rad]", (3,)),
-        objective=objective,
-        obstacles=tuple(obstacles),
-        walker=Walker() if walker is None else walker,
-        room=finite_number(room, "walking room [m]", at_least=0.0),
-        max_speed=None if max_speed is None else finite_number(max_speed, "max_speed [m/s]", at_least=0.1),
-        start_velocity=frozen_array(start_velocity, "walking start_velocity [m/s, m/s, rad/s]", (3,)),
-        goal_velocity=frozen_array(goal_velocity, "walking goal_velocity [m/s, m/s, rad/s]", (3,)),
-    )
+        frozen_array(start, "walking start [m, m, rad]", (3,)),
+        frozen_array(goal, "walking goal [m, m, rad]", (3,)),
+        objective, tuple(obstacles), walker or Walker(),
+        finite_number(room, "walking room [m]", at_least=0.0),
+        None if max_speed is None else finite_number(max_speed, "max_speed [m/s]", at_least=0.1),
+        frozen_array(start_velocity, "walking start_velocity [m/s, m/s, rad/s]", (3,)),
+        frozen_array(goal_velocity, "walking goal_velocity [m/s, m/s, rad/s]", (3,)),
+    )  # fmt: skip
     _check(task)
     guesses = _guesses(task) if like is None else [Guess("like another", *bent(like, task))]
     free = cheapest([solve(replace(task, obstacles=()), guess) for guess in guesses])
@@ -237,12 +232,11 @@ def _check(task: WalkingTask) -> None:
 
 
 def _guesses(task: WalkingTask) -> Iterator[Guess]:
-    structure = programme_of(replace(task, obstacles=())).structure
     # Somewhat above that of a straight walk.
     distance = float(np.hypot(*(task.goal[:2] - task.start[:2])))
     duration = 1.3 * task.objective.straight_duration(max(distance, 0.3))
     for kind in kinds_of_guesses(task.start, task.goal):
-        yield Guess(kind, guess_path(structure, kind, task.start, task.goal), duration)
+        yield Guess(kind, guess_path(task, kind), duration)
 
 
 def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
@@ -290,9 +284,8 @@ def _in_frame(
 
 def _way_guesses(task: WalkingTask, free: WalkingPath, ways: Mapping[str, FloatArray]) -> Iterator[Guess]:
     """Along ways over the grid; along the narrow one, where the shoulders may not fit, turned aside too."""
-    structure = programme_of(task).structure
     for name, way in ways.items():
-        points = guess_path(structure, "turning", task.start, task.goal, list(way))
+        points = guess_path(task, "turning", list(way))
         yield Guess(name, points, 1.2 * free.duration)
         if name == "narrow way":
             share = np.linspace(0.0, 1.0, len(points))
@@ -308,13 +301,11 @@ def _detour_guesses(
     """Past what is in the way on either side; straight on, sooner or later where something moves."""
     if not blocking:
         return
-    structure = programme_of(task).structure
     times = np.linspace(0.0, free.duration, 201)
     room = clearance(blocking, task.walker, free.place_at(times), times)
     nearest = [float(times[i]) for i in room.argmin(axis=0)]
     for number, via in enumerate(detours(blocking, nearest, task.walker, task.start, task.goal)):
-        points = guess_path(structure, "turning", task.start, task.goal, via)
-        yield Guess(f"detour {number}", points, 1.2 * free.duration)
+        yield Guess(f"detour {number}", guess_path(task, "turning", via), 1.2 * free.duration)
     if any(item.moves for item in blocking):
         for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
             yield Guess(name, free.spline.control_points, factor * free.duration)

@@ -16,7 +16,7 @@ import numpy as np
 
 from manikin.numerics.spatial import FloatArray
 from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
-from manikin.walking.path.walk_obstacles import WalkObstacle, clearance
+from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_model import to_world
 from manikin.walking.path.walking_path import TOLERANCE, WalkingPath, WalkingTask
 
@@ -28,11 +28,7 @@ DEGREE = 4
 class PathStructure:
     """What the programme's expressions depend on; numbers are its parameters.
 
-    Attributes:
-        pieces: Number of pieces of the spline.
-        obstacles: Numbers of corners and of instants of each obstacle.
-        discs: Number of discs of the walker.
-        limited_speed: Whether the speed is limited.
+    Of each obstacle these are the numbers of corners and of instants, of the walker that of discs.
     """
 
     pieces: int
@@ -97,17 +93,6 @@ class PathProgram:
         last_but_one = goal - step * np.asarray(values["goal_rate"])
         points = np.vstack([start, second, inner, last_but_one, goal])
         return BSpline(DEGREE, self.structure.knots, points), duration
-
-
-def obstacle_parameters(index: int, obstacle: WalkObstacle) -> dict[str, FloatArray]:
-    """Parameters of one obstacle: its track is a place, first a velocity of zero, and changes of velocity."""
-    velocity = np.diff(obstacle.displacements, axis=0) / np.diff(obstacle.times)[:, None]
-    return {
-        f"corners{index}": obstacle.corners + obstacle.displacements[0],
-        f"radius{index}": np.array([obstacle.radius]),
-        f"times{index}": obstacle.times,
-        f"changes{index}": np.diff(np.pad(velocity, ((1, 1), (0, 0))), axis=0),
-    }
 
 
 class _Parameters(dict[str, ca.SX]):
@@ -218,15 +203,17 @@ class Guess:
     duration: float
 
 
-def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
-    """The compiled programme of a task, shared by all tasks of the same structure.
-
-    It has 20 pieces up to 10 m and 40 beyond, times ``finer``.
-    """
+def structure_of(task: WalkingTask, finer: int = 1) -> PathStructure:
+    """The structure of a task's programme, with 20 pieces up to 10 m and 40 beyond, times ``finer``."""
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
     obstacles = tuple((len(item.corners), len(item.times)) for item in task.obstacles)
     discs, pieces = len(task.walker.offsets) if obstacles else 1, finer * (20 if distance <= 10.0 else 40)
-    return transcribe(PathStructure(pieces, obstacles, discs, task.max_speed is not None))
+    return PathStructure(pieces, obstacles, discs, task.max_speed is not None)
+
+
+def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
+    """The compiled programme of a task, shared by all tasks of the same structure."""
+    return transcribe(structure_of(task, finer))
 
 
 def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatArray) -> dict[str, Any]:
@@ -242,16 +229,22 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
         "room": task.walker.depth / 2 + task.room + tightening[:-1],
         "max_speed": (task.max_speed or 0.0) - tightening[-1],
     }  # fmt: skip
-    for index, obstacle in enumerate(task.obstacles):
-        values |= obstacle_parameters(index, obstacle)
+    for index, item in enumerate(task.obstacles):
+        # A track is a place, first a velocity of zero, and changes of velocity.
+        velocity = np.diff(item.displacements, axis=0) / np.diff(item.times)[:, None]
+        values |= {
+            f"corners{index}": item.corners + item.displacements[0], f"radius{index}": [item.radius],
+            f"times{index}": item.times,
+            f"changes{index}": np.diff(np.pad(velocity, ((1, 1), (0, 0))), axis=0),
+        }  # fmt: skip
     return values
 
 
 def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
     """Optimise from one guess, again with more room where the path between the samples had too little.
 
-    The result is the last iterate, whose ``failure`` says if it is no solution. The pieces, and the guess's
-    control points, are ``finer`` than usual.
+    The result is the last iterate, whose ``failure`` says if it is no solution. Its pieces, and the guess's,
+    are ``finer`` times as many as usual.
     """
     programme = programme_of(task, finer)
     tightening = np.zeros(len(task.obstacles) + 1)
@@ -294,8 +287,7 @@ def sharpened(path: WalkingPath) -> WalkingPath:
 
 def bent(path: WalkingPath, task: WalkingTask, finer: int = 1) -> tuple[FloatArray, float]:
     """Control points and duration of a path, its ends moved to those of another task."""
-    structure = programme_of(replace(task, obstacles=()), finer).structure
-    share = np.linspace(0.0, 1.0, structure.pieces + 4)[:, None]
+    share = np.linspace(0.0, 1.0, structure_of(task, finer).pieces + 4)[:, None]
     points = path.spline.control_points
     points = points if len(points) == len(share) else path.spline(share[:, 0])
     goal = task.goal.copy()

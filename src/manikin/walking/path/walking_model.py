@@ -125,9 +125,8 @@ def experiment_targets() -> FloatArray:
 def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
     """(..., 6) rate of a state under accelerations ([Truong2010]_ 5.5, with left positive).
 
-    Args:
-        state: (..., 6) x, y [m], heading [rad], forward and left velocity [m/s], angular velocity [rad/s].
-        control: (..., 3) rates of these velocities: forward, left [m/s^2], angular [rad/s^2].
+    States are (..., 6) x, y [m], heading [rad], forward and left [m/s], angular velocity [rad/s], controls
+    (..., 3) rates of the velocities.
     """
     z, u = _last(state, 6, "walking state"), _last(control, 3, "walking control")
     rate = np.empty((*np.broadcast_shapes(z.shape[:-1], u.shape[:-1]), 6))

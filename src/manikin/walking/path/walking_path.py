@@ -64,16 +64,11 @@ class WalkingResiduals:
 class WalkingTask:
     """Start, goal and constraints of a walk.
 
+    Places are (3,) x, y [m], heading [rad], velocities (3,) forward, left [m/s], angular [rad/s].
+
     Attributes:
-        start: (3,) x, y [m], heading [rad].
-        goal: (3,) x, y [m], heading [rad].
-        objective: Cost to be minimised.
-        obstacles: Obstacles to keep away from.
-        walker: Extent of the walker.
         room: Distance to keep from obstacles [m].
         max_speed: Limit of the speed over the floor [m/s], or None.
-        start_velocity: (3,) forward, left [m/s], angular [rad/s].
-        goal_velocity: (3,) forward, left [m/s], angular [rad/s].
     """
 
     start: FloatArray
