@@ -90,9 +90,7 @@ def admissible_com_polygon(
     """(k, 2) corners of the ground below admissible CoM positions, counter-clockwise ([Qiu2012]_ 4.41) [m].
 
     There are none when the stance cannot carry the body. At rest the height of the CoM does not matter.
-
-    Raises:
-        InputError: If the polygon is unbounded (free fall, ``acceleration = g``).
+    InputError if the polygon is unbounded (free fall, ``acceleration = g``).
     """
     given = frozen_array(acceleration, "acceleration", (3,))
     at_zero = pseudo_wrench(mass, (0.0, 0.0, height), given, None, W.reference)
@@ -111,12 +109,9 @@ def admissible_zmp_polygon(
 
     Args:
         mass: [kg].
-        com: (3,) [m], above or below the plane.
-        vertical_acceleration: Of the CoM [m/s^2], above ``-g``.
+        com: (3,) [m], above or below the plane; InputError in it, where the ZMP is fixed.
+        vertical_acceleration: Of the CoM [m/s^2], above ``-g``; InputError otherwise.
         plane_height: [m].
-
-    Raises:
-        InputError: If the CoM lies in the plane or falls freely: its ZMP is then fixed or undefined.
     """
     x = frozen_array(com, "com [m]", (3,))
     lift = finite_number(vertical_acceleration, "vertical_acceleration [m/s^2]", above=-GRAVITY) + GRAVITY
@@ -231,9 +226,8 @@ def torque_share_gradient(
 ) -> tuple[float, FloatArray | None]:
     """The share of :func:`static_torque_share`, and its gradient (nv,) along motions that keep the contacts.
 
-    The gradient is that of the optimal value of a linear program: its multipliers times the derivatives of
-    the torques under constant contact forces.  It leaves the acceleration out, and is None where the share is
-    infinite.
+    That is, of the optimal value of a linear program, its multipliers times the derivatives of the torques
+    under constant contact forces.  It leaves the acceleration out, and is None where the share is infinite.
     """
     if not len(stance):
         return np.inf, None

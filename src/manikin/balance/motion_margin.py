@@ -77,11 +77,7 @@ def motion_margin(
         wrench: (n, 6) force and moment about the world origin that the contacts have to give [N, N.m].
         com: (n, 3) [m].
         polytopes: W_p of each phase, about any point, where it is known already; else each stance's is
-            computed once, and only for phases with samples.
-
-    Raises:
-        InputError: If the shapes do not fit.
-        ContactError: If the normal force of a contact is bounded by no cap.
+            computed once, and only for phases with samples (ContactError without any cap on a contact).
     """
     w, x, row_phases = _series(wrench, com, phases, len(stances))
     margin, force, zmp = (np.full(len(w), np.nan) for _ in range(3))

@@ -118,7 +118,8 @@ def _merged(shares: list[LimitShare]) -> list[LimitShare]:
 
 
 def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap: float) -> list[LimitShare]:
-    limits = contact_limits(contact, W.friction_model)
+    model = W.stance.friction_model
+    limits = contact_limits(contact, model)
     if contact.kind is ContactKind.GRASP:
         weights = np.maximum(limits.A @ rows_about(normal[None], contact.position - W.reference)[0], 0.0)
         if contact.max_moment == 0:
@@ -133,7 +134,7 @@ def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap
         size = float(np.linalg.norm(twist[:components]))
         if size < NEGLIGIBLE:
             return []
-        edges = edge_wrenches(contact, W.friction_model)
+        edges = edge_wrenches(contact, model)
         if contact.torsion_limit is None and (edges @ twist).max() < -NEGLIGIBLE:
             return [LimitShare(contact.effector, LimitKind.LIFTING, "lifting off", size)]
         weights = _multipliers(limits, twist, components)
@@ -190,11 +191,6 @@ class WrenchPolytope(Displayed, Polytope):
         object.__setattr__(self, "reference", frozen_array(reference, "reference [m]", (3,), ContactError))
         multipliers = frozen_array(np.asarray(cap_multipliers) / length, "cap_multipliers", (len(self.h),))
         object.__setattr__(self, "stance_cap_multipliers", multipliers)
-
-    @property
-    def friction_model(self) -> FrictionModel:
-        """Friction model of the stance."""
-        return self.stance.friction_model
 
     def at_reference(self, reference: ArrayLike) -> WrenchPolytope:
         """The same set with moments about another point, with rows of unit length.
@@ -259,9 +255,7 @@ def wrench_polytope(stance: Stance, *, reference: ArrayLike = (0.0, 0.0, 0.0)) -
     """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
 
     Without any contact (flight) it is the single point 0; ``reference`` (3,) is the point of the moments [m].
-
-    Raises:
-        ContactError: If the normal force of a contact is bounded by no cap.
+    ContactError if the normal force of a contact is bounded by no cap.
     """
     origin = frozen_array(reference, "reference [m]", (3,), ContactError)
     local = _middle(stance) if len(stance) else origin
@@ -281,9 +275,7 @@ def wrench_polytopes(
     """W_p of several stances; a stance that is an earlier one moved elsewhere is not computed again.
 
     ``reference`` (3,) is the point of all moments [m]; when omitted, the middle of each stance's contacts.
-
-    Raises:
-        ContactError: If the normal force of a contact is bounded by no cap.
+    ContactError if the normal force of a contact is bounded by no cap.
     """
     known: dict[tuple[Any, ...], WrenchPolytope] = {}
     polytopes = []
@@ -367,8 +359,7 @@ def _extreme_wrenches(
 ) -> tuple[FloatArray, FloatArray]:
     """Wrenches (n, 6) in the contact frame that generate the contact's set, and their weights.
 
-    With combinations of non-negative multipliers, weighted sum at most 1, they make the
-    contact's set up to its own cap; weights of 0 mark rays, left to the stance's cap.
+    Combinations of weighted sum at most 1 make the set up to its own cap; weights of 0 mark rays.
     """
     cap = own if own is not None else total
     if contact.torsion_limit is None:

@@ -118,15 +118,12 @@ def generate_posture(
     """Find a posture.
 
     Args:
-        start: (nq,) where to begin, such as a neighbouring posture; the reference placed over
-            the contacts when omitted.
+        start: (nq,) where to begin, such as a neighbouring posture (BodyError if it is not usable); the
+            reference placed over the contacts when omitted.
 
     Returns:
         A posture that meets all requirements (without ``start`` the better of the first two
         found, by its preferences), otherwise the best attempt with an explanation.
-
-    Raises:
-        BodyError: If ``start`` has another length or is not finite.
     """
     settings = settings or SolverSettings()
     solver = PostureSolver(problem, settings)
@@ -286,14 +283,14 @@ class PostureSolver:
         """Pack the best iterate, with an explanation when it does not meet the requirements."""
         succeeded = self.meets(iterate)
         residual = iterate.clearance.residual
-        worst = int(np.argmin(residual)) if len(residual) else -1
+        pair = iterate.pairs[int(np.argmin(residual))] if len(residual) else None
+        clearance = float(residual.min(initial=np.inf))
         misses = () if succeeded else self._misses(iterate)
         limits = self._limits.at_limit(self._configuration.update(iterate.q))
-        clearance, pair = (residual[worst], iterate.pairs[worst]) if worst >= 0 else (np.inf, None)
         failure = None if succeeded else self._explanation(misses, limits)
         q = frozen_array(iterate.q, "posture q")
         return PostureResult(
-            succeeded, q, iterate.error, float(clearance), pair, limits, iterations, misses, failure
+            succeeded, q, iterate.error, clearance, pair, limits, iterations, misses, failure
         )
 
     def _merit(self, iterate: _Iterate) -> float:
@@ -344,11 +341,10 @@ class PostureSolver:
         text = "; ".join(misses[:2])
         if limits:
             text += f"; at the end of their range: {', '.join(limits[:6])}"
-        if self.settings.explain:
-            quick = replace(self.settings, explain=False)
-            for name, lighter in without_one(self.problem):
-                if generate_posture(lighter, settings=quick).succeeded:
-                    return f"{text}; a posture exists without {name}"
+        quick = replace(self.settings, explain=False)
+        for name, lighter in without_one(self.problem) if self.settings.explain else ():
+            if generate_posture(lighter, settings=quick).succeeded:
+                return f"{text}; a posture exists without {name}"
         return text
 
 
