@@ -92,12 +92,9 @@ class PostureResult:
         succeeded: Whether every requirement is met.
         q: (nq,) configuration found.
         error: Largest residual of the requirements [m, rad].
-        clearance: Smallest distance beyond the safety distances [m] among the close pairs;
-            infinite when none is close.
-        closest: The pair of shapes there, or None.
+        clearance: Smallest distance beyond the safety distances [m] among the close pairs, or infinite.
         at_limit: Hinges at an end of their range.
         iterations: Iterations over all starts.
-        misses: What each requirement that is not met misses, worst first.
         failure: None, or the explanation in one line.
     """
 
@@ -105,10 +102,8 @@ class PostureResult:
     q: FloatArray
     error: float
     clearance: float
-    closest: Pair | None
     at_limit: tuple[str, ...]
     iterations: int
-    misses: tuple[str, ...] = ()
     failure: str | None = None
 
 
@@ -281,17 +276,11 @@ class PostureSolver:
 
     def result(self, iterate: _Iterate, iterations: int) -> PostureResult:
         """Pack the best iterate, with an explanation when it does not meet the requirements."""
-        succeeded = self.meets(iterate)
-        residual = iterate.clearance.residual
-        pair = iterate.pairs[int(np.argmin(residual))] if len(residual) else None
-        clearance = float(residual.min(initial=np.inf))
-        misses = () if succeeded else self._misses(iterate)
-        limits = self._limits.at_limit(self._configuration.update(iterate.q))
-        failure = None if succeeded else self._explanation(misses, limits)
-        q = frozen_array(iterate.q, "posture q")
-        return PostureResult(
-            succeeded, q, iterate.error, clearance, pair, limits, iterations, misses, failure
-        )
+        succeeded, q = self.meets(iterate), frozen_array(iterate.q, "posture q")
+        limits = self._limits.at_limit(self._configuration.update(q))
+        failure = None if succeeded else self._explanation(self._misses(iterate), limits)
+        clearance = float(iterate.clearance.residual.min(initial=np.inf))
+        return PostureResult(succeeded, q, iterate.error, clearance, limits, iterations, failure)
 
     def _merit(self, iterate: _Iterate) -> float:
         intrusion = np.minimum(iterate.clearance.residual - self.settings.buffer, 0.0)
