@@ -57,9 +57,7 @@ def contact_limits(contact: Contact, friction_model: FrictionModel = "outer") ->
     corrected), beside friction on the whole force (4.20) and CoP (4.14).
 
     A part of a sole is taken about the middle of its points; an edge resists no moment about itself.
-
-    Raises:
-        ContactError: If the friction model is unknown.
+    ContactError if the friction model is unknown.
     """
     if contact.kind is ContactKind.GRASP:
         rows = _grasp_rows(contact)

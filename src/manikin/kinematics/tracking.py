@@ -25,7 +25,7 @@ def search(
     cost: PostureCost, starts: FloatArray, wanted: FloatArray, before: FloatArray,
     least_gain: float = LEAST_GAIN,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """The closest postures by Levenberg-Marquardt, projected onto the joints' ranges.
+    """The closest postures (n, nq) by Levenberg-Marquardt in the joints' ranges, and their costs (n,) [m^2].
 
     The n searches do not depend on each other; together they take less time.
 
@@ -34,9 +34,6 @@ def search(
         wanted: (n, k, 3) positions of the targets [m]; NaN where one is not seen.
         before: (n, nq) postures to stay near.
         least_gain: A step that lowers the cost by a smaller share is the last one.
-
-    Returns:
-        (n, nq) postures and their costs (n,) [m^2].
     """
     held = cost.drawn_to(before)
     now = cost.at(cost.settled(starts, held), held, wanted)
