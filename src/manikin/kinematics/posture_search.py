@@ -278,7 +278,7 @@ class PostureSolver:
         """Pack the best iterate, with an explanation when it does not meet the requirements."""
         succeeded, q = self.meets(iterate), frozen_array(iterate.q, "posture q")
         limits = self._limits.at_limit(self._configuration.update(q))
-        failure = None if succeeded else self._explanation(self._misses(iterate), limits)
+        failure = None if succeeded else self._explanation(iterate, limits)
         clearance = float(iterate.clearance.residual.min(initial=np.inf))
         return PostureResult(succeeded, q, iterate.error, clearance, limits, iterations, failure)
 
@@ -297,7 +297,11 @@ class PostureSolver:
         hessian = wish_jacobian.T @ weighted + rho * (jacobian.T @ jacobian) + damping
         gradient = (weighted.T @ wish if wishes else 0.0) + rho * (jacobian.T @ residual)
         distance, slope = iterate.clearance
-        bounds = self._bounds(iterate.q, trust)
+        angles, limits = iterate.q[7:], self._limits
+        lower, upper = np.full(nv, -trust), np.full(nv, trust)  # the trust region, cut by the hinge ranges
+        lower[6:] = np.maximum(lower[6:], np.minimum(limits.lower - angles, 0.0))
+        upper[6:] = np.minimum(upper[6:], np.maximum(limits.upper - angles, 0.0))
+        bounds = lower, upper
         program = solve_qp(hessian, gradient, slope, buffer - distance, None, bounds, softness=1.0 / rho)
         step = program.x if program.solved else np.zeros(nv)
         hard = np.sum((residual + jacobian @ step) ** 2)
@@ -305,16 +309,8 @@ class PostureSolver:
         soft = np.sum(self._wish_weights * (wish + wish_jacobian @ step) ** 2)
         return step, float(0.5 * soft + 0.5 * rho * hard)
 
-    def _bounds(self, q: FloatArray, trust: float) -> tuple[FloatArray, FloatArray]:
-        """Trust region cut by the hinge ranges."""
-        angles, limits, nv = q[7:], self._limits, self.problem.body.nv
-        lower, upper = np.full(nv, -trust), np.full(nv, trust)
-        lower[6:] = np.maximum(lower[6:], np.minimum(limits.lower - angles, 0.0))
-        upper[6:] = np.minimum(upper[6:], np.maximum(limits.upper - angles, 0.0))
-        return lower, upper
-
-    def _misses(self, iterate: _Iterate) -> tuple[str, ...]:
-        """Descriptions of the requirements that are not met, worst first."""
+    def _explanation(self, iterate: _Iterate, limits: tuple[str, ...]) -> str:
+        """The worst requirements that are not met, the ends of ranges, and what stands in the way."""
         misses: list[tuple[float, str]] = []
         for term, part in zip(self.requirements, iterate.parts, strict=True):
             residual = iterate.requirement.residual[part]
@@ -324,10 +320,7 @@ class PostureSolver:
         if self._clearances is not None and iterate.intrusion > self.settings.clearance_tolerance:
             text = self._clearances.describe(iterate.clearance.residual, iterate.pairs)
             misses.append((iterate.intrusion, text))
-        return tuple(text for _, text in sorted(misses, key=lambda item: -item[0]))
-
-    def _explanation(self, misses: tuple[str, ...], limits: tuple[str, ...]) -> str:
-        text = "; ".join(misses[:2])
+        text = "; ".join(miss for _, miss in sorted(misses, key=lambda item: -item[0])[:2])
         if limits:
             text += f"; at the end of their range: {', '.join(limits[:6])}"
         quick = replace(self.settings, explain=False)

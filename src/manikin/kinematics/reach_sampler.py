@@ -110,7 +110,6 @@ class ReachBody:
         self.scale = far if body.stature is None else body.stature / 1.75
         frames = _SPINE if self.spine else (body.segments[0].name,)
         self.masses, self.coms, self.origins = _trunk_masses(body, state, frames, self.legs is not None)
-        self.leg_masses, self.leg_coms = np.zeros(2), np.zeros((2, 3))
         if self.legs is not None:
             self.leg_masses, self.leg_coms = _leg_masses(body)
         self._volumes: dict[str, tuple[ReachVolume, float]] = {}
