@@ -24,10 +24,8 @@ from manikin.numerics.spatial import FloatArray, cross
 
 STEPS, HALVINGS = 40, 8
 """Newton steps after which a sample is left to a general solver, and times that one is halved."""
-
 LEAST_NORMAL = 1.0
 """Smallest normal force that friction is a share of [N]."""
-
 SOLVED = 1e-12
 """Error of the equations that is rounding, relative to the wrench."""
 

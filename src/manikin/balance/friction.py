@@ -126,6 +126,7 @@ def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
     mu, limit = pyramid_friction(contact, friction_model), contact.torsion_limit or 0.0
     x, y = contact.length / 2, contact.width / 2
     signs = [(a, b, c) for c in (1.0, -1.0) for a in (1.0, -1.0) for b in (1.0, -1.0)]
+    rows: list[list[float]]
     if contact.torsion_limit is not None:
         rows = [[0, 0, 0, a * mu, b * mu, c] for a, b, c in signs]
     elif friction_model == "cone" or _is_polygon(contact):

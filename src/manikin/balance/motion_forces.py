@@ -85,10 +85,8 @@ def carried_motion(
 
 _RAMP, _SUDDEN_RAMP = 0.08, 0.02
 """Time over which a contact takes or loses its share of the load, and the same for one made at speed [s]."""
-
 TORQUE_SHARE = 0.98
 """Share of the joints' strength that the forces are shared for where it does not suffice at once."""
-
 _MISSING_COST = 1.0e-6
 """Square of the cost of force relative to that of missing the wrench."""
 

@@ -42,7 +42,6 @@ STATURE_RANGE, SOLE_LENGTH_RANGE, SOLE_WIDTH_RANGE = (1.40, 2.10), (0.15, 0.40),
 """Accepted stature and size of the soles [m]."""
 MASS_RANGE, BODY_MASS_INDEX_RANGE = (35.0, 160.0), (10.0, 60.0)
 """Accepted body mass [kg] and mass / stature^2 [kg/m^2]."""
-
 ANKLE_HEIGHT, NECK_RADIUS = 0.043, 0.034
 """Ankle joint above the sole and radius of the neck, per stature."""
 ANKLE_FROM_HEEL, TOE_HINGE_FROM_HEEL = 0.26, 0.73

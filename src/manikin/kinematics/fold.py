@@ -23,10 +23,8 @@ from manikin.scene import Box, Obstacle, Proximity, Scene
 
 HEAD_CLEARANCE = 0.03
 """Distance kept from the ceiling [m]."""
-
 HABIT = 0.5
 """Posture of recorded people between the squat (0) and the stoop on straight legs (1)."""
-
 FEET_APART = 0.115
 """Distance of the soles' centres over stature."""
 

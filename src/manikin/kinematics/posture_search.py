@@ -40,13 +40,10 @@ a squat, a crouch and a stoop."""
 
 NEAR = 2e-3
 """Violation [m, rad] below which the rest is done by projection onto the requirements."""
-
 MAX_TRUST = 0.8
 """Largest trust region [m, rad]."""
-
 COMPARED = 2
 """Cold starts that must succeed; the better posture is taken, as there are poor local minima."""
-
 PATIENCE = 6
 """Iterations in a row that gain less than half a percent after which a start is given up."""
 

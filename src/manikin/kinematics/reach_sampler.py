@@ -25,28 +25,16 @@ from manikin.numerics.spatial import FloatArray, dot, rotations
 
 SAMPLES, ROUNDS, OUTWARD = 600, 10, 12
 """Postures of one round of sampling, rounds towards the contacts at most, and rounds outwards."""
-
-ENOUGH = 150
-"""Postures that are enough to begin the search outwards."""
-
-ELITE = 60
-"""Postures that violate least, from whose neighbourhood the next round is sampled."""
-
+ENOUGH, ELITE = 150, 60
+"""Postures that are enough to begin the search outwards, and the best, near which the next are sampled."""
 OUTERMOST = 10
 """Outermost postures along each direction, whose differences are the steps of the next round."""
-
 RANGE_MARGIN = 0.05
 """Angle that joints keep from the ends of their ranges [rad], as the postures of contact plans do."""
-
-VOLUME_MARGIN = 0.02
-"""Distance that effectors keep inside their limbs' volumes [m], of a body of 1.75 m."""
-
-LEGS_APART = 0.10
-"""Least distance of the shanks' middle lines [m], of a body of 1.75 m; our choice, a slim shank's breadth."""
-
+VOLUME_MARGIN, LEGS_APART = 0.02, 0.10
+"""Distance of effectors inside their limbs' volumes, and of the shanks' middle lines, at 1.75 m [m]; ours."""
 HEEL_UP, TOES_UP = 0.9, 0.45
 """Largest pitches of a foot that stands on its toes and of one that stands on its heel [rad]."""
-
 BEYOND = 3.0
 """Violation of a contact that is missed by a metre [rad]."""
 

@@ -45,10 +45,8 @@ FILE = Path(__file__).with_name("step_reach.npz")
 
 STATURE = 1.75
 """Stature of the bodies whose sets are shipped [m]."""
-
 TURN_LENGTH = 0.4
 """Length that counts as much as a turn by one radian among places of a foot [m/rad]."""
-
 FACES = 100
 """Directions in which a set of places is sampled to its end."""
 

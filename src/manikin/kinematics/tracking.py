@@ -13,10 +13,8 @@ from manikin.numerics.spatial import FloatArray
 MOST_STEPS, MOST_ROUNDS = 60, 5
 LEAST_GAIN, ROUGH = 1e-4, 1e-2
 """A step that lowers the cost by a smaller share is the last one, and the last one of a guess."""
-
 LEAST_COST = 1e-10
 """Cost [m^2] below which nothing is left to gain."""
-
 LEAST_DAMPING, FIRST_DAMPING, FAILED_DAMPING, MOST_DAMPING = 1e-8, 1e-6, 1e-3, 1e3
 """Least, at first, least after a step that failed, and beyond which the search gives up [m^2]."""
 
@@ -114,10 +112,8 @@ def _solved(
 
 POOR = 0.05
 """A frame with a point farther away than this [m] is searched from its own start, too."""
-
 APART = 1.0 / 15.0
 """Time between the frames that are searched one by one [s]; those between begin on a curve through them."""
-
 TOGETHER = 128
 """Most frames that are found at once."""
 
