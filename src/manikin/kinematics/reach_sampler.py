@@ -90,7 +90,7 @@ class ReachBody:
         except BodyError:
             self.legs = None
         self.spine = set(_SPINE) <= {segment.name for segment in body.segments}
-        state = Configuration(body, body.standing_posture())
+        state = Configuration(body)
         far = max(
             (float(np.linalg.norm(state.effector_placement(e)[1] - state.q[:3])) for e in body.effectors),
             default=1.0,
