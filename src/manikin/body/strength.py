@@ -127,11 +127,13 @@ def _harbo(per_kg: float, women: Women = Women.GENERAL) -> MassStrength:
     return MassStrength(per_kg, HARBO, Grade.QUOTED, women)
 
 
-_HIGHER = 0.75
-_THORAX = "0.75 of the lumbar's: the same muscles, fewer of them"
 _TRUNK_TURN = _estimate(1.25, "young men, quoted without a source")
 _TRUNK_SIDE = _printed(159.0, STOBBE, Grade.QUOTED)
 _TRUNK_BEND, _TRUNK_EXTEND = (_printed(value, STOBBE, Grade.QUOTED) for value in (143.0, 234.0))
+_THORAX_EXTEND, _THORAX_BEND, _THORAX_SIDE, _THORAX_TURN = (
+    _estimate(0.75 * lumbar.per_kg, "0.75 of the lumbar's: the same muscles, fewer of them")
+    for lumbar in (_TRUNK_EXTEND, _TRUNK_BEND, _TRUNK_SIDE, _TRUNK_TURN)
+)
 _KNEE_TURN = _estimate(0.70, "muscles 0.35 (Armour et al. 2004, quoted), as much by the ligaments under load")
 _FOOT_SIDE = "quoted without a source"
 
@@ -139,14 +141,12 @@ HUMAN_STRENGTH: Mapping[str, tuple[DirectionStrength, DirectionStrength]] = Mapp
     "lumbar_flexion": (_TRUNK_EXTEND, _TRUNK_BEND),
     "lumbar_side_bend": (_TRUNK_SIDE, _TRUNK_SIDE),
     "lumbar_rotation": (_TRUNK_TURN, _TRUNK_TURN),
-    "thorax_flexion": (
-        _estimate(_HIGHER * _TRUNK_EXTEND.per_kg, _THORAX), _estimate(_HIGHER * _TRUNK_BEND.per_kg, _THORAX),
-    ),
-    "thorax_side_bend": (_estimate(_HIGHER * _TRUNK_SIDE.per_kg, _THORAX),) * 2,
-    "thorax_rotation": (_estimate(_HIGHER * _TRUNK_TURN.per_kg, _THORAX),) * 2,
+    "thorax_flexion": (_THORAX_EXTEND, _THORAX_BEND),
+    "thorax_side_bend": (_THORAX_SIDE, _THORAX_SIDE),
+    "thorax_rotation": (_THORAX_TURN, _THORAX_TURN),
     "neck_flexion": (_printed(51.0, FICE, Grade.PAPER), _printed(30.0, FICE, Grade.PAPER)),
-    "neck_side_bend": (_printed(32.0, FICE, Grade.PAPER),) * 2,
-    "neck_rotation": (_printed(13.0, FICE, Grade.PAPER),) * 2,
+    "neck_side_bend": (_printed(32.0, FICE, Grade.PAPER), _printed(32.0, FICE, Grade.PAPER)),
+    "neck_rotation": (_printed(13.0, FICE, Grade.PAPER), _printed(13.0, FICE, Grade.PAPER)),
     "shoulder_flexion": (
         _harbo(1.25, Women.SHOULDER), _printed(89.9, SHOULDER_STUDY, Grade.PAPER, Women.SHOULDER),
     ),
