@@ -2,8 +2,7 @@
 
 Every contact force is a sum of generators with magnitudes from 0 to a bound: the edges of the friction
 pyramid at each point of a sole or point, in the friction model of the stance, and the axes of a grasp
-both ways. Planned, refined and recorded motions share the wrench they need among these generators by
-one quadratic program,
+both ways. The wrench that is needed is shared among these generators by one quadratic program,
 
     min_x |b - A x|^2 / (2 e) + sum_j (x_j - l_j)^2 / (2 g_j),   0 <= x_j <= u_j,
 
@@ -23,15 +22,10 @@ from manikin.balance.friction import edges_in_world, pyramid_sides
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
 from manikin.numerics.spatial import FloatArray, cross
 
-STEPS = 40
-"""Newton steps after which a sample is left to a general solver."""
-
-HALVINGS = 8
-"""Times that a Newton step is halved which does not bring the equations nearer to zero."""
-
+STEPS, HALVINGS = 40, 8
+"""Newton steps after which a sample is left to a general solver, and times that one is halved."""
 LEAST_NORMAL = 1.0
 """Smallest normal force that friction is a share of [N]."""
-
 SOLVED = 1e-12
 """Error of the equations that is rounding, relative to the wrench."""
 
@@ -67,8 +61,7 @@ class ContactGenerators:
                 contact when omitted.
             grasp_moments: Whether grasps may use their moments.
         """
-        none = np.zeros(0)
-        empty = np.zeros((0, 3))
+        none, empty = np.zeros(0), np.zeros((0, 3))
         parts: list[tuple[np.ndarray, ...]] = [(empty, empty, empty, none.astype(np.int64), none, none)]
         for number, contact in enumerate(stance):
             local = contact.points if points is None else points[number]
@@ -109,14 +102,9 @@ class SharedForces:
 
 
 def share(
-    generators: FloatArray,
-    wrench: FloatArray,
-    gain: FloatArray,
-    softness: float,
-    *,
-    prior: FloatArray | float = 0.0,
-    upper: FloatArray | float = np.inf,
-) -> SharedForces:
+    generators: FloatArray, wrench: FloatArray, gain: FloatArray, softness: float, *,
+    prior: FloatArray | float = 0.0, upper: FloatArray | float = np.inf,
+) -> SharedForces:  # fmt: skip
     """Share wrenches among generators, for many samples at once.
 
     Newton's method on the six equations of each sample, from all generators free. It ends where the free
@@ -214,12 +202,9 @@ class _Program:
 
 @dataclass(frozen=True)
 class FrictionUse:
-    """Largest use of friction along a motion, by whom and when.
+    """Largest share of a friction model's pyramid that a motion uses, by whom and when [s].
 
-    Attributes:
-        model: Friction model that the use is measured in.
-        share: Of the pyramid; 1 is on one of its sides, 0 without soles and points.
-        time: [s].
+    1 is on one of the sides, 0 without soles and points.
     """
 
     model: FrictionModel
@@ -259,14 +244,14 @@ def friction_use(
     phases = schedule.phase_at(time)
     most = FrictionUse(schedule.sequence[0].stance.friction_model, 0.0, 0.0, "")
     for number, phase in enumerate(schedule.sequence):
-        rows = np.flatnonzero(phases == number)
+        rows, model = np.flatnonzero(phases == number), phase.stance.friction_model
         for contact in phase.stance:
             if contact.kind is ContactKind.GRASP or not len(rows):
                 continue
             force = contact_force[rows, list(names).index(contact.effector), :3]
-            shares = friction_share(contact, force, phase.stance.friction_model)
+            shares = friction_share(contact, force, model)
             worst = int(np.argmax(shares))
             if shares[worst] > most.share:
-                at, model = float(time[rows[worst]]), phase.stance.friction_model
+                at = float(time[rows[worst]])
                 most = FrictionUse(model, float(shares[worst]), at, contact.effector)
     return most

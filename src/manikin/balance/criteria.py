@@ -3,7 +3,7 @@
 The former are points of a horizontal plane, to be held inside the support polygon; W_p is more general, as
 these know neither friction nor walls nor grasps ([Qiu2012]_ 4.1.2, 4.2.8). Contact forces that hold a posture
 at rest come from one linear program ([Bretl2008]_'s test, with grasps): unlike W_p it knows the posture, and
-with it the torques of the joints; it costs a few milliseconds and shares no code with the polytope.
+with it the torques of the joints.
 """
 
 from dataclasses import dataclass
@@ -58,11 +58,9 @@ def zero_moment_point(
 
 
 def foot_rotation_indicator(
-    wrench: ArrayLike,
-    plane_height: float = 0.0,
-    foot_wrench: ArrayLike | None = None,
+    wrench: ArrayLike, plane_height: float = 0.0, foot_wrench: ArrayLike | None = None,
     reference: ArrayLike | None = None,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(..., 2) point at which the ground would have to push to keep the foot still (Goswami 1999) [m].
 
     It is the ZMP of the body with its supporting foot held at rest, and may leave the sole: by how much and
@@ -92,24 +90,18 @@ def admissible_com_polygon(
     """(k, 2) corners of the ground below admissible CoM positions, counter-clockwise ([Qiu2012]_ 4.41) [m].
 
     There are none when the stance cannot carry the body. At rest the height of the CoM does not matter.
-
-    Raises:
-        InputError: If the polygon is unbounded (free fall, ``acceleration = g``).
+    InputError if the polygon is unbounded (free fall, ``acceleration = g``).
     """
-    at_zero = pseudo_wrench(
-        mass, (0.0, 0.0, height), frozen_array(acceleration, "acceleration", (3,)), None, W.reference
-    )
+    given = frozen_array(acceleration, "acceleration", (3,))
+    at_zero = pseudo_wrench(mass, (0.0, 0.0, height), given, None, W.reference)
     matrix = np.vstack([np.zeros((3, 2)), -skew(at_zero[:3])[:, :2]])
     return polygon_of_halfplanes(W.H @ matrix, W.h - W.H @ at_zero)
 
 
 def admissible_zmp_polygon(
-    W: WrenchPolytope,
-    mass: float,
-    com: ArrayLike,
-    vertical_acceleration: float = 0.0,
+    W: WrenchPolytope, mass: float, com: ArrayLike, vertical_acceleration: float = 0.0,
     plane_height: float = 0.0,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(k, 2) corners of the admissible ZMP positions, counter-clockwise ([Qiu2012]_ 4.43-4.45) [m].
 
     The horizontal accelerations that W_p admits, carried to the ZMP by the (linear) ZMP formula; no angular
@@ -117,12 +109,9 @@ def admissible_zmp_polygon(
 
     Args:
         mass: [kg].
-        com: (3,) [m], above or below the plane.
-        vertical_acceleration: Of the CoM [m/s^2], above ``-g``.
+        com: (3,) [m], above or below the plane; InputError in it, where the ZMP is fixed.
+        vertical_acceleration: Of the CoM [m/s^2], above ``-g``; InputError otherwise.
         plane_height: [m].
-
-    Raises:
-        InputError: If the CoM lies in the plane or falls freely: its ZMP is then fixed or undefined.
     """
     x = frozen_array(com, "com [m]", (3,))
     lift = finite_number(vertical_acceleration, "vertical_acceleration [m/s^2]", above=-GRAVITY) + GRAVITY
@@ -142,8 +131,7 @@ def admissible_zmp_polygon(
 class StaticRegion:
     """Ground below the places of the centre of mass at which a stance carries the body at rest.
 
-    Attributes:
-        polygon: (k, 2) vertices counter-clockwise [m]; none when the stance cannot carry the body.
+    Its polygon has vertices (k, 2) counter-clockwise [m]; none when the stance cannot carry the body.
     """
 
     polygon: FloatArray
@@ -175,9 +163,8 @@ def _onto(polygon: FloatArray, point: FloatArray) -> FloatArray:
     if signed_distance(point, polygon) >= 0.0:
         return np.array(point, dtype=np.float64)
     edges = np.roll(polygon, -1, axis=0) - polygon
-    shares = np.einsum("ni,ni->n", point - polygon, edges) / np.maximum(
-        np.einsum("ni,ni->n", edges, edges), 1e-18
-    )
+    squares = np.maximum(np.einsum("ni,ni->n", edges, edges), 1e-18)
+    shares = np.einsum("ni,ni->n", point - polygon, edges) / squares
     points = polygon + np.clip(shares, 0.0, 1.0)[:, None] * edges
     return points[int(np.argmin(np.linalg.norm(points - point, axis=1)))]
 
@@ -187,16 +174,14 @@ def static_room(
 ) -> float:
     """Distance that the centre of mass may move in any horizontal direction while held at rest [m].
 
-    One linear program for each direction; the room is exact in these directions.
+    One linear program for each direction; the room is exact in these directions, and minus infinity where the
+    contacts cannot hold the body as it is.
 
     Args:
         stance: The contacts that carry the body; a sum of normal forces without a cap has the default one.
         mass: Of the body [kg].
         com: (3,) centre of mass [m].
         acceleration: (3,) of the centre of mass, held in that motion then [m/s^2]; none when omitted.
-
-    Returns:
-        Distance [m]; minus infinity where the contacts cannot hold the body as it is.
     """
     if not len(stance):
         return -np.inf
@@ -204,11 +189,10 @@ def static_room(
     bounds = [(0.0, limit) for limit in generators.upper]
     about_origin = generators.about(np.zeros(3))
     force = mass * (np.array([0.0, 0.0, GRAVITY]) + (0.0 if acceleration is None else acceleration))
-    room = np.inf
+    wanted, room = np.concatenate([force, np.cross(com, force)]), np.inf
     for angle in 2.0 * np.pi * np.arange(directions) / directions:
         step = np.array([np.cos(angle), np.sin(angle), 0.0])
         column = np.concatenate([np.zeros(3), -np.cross(step, force)])
-        wanted = np.concatenate([force, np.cross(com, force)])
         solution = linprog(
             np.append(np.zeros(len(bounds)), -1.0),
             A_ub=np.append(generators.normal, 0.0)[None], b_ub=[cap],
@@ -224,7 +208,7 @@ def static_room(
 def static_torque_share(
     body: BodyModel, q: FloatArray, stance: Stance, acceleration: FloatArray | None = None
 ) -> float:
-    """Smallest share of the joints' torque limits with which a posture is held at rest.
+    """Smallest share of the joints' torque limits with which a posture is held at rest; infinite if none is.
 
     Minimises the largest share of a torque limit over the contact forces, with
     ``tau = g(q) - sum J^T w`` and the six rows of the root in equilibrium.
@@ -233,9 +217,6 @@ def static_torque_share(
         q: (nq,) posture that holds the contacts.
         stance: The contacts that carry it, with a cap as in :func:`static_room`.
         acceleration: (3,) of the whole body, which moves as one [m/s^2]; none when omitted.
-
-    Returns:
-        The share; infinite where the contacts cannot hold the posture.
     """
     return torque_share_gradient(body, q, stance, acceleration)[0]
 
@@ -245,9 +226,8 @@ def torque_share_gradient(
 ) -> tuple[float, FloatArray | None]:
     """The share of :func:`static_torque_share`, and its gradient (nv,) along motions that keep the contacts.
 
-    The gradient is that of the optimal value of a linear program: its multipliers times the derivatives of
-    the torques under constant contact forces.  It leaves the acceleration out, and is None where the share is
-    infinite.
+    That is, of the optimal value of a linear program, its multipliers times the derivatives of the torques
+    under constant contact forces.  It leaves the acceleration out, and is None where the share is infinite.
     """
     if not len(stance):
         return np.inf, None
@@ -260,9 +240,8 @@ def torque_share_gradient(
         moving[:3] = pin.XYZQUATToSE3(q[:7]).rotation.T @ acceleration
     gravity = pin.rnea(model, data, q, np.zeros(model.nv), moving)
     jacobians = [state.effector_jacobian(contact.effector) for contact in stance]
-    columns = np.column_stack(
-        [jacobians[number].T @ wrench for number, wrench in zip(generators.contact, wrenches, strict=True)]
-    )
+    pairs = zip(generators.contact, wrenches, strict=True)
+    columns = np.column_stack([jacobians[number].T @ wrench for number, wrench in pairs])
     count = len(wrenches)
     above = np.column_stack([columns[6:], body.torque_lower])
     below = np.column_stack([-columns[6:], -body.torque_upper])

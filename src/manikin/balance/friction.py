@@ -32,13 +32,9 @@ class LimitKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class ContactLimits:
-    """Rows ``A w <= b`` of one contact, each with its kind and a phrase.
+    """Unit rows ``A w <= b``, (k, 6) and (k,) [N, N.m], of one contact.
 
-    Attributes:
-        A: (k, 6) unit rows.
-        b: (k,) [N, N.m].
-        kinds: What each row limits.
-        phrases: Words for each row: how the contact moves when it gives way.
+    Each has its kind and a phrase: how the contact moves when it gives way.
     """
 
     A: FloatArray
@@ -61,9 +57,7 @@ def contact_limits(contact: Contact, friction_model: FrictionModel = "outer") ->
     corrected), beside friction on the whole force (4.20) and CoP (4.14).
 
     A part of a sole is taken about the middle of its points; an edge resists no moment about itself.
-
-    Raises:
-        ContactError: If the friction model is unknown.
+    ContactError if the friction model is unknown.
     """
     if contact.kind is ContactKind.GRASP:
         rows = _grasp_rows(contact)
@@ -73,9 +67,8 @@ def contact_limits(contact: Contact, friction_model: FrictionModel = "outer") ->
             rows += _pressure_rows(contact) + _turning_rows(contact, friction_model)
         if contact.normal_force_cap is not None:
             cap = contact.normal_force_cap
-            rows.append(
-                ([0, 0, 1, 0, 0, 0], cap, LimitKind.NORMAL_FORCE_CAP, f"normal force cap of {cap:g} N")
-            )
+            phrase = f"normal force cap of {cap:g} N"
+            rows.append(([0, 0, 1, 0, 0, 0], cap, LimitKind.NORMAL_FORCE_CAP, phrase))
     normals, bounds, kinds, phrases = zip(*rows, strict=True)
     A, b = np.array(normals, dtype=np.float64), np.array(bounds)
     length = np.linalg.norm(A, axis=1)
@@ -96,22 +89,18 @@ def _pressure_rows(contact: Contact) -> list[Row]:
     """CoP inside the rectangle ([Qiu2012]_ 4.14) or polygon: x = -tau_y / f_z, y = tau_x / f_z."""
     if _is_polygon(contact):
         return _polygon_rows(contact)
-    half_length, half_width = contact.length / 2, contact.width / 2
+    x, y, tip = contact.length / 2, contact.width / 2, LimitKind.TIPPING
     sides = {"left": ("outer", "inner"), "right": ("inner", "outer")}
     left, right = sides.get(contact.effector.split("_")[0], ("left", "right"))
-    tip = LimitKind.TIPPING
-    edge = half_length == 0.0
-    ahead, behind = (
-        ("rolling forward over its edge", "rolling backward over its edge")
-        if edge
-        else ("tipping over its front edge", "tipping over its rear edge")
-    )
-    end = "end" if edge else "edge"
+    over, end = "tipping over its {} edge", "edge"
+    ahead, behind = over.format("front"), over.format("rear")
+    if x == 0.0:
+        ahead, behind, end = "rolling forward over its edge", "rolling backward over its edge", "end"
     return [
-        ([0, 0, -half_length, 0, -1, 0], 0.0, tip, ahead),
-        ([0, 0, -half_length, 0, 1, 0], 0.0, tip, behind),
-        ([0, 0, -half_width, 1, 0, 0], 0.0, tip, f"tipping over its {left} {end}"),
-        ([0, 0, -half_width, -1, 0, 0], 0.0, tip, f"tipping over its {right} {end}"),
+        ([0, 0, -x, 0, -1, 0], 0.0, tip, ahead),
+        ([0, 0, -x, 0, 1, 0], 0.0, tip, behind),
+        ([0, 0, -y, 1, 0, 0], 0.0, tip, f"tipping over its {left} {end}"),
+        ([0, 0, -y, -1, 0, 0], 0.0, tip, f"tipping over its {right} {end}"),
     ]
 
 
@@ -124,39 +113,29 @@ def _is_polygon(contact: Contact) -> bool:
 def _polygon_rows(contact: Contact) -> list[Row]:
     """CoP inside the hull of the points, about their middle."""
     corners = convex_polygon((contact.points - contact.centre)[:, :2])
-    words = {(0, True): "front", (0, False): "rear", (1, True): "left", (1, False): "right"}
     rows: list[Row] = []
     for (x, y), corner in zip(walls(corners)[0].tolist(), corners, strict=True):
-        axis = int(abs(y) > abs(x))
-        side = words[axis, (x, y)[axis] > 0.0]
-        room = float(corner @ [x, y])
+        across = abs(y) > abs(x)
+        side = ("left" if y > 0.0 else "right") if across else ("front" if x > 0.0 else "rear")
         phrase = f"tipping over the {side} edge of what of it touches"
-        rows.append(([0, 0, -room, y, -x, 0], 0.0, LimitKind.TIPPING, phrase))
+        rows.append(([0, 0, -float(corner @ [x, y]), y, -x, 0], 0.0, LimitKind.TIPPING, phrase))
     return rows
 
 
 def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
-    turn, mu = LimitKind.TURNING, pyramid_friction(contact, friction_model)
-    signs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
-    words = {1.0: "turning clockwise on its sole", -1.0: "turning counter-clockwise on its sole"}
-    if contact.torsion_limit is not None:
-        return [
-            ([0, 0, 0, a * mu, b * mu, c], contact.torsion_limit, turn, words[c])
-            for c in (1.0, -1.0)
-            for a, b in signs
-        ]
-    if friction_model == "cone" or _is_polygon(contact):
-        centred = replace(contact, points=contact.points - contact.centre)
-        return [
-            (row.tolist(), 0.0, turn, words[float(np.sign(row[5]))])
-            for row in _yaw_facets(centred, friction_model)
-        ]
+    mu, limit = pyramid_friction(contact, friction_model), contact.torsion_limit or 0.0
     x, y = contact.length / 2, contact.width / 2
-    return [
-        ([a * y, b * x, -mu * (x + y), c * a * mu, c * b * mu, c], 0.0, turn, words[c])
-        for c in (1.0, -1.0)
-        for a, b in signs
-    ]
+    signs = [(a, b, c) for c in (1.0, -1.0) for a in (1.0, -1.0) for b in (1.0, -1.0)]
+    rows: list[list[float]]
+    if contact.torsion_limit is not None:
+        rows = [[0, 0, 0, a * mu, b * mu, c] for a, b, c in signs]
+    elif friction_model == "cone" or _is_polygon(contact):
+        centred = replace(contact, points=contact.points - contact.centre)
+        rows = _yaw_facets(centred, friction_model).tolist()
+    else:
+        rows = [[a * y, b * x, -mu * (x + y), c * a * mu, c * b * mu, c] for a, b, c in signs]
+    words = {True: "turning clockwise on its sole", False: "turning counter-clockwise on its sole"}
+    return [(row, limit, LimitKind.TURNING, words[row[5] > 0.0]) for row in rows]
 
 
 def _yaw_facets(sole: Contact, friction_model: FrictionModel) -> FloatArray:
@@ -191,13 +170,10 @@ def _grasp_rows(contact: Contact) -> list[Row]:
 
 _CORNERS: FloatArray = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
-_CONE_SIDES = 8
-"""Edges along x and y, where no friction is lost, and between them."""
+_CONE_SIDES = 8  # edges along x and y, where no friction is lost, and between them
 
 _CONE_ANGLES: FloatArray = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
 _CONE_EDGES: FloatArray = np.column_stack([np.cos(_CONE_ANGLES), np.sin(_CONE_ANGLES)])
-for _table in (_CORNERS, _CONE_EDGES):
-    _table.setflags(write=False)
 
 
 def pyramid_friction(contact: Contact, friction_model: FrictionModel) -> float:
@@ -207,10 +183,8 @@ def pyramid_friction(contact: Contact, friction_model: FrictionModel) -> float:
 
 def pyramid_edges(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
     """(k, 3) forces along the pyramid's edges, 4 or with ``cone`` 8, of unit normal force, contact frame."""
-    if checked(friction_model) == "cone":
-        tangential = contact.friction * _CONE_EDGES
-    else:
-        tangential = pyramid_friction(contact, friction_model) * _CORNERS
+    directions = _CONE_EDGES if checked(friction_model) == "cone" else _CORNERS
+    tangential = pyramid_friction(contact, friction_model) * directions
     return np.column_stack([tangential, np.ones(len(tangential))])
 
 

@@ -38,8 +38,7 @@ class StabilityMargins:
         force: (...) Ms1, a force at the CoM alone [N].
         moment: (...) Ms2, a moment alone [N.m].
         wrench: (...) Ms3, both, moments about the reference of W_p, alpha = 1 m [N.m].
-        wrench_about_com: (...) Ms3 with moments about the CoM, which makes scenes
-            comparable ([Qiu2012]_ 4.2.9, remark 2) [N.m].
+        wrench_about_com: (...) Ms3 with moments about the CoM ([Qiu2012]_ 4.2.9, remark 2) [N.m].
     """
 
     force: FloatArray
@@ -57,8 +56,7 @@ def force_space(W: WrenchPolytope, com: ArrayLike) -> Polytope:
 def moment_space(W: WrenchPolytope, force: ArrayLike) -> Polytope:
     """T_p: moments (3,) about the reference [N.m] that W_p admits beside a force ``m (a - g)`` (3,) [N].
 
-    The thesis projects F_p (4.39), which is flat; a perturbing moment leaves the force
-    alone, so the right set is the slice ``{tau : H2 tau <= h - H1 f}``.
+    The thesis projects F_p (4.39), which is flat; the right set is the slice ``{tau : H2 tau <= h - H1 f}``.
     """
     f = frozen_array(force, "force [N]", (3,))
     return W.preimage(np.vstack([np.zeros((3, 3)), np.eye(3)]), np.concatenate([f, np.zeros(3)]))
@@ -73,10 +71,7 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
 
     Args:
         wrench: (..., 6) about ``W.reference``, of a point mass or a whole body.
-        com: (..., 3) in the world [m].
-
-    Raises:
-        InputError: If the shapes do not fit.
+        com: (..., 3) in the world [m]; InputError if the shapes do not fit.
     """
     w, x = np.asarray(wrench, dtype=np.float64), np.asarray(com, dtype=np.float64)
     if w.shape[-1:] != (6,) or x.shape[-1:] != (3,):
@@ -149,15 +144,20 @@ def _smallest(distances: FloatArray, lever: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class GroundPoint:
-    """A point of a classical criterion.
-
-    Attributes:
-        position: (2,) in the world [m].
-        distance: To the support polygon's boundary, negative outside [m].
-    """
+    """A point (2,) of a classical criterion and its distance to the support polygon, negative outside [m]."""
 
     position: FloatArray
     distance: float
+
+    @classmethod
+    def of(cls, position: FloatArray, polygon: FloatArray) -> "GroundPoint":
+        """Measure a point."""
+        return cls(position, float(signed_distance(position, polygon)))
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready numbers."""
+        position = [_number(float(value)) for value in self.position]
+        return {"position_m": position, "distance_m": _number(self.distance)}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -218,27 +218,24 @@ class BalanceReport(Displayed):
             "force_margin_N": _number(self.force_margin),
             "moment_margin_Nm": _number(self.moment_margin),
             "limiting": {
-                "effector": self.limiting.effector,
-                "kind": self.limiting.kind.value,
-                "description": self.limiting.description,
-                "direction": self.limiting.direction.tolist(),
+                "effector": self.limiting.effector, "kind": self.limiting.kind.value,
+                "description": self.limiting.description, "direction": self.limiting.direction.tolist(),
                 "all": [str(share) for share in self.limiting.shares],
             },
             "wrench": self.wrench.tolist(),
             "reference_m": self.W.reference.tolist(),
             "facets": {
-                "wrench_polytope": len(self.W),
-                "force_space": len(self.force_space),
+                "wrench_polytope": len(self.W), "force_space": len(self.force_space),
                 "moment_space": len(self.moment_space),
             },
             "support_polygon_m": self.support_polygon.tolist(),
             "static_com_polygon_m": self.com_polygon.tolist(),
             "plane_height_m": self.plane_height,
-            "com_projection": _ground(self.com_projection),
-            "zmp": _ground(self.zmp),
-            "fri": None if self.fri is None else _ground(self.fri),
-            "cmp": _ground(self.cmp),
-        }
+            "com_projection": self.com_projection.as_dict(),
+            "zmp": self.zmp.as_dict(),
+            "fri": None if self.fri is None else self.fri.as_dict(),
+            "cmp": self.cmp.as_dict(),
+        }  # fmt: skip
         if polytope:
             report["H"], report["h"] = self.W.H.tolist(), self.W.h.tolist()
         return report
@@ -267,47 +264,25 @@ def evaluate_balance(
     W = wrench_polytope(stance, reference=reference)
     wrench = pseudo_wrench(mass, x, a, rate, W.reference)
     margins = stability_margins(W, wrench, x)
-    polygon = support_polygon(stance)
-    height = support_height(stance)
+    polygon, height = support_polygon(stance), support_height(stance)
     zmp = zero_moment_point(wrench, height, W.reference)
     fri = foot_rotation_indicator(wrench, height, None, W.reference)
     single = len(stance) == 1 and stance.contacts[0].kind is ContactKind.SOLE
-    return BalanceReport(
-        W=W,
-        wrench=wrench,
-        balanced=bool(margins.wrench >= -1e-9 * max(1.0, float(np.abs(W.h).max()))),
-        margin=float(margins.wrench_about_com),
-        margin_about_reference=float(margins.wrench),
-        force_margin=float(margins.force),
-        moment_margin=float(margins.moment),
-        limiting=W.limiting(wrench, x),
-        force_space=force_space(W, x),
-        moment_space=moment_space(W, wrench[:3]),
-        support_polygon=polygon,
-        com_polygon=_static_polygon(W, mass),
-        plane_height=height,
-        com_projection=_point(x[:2], polygon),
-        zmp=_point(zmp, polygon),
-        fri=_point(fri, polygon) if single else None,
-        cmp=_point(centroidal_moment_pivot(wrench[:3], x, height), polygon),
-    )
-
-
-def _static_polygon(W: WrenchPolytope, mass: float) -> FloatArray:
     try:
-        return admissible_com_polygon(W, mass)
+        com_polygon = admissible_com_polygon(W, mass)
     except InputError:
-        return np.zeros((0, 2))
-
-
-def _point(position: FloatArray, polygon: FloatArray) -> GroundPoint:
-    return GroundPoint(position, float(signed_distance(position, polygon)))
+        com_polygon = np.zeros((0, 2))
+    return BalanceReport(
+        W, wrench, balanced=bool(margins.wrench >= -1e-9 * max(1.0, float(np.abs(W.h).max()))),
+        margin=float(margins.wrench_about_com), margin_about_reference=float(margins.wrench),
+        force_margin=float(margins.force), moment_margin=float(margins.moment),
+        limiting=W.limiting(wrench, x), force_space=force_space(W, x),
+        moment_space=moment_space(W, wrench[:3]), support_polygon=polygon, com_polygon=com_polygon,
+        plane_height=height, com_projection=GroundPoint.of(x[:2], polygon), zmp=GroundPoint.of(zmp, polygon),
+        fri=GroundPoint.of(fri, polygon) if single else None,
+        cmp=GroundPoint.of(centroidal_moment_pivot(wrench[:3], x, height), polygon),
+    )  # fmt: skip
 
 
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _ground(point: GroundPoint) -> dict[str, Any]:
-    position = [_number(float(value)) for value in point.position]
-    return {"position_m": position, "distance_m": _number(point.distance)}

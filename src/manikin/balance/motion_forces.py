@@ -1,9 +1,8 @@
 """Contact forces and joint torques that a planned motion needs.
 
-The generalised forces of inverse dynamics leave a six-dimensional wrench that the contacts
-must supply.  It is shared among the force-carrying points with the least squared force along
-the edges of their friction pyramids, in the friction model of each stance; contacts that have
-just been made, or are about to be left, cost more, so that load passes smoothly from one to the next.
+The wrench that the contacts must supply is shared among the force-carrying points with the least squared
+force along the edges of their friction pyramids; contacts that have just been made, or are about to be left,
+cost more, so that load passes smoothly from one to the next.
 """
 
 from collections.abc import Iterator, Sequence
@@ -69,18 +68,14 @@ def carried_motion(
     the loaded body. Nothing is planned again: a negative margin means that the load forbids the motion.
 
     Args:
-        body: With empty hands.
+        body: With empty hands, else InputError.
         motion: Its motion.
         mass: Of the load [kg].
-        hand: ``"left"``, ``"right"`` or ``"both"``.
-
-    Raises:
-        InputError: If the body carries something already, or has no such hand.
+        hand: ``"left"``, ``"right"`` or ``"both"``; InputError if the body has no such hand.
     """
     if body.loads:
-        raise InputError(
-            f"the motion was made with {sum(body.loads.values()):g} kg in the hands; valid: a motion without"
-        )
+        held = sum(body.loads.values())
+        raise InputError(f"the motion was made with {held:g} kg in the hands; valid: a motion without")
     loaded = carrying(body, mass, hand)
     stances = [phase.stance.bounded(loaded.mass) for phase in schedule.sequence]
     states = motion.time, motion.q, motion.v, motion.a
@@ -88,26 +83,18 @@ def carried_motion(
     return loaded, measured
 
 
-_RAMP = 0.08
-"""Time over which a contact takes or loses its share of the load [s]."""
-
-_SUDDEN_RAMP = 0.02
-"""The same for a contact that is made at speed [s]."""
-
+_RAMP, _SUDDEN_RAMP = 0.08, 0.02
+"""Time over which a contact takes or loses its share of the load, and the same for one made at speed [s]."""
 TORQUE_SHARE = 0.98
 """Share of the joints' strength that the forces are shared for where it does not suffice at once."""
-
 _MISSING_COST = 1.0e-6
 """Square of the cost of force relative to that of missing the wrench."""
 
-_ARM = 0.1
-"""Length that makes moments comparable with forces [m]."""
-
-_RAISED = 0.005
-"""Height above the lowest point of a contact that still settles at which a force costs twice as much [m]."""
-
-_HANGING_COST = 3.0
-"""Cost of a force on a hanging segment (toes) relative to one on the effector's own."""
+_ARM = 0.1  # length that makes moments comparable with forces [m]
+_RAISED = (
+    0.005  # height above the lowest point of a contact that settles at which force costs twice as much [m]
+)
+_HANGING_COST = 3.0  # cost of a force on a hanging segment (toes) relative to one on the effector's own
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,13 +144,9 @@ class _Generators(ContactGenerators):
 
     @cached_property
     def by_carrier(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
-        """For each joint that carries generators: which velocities move it, and the (6, g) wrenches on it.
-
-        The first is (nv,), 1 or 0; the wrenches of the generators on other joints are zero.
-        """
-        return tuple(
-            (self.moves[joint], self.wrenches * (self.carrier == joint)) for joint in np.unique(self.carrier)
-        )
+        """Of each joint that carries generators: :attr:`moves`, and the (6, g) wrenches, 0 for the others."""
+        joints = np.unique(self.carrier)
+        return tuple((self.moves[joint], self.wrenches * (self.carrier == joint)) for joint in joints)
 
     @cached_property
     def by_contact(self) -> dict[int, FloatArray]:
@@ -174,7 +157,7 @@ class _Generators(ContactGenerators):
 def plan_forces(
     body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Distribute the contact forces of a motion and compute its joint torques, see :func:`full_motion`.
+    """Distribute the contact forces of a motion, see :func:`full_motion`.
 
     Returns:
         (n, nv) generalised forces, of which the first six are what no contact force could supply (zero for a
@@ -185,8 +168,7 @@ def plan_forces(
         dynamics = dynamics.carrying(load)
     names = schedule.sequence.effectors
     shares = load_shares(schedule, time, names)
-    tau = np.zeros((len(time), body.nv))
-    forces = np.zeros((len(time), len(names), 6))
+    tau, forces = np.zeros((len(time), body.nv)), np.zeros((len(time), len(names), 6))
     for rows, generators, stance in _alike(body, schedule, time, q):
         part = dynamics.part(rows)
         if not len(stance):
@@ -197,8 +179,7 @@ def plan_forces(
         magnitude = share(matrix, target, cost**-2.0, _MISSING_COST).magnitude
         tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
         over = np.any(body.torque_share(tau[rows, 6:]) > 1.0, axis=1)
-        over |= np.any(magnitude > generators.upper, axis=1)
-        for k in np.flatnonzero(over):
+        for k in np.flatnonzero(over | np.any(magnitude > generators.upper, axis=1)):
             joint_map = _joint_map(part.jacobians[k], generators)
             other = _share_within_limits(
                 generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
@@ -207,7 +188,10 @@ def plan_forces(
             if other is not None:
                 magnitude[k] = other
                 tau[rows[k]] = part.needed[k] - joint_map @ other
-        forces[rows] = _by_contact(generators, magnitude, stance, names)
+        for contact in stance:
+            index = names.index(contact.effector)
+            wrench = magnitude @ generators.by_contact[index].T
+            forces[rows, index] = wrench_about(wrench, contact.position)
     return tau, forces
 
 
@@ -286,8 +270,7 @@ def _share_within_limits(
     The generators' wrenches (6, g) supply the target (6,); the torques are those without contacts, (nv - 6,)
     [N.m], less what ``joint_map`` (nv - 6, g) takes per unit magnitude.
     """
-    cost = cost**2
-    count = len(cost)
+    cost, count = cost**2, len(cost)
     limit = np.where(np.isfinite(generators.upper), generators.upper, 1e6)
     solution = solve_qp(
         np.diag(cost / cost.mean()), np.zeros(count), np.vstack([matrix, joint_map]),
@@ -299,9 +282,8 @@ def _share_within_limits(
 
 def _joint_map(jacobians: FloatArray, generators: _Generators) -> FloatArray:
     """(nv, g) generalised force of a unit magnitude of each generator, from joint Jacobians (6, nv)."""
-    return sum((jacobians * moved).T @ wrenches for moved, wrenches in generators.by_carrier) + np.zeros(
-        (jacobians.shape[1], len(generators.cost))
-    )
+    none = np.zeros((jacobians.shape[1], len(generators.cost)))
+    return sum((jacobians * moved).T @ wrenches for moved, wrenches in generators.by_carrier) + none
 
 
 def _apply(jacobians: FloatArray, generators: _Generators, magnitude: FloatArray) -> FloatArray:
@@ -310,14 +292,3 @@ def _apply(jacobians: FloatArray, generators: _Generators, magnitude: FloatArray
     for moved, wrenches in generators.by_carrier:
         total += moved * ((magnitude @ wrenches.T)[:, None, :] @ jacobians)[:, 0]
     return total
-
-
-def _by_contact(
-    generators: _Generators, magnitude: FloatArray, stance: Stance, names: tuple[str, ...]
-) -> FloatArray:
-    """(n, c, 6) force and moment about each contact's origin of magnitudes (n, g)."""
-    out = np.zeros((len(magnitude), len(names), 6))
-    for contact in stance:
-        index = names.index(contact.effector)
-        out[:, index] = wrench_about(magnitude @ generators.by_contact[index].T, contact.position)
-    return out

@@ -27,9 +27,8 @@ class MotionMargin:
             ([Qiu2012]_ 4.2.9 case 3, remark 2) [N.m].
         force: (n,) smallest force at the CoM that ends balance ([Qiu2012]_ 4.2.9 case 1) [N]; infinite
             where no force alone does.
-        zmp_distance: (n,) of the ZMP to the edge of the support polygon [m]; not a number where the
-            contacts do not span one plane, or something is grasped, or less than
-            :data:`~manikin.balance.zmp.LEAST_LOAD` presses on it.
+        zmp_distance: (n,) of the ZMP to the edge of the support polygon [m]; not a number where contacts do
+            not span one plane, or grasp, or press with less than :data:`~manikin.balance.zmp.LEAST_LOAD`.
     """
 
     margin: FloatArray
@@ -64,13 +63,9 @@ class MotionMargin:
 
 
 def motion_margin(
-    stances: Sequence[Stance],
-    phases: ArrayLike,
-    wrench: ArrayLike,
-    com: ArrayLike,
-    *,
+    stances: Sequence[Stance], phases: ArrayLike, wrench: ArrayLike, com: ArrayLike, *,
     polytopes: Sequence[WrenchPolytope | None] | None = None,
-) -> MotionMargin:
+) -> MotionMargin:  # fmt: skip
     """Margins of a series of pseudo-wrenches, each in the polytope of its phase.
 
     Without any contact the only admissible wrench is 0: margin and force are then the negative lengths of
@@ -82,16 +77,15 @@ def motion_margin(
         wrench: (n, 6) force and moment about the world origin that the contacts have to give [N, N.m].
         com: (n, 3) [m].
         polytopes: W_p of each phase, about any point, where it is known already; else each stance's is
-            computed once, and only for phases with samples.
-
-    Raises:
-        InputError: If the shapes do not fit.
-        ContactError: If the normal force of a contact is bounded by no cap.
+            computed once, and only for phases with samples (ContactError without any cap on a contact).
     """
     w, x, row_phases = _series(wrench, com, phases, len(stances))
     margin, force, zmp = (np.full(len(w), np.nan) for _ in range(3))
     present = np.unique(row_phases).tolist()
-    known = _polytopes(stances, present, polytopes)
+    held = [number for number in present if len(stances[number])]
+    known = {k: item for k in held if polytopes is not None and (item := polytopes[k]) is not None}
+    missing = [number for number in held if number not in known]
+    known |= dict(zip(missing, wrench_polytopes([stances[k] for k in missing]), strict=True))
     for number in present:
         rows = np.flatnonzero(row_phases == number)
         if not len(stances[number]):
@@ -127,13 +121,3 @@ def _series(
     if len(index) and not (index.min() >= 0 and index.max() < count):
         raise InputError(f"phases go from {index.min()} to {index.max()}; valid: 0 to {count - 1}")
     return w, x, index
-
-
-def _polytopes(
-    stances: Sequence[Stance], present: Sequence[int], given: Sequence[WrenchPolytope | None] | None
-) -> dict[int, WrenchPolytope]:
-    """Polytopes of the phases that have samples and contacts, by number."""
-    held = [number for number in present if len(stances[number])]
-    known = {k: item for k in held if given is not None and (item := given[k]) is not None}
-    missing = [number for number in held if number not in known]
-    return known | dict(zip(missing, wrench_polytopes([stances[k] for k in missing]), strict=True))

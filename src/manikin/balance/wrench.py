@@ -1,9 +1,9 @@
 """The admissible pseudo-wrench space W_p of a stance and the pseudo-wrench itself.
 
-W_p is the sum over the contacts of the wrenches each can apply, under their own caps and the stance's cap
-on the sum of normal forces. It is found from generators: every edge of a friction pyramid (every vertex,
-for a sole with a torsion limit) is a ray of one cone whose slice at the caps is W_p, and every axis of a
-grasp box is a segment added to it. Each facet is explained by the contacts and limits met on it.
+W_p is the sum over the contacts of the wrenches each can apply, under their own caps and the stance's cap on
+the sum of normal forces. It is found from generators: every edge of a friction pyramid (every vertex, for a
+sole with a torsion limit) is a ray of one cone whose slice at the caps is W_p, and every axis of a grasp box
+is a segment added to it.
 
 A stance with few contacts has a flat W_p (a point contact can give no moment about itself). Such a W_p
 carries each equality as a pair of opposite rows at the end of H: the margin of a wrench is then 0 at best,
@@ -110,16 +110,16 @@ def facet_shares(W: WrenchPolytope, row: int) -> tuple[LimitShare, ...]:
 
 def _merged(shares: list[LimitShare]) -> list[LimitShare]:
     """One share per phrase, several rows of one limit added up."""
-    total: dict[tuple[str, str], LimitShare] = {}
+    total: dict[str, LimitShare] = {}
     for share in shares:
-        key = (share.effector, share.phrase)
-        before = total[key].share if key in total else 0.0
-        total[key] = replace(share, share=before + share.share)
+        before = total[str(share)].share if str(share) in total else 0.0
+        total[str(share)] = replace(share, share=before + share.share)
     return list(total.values())
 
 
 def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap: float) -> list[LimitShare]:
-    limits = contact_limits(contact, W.friction_model)
+    model = W.stance.friction_model
+    limits = contact_limits(contact, model)
     if contact.kind is ContactKind.GRASP:
         weights = np.maximum(limits.A @ rows_about(normal[None], contact.position - W.reference)[0], 0.0)
         if contact.max_moment == 0:
@@ -134,7 +134,7 @@ def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap
         size = float(np.linalg.norm(twist[:components]))
         if size < NEGLIGIBLE:
             return []
-        edges = edge_wrenches(contact, W.friction_model)
+        edges = edge_wrenches(contact, model)
         if contact.torsion_limit is None and (edges @ twist).max() < -NEGLIGIBLE:
             return [LimitShare(contact.effector, LimitKind.LIFTING, "lifting off", size)]
         weights = _multipliers(limits, twist, components)
@@ -170,8 +170,7 @@ class WrenchPolytope(Displayed, Polytope):
         h: (m,) offsets [N, N.m].
         stance: The contacts, with their friction model and caps.
         reference: (3,) point of the moments [m].
-        stance_cap_multipliers: (m,) growth of each offset per newton of the stance's
-            ``normal_force_cap``; 0 where that cap does not matter.
+        stance_cap_multipliers: (m,) growth of each offset per newton of the stance's ``normal_force_cap``.
     """
 
     stance: Stance
@@ -180,10 +179,8 @@ class WrenchPolytope(Displayed, Polytope):
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
-        return {
-            "effectors": " ".join(self.stance.effectors), "facets": str(len(self.h)),
-            "reference": str(np.round(self.reference, 3).tolist()),
-        }  # fmt: skip
+        place = str(np.round(self.reference, 3).tolist())
+        return {"effectors": " ".join(self.stance.effectors), "facets": str(len(self.h)), "reference": place}
 
     def __init__(
         self, H: ArrayLike, h: ArrayLike, stance: Stance, reference: ArrayLike, cap_multipliers: ArrayLike
@@ -194,11 +191,6 @@ class WrenchPolytope(Displayed, Polytope):
         object.__setattr__(self, "reference", frozen_array(reference, "reference [m]", (3,), ContactError))
         multipliers = frozen_array(np.asarray(cap_multipliers) / length, "cap_multipliers", (len(self.h),))
         object.__setattr__(self, "stance_cap_multipliers", multipliers)
-
-    @property
-    def friction_model(self) -> FrictionModel:
-        """Friction model of the stance."""
-        return self.stance.friction_model
 
     def at_reference(self, reference: ArrayLike) -> WrenchPolytope:
         """The same set with moments about another point, with rows of unit length.
@@ -212,17 +204,14 @@ class WrenchPolytope(Displayed, Polytope):
     def limiting(self, wrench: ArrayLike, about: ArrayLike | None = None) -> LimitingConstraint:
         """Explain the facet of W_p that gives the margin of a wrench.
 
-        The facet's normal is a combination, with multipliers >= 0, of the limits met on it
-        (linear-programming duality); the multiplier of a limit is how much the margin grows
-        when that limit is relaxed, and the largest one names the constraint. Contacts that
-        carry no force on the facet are lifting off: they are named only when no other is.
+        By linear-programming duality the facet is a combination, with multipliers >= 0, of the limits that
+        are met on it; the multiplier of a limit is how much the margin grows when that limit is relaxed, and
+        the largest one names the constraint. Contacts that carry no force on the facet are lifting off: they
+        are named only when no other is.
 
         Args:
-            wrench: (6,) pseudo-wrench about :attr:`reference`.
+            wrench: (6,) pseudo-wrench about :attr:`reference`, finite (ContactError).
             about: (3,) point of the margin's moments, in general the CoM [m]; :attr:`reference` when omitted.
-
-        Raises:
-            ContactError: If the wrench is not six finite numbers.
         """
         w = frozen_array(wrench, "wrench", (6,), ContactError)
         if about is not None:
@@ -245,14 +234,11 @@ def pseudo_wrench(
     [Qiu2012]_ 4.6 for the point mass, 4.51 with the rate of change of angular momentum.
 
     Args:
-        mass: [kg], > 0.
+        mass: [kg], > 0 (InputError).
         com: (..., 3) [m].
         acceleration: (..., 3) of the CoM [m/s^2].
         angular_momentum_rate: (..., 3) about the CoM [N.m]; zero when omitted.
         reference: (..., 3) point ``o`` of the moments [m]; the world origin when omitted.
-
-    Raises:
-        InputError: If the mass is not positive.
     """
     mass = finite_number(mass, "mass [kg]", above=0.0)
     force = mass * (np.asarray(acceleration, dtype=np.float64) - GRAVITY_VECTOR)
@@ -269,14 +255,12 @@ def wrench_polytope(stance: Stance, *, reference: ArrayLike = (0.0, 0.0, 0.0)) -
     """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
 
     Without any contact (flight) it is the single point 0; ``reference`` (3,) is the point of the moments [m].
-
-    Raises:
-        ContactError: If the normal force of a contact is bounded by no cap.
+    ContactError if the normal force of a contact is bounded by no cap.
     """
     origin = frozen_array(reference, "reference [m]", (3,), ContactError)
     local = _middle(stance) if len(stance) else origin
-    caps, total = _caps(stance)
-    generators, levels = _generators(stance, caps, total, local)
+    pairs, total = _caps(stance)
+    generators, levels = _generators(pairs, total, stance.friction_model, local)
     segments = [_grasp_segments(c, local) for c in stance if c.kind is ContactKind.GRASP]
     fan = fan_of_generators(generators, levels, np.ones(levels.shape[1], dtype=np.bool_))
     fan = fan.plus_segments(np.vstack([np.zeros((0, 6)), *segments]))
@@ -291,9 +275,7 @@ def wrench_polytopes(
     """W_p of several stances; a stance that is an earlier one moved elsewhere is not computed again.
 
     ``reference`` (3,) is the point of all moments [m]; when omitted, the middle of each stance's contacts.
-
-    Raises:
-        ContactError: If the normal force of a contact is bounded by no cap.
+    ContactError if the normal force of a contact is bounded by no cap.
     """
     known: dict[tuple[Any, ...], WrenchPolytope] = {}
     polytopes = []
@@ -324,44 +306,44 @@ def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
     return (stance.model, *sorted(contacts))
 
 
-def _caps(stance: Stance) -> tuple[list[float | None], float | None]:
-    """Caps that matter: of each frictional contact, and on their sum.
+def _caps(stance: Stance) -> tuple[list[tuple[Contact, float | None]], float | None]:
+    """Caps that matter: each frictional contact with its own, and on their sum.
 
     The first are None where only the sum bounds a contact, the last where the contacts' own caps imply it.
     """
     total = stance.normal_force_cap
-    own = [_own_cap(contact, total) for contact in stance if contact.kind is not ContactKind.GRASP]
-    known = [cap for cap in own if cap is not None]
-    if not own or (total is not None and len(known) == len(own) and sum(known) <= total):
+    pairs: list[tuple[Contact, float | None]] = []
+    for contact in stance:
+        own = contact.normal_force_cap
+        if contact.kind is ContactKind.GRASP:
+            continue
+        if own is None and total is None:
+            raise ContactError(
+                f"nothing bounds the normal force of {contact.effector!r}; "
+                "valid: a normal_force_cap [N] for this contact or for the stance"
+            )
+        pairs.append((contact, own if total is None or own is None or own < total else None))
+    known = [cap for _, cap in pairs if cap is not None]
+    if not pairs or (total is not None and len(known) == len(pairs) and sum(known) <= total):
         total = None
-    return own, total
-
-
-def _own_cap(contact: Contact, total: float | None) -> float | None:
-    own = contact.normal_force_cap
-    if own is None and total is None:
-        raise ContactError(
-            f"nothing bounds the normal force of {contact.effector!r}; "
-            "valid: a normal_force_cap [N] for this contact or for the stance"
-        )
-    return own if total is None or own is None or own < total else None
+    return pairs, total
 
 
 def _generators(
-    stance: Stance, caps: list[float | None], total: float | None, reference: FloatArray
+    pairs: list[tuple[Contact, float | None]],
+    total: float | None,
+    model: FrictionModel,
+    reference: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Generators (n, 6) and the share of each level that each one uses (n, k).
 
-    The levels are one per contact with a cap or a torsion limit of its own, then the
-    stance's cap.
+    The levels are one per contact with a cap or a torsion limit of its own, then the stance's cap.
     """
-    frictional = [c for c in stance if c.kind is not ContactKind.GRASP]
-    pairs = list(zip(frictional, caps, strict=True))
     has_level = [own is not None or contact.torsion_limit is not None for contact, own in pairs]
     columns = sum(has_level) + (total is not None)
     generators, levels = [np.zeros((0, 6))], [np.zeros((0, columns))]
     for i, (contact, own) in enumerate(pairs):
-        local, bounded = _extreme_wrenches(contact, own, total, stance.friction_model)
+        local, bounded = _extreme_wrenches(contact, own, total, model)
         level = np.zeros((len(local), columns))
         if has_level[i]:
             level[:, sum(has_level[:i])] = bounded
@@ -377,8 +359,7 @@ def _extreme_wrenches(
 ) -> tuple[FloatArray, FloatArray]:
     """Wrenches (n, 6) in the contact frame that generate the contact's set, and their weights.
 
-    With combinations of non-negative multipliers, weighted sum at most 1, they make the
-    contact's set up to its own cap; weights of 0 mark rays, left to the stance's cap.
+    Combinations of weighted sum at most 1 make the set up to its own cap; weights of 0 mark rays.
     """
     cap = own if own is not None else total
     if contact.torsion_limit is None:
@@ -410,6 +391,5 @@ def _grasp_segments(contact: Contact, reference: FloatArray) -> FloatArray:
     """(3 or 6, 6) half axes of the grasp's box of forces and moments ([Qiu2012]_ 4.22)."""
     force = contact.max_force * np.eye(3)
     forces = np.hstack([force, cross((contact.position - reference)[None], force)])
-    if contact.max_moment == 0:
-        return forces
-    return np.vstack([forces, np.hstack([np.zeros((3, 3)), contact.max_moment * np.eye(3)])])
+    moments = np.hstack([np.zeros((3, 3)), contact.max_moment * np.eye(3)])
+    return forces if contact.max_moment == 0 else np.vstack([forces, moments])

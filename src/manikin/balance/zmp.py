@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from manikin.balance.criteria import support_height, zero_moment_point
+from manikin.balance.criteria import support_height, support_polygon, zero_moment_point
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.motion import Motion
 from manikin.numerics.polytope import convex_polygon, signed_distance
@@ -30,8 +30,7 @@ class SupportPlane:
         origin: (3,) a point of the plane [m].
         rotation_plane_to_world: (3, 3); its z column is the normal.
         polygon: (k, 2) support polygon in the plane's own x and y, counter-clockwise [m].
-        decisive: Whether balance requires the ZMP inside the polygon (friction aside): the plane carries
-            every contact of the stance, and nothing is grasped.
+        decisive: Whether balance requires the ZMP inside the polygon (friction aside): the plane carries all.
     """
 
     origin: FloatArray
@@ -80,11 +79,8 @@ def least_zmp_distance(samples: Iterable[tuple[Stance, FloatArray]]) -> float | 
 
     Samples are stances with the pseudo-wrenches (n, 6) about the world origin while they are held.
     """
-    distances = []
-    for stance, wrench in samples:
-        plane = support_plane(stance)
-        if plane is not None and len(wrench):
-            distances.append(float(plane.zmp_distance(wrench).min()))
+    known = ((support_plane(stance), wrench) for stance, wrench in samples if len(wrench))
+    distances = (float(plane.zmp_distance(wrench).min()) for plane, wrench in known if plane is not None)
     return min(distances, default=None)
 
 
@@ -96,12 +92,8 @@ def projection_plane(stance: Stance) -> SupportPlane | None:
     pressing = [contact for contact in stance if contact.kind is not ContactKind.GRASP]
     if not any(contact.normal[2] > STEEPEST for contact in pressing):
         return None
-    plane = support_plane(stance)
-    if plane is not None:
-        return plane
-    points = np.vstack([contact.points_in_world[:, :2] for contact in pressing])
-    origin = np.array([0.0, 0.0, support_height(stance)])
-    return SupportPlane(origin, np.eye(3), convex_polygon(points), decisive=False)
+    polygon, origin = support_polygon(stance), np.array([0.0, 0.0, support_height(stance)])
+    return support_plane(stance) or SupportPlane(origin, np.eye(3), polygon, decisive=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +103,8 @@ class ZmpPath:
     Attributes:
         time: (n,) [s].
         point: (n, 3) in the world [m]; not a number where less than :data:`LEAST_LOAD` presses.
-        distance: (n,) to the edge of the support polygon, negative outside [m]. On a line of
-            contacts (a heel's or a toe's edge) there is no inside and 0 is best.
+        distance: (n,) to the edge of the support polygon, negative outside [m]; on a line of contacts 0 at
+            best.
         phase: (n,) index of the phase.
         planes: One per phase; None for one without any support to press on.
     """
@@ -153,9 +145,7 @@ def zmp_path(schedule: ContactSchedule, time: FloatArray, wrench: FloatArray) ->
 def contact_wrench(motion: Motion, schedule: ContactSchedule) -> FloatArray:
     """(n, 6) wrench of all contacts on the body about the world origin [N, N.m].
 
-    Args:
-        motion: Its contact moments are about the planned contacts' origins.
-        schedule: The planned contacts; after a lift-off the moments stay about the contact left for 0.1 s.
+    Its moments are about the origins of the planned contacts, for 0.1 s after a lift-off the contact left.
     """
     total = np.zeros((len(motion.time), 6))
     for column, name in enumerate(motion.contact_names):

@@ -42,21 +42,14 @@ STATURE_RANGE, SOLE_LENGTH_RANGE, SOLE_WIDTH_RANGE = (1.40, 2.10), (0.15, 0.40),
 """Accepted stature and size of the soles [m]."""
 MASS_RANGE, BODY_MASS_INDEX_RANGE = (35.0, 160.0), (10.0, 60.0)
 """Accepted body mass [kg] and mass / stature^2 [kg/m^2]."""
-
-ANKLE_HEIGHT = 0.043
-"""Ankle joint above the sole, per stature."""
-ANKLE_FROM_HEEL = 0.26
-"""Ankle joint in front of the heel, per sole length."""
-TOE_HINGE_FROM_HEEL = 0.73
-"""Metatarsal line in front of the heel, per sole length."""
-TOES_MASS_SHARE = 0.10
-"""Mass of the toes per mass of the foot."""
+ANKLE_HEIGHT, NECK_RADIUS = 0.043, 0.034
+"""Ankle joint above the sole and radius of the neck, per stature."""
+ANKLE_FROM_HEEL, TOE_HINGE_FROM_HEEL = 0.26, 0.73
+"""Ankle joint and metatarsal line in front of the heel, per sole length."""
+TOES_MASS_SHARE, NECK_MASS_SHARE = 0.10, 0.20
+"""Mass of the toes per mass of the foot, and of the neck per mass of head and neck."""
 NECK_LENGTH_SHARE = 1.0 / 3.0
 """Length of the neck per cervicale-vertex length."""
-NECK_MASS_SHARE = 0.20
-"""Mass of the neck per mass of head and neck."""
-NECK_RADIUS = 0.034
-"""Radius of the neck, per stature."""
 HIP_JOINT_DISTANCE = 0.100
 """Distance of the hip joint centres, per stature."""
 

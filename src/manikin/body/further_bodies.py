@@ -76,10 +76,8 @@ PARTS: Mapping[str, PartSize] = MappingProxyType({
 
 SHOULDER_WIDTH, HIP_WIDTH = 0.40, 0.30
 """Distances between the shoulder joints and between the hip joints [m] ([Kudoh2002]_ 3.2)."""
-
 MASS = 70.0
 """Mass of the whole body [kg]."""
-
 ANKLE_HEIGHT, SOLE_WIDTH = 0.07, 0.10
 """Height of the ankle above the sole and width of the sole [m]; ours, the thesis has neither."""
 

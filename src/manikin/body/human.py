@@ -36,12 +36,13 @@ from manikin.body.strength import AGE_RANGE, DEFAULT_AGE, HANDS, carrying, hinge
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, finite_number, skew
 
-_SOFT_PAIRS = (
+_SOFT_PAIRS = frozenset(frozenset(pair) for pair in (
     # One short link apart: the shapes overlap in ordinary postures.
-    ("pelvis", "thorax"), ("lumbar", "neck"), ("thorax", "head"), ("leg", "toes"),
+    ("pelvis", "thorax"), ("lumbar", "neck"), ("thorax", "head"),
+    ("left_leg", "left_toes"), ("right_leg", "right_toes"),
     # Belly and thigh are soft and press against each other in every deep crouch.
-    ("lumbar", "thigh"),
-)  # fmt: skip
+    ("lumbar", "left_thigh"), ("lumbar", "right_thigh"),
+))  # fmt: skip
 
 _ARM_SPREAD = np.deg2rad(14.0)
 
@@ -121,7 +122,7 @@ def human(
     builder = _HumanBuilder(size, off_axis_masses, age, strength)
     effectors = {effector.name: effector for effector in builder.effectors()}
     return BodyModel(
-        "human", builder.segments(), effectors, standing_angles(), _soft_pairs(), size.stature, str(size.sex),
+        "human", builder.segments(), effectors, standing_angles(), _SOFT_PAIRS, size.stature, str(size.sex),
         size.sole_length, size.sole_width, nominal_mass=size.mass,
         limbs=arms_and_legs(("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot")), age=age,
         strength=strength, lengths=size.lengths, off_axis_masses=off_axis_masses,
@@ -161,15 +162,6 @@ def standing_angles() -> dict[str, float]:
     angles["shoulder_flexion"] = float(np.arctan2(arm @ spread, -arm[2]))
     angles["shoulder_abduction"] = float(np.arcsin(arm @ -lift))
     return {f"{side}_{name}": angle for side in ("left", "right") for name, angle in angles.items()}
-
-
-def _soft_pairs() -> frozenset[frozenset[str]]:
-    sided = {name for name in HUMAN_HINGES if name not in ("lumbar", "thorax", "neck")}
-    return frozenset(
-        frozenset(f"{side}_{name}" if name in sided else name for name in pair)
-        for pair in _SOFT_PAIRS
-        for side in ("left", "right")
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ Two kinds of published values are used:
   [Anderson2007]_ Table 3 for three age groups of each sex. Between the ages that stand for the groups it
   changes linearly (our choice of the ages), outside of them it stays.
 * All other joints: N.m per kilogram of body mass of young men. A torque that was printed in N.m is divided by
-  :data:`PRINTED_FOR` (ours). Women have the share of :data:`WOMEN` of the men's value; both fall with age as
+  :data:`PRINTED_FOR` (ours). Women have the share of :class:`Women` of the men's value; both fall with age as
   :func:`age_factor` says ([DanneskioldSamsoe2009]_).
 
 The values are means of healthy adults, who differ among themselves by 20 to 30 % of the mean
@@ -19,7 +19,7 @@ Also a load in the hands: a point mass at the palms that moves with them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import StrEnum
+from enum import Enum, StrEnum
 from types import MappingProxyType
 
 import numpy as np
@@ -50,25 +50,19 @@ class Grade(StrEnum):
     ESTIMATE = "estimate"
 
 
-class Women(StrEnum):
-    """Part of the body in which women have a certain share of men's strength."""
+class Women(Enum):
+    """Women's torque per kg over men's in a part of the body.
 
-    GENERAL = "general"
-    SHOULDER = "shoulder"
-    FOREARM = "forearm"
-    WRIST = "wrist"
+    Torques: 1/1.75, the middle of [DanneskioldSamsoe2009]_ (men 1.5 to 2 times as strong); shoulder 0.5
+    (Clin. Biomech. 1989, doi 10.1016/0268-0033(89)90046-6, and :data:`SHOULDER_STUDY`); forearm 1/1.7
+    (Axelsson et al. 2018); wrist 0.786 per kg (J. Funct. Morphol. Kinesiol. 10:377, 2025).
+    """
 
+    GENERAL = MEAN_MEN_PER_WOMEN / 1.75
+    SHOULDER = MEAN_MEN_PER_WOMEN * 0.5
+    FOREARM = MEAN_MEN_PER_WOMEN / 1.7
+    WRIST = 0.786
 
-WOMEN: Mapping[Women, float] = MappingProxyType({
-    Women.GENERAL: MEAN_MEN_PER_WOMEN / 1.75,
-    Women.SHOULDER: MEAN_MEN_PER_WOMEN * 0.5,
-    Women.FOREARM: MEAN_MEN_PER_WOMEN / 1.7,
-    Women.WRIST: 0.786,
-})  # fmt: skip
-"""Women's torque per kg over men's. Torques: 1/1.75, the middle of [DanneskioldSamsoe2009]_ (men 1.5 to
-2 times as strong); shoulder 0.5 (Clin. Biomech. 1989, doi 10.1016/0268-0033(89)90046-6, and
-:data:`SHOULDER_STUDY`); forearm 1/1.7 (Axelsson et al. 2018); wrist 0.786 per kg (J. Funct. Morphol.
-Kinesiol. 10:377, 2025)."""
 
 ANDERSON = "Anderson et al. 2007, Table 3"
 HARBO = "Harbo et al. 2012, men of 25 y, 1.80 m, 80 kg"
@@ -114,7 +108,7 @@ class MassStrength:
 
     def torque(self, mass: float, stature: float, sex: str, age: float) -> float:  # noqa: ARG002
         """Torque of a person [N.m]."""
-        share = WOMEN[self.women] if sex == "female" else 1.0
+        share = self.women.value if sex == "female" else 1.0
         return self.per_kg * mass * share * age_factor(sex, age)
 
 
@@ -133,11 +127,13 @@ def _harbo(per_kg: float, women: Women = Women.GENERAL) -> MassStrength:
     return MassStrength(per_kg, HARBO, Grade.QUOTED, women)
 
 
-_HIGHER = 0.75
-_THORAX = "0.75 of the lumbar's: the same muscles, fewer of them"
 _TRUNK_TURN = _estimate(1.25, "young men, quoted without a source")
 _TRUNK_SIDE = _printed(159.0, STOBBE, Grade.QUOTED)
 _TRUNK_BEND, _TRUNK_EXTEND = (_printed(value, STOBBE, Grade.QUOTED) for value in (143.0, 234.0))
+_THORAX_EXTEND, _THORAX_BEND, _THORAX_SIDE, _THORAX_TURN = (
+    _estimate(0.75 * lumbar.per_kg, "0.75 of the lumbar's: the same muscles, fewer of them")
+    for lumbar in (_TRUNK_EXTEND, _TRUNK_BEND, _TRUNK_SIDE, _TRUNK_TURN)
+)
 _KNEE_TURN = _estimate(0.70, "muscles 0.35 (Armour et al. 2004, quoted), as much by the ligaments under load")
 _FOOT_SIDE = "quoted without a source"
 
@@ -145,14 +141,12 @@ HUMAN_STRENGTH: Mapping[str, tuple[DirectionStrength, DirectionStrength]] = Mapp
     "lumbar_flexion": (_TRUNK_EXTEND, _TRUNK_BEND),
     "lumbar_side_bend": (_TRUNK_SIDE, _TRUNK_SIDE),
     "lumbar_rotation": (_TRUNK_TURN, _TRUNK_TURN),
-    "thorax_flexion": (
-        _estimate(_HIGHER * _TRUNK_EXTEND.per_kg, _THORAX), _estimate(_HIGHER * _TRUNK_BEND.per_kg, _THORAX),
-    ),
-    "thorax_side_bend": (_estimate(_HIGHER * _TRUNK_SIDE.per_kg, _THORAX),) * 2,
-    "thorax_rotation": (_estimate(_HIGHER * _TRUNK_TURN.per_kg, _THORAX),) * 2,
+    "thorax_flexion": (_THORAX_EXTEND, _THORAX_BEND),
+    "thorax_side_bend": (_THORAX_SIDE, _THORAX_SIDE),
+    "thorax_rotation": (_THORAX_TURN, _THORAX_TURN),
     "neck_flexion": (_printed(51.0, FICE, Grade.PAPER), _printed(30.0, FICE, Grade.PAPER)),
-    "neck_side_bend": (_printed(32.0, FICE, Grade.PAPER),) * 2,
-    "neck_rotation": (_printed(13.0, FICE, Grade.PAPER),) * 2,
+    "neck_side_bend": (_printed(32.0, FICE, Grade.PAPER), _printed(32.0, FICE, Grade.PAPER)),
+    "neck_rotation": (_printed(13.0, FICE, Grade.PAPER), _printed(13.0, FICE, Grade.PAPER)),
     "shoulder_flexion": (
         _harbo(1.25, Women.SHOULDER), _printed(89.9, SHOULDER_STUDY, Grade.PAPER, Women.SHOULDER),
     ),

@@ -113,18 +113,14 @@ def _around(points: FloatArray) -> UrdfShape:
     along = int(np.argmax(extents))
     radius, length = _capsule(local, along)
     reach = max(float(np.linalg.norm(local, axis=1).max()), _THINNEST)
-    volumes = {
-        ShapeKind.BOX: float(np.prod(extents)),
-        ShapeKind.CAPSULE: np.pi * radius**2 * (length + 4.0 / 3.0 * radius),
-        ShapeKind.SPHERE: 4.0 / 3.0 * np.pi * reach**3,
-    }
-    kind = min(volumes, key=lambda item: volumes[item])
-    if kind is ShapeKind.BOX:
-        return UrdfShape(kind, extents, turn, centre)
-    if kind is ShapeKind.SPHERE:
-        return UrdfShape(kind, np.array([reach]), np.eye(3), centre)
-    upright = np.roll(np.eye(3), along - 2, axis=0)
-    return UrdfShape(kind, np.array([radius, length]), turn @ upright, centre)
+    capsule, volume = np.array([radius, length]), np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
+    upright = turn @ np.roll(np.eye(3), along - 2, axis=0)
+    shapes = (
+        (float(np.prod(extents)), UrdfShape(ShapeKind.BOX, extents, turn, centre)),
+        (volume, UrdfShape(ShapeKind.CAPSULE, capsule, upright, centre)),
+        (4.0 / 3.0 * np.pi * reach**3, UrdfShape(ShapeKind.SPHERE, np.array([reach]), np.eye(3), centre)),
+    )
+    return min(shapes, key=lambda item: item[0])[1]
 
 
 def _capsule(local: FloatArray, along: int) -> tuple[float, float]:

@@ -304,7 +304,7 @@ def grasp(
         rotation: (3, 3) contact-to-world rotation that the hand should have; free when omitted.
 
     Raises:
-        ContactError: If a value is not finite or out of its range.
+        ContactError: If a value is out of its range.
     """
     where, turn = f"grasp '{effector}'", np.eye(3) if rotation is None else rotation
     return Contact(
@@ -336,12 +336,9 @@ def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
     moment about its edge. A torsion limit is dropped, as the friction of fewer points is less.
 
     Args:
-        contact: A full sole.
+        contact: A full sole; ContactError for any other contact.
         part: What touches.
-        hinge: Where the hinge of the toes crosses the sole's x axis [m].
-
-    Raises:
-        ContactError: If the contact is no whole sole or the hinge lies beyond it.
+        hinge: Where the hinge of the toes crosses the sole's x axis [m]; ContactError beyond it.
     """
     where = f"{part} of '{contact.effector}'"
     if contact.kind is not ContactKind.SOLE or contact.part is not SolePart.FULL:

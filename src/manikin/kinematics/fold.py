@@ -12,21 +12,18 @@ from functools import lru_cache
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import end_segments
 from manikin.body.segments import Shape, ShapeKind
 from manikin.contact import Contact, sole
 from manikin.errors import BodyError
-from manikin.kinematics.posture_problem import PostureProblem, com_target
+from manikin.kinematics.posture_problem import PostureProblem, com_target, touching_pairs
 from manikin.kinematics.posture_search import PostureResult, SolverSettings, generate_posture
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 HEAD_CLEARANCE = 0.03
 """Distance kept from the ceiling [m]."""
-
 HABIT = 0.5
 """Posture of recorded people between the squat (0) and the stoop on straight legs (1)."""
-
 FEET_APART = 0.115
 """Distance of the soles' centres over stature."""
 
@@ -87,21 +84,13 @@ def _squat(body: BodyModel, height: float) -> tuple[FloatArray, float]:
     that the result does not jump between unlike postures.
     """
     q, lowest = body.standing_posture(), np.inf
-    for ceiling in _heights(body, height).tolist():
+    top = float(Configuration(body).effector_placement("head")[1][2]) + 2.0 * HEAD_CLEARANCE
+    for ceiling in [*np.arange(top, height, -STEP).tolist(), height]:
         squat = _Folder(body, ceiling).posture(None, q)
         if not squat.succeeded:
             break
         q, lowest = squat.q, ceiling
     return q, lowest
-
-
-def _heights(body: BodyModel, lowest: float) -> FloatArray:
-    """Ceilings from above the standing body down to ``lowest``, at most :data:`STEP` apart [m]."""
-    standing = Configuration(body, body.standing_posture())
-    top = float(standing.effector_placement("head")[1][2]) + 2.0 * HEAD_CLEARANCE
-    if lowest >= top:
-        return np.array([lowest])
-    return np.append(np.arange(top, lowest, -STEP), lowest)
 
 
 class _Folder:
@@ -112,9 +101,7 @@ class _Folder:
         ceiling = Obstacle("ceiling", Box((10.0, 10.0, 1.0)), translation=(0.0, 0.0, height + 0.5))
         self._proximity = Proximity(body, Scene([ceiling]))
         self._feet = tuple(_feet(body))
-        self._ignored = frozenset(
-            (segment, "floor") for contact in self._feet for segment in end_segments(body, contact.effector)
-        )
+        self._ignored = touching_pairs(body, ((foot.effector, "floor") for foot in self._feet))
         self._configuration = Configuration(body)
 
     def posture(self, com_height: float | None, start: FloatArray) -> PostureResult:
@@ -128,7 +115,7 @@ class _Folder:
     def stoop(self, q: FloatArray) -> float:
         """Greatest CoM height found from posture ``q`` on."""
         low = self.com_height(q)
-        high = max(low, 1.1 * float(Configuration(self._body, self._body.standing_posture()).com[2]))
+        high = max(low, 1.1 * float(Configuration(self._body).com[2]))
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             tried = self.posture(middle, q)

@@ -72,7 +72,7 @@ class LegKinematics:
     def segments(self, pelvis: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Rotations (2, n, 3, 3) of thighs and shanks to the world, see :meth:`angles`."""
         a = angles[:, self.slots].transpose(2, 1, 0)
-        thigh = _reflected(pelvis) @ _hip(a[0], a[1], a[2])
+        thigh = _reflected(pelvis) @ bend(-a[0], a[1], -a[2])
         shank = thigh @ _turn(a[3], "y") @ _turn(-a[4], "z")
         return _reflect_right(thigh), _reflect_right(shank)
 
@@ -95,18 +95,18 @@ class LegKinematics:
         size = np.sqrt(dot(line, line))
         reach = np.clip(size, abs(self.thigh - self.shank) + 1e-6, self.length)
         a, b = self.thigh, self.shank
-        bend = np.arccos(np.clip((reach**2 - a**2 - b**2) / (2.0 * a * b), -1.0, 1.0))
+        knee = np.arccos(np.clip((reach**2 - a**2 - b**2) / (2.0 * a * b), -1.0, 1.0))
         # Angle at the hip between the thigh and the line to the ankle, which lies behind it.
-        behind = np.arctan2(b * np.sin(bend), a + b * np.cos(bend))
-        plane = _plane(-line / size[..., None], pelvis[..., 1], foot[..., 0], rotation, bend - behind)
+        behind = np.arctan2(b * np.sin(knee), a + b * np.cos(knee))
+        plane = _plane(-line / size[..., None], pelvis[..., 1], foot[..., 0], rotation, knee - behind)
         thigh = plane @ _turn(-behind, "y")
-        shank = thigh @ _turn(bend, "y") @ _turn(-rotation, "z")
+        shank = thigh @ _turn(knee, "y") @ _turn(-rotation, "z")
         hip, ankle_turn = np.swapaxes(pelvis, -1, -2) @ thigh, np.swapaxes(shank, -1, -2) @ foot
         legs = np.stack([
             np.arctan2(-hip[..., 0, 2], hip[..., 2, 2]),
             np.arcsin(np.clip(-hip[..., 1, 2], -1.0, 1.0)),
             np.arctan2(-hip[..., 1, 0], hip[..., 1, 1]),
-            bend,
+            knee,
             rotation,
             np.arctan2(ankle_turn[..., 2, 0], ankle_turn[..., 0, 0]),
             np.arctan2(ankle_turn[..., 1, 2], ankle_turn[..., 1, 1]),
@@ -157,14 +157,15 @@ def _reflect_right(turns: FloatArray) -> FloatArray:
     return reflected
 
 
-def _hip(flexion: FloatArray, abduction: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Product of turns about -y, x and -z."""
-    cf, sf, ca, sa = np.cos(flexion), np.sin(flexion), np.cos(abduction), np.sin(abduction)
-    cr, sr = np.cos(rotation), np.sin(rotation)
+def bend(flexion: FloatArray, side_bend: FloatArray, twist: FloatArray) -> FloatArray:
+    """(..., 3, 3) turns about y, then x, then z, as of the spine; the hip turns about -y, x, -z."""
+    cy, sy = np.cos(flexion), np.sin(flexion)
+    cx, sx = np.cos(side_bend), np.sin(side_bend)
+    cz, sz = np.cos(twist), np.sin(twist)
     return matrix([
-        [cf * cr + sf * sa * sr, cf * sr - sf * sa * cr, -sf * ca],
-        [-ca * sr, ca * cr, -sa],
-        [sf * cr - cf * sa * sr, sf * sr + cf * sa * cr, cf * ca],
+        [cy * cz + sy * sx * sz, -cy * sz + sy * sx * cz, sy * cx],
+        [cx * sz, cx * cz, -sx],
+        [-sy * cz + cy * sx * sz, sy * sz + cy * sx * cz, cy * cx],
     ])  # fmt: skip
 
 

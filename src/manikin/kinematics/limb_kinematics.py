@@ -176,7 +176,15 @@ class LimbKinematics:
         out = EffectorPlacements(*(np.empty(shape) for shape in ((n, 3), (n, 3, 3), (n, 3, k), (n, 3, k))))
         for start in range(0, n, _BLOCK):
             rows = slice(start, start + _BLOCK)
-            self._place_block(q[rows], out, rows)
+            frames, places = self._frames(q[rows])
+            turn, before = frames[:, -1], frames[:, :-1]
+            axes = (before @ self.axes[..., None])[..., 0]
+            point = turn @ self.tip
+            if len(self):
+                point += places[:, -1]
+            out.positions[rows], out.rotations[rows] = point, turn @ self.tip_rotation
+            out.axes[rows] = axes.transpose(0, 2, 1)
+            out.jacobians[rows] = cross(axes, point[:, None] - places).transpose(0, 2, 1)
         return out
 
     def segment_placements(self, angles: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
@@ -202,18 +210,6 @@ class LimbKinematics:
         for hinge in range(len(self)):
             np.matmul(frames[:, hinge], turns[:, hinge], out=frames[:, hinge + 1])
         return frames, np.cumsum((frames[:, :-1] @ self.offsets[..., None])[..., 0], axis=1)
-
-    def _place_block(self, q: FloatArray, out: EffectorPlacements, rows: slice) -> None:
-        frames, places = self._frames(q)
-        turn, before = frames[:, -1], frames[:, :-1]
-        axes = (before @ self.axes[..., None])[..., 0]
-        point = turn @ self.tip
-        if len(self):
-            point += places[:, -1]
-        out.positions[rows] = point
-        out.rotations[rows] = turn @ self.tip_rotation
-        out.axes[rows] = axes.transpose(0, 2, 1)
-        out.jacobians[rows] = cross(axes, point[:, None] - places).transpose(0, 2, 1)
 
 
 def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:

@@ -101,9 +101,7 @@ class Preferences:
     Attributes:
         hinge: Of every hinge's distance from the reference [1/rad^2].
         hinges: Replaces ``hinge`` for hinges whose name contains the key, the first one that fits.
-        pelvis: Of the pelvis' tilt.
-        trunk: Of the thorax' tilt.
-        head: Of the head's tilt.
+        pelvis, trunk, head: Of the tilts of pelvis, thorax and head.
         arms: Of the upper arms' deviation from hanging.
         grasp: Of a grasping hand's deviation from the orientation its contact gives [1/rad^2].
         damping: Of every change in one iteration; keeps the problem regular.

@@ -40,13 +40,10 @@ a squat, a crouch and a stoop."""
 
 NEAR = 2e-3
 """Violation [m, rad] below which the rest is done by projection onto the requirements."""
-
 MAX_TRUST = 0.8
 """Largest trust region [m, rad]."""
-
 COMPARED = 2
 """Cold starts that must succeed; the better posture is taken, as there are poor local minima."""
-
 PATIENCE = 6
 """Iterations in a row that gain less than half a percent after which a start is given up."""
 
@@ -92,12 +89,9 @@ class PostureResult:
         succeeded: Whether every requirement is met.
         q: (nq,) configuration found.
         error: Largest residual of the requirements [m, rad].
-        clearance: Smallest distance beyond the safety distances [m] among the close pairs;
-            infinite when none is close.
-        closest: The pair of shapes there, or None.
+        clearance: Smallest distance beyond the safety distances [m] among the close pairs, or infinite.
         at_limit: Hinges at an end of their range.
         iterations: Iterations over all starts.
-        misses: What each requirement that is not met misses, worst first.
         failure: None, or the explanation in one line.
     """
 
@@ -105,10 +99,8 @@ class PostureResult:
     q: FloatArray
     error: float
     clearance: float
-    closest: Pair | None
     at_limit: tuple[str, ...]
     iterations: int
-    misses: tuple[str, ...] = ()
     failure: str | None = None
 
 
@@ -118,15 +110,12 @@ def generate_posture(
     """Find a posture.
 
     Args:
-        start: (nq,) where to begin, such as a neighbouring posture; the reference placed over
-            the contacts when omitted.
+        start: (nq,) where to begin, such as a neighbouring posture (BodyError if it is not usable); the
+            reference placed over the contacts when omitted.
 
     Returns:
         A posture that meets all requirements (without ``start`` the better of the first two
         found, by its preferences), otherwise the best attempt with an explanation.
-
-    Raises:
-        BodyError: If ``start`` has another length or is not finite.
     """
     settings = settings or SolverSettings()
     solver = PostureSolver(problem, settings)
@@ -284,17 +273,11 @@ class PostureSolver:
 
     def result(self, iterate: _Iterate, iterations: int) -> PostureResult:
         """Pack the best iterate, with an explanation when it does not meet the requirements."""
-        succeeded = self.meets(iterate)
-        residual = iterate.clearance.residual
-        worst = int(np.argmin(residual)) if len(residual) else -1
-        misses = () if succeeded else self._misses(iterate)
-        limits = self._limits.at_limit(self._configuration.update(iterate.q))
-        clearance, pair = (residual[worst], iterate.pairs[worst]) if worst >= 0 else (np.inf, None)
-        failure = None if succeeded else self._explanation(misses, limits)
-        q = frozen_array(iterate.q, "posture q")
-        return PostureResult(
-            succeeded, q, iterate.error, float(clearance), pair, limits, iterations, misses, failure
-        )
+        succeeded, q = self.meets(iterate), frozen_array(iterate.q, "posture q")
+        limits = self._limits.at_limit(self._configuration.update(q))
+        failure = None if succeeded else self._explanation(iterate, limits)
+        clearance = float(iterate.clearance.residual.min(initial=np.inf))
+        return PostureResult(succeeded, q, iterate.error, clearance, limits, iterations, failure)
 
     def _merit(self, iterate: _Iterate) -> float:
         intrusion = np.minimum(iterate.clearance.residual - self.settings.buffer, 0.0)
@@ -311,7 +294,11 @@ class PostureSolver:
         hessian = wish_jacobian.T @ weighted + rho * (jacobian.T @ jacobian) + damping
         gradient = (weighted.T @ wish if wishes else 0.0) + rho * (jacobian.T @ residual)
         distance, slope = iterate.clearance
-        bounds = self._bounds(iterate.q, trust)
+        angles, limits = iterate.q[7:], self._limits
+        lower, upper = np.full(nv, -trust), np.full(nv, trust)  # the trust region, cut by the hinge ranges
+        lower[6:] = np.maximum(lower[6:], np.minimum(limits.lower - angles, 0.0))
+        upper[6:] = np.minimum(upper[6:], np.maximum(limits.upper - angles, 0.0))
+        bounds = lower, upper
         program = solve_qp(hessian, gradient, slope, buffer - distance, None, bounds, softness=1.0 / rho)
         step = program.x if program.solved else np.zeros(nv)
         hard = np.sum((residual + jacobian @ step) ** 2)
@@ -319,16 +306,8 @@ class PostureSolver:
         soft = np.sum(self._wish_weights * (wish + wish_jacobian @ step) ** 2)
         return step, float(0.5 * soft + 0.5 * rho * hard)
 
-    def _bounds(self, q: FloatArray, trust: float) -> tuple[FloatArray, FloatArray]:
-        """Trust region cut by the hinge ranges."""
-        angles, limits, nv = q[7:], self._limits, self.problem.body.nv
-        lower, upper = np.full(nv, -trust), np.full(nv, trust)
-        lower[6:] = np.maximum(lower[6:], np.minimum(limits.lower - angles, 0.0))
-        upper[6:] = np.minimum(upper[6:], np.maximum(limits.upper - angles, 0.0))
-        return lower, upper
-
-    def _misses(self, iterate: _Iterate) -> tuple[str, ...]:
-        """Descriptions of the requirements that are not met, worst first."""
+    def _explanation(self, iterate: _Iterate, limits: tuple[str, ...]) -> str:
+        """The worst requirements that are not met, the ends of ranges, and what stands in the way."""
         misses: list[tuple[float, str]] = []
         for term, part in zip(self.requirements, iterate.parts, strict=True):
             residual = iterate.requirement.residual[part]
@@ -338,17 +317,13 @@ class PostureSolver:
         if self._clearances is not None and iterate.intrusion > self.settings.clearance_tolerance:
             text = self._clearances.describe(iterate.clearance.residual, iterate.pairs)
             misses.append((iterate.intrusion, text))
-        return tuple(text for _, text in sorted(misses, key=lambda item: -item[0]))
-
-    def _explanation(self, misses: tuple[str, ...], limits: tuple[str, ...]) -> str:
-        text = "; ".join(misses[:2])
+        text = "; ".join(miss for _, miss in sorted(misses, key=lambda item: -item[0])[:2])
         if limits:
             text += f"; at the end of their range: {', '.join(limits[:6])}"
-        if self.settings.explain:
-            quick = replace(self.settings, explain=False)
-            for name, lighter in without_one(self.problem):
-                if generate_posture(lighter, settings=quick).succeeded:
-                    return f"{text}; a posture exists without {name}"
+        quick = replace(self.settings, explain=False)
+        for name, lighter in without_one(self.problem) if self.settings.explain else ():
+            if generate_posture(lighter, settings=quick).succeeded:
+                return f"{text}; a posture exists without {name}"
         return text
 
 

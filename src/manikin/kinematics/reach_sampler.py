@@ -19,34 +19,22 @@ from manikin.body.limbs import REFLECTION, hinge_line
 from manikin.body.segments import Limb
 from manikin.contact import ContactKind, SolePart
 from manikin.errors import BodyError
-from manikin.kinematics.leg_kinematics import LegKinematics
+from manikin.kinematics.leg_kinematics import LegKinematics, bend
 from manikin.kinematics.limb_kinematics import LimbKinematics, ReachVolume, reach_volume, rigid_reach
-from manikin.numerics.spatial import FloatArray, dot, matrix, rotations
+from manikin.numerics.spatial import FloatArray, dot, rotations
 
 SAMPLES, ROUNDS, OUTWARD = 600, 10, 12
 """Postures of one round of sampling, rounds towards the contacts at most, and rounds outwards."""
-
-ENOUGH = 150
-"""Postures that are enough to begin the search outwards."""
-
-ELITE = 60
-"""Postures that violate least, from whose neighbourhood the next round is sampled."""
-
+ENOUGH, ELITE = 150, 60
+"""Postures that are enough to begin the search outwards, and the best, near which the next are sampled."""
 OUTERMOST = 10
 """Outermost postures along each direction, whose differences are the steps of the next round."""
-
 RANGE_MARGIN = 0.05
 """Angle that joints keep from the ends of their ranges [rad], as the postures of contact plans do."""
-
-VOLUME_MARGIN = 0.02
-"""Distance that effectors keep inside their limbs' volumes [m], of a body of 1.75 m."""
-
-LEGS_APART = 0.10
-"""Least distance of the shanks' middle lines [m], of a body of 1.75 m; our choice, a slim shank's breadth."""
-
+VOLUME_MARGIN, LEGS_APART = 0.02, 0.10
+"""Distance of effectors inside their limbs' volumes, and of the shanks' middle lines, at 1.75 m [m]; ours."""
 HEEL_UP, TOES_UP = 0.9, 0.45
 """Largest pitches of a foot that stands on its toes and of one that stands on its heel [rad]."""
-
 BEYOND = 3.0
 """Violation of a contact that is missed by a metre [rad]."""
 
@@ -102,7 +90,7 @@ class ReachBody:
         except BodyError:
             self.legs = None
         self.spine = set(_SPINE) <= {segment.name for segment in body.segments}
-        state = Configuration(body, body.standing_posture())
+        state = Configuration(body)
         far = max(
             (float(np.linalg.norm(state.effector_placement(e)[1] - state.q[:3])) for e in body.effectors),
             default=1.0,
@@ -110,7 +98,6 @@ class ReachBody:
         self.scale = far if body.stature is None else body.stature / 1.75
         frames = _SPINE if self.spine else (body.segments[0].name,)
         self.masses, self.coms, self.origins = _trunk_masses(body, state, frames, self.legs is not None)
-        self.leg_masses, self.leg_coms = np.zeros(2), np.zeros((2, 3))
         if self.legs is not None:
             self.leg_masses, self.leg_coms = _leg_masses(body)
         self._volumes: dict[str, tuple[ReachVolume, float]] = {}
@@ -141,7 +128,7 @@ class ReachBody:
             share = _THORAX_SHARE if number == 2 else 1.0
             twist = (1.0 if number == 2 else _LUMBAR_TWIST) * spine[:, 2]
             places.append(places[-1] + frames[-1] @ self.origins[number])
-            frames.append(frames[-1] @ _bend(share * spine[:, 0], share * spine[:, 1], twist))
+            frames.append(frames[-1] @ bend(share * spine[:, 0], share * spine[:, 1], twist))
         parts = zip(self.masses, frames, places, self.coms, strict=True)
         com = sum(mass * (origin + frame @ com) for mass, frame, origin, com in parts)
         return frames, places, np.asarray(com)
@@ -254,7 +241,12 @@ class ReachSampler:
         for _ in range(ROUNDS):
             if np.count_nonzero(violation <= 0.0) >= ENOUGH:
                 break
-            fresh = self._nearer(x[np.argsort(violation, kind="stable")[:ELITE]], low, high)
+            # In the box of the best ones, made a little wider.
+            best = x[np.argsort(violation, kind="stable")[:ELITE]]
+            first, last = best.min(axis=0), best.max(axis=0)
+            wider = 0.15 * (last - first)
+            a, b = np.maximum(first - wider, low), np.minimum(last + wider, high)
+            fresh = self._rng.uniform(a, b, (SAMPLES, len(low)))
             more, beyond = self._evaluate(fresh)
             x, projections = np.vstack([x, fresh]), np.vstack([projections, more])
             violation = np.concatenate([violation, beyond])
@@ -272,12 +264,6 @@ class ReachSampler:
 
     def _first(self, low: FloatArray, high: FloatArray) -> FloatArray:
         return self._rng.uniform(low, high, (2 * SAMPLES, len(low)))
-
-    def _nearer(self, best: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-        """New unknowns in the box of the best ones, made a little wider."""
-        width = best.max(axis=0) - best.min(axis=0)
-        a, b = best.min(axis=0) - 0.15 * width, best.max(axis=0) + 0.15 * width
-        return self._rng.uniform(np.maximum(a, low), np.minimum(b, high), (SAMPLES, len(low)))
 
     def _farther(self, x: FloatArray, outermost: NDArray[np.int64]) -> FloatArray:
         """New unknowns near those (m, k) that are outermost along each direction: differential evolution."""
@@ -401,18 +387,6 @@ class ReachSampler:
     def _placed(self, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
         """Place and axes of a contact, the same for all unknowns or (n, ...)."""
         return contact.position, contact.rotation
-
-
-def _bend(flexion: FloatArray, side_bend: FloatArray, twist: FloatArray) -> FloatArray:
-    """(n, 3, 3) turns about y, then x, then z, as the hinges of the spine are."""
-    cy, sy = np.cos(flexion), np.sin(flexion)
-    cx, sx = np.cos(side_bend), np.sin(side_bend)
-    cz, sz = np.cos(twist), np.sin(twist)
-    return matrix([
-        [cy * cz + sy * sx * sz, -cy * sz + sy * sx * cz, sy * cx],
-        [cx * sz, cx * cz, -sx],
-        [-sy * cz + cy * sx * sz, sy * sz + cy * sx * cz, cy * cx],
-    ])  # fmt: skip
 
 
 def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:

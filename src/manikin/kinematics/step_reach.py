@@ -45,10 +45,8 @@ FILE = Path(__file__).with_name("step_reach.npz")
 
 STATURE = 1.75
 """Stature of the bodies whose sets are shipped [m]."""
-
 TURN_LENGTH = 0.4
 """Length that counts as much as a turn by one radian among places of a foot [m/rad]."""
-
 FACES = 100
 """Directions in which a set of places is sampled to its end."""
 
@@ -167,11 +165,13 @@ class _StepSampler(ReachSampler):
 
     def _evaluate(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How far the places are out (n, m), and the largest violation (n,) of unknowns (n, d)."""
-        root = rotations(x[:, 3], x[:, 4], x[:, 5])
+        parts, root = self._parts, rotations(x[:, 3], x[:, 4], x[:, 5])
         legs, violation = self._legs(x, x[:, :3], root)
         place, rotation = self._placed(self._moved, x)
         if self._rest != "anywhere":
-            com = self._coms(x[:, :3], root, legs)
+            # Of the bends of the spine, (n, k, 3).
+            upper = parts.masses.sum() * x[:, None, :3] + parts.bends @ np.swapaxes(root, -1, -2)
+            com = (upper + legs.sum(axis=0)[:, None]) / parts.body.mass
             if self._rest == "moved":
                 com = (com - place[:, None]) @ rotation
             over = np.maximum(np.abs(com[..., :2]) - self._room, 0.0)
@@ -180,11 +180,6 @@ class _StepSampler(ReachSampler):
         apart = segment_distance(place - along, place + along, -here, here)
         violation = np.maximum(violation, BEYOND * (self._width - apart))
         return self._places(x) @ self._normals.T, violation
-
-    def _coms(self, place: FloatArray, root: FloatArray, legs: FloatArray) -> FloatArray:
-        """(n, k, 3) centres of mass of the bends of the spine [m]."""
-        upper = self._parts.masses.sum() * place[:, None] + self._parts.bends @ np.swapaxes(root, -1, -2)
-        return (upper + legs.sum(axis=0)[:, None]) / self._parts.body.mass
 
     def _placed(self, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         if contact is not self._moved:

@@ -13,10 +13,8 @@ from manikin.numerics.spatial import FloatArray
 MOST_STEPS, MOST_ROUNDS = 60, 5
 LEAST_GAIN, ROUGH = 1e-4, 1e-2
 """A step that lowers the cost by a smaller share is the last one, and the last one of a guess."""
-
 LEAST_COST = 1e-10
 """Cost [m^2] below which nothing is left to gain."""
-
 LEAST_DAMPING, FIRST_DAMPING, FAILED_DAMPING, MOST_DAMPING = 1e-8, 1e-6, 1e-3, 1e3
 """Least, at first, least after a step that failed, and beyond which the search gives up [m^2]."""
 
@@ -25,7 +23,7 @@ def search(
     cost: PostureCost, starts: FloatArray, wanted: FloatArray, before: FloatArray,
     least_gain: float = LEAST_GAIN,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """The closest postures by Levenberg-Marquardt, projected onto the joints' ranges.
+    """The closest postures (n, nq) by Levenberg-Marquardt in the joints' ranges, and their costs (n,) [m^2].
 
     The n searches do not depend on each other; together they take less time.
 
@@ -34,9 +32,6 @@ def search(
         wanted: (n, k, 3) positions of the targets [m]; NaN where one is not seen.
         before: (n, nq) postures to stay near.
         least_gain: A step that lowers the cost by a smaller share is the last one.
-
-    Returns:
-        (n, nq) postures and their costs (n,) [m^2].
     """
     held = cost.drawn_to(before)
     now = cost.at(cost.settled(starts, held), held, wanted)
@@ -117,10 +112,8 @@ def _solved(
 
 POOR = 0.05
 """A frame with a point farther away than this [m] is searched from its own start, too."""
-
 APART = 1.0 / 15.0
 """Time between the frames that are searched one by one [s]; those between begin on a curve through them."""
-
 TOGETHER = 128
 """Most frames that are found at once."""
 
