@@ -175,30 +175,24 @@ def _several(
     from joblib import cpu_count
 
     from manikin.analysis import AnalysisJob
-    from manikin.reports.analysis_directory import (
-        AnalysisDirectory,
-        analyze_files,
-        directories_for,
-        overview_of,
-        write_overview,
-    )
+    from manikin.reports import analysis_directory as files
 
     if directory is not None:
-        AnalysisDirectory(directory)
-    folders = [None] * len(paths) if directory is None else directories_for(paths, directory)
+        files.AnalysisDirectory(directory)
+    folders = [None] * len(paths) if directory is None else files.directories_for(paths, directory)
     work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
     began, entries = clock.perf_counter(), {}
     with console.bars(interruption) as progress:
-        for entry in analyze_files(work, options, workers=jobs or cpu_count()):
+        for entry in files.analyze_files(work, options, workers=jobs or cpu_count()):
             entries[entry.job.path] = entry
             if entry.summary is None:
                 console.complain(entry.refusal, console.BAD_INPUT)
             progress("analyze", len(entries) / len(work), entry.job.path.name)
     ordered = [entries[path] for path in paths]
-    overview = overview_of(ordered, clock.perf_counter() - began)
+    overview = files.overview_of(ordered, clock.perf_counter() - began)
     measured, refused = len(overview["files"]), len(overview["refused"])
     if directory is not None:
-        write_overview(ordered, overview, directory)
+        files.write_overview(ordered, overview, directory)
     if json:
         console.print_json(overview)
     else:

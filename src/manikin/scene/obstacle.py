@@ -88,7 +88,7 @@ class HalfSpace(_Endless):
 Shape = Box | Sphere | Cylinder | Capsule | Plane | HalfSpace | Mesh
 
 
-def local_bounds(shape: Shape) -> tuple[FloatArray, FloatArray]:
+def extents(shape: Shape) -> tuple[FloatArray, FloatArray]:
     """Lower and upper corner of the shape in its own frame; infinite for planes and half-spaces."""
     if isinstance(shape, Mesh):
         return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
@@ -166,7 +166,7 @@ class Obstacle(Displayed):
             placed = self.to_world(self.shape.vertices)
             return placed.min(axis=0), placed.max(axis=0)
         if isinstance(self.shape, (Plane, HalfSpace)):
-            return local_bounds(self.shape)
+            return extents(self.shape)
         reach = _reach(self.shape, self.rotation)
         return self.translation - reach, self.translation + reach
 
