@@ -38,11 +38,7 @@ from manikin.scenarios.validation import KeyPath, place
 class ScenarioValues:
     """A checked scenario file and the numbers in it, scaled to the body.
 
-    Attributes:
-        file: The checked content of the scenario file.
-        source: Name of the file, for messages.
-        folder: Folder that relative paths start from.
-        lines: Place (file and line) of each key, for messages.
+    Relative paths start from ``folder``; ``source`` and ``lines``, those of keys, are for messages.
     """
 
     file: ScenarioFile

@@ -102,13 +102,9 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class MeshPiece:
-    """A connected piece of a mesh.
+    """A connected piece of a mesh, of vertices (n, 3) [m] and their indices in each face (m, 3).
 
-    Attributes:
-        vertices: (n, 3) [m].
-        faces: (m, 3) vertex indices, outward when ``closed``.
-        closed: Whether the surface is watertight, so that it has an inside.
-        convex: Whether it is closed and convex.
+    One that is ``closed`` is watertight and has an inside, with faces outward; so is a ``convex`` one.
     """
 
     vertices: FloatArray

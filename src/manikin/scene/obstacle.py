@@ -129,13 +129,9 @@ DRAWN_HALF_SIZE = 10.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Obstacle(Displayed):
-    """A shape of the scene at a fixed placement.
+    """A shape at a fixed placement in the scene, in which its name is unique.
 
-    Attributes:
-        name: Unique in its scene.
-        shape: Box, sphere, cylinder, capsule, plane, half-space or mesh.
-        rotation: (3, 3) shape-to-world rotation.
-        translation: (3,) origin of the shape's frame in the world [m].
+    Its rotation (3, 3) is shape-to-world, its translation (3,) the origin of the shape's frame there [m].
     """
 
     name: str

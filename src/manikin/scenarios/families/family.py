@@ -151,12 +151,7 @@ def _angle(degrees: float) -> float:
 
 @dataclass(frozen=True)
 class Family:
-    """Random scenes of one kind.
-
-    Attributes:
-        name: Short name.
-        draw: Draws one into a sketch; its docstring says what is drawn, and why a person can do it.
-    """
+    """Random scenes of one kind; the docstring of ``draw`` says what is drawn, and why a person can do it."""
 
     name: str
     draw: Callable[[Sketch], None]
