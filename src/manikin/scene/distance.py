@@ -202,8 +202,7 @@ class Proximity(BodyPairs):
     ) -> ProximitySamples:
         """Measure every close pair of (n, nq) configurations, see :meth:`evaluate_placed`.
 
-        Raises:
-            SceneError: If the number of ignore sets is not n, or a sample is not a finite vector.
+        SceneError if the number of ignore sets is not n, or a sample is not a finite vector.
         """
         return self.evaluate_placed(self.place(q_samples), activation, ignore)
 
