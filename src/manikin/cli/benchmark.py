@@ -84,9 +84,8 @@ def _checked(plan: Path, scenario: str | None, *, json: bool) -> int:
     from manikin.scenarios import load_scenario
     from manikin.verification import check_contact_plan, load_contact_plan
 
-    result = check_contact_plan(
-        *load_contact_plan(plan, None if scenario is None else load_scenario(scenario))
-    )
+    job = None if scenario is None else load_scenario(scenario)
+    result = check_contact_plan(*load_contact_plan(plan, job))
     report = result.to_dict()
     if json:
         console.print_json(report)

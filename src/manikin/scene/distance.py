@@ -192,9 +192,8 @@ class Proximity(BodyPairs):
         measured = self._measure(near.tolist(), *_split(placements), activation)
         kept = [row for row, item in enumerate(measured) if item[0] < activation]
         distance = np.array([measured[row][0] for row in kept])
-        normal, on_body, on_other = (
-            np.array([measured[row][part] for row in kept]).reshape(-1, 3) for part in (1, 2, 3)
-        )
+        vectors = (np.array([measured[row][part] for row in kept]).reshape(-1, 3) for part in (1, 2, 3))
+        normal, on_body, on_other = vectors
         return self._result(near[kept], jacobian, distance, (normal, on_body, on_other))
 
     def evaluate_over(
