@@ -132,9 +132,8 @@ def _settings(
     from manikin.recordings.supports.supports import FEET
 
     console.refuse(bar is not None and box is not None, "--bar", "a box is given")
-    overhead = None if bar is None else Overhead(bar)
-    if box is not None:
-        overhead = Overhead(box[4], box[:2], box[2:4])
+    above = None if bar is None else Overhead(bar)
+    overhead = above if box is None else Overhead(box[4], box[:2], box[2:4])
     within = LIMIT if limit is None else finite_number(limit, "--limit [m]", above=0.0)
     active = None if effectors == "all" else FEET
     return StatisticsSettings(overhead, within, active, phases, start, origin=origin)
