@@ -29,12 +29,7 @@ __all__ = ["Balance", "balance", "creature", "grasp", "human", "point", "scene",
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance(Displayed):
-    """Balance of a stance: its margins, and what gives way first.
-
-    Attributes:
-        com: (3,) [m].
-        report: Every criterion.
-    """
+    """Balance of a stance with a CoM (3,) [m]: margins, what gives way first, a report of all criteria."""
 
     stance: Stance
     com: FloatArray

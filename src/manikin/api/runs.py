@@ -33,12 +33,9 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(Displayed):
-    """Result of a run: its verdict, motions and figures.
+    """Result of a run of ``scenario``: its verdict, motions and figures.
 
-    Attributes:
-        summary: As printed by ``manikin run --json``.
-        directory: Where its files are.
-        scenario: What was run.
+    Its files are in ``directory``; ``summary`` is as printed by ``manikin run --json``.
     """
 
     summary: Mapping[str, Any]

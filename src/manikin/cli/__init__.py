@@ -12,21 +12,11 @@ from typing import Annotated
 
 import typer
 
+from manikin.cli import console
 from manikin.cli.analyze import analyze
 from manikin.cli.balance import balance, contact
 from manikin.cli.benchmark import benchmark
-from manikin.cli.console import (
-    BAD_INPUT,
-    DONE,
-    FAILED,
-    INTERRUPTED,
-    Interruption,
-    JsonOption,
-    complain,
-    flag,
-    print_json,
-    print_table,
-)
+from manikin.cli.console import Interruption, JsonOption, flag
 from manikin.cli.ergonomics import ergonomics
 from manikin.cli.push import push
 from manikin.cli.run import run
@@ -57,22 +47,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with Interruption() as interruption:
             given = None if arguments is None else list(arguments)
             status = app(args=given, standalone_mode=False, obj=interruption)
-        if status == INTERRUPTED:  # typer turns Ctrl-C into this status without a word
+        if status == console.INTERRUPTED:  # typer turns Ctrl-C into this status without a word
             raise KeyboardInterrupt
-        return status if isinstance(status, int) else DONE
+        return status if isinstance(status, int) else console.DONE
     except typer.TyperException as error:
         problem = error.format_message().rstrip(".").replace("Value error, ", "")
-        return complain(f"{problem}; see 'manikin --help'", BAD_INPUT)
+        return console.complain(f"{problem}; see 'manikin --help'", console.BAD_INPUT)
     except InputError as error:
-        return complain(str(error), BAD_INPUT)
+        return console.complain(str(error), console.BAD_INPUT)
     except ManikinError as error:
-        return complain(str(error), FAILED)
+        return console.complain(str(error), console.FAILED)
     except (KeyboardInterrupt, typer.Abort):
-        return complain("interrupted; the files of finished stages are kept", INTERRUPTED)
+        return console.complain("interrupted; the files of finished stages are kept", console.INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output has gone, as in "manikin ... | head"; nobody is left to tell.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return INTERRUPTED
+        return console.INTERRUPTED
 
 
 @app.callback(invoke_without_command=True)
@@ -93,13 +83,13 @@ def scenarios(json: JsonOption = False) -> None:
     descriptions = list_scenarios()
     variants = {name: list_variants(name) for name in descriptions}
     if json:
-        print_json({"scenarios": descriptions, "variants": variants})
+        console.print_json({"scenarios": descriptions, "variants": variants})
         return
     rows = {}
     for name, description in descriptions.items():
         rows[name] = description
         rows |= {f"{name}@{variant}": text for variant, text in variants[name].items()}
-    print_table(rows)
+    console.print_table(rows)
 
 
 for _command in (

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from manikin.cli import console
 from manikin.cli.console import (
-    BAD_INPUT,
-    DONE,
-    FAILED,
     FiguresOption,
     Interruption,
     JobsOption,
@@ -18,15 +16,8 @@ from manikin.cli.console import (
     LoadHandOption,
     SexOption,
     argument,
-    bars,
-    complain,
-    directory_of,
     flag,
     option,
-    print_json,
-    print_table,
-    refuse,
-    stdout_kept_clean,
 )
 from manikin.errors import InputError
 
@@ -70,8 +61,8 @@ def analyze(
     """Measure recorded people: supports, timing, balance, forces, effort; one report for each file."""
     single = len(sources) == 1 and not sources[0].is_dir()
     if not single:
-        refuse(plan is not None or execute, "--plan", "there are several files")
-        refuse(frames is not None, "--frames", "there are several files")
+        console.refuse(plan is not None or execute, "--plan", "there are several files")
+        console.refuse(frames is not None, "--frames", "there are several files")
     from manikin.analysis import AnalysisOptions, recordings_in
 
     options = AnalysisOptions(
@@ -80,25 +71,20 @@ def analyze(
     )  # fmt: skip
     paths = recordings_in(sources)
     if not single:
-        directory = directory_of(out, "analysis", json=json)
+        directory = console.directory_of(out, "analysis", json=json)
         return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
-    refuse(jobs is not None, "--jobs", "there is one file")
-    refuse(execute and plan is None, "--execute", "it needs --plan")
-    directory = directory_of(out, f"analysis/{paths[0].stem}", json=json)
+    console.refuse(jobs is not None, "--jobs", "there is one file")
+    console.refuse(execute and plan is None, "--execute", "it needs --plan")
+    directory = console.directory_of(out, f"analysis/{paths[0].stem}", json=json)
     return _one(paths[0], directory, options, (plan, execute), draw=figures, json=json)
 
 
 def _one(
-    path: Path,
-    directory: Path | None,
-    options: Any,
-    plan: "tuple[Method | None, bool]",
-    *,
-    draw: bool,
+    path: Path, directory: Path | None, options: Any, plan: "tuple[Method | None, bool]", *, draw: bool,
     json: bool,
-) -> int:
+) -> int:  # fmt: skip
     method, execute = plan
-    with stdout_kept_clean():
+    with console.stdout_kept_clean():
         from manikin.analysis import analyze_file
         from manikin.reports.analysis_directory import AnalysisDirectory, summary_of, write_analysis
 
@@ -116,17 +102,16 @@ def _one(
     summary = summary_of(result, planned)
     failure = None if planned is None else summary["plan"]["failure"]
     if json:
-        print_json(summary)
+        console.print_json(summary)
     else:
-        print_table(_shown(summary))
+        console.print_table(_shown(summary))
         for remark in summary["remarks"]:
             typer.echo(f"note: {remark}", err=True)
         if failure:
             typer.echo(f"no plan: {failure}", err=True)
-        typer.echo(
-            f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True
-        )
-    return FAILED if failure else DONE
+        view = f"see the motion with: manikin view {directory}"
+        typer.echo(f"report in {directory}/report.html; {view}", err=True)
+    return console.FAILED if failure else console.DONE
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:
@@ -157,9 +142,8 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         )
     for name in ("rula", "reba"):
         if (score := effort[name]) is not None:
-            shown[name.upper()] = (
-                f"{score['max']} at {score['max_at_s']:.2f} s, {score['mean']:.1f} on average"
-            )
+            worst = f"{score['max']} at {score['max_at_s']:.2f} s"
+            shown[name.upper()] = f"{worst}, {score['mean']:.1f} on average"
     if (strength := effort["strength"]) is not None:
         share, joint = 100.0 * strength["max_share"], strength["max_joint"]
         shown["largest torque"] = f"{share:.0f} % of strength, {joint} at {strength['max_at_s']:.2f} s"
@@ -179,10 +163,8 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
             f"CoP {1e3 * plates['cop_rms_m']:.0f} mm (RMS)"
         )
     if plates["torques"]:
-        apart = ", ".join(
-            f"{joint.replace('_', ' ')} {item['rms_Nm']:.0f}" for joint, item in plates["torques"].items()
-        )
-        shown["plates: torques"] = f"{apart} N.m (RMS)"
+        apart = [f"{key.replace('_', ' ')} {item['rms_Nm']:.0f}" for key, item in plates["torques"].items()]
+        shown["plates: torques"] = f"{', '.join(apart)} N.m (RMS)"
     return shown
 
 
@@ -193,32 +175,26 @@ def _several(
     from joblib import cpu_count
 
     from manikin.analysis import AnalysisJob
-    from manikin.reports.analysis_directory import (
-        AnalysisDirectory,
-        analyze_files,
-        directories_for,
-        overview_of,
-        write_overview,
-    )
+    from manikin.reports import analysis_directory as files
 
     if directory is not None:
-        AnalysisDirectory(directory)
-    folders = [None] * len(paths) if directory is None else directories_for(paths, directory)
+        files.AnalysisDirectory(directory)
+    folders = [None] * len(paths) if directory is None else files.directories_for(paths, directory)
     work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
     began, entries = clock.perf_counter(), {}
-    with bars(interruption) as progress:
-        for entry in analyze_files(work, options, workers=jobs or cpu_count()):
+    with console.bars(interruption) as progress:
+        for entry in files.analyze_files(work, options, workers=jobs or cpu_count()):
             entries[entry.job.path] = entry
             if entry.summary is None:
-                complain(entry.refusal, BAD_INPUT)
+                console.complain(entry.refusal, console.BAD_INPUT)
             progress("analyze", len(entries) / len(work), entry.job.path.name)
     ordered = [entries[path] for path in paths]
-    overview = overview_of(ordered, clock.perf_counter() - began)
+    overview = files.overview_of(ordered, clock.perf_counter() - began)
     measured, refused = len(overview["files"]), len(overview["refused"])
     if directory is not None:
-        write_overview(ordered, overview, directory)
+        files.write_overview(ordered, overview, directory)
     if json:
-        print_json(overview)
+        console.print_json(overview)
     else:
         recorded, wall = overview["duration_s"], overview["wall_s"]
         typer.echo(f"{measured} recordings of {recorded:.0f} s measured in {wall:.1f} s, {refused} refused")
@@ -226,4 +202,4 @@ def _several(
             typer.echo(f"overview in {directory}/index.html", err=True)
     if not measured:
         raise InputError(f"none of the {refused} files could be measured; valid: recordings, see above")
-    return BAD_INPUT if refused else DONE
+    return console.BAD_INPUT if refused else console.DONE

@@ -5,17 +5,8 @@ from typing import Annotated
 
 import typer
 
-from manikin.cli.console import (
-    DONE,
-    FAILED,
-    JsonOption,
-    argument,
-    flag,
-    flattened,
-    option,
-    print_report,
-    stdout_kept_clean,
-)
+from manikin.cli import console
+from manikin.cli.console import JsonOption, argument, flag, option
 
 
 def balance(
@@ -26,9 +17,9 @@ def balance(
     """Polytope and margins of one stance and centre-of-mass state."""
     from manikin.scenarios.stance_file import judge_stance_file
 
-    with stdout_kept_clean():
+    with console.stdout_kept_clean():
         report = judge_stance_file(stance).as_dict(polytope=polytope and json)
-    print_report(report, flattened(report), json=json)
+    console.print_report(report, console.flattened(report), json=json)
 
 
 def contact(
@@ -57,7 +48,7 @@ def contact(
     from manikin.scenarios.world import contact_rules, start_posture
 
     job = load_scenario(scenario)
-    with stdout_kept_clean():
+    with console.stdout_kept_clean():
         body, scene = job.build_body(), job.build_scene()
         q = start_posture(job, body, scene, at=at, heading_deg=heading, posture=posture)
         question = ContactQuestion.of(
@@ -69,7 +60,7 @@ def contact(
 
             write_contact_figure(body, scene, answer, figure)
     report = answer.as_dict()
-    print_report(report, {key: value for key, value in report.items() if key != "q"}, json=json)
+    console.print_report(report, {key: value for key, value in report.items() if key != "q"}, json=json)
     if not (json or report["found"]):
         typer.echo(f"no contact: {report['failure']}", err=True)
-    return DONE if report["found"] else FAILED
+    return console.DONE if report["found"] else console.FAILED

@@ -6,20 +6,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from manikin.cli.console import (
-    DONE,
-    FAILED,
-    JobsOption,
-    JsonOption,
-    OutOption,
-    argument,
-    bars,
-    directory_of,
-    flag,
-    option,
-    print_json,
-    print_report,
-)
+from manikin.cli import console
+from manikin.cli.console import JobsOption, JsonOption, OutOption, argument, flag, option
 from manikin.errors import InputError
 
 
@@ -61,14 +49,14 @@ def benchmark(
     numbers = range(first_seed, first_seed + seeds)
     if list_families:
         descriptions = {name: family.description for name, family in FAMILIES.items()}
-        print_report({"families": descriptions}, descriptions, json=json)
-        return DONE
+        console.print_report({"families": descriptions}, descriptions, json=json)
+        return console.DONE
     if write_scenes is not None:
         tasks.write_scenes(chosen, numbers, write_scenes)
         typer.echo(f"{len(chosen) * seeds} scenes in {write_scenes}", err=True)
-        return DONE
-    directory = directory_of(out, "benchmark", json=json)
-    with bars(context.obj) as progress:
+        return console.DONE
+    directory = console.directory_of(out, "benchmark", json=json)
+    with console.bars(context.obj) as progress:
 
         def report(entry: Mapping[str, Any], done: int, count: int) -> None:
             progress("benchmark", done / count, f"{done} of {count}, {entry['family']}-{entry['seed']}")
@@ -82,12 +70,12 @@ def benchmark(
 
     page = None if directory is None else write_benchmark_page(directory, result)
     if json:
-        print_json(result)
-        return DONE
+        console.print_json(result)
+        return console.DONE
     typer.echo("\n".join([family_table(result), *failure_lines(result)]))
     if page is not None:
         typer.echo(f"report: {page}")
-    return DONE
+    return console.DONE
 
 
 def _checked(plan: Path, scenario: str | None, *, json: bool) -> int:
@@ -96,12 +84,11 @@ def _checked(plan: Path, scenario: str | None, *, json: bool) -> int:
     from manikin.scenarios import load_scenario
     from manikin.verification import check_contact_plan, load_contact_plan
 
-    result = check_contact_plan(
-        *load_contact_plan(plan, None if scenario is None else load_scenario(scenario))
-    )
+    job = None if scenario is None else load_scenario(scenario)
+    result = check_contact_plan(*load_contact_plan(plan, job))
     report = result.to_dict()
     if json:
-        print_json(report)
+        console.print_json(report)
     else:
         typer.echo("\n".join([result.verdict, *requirement_lines(report["requirements"])]))
-    return DONE if result.held else FAILED
+    return console.DONE if result.held else console.FAILED

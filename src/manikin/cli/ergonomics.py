@@ -5,17 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from manikin.cli.console import (
-    JsonOption,
-    LoadHandOption,
-    MotionArgument,
-    flag,
-    flattened,
-    option,
-    print_json,
-    print_table,
-    stdout_kept_clean,
-)
+from manikin.cli import console
+from manikin.cli.console import JsonOption, LoadHandOption, MotionArgument, flag, option
 from manikin.errors import InputError
 
 _SCORE = ("max", "max_at_s", "max_side", "mean", "action_level", "action", "share_of_time")
@@ -83,7 +74,7 @@ def ergonomics(
         carried, load_pattern, coupling, static, repeated, rapid, raised, supported,
         neck_upright_deg=neck,
     )  # fmt: skip
-    with stdout_kept_clean():
+    with console.stdout_kept_clean():
         result = ergonomics_of(body, motion, schedule=content.schedule, given=given, fraction=fraction)
     if csv is not None:
         from manikin.runtime.files import write_result
@@ -95,7 +86,7 @@ def ergonomics(
         save_figure(ergonomics_figure(result, f"Ergonomics of {source.resolve().stem}, {which}"), figure)
     report = {"motion": which} | result.as_dict()
     if json:
-        print_json(report)
+        console.print_json(report)
     else:
         _print(report)
 
@@ -105,7 +96,8 @@ def _print(report: dict[str, Any]) -> None:
     rows: dict[str, Any] = {key: report[key] for key in ("motion", "duration_s", "frames")}
     for part, keys in SHOWN.items():
         values = report[part]
-        rows |= {part: None} if values is None else flattened({part: {key: values[key] for key in keys}})
-    print_table(rows)
+        shown = None if values is None else {key: values[key] for key in keys}
+        rows |= console.flattened({part: shown})
+    console.print_table(rows)
     for part, reason in report["missing"].items():
         typer.echo(f"{part}: {reason}", err=True)

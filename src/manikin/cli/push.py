@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from manikin.cli import console
 from manikin.cli.console import (
     FiguresOption,
     Interruption,
@@ -13,15 +14,8 @@ from manikin.cli.console import (
     JsonOption,
     OutOption,
     SexOption,
-    bars,
-    directory_of,
     flag,
-    given,
     option,
-    print_json,
-    refuse,
-    refuse_given,
-    run_job,
 )
 from manikin.errors import InputError
 from manikin.reports.summary_table import columns
@@ -41,6 +35,11 @@ _COMPARED: dict[str, tuple[str, Callable[[str], Any]]] = {
     "locked": ("locked", lambda value: [] if value == "none" else value.split("+")),
 }
 """Settings of ``--compare``: key of the recovery and how its value is read."""
+
+_COMPARE = (
+    "With --map: a further map that differs in this, such as locked=arms, support=left "
+    "or delay=0; repeatable."
+)
 
 _OPTIONS: dict[tuple[str | int, ...], str] = {
     ("push", "direction_deg"): "--direction",
@@ -94,14 +93,7 @@ def push(
     map_: Annotated[bool, flag("--map", "Search the largest impulse that is held, by direction.")] = False,
     directions: Annotated[int | None, option("N", "With --map: number of directions. Default: 24.")] = None,
     tolerance: Annotated[float | None, option("N.S", "With --map: of the impulse [N.s]. Default: 1.")] = None,
-    compare: Annotated[
-        list[str] | None,
-        option(
-            "KEY=VALUE",
-            "With --map: a further map that differs in this, such as locked=arms, support=left "
-            "or delay=0; repeatable.",
-        ),
-    ] = None,
+    compare: Annotated[list[str] | None, option("KEY=VALUE", _COMPARE)] = None,
     jobs: JobsOption = None,
     out: OutOption = None,
     figures: FiguresOption = True,
@@ -112,8 +104,8 @@ def push(
     from manikin.scenarios.planned import push_task
     from manikin.simulation.push_force import STRONGEST
 
-    person = given({"model": body, "stature_m": stature, "mass_kg": mass, "sex": sex})
-    recovery = given({
+    person = console.given({"model": body, "stature_m": stature, "mass_kg": mass, "sex": sex})
+    recovery = console.given({
         "feet": feet, "support": support, "feet_apart_m": feet_apart, "steps": steps, "delay_s": delay,
         "ankle_stiffness": ankle_stiffness, "locked": list(locked or ()), "strength": strength,
         "posture_control_only": posture_control_only,
@@ -128,25 +120,25 @@ def push(
     if map_:
         from manikin.pipeline.stages.recovery_stage import push_map_searches
 
-        refuse(force is not None, "--force", "it is what a map searches")
-        refuse(direction is not None, "--direction", "a map has all of them")
+        console.refuse(force is not None, "--force", "it is what a map searches")
+        console.refuse(direction is not None, "--direction", "a map has all of them")
         within = 1.0 if tolerance is None else tolerance
         within = finite_number(within, "--tolerance", at_least=0.01, at_most=100.0)
         changed = ({}, *(_changes(text) for text in compare or ()))
         scenarios = [scenario("push-map", 1.0, 0.0, changes) for changes in changed]
         asked = push_map_searches(scenarios, 24 if directions is None else directions, within)
-        directory = directory_of(out, "push-map", json=json)
+        directory = console.directory_of(out, "push-map", json=json)
         return _search(asked, directory, context.obj, jobs=jobs, draw=figures, json=json)
     only_maps: dict[str, Any] = {
         "--directions": directions, "--tolerance": tolerance, "--compare": compare, "--jobs": jobs,
     }  # fmt: skip
-    refuse_given(only_maps, "it is for --map")
+    console.refuse_given(only_maps, "it is for --map")
     if force is None or direction is None:
         option = "--force" if force is None else "--direction"
         raise InputError(f"{option} is missing; valid: a number, or --map")
     finite_number(force, "--force [N]", above=0.0, at_most=STRONGEST)
     job = scenario(f"push-{force:g}N-{direction:g}deg", force, direction, {})
-    return run_job(job, out, context.obj, draw=figures, json=json, part="push", shown=SHOWN)
+    return console.run_job(job, out, context.obj, draw=figures, json=json, part="push", shown=SHOWN)
 
 
 def _changes(text: str) -> dict[str, Any]:
@@ -173,14 +165,9 @@ def _changes(text: str) -> dict[str, Any]:
 
 
 def _search(
-    asked: "list[tuple[PushMap, list[DirectionSearch]]]",
-    path: Path | None,
-    interruption: Interruption,
-    *,
-    jobs: int | None,
-    draw: bool,
-    json: bool,
-) -> None:
+    asked: "list[tuple[PushMap, list[DirectionSearch]]]", path: Path | None, interruption: Interruption, *,
+    jobs: int | None, draw: bool, json: bool,
+) -> None:  # fmt: skip
     """Search maps, keep every direction as soon as it is known, draw and print."""
     from joblib import cpu_count
 
@@ -194,7 +181,7 @@ def _search(
     waiting = [(number, index) for number, item in enumerate(maps) for index in item.missing]
     total = sum(len(item.directions) for item in maps)
     known = total - len(waiting)
-    with bars(interruption) as progress:
+    with console.bars(interruption) as progress:
         progress("map", known / total, f"{known} of {total} directions")
         searches = [asked[number][1][index] for number, index in waiting]
         done = search_directions(searches, jobs=jobs or cpu_count())
@@ -209,7 +196,7 @@ def _search(
         if directory is not None and draw:
             directory.draw(asked[0][1][0].trials)
     if json:
-        print_json(maps_as_dict(maps))
+        console.print_json(maps_as_dict(maps))
     else:
         _print_maps(maps)
         if path is not None:

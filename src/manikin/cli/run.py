@@ -5,9 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
+from manikin.cli import console
 from manikin.cli.console import (
-    DONE,
-    FAILED,
     FiguresOption,
     Interruption,
     JobsOption,
@@ -17,9 +16,6 @@ from manikin.cli.console import (
     SexOption,
     argument,
     option,
-    print_json,
-    refuse,
-    run_job,
 )
 
 ALL = "all"
@@ -55,13 +51,14 @@ def run(
     """Plan a scenario, execute it in the physics engine and report: proved, planned or failed."""
     body = {"stature_m": stature, "mass_kg": mass, "sex": sex, "age": age, "strength": strength}
     if scenario == ALL:
-        refuse(variant is not None, "--variant", "every variant is run")
-        refuse(bool(overrides), "--set", "it belongs to one scenario")
-        refuse(moved is not None, "--moved", "it belongs to one scenario")
-        refuse(load_kg is not None or load_hand is not None, "--load-kg", "it belongs to one scenario")
+        console.refuse(variant is not None, "--variant", "every variant is run")
+        console.refuse(bool(overrides), "--set", "it belongs to one scenario")
+        console.refuse(moved is not None, "--moved", "it belongs to one scenario")
+        loaded = load_kg is not None or load_hand is not None
+        console.refuse(loaded, "--load-kg", "it belongs to one scenario")
         return _run_all(out, seed, body, context.obj, draw=figures, workers=jobs, json=json)
-    refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
-    refuse(load_hand is not None and load_kg is None, "--load-hand", "it needs --load-kg")
+    console.refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
+    console.refuse(load_hand is not None and load_kg is None, "--load-hand", "it needs --load-kg")
     load = None if load_kg is None else {"mass_kg": load_kg, "hand": load_hand or "both"}
     from manikin.scenarios import load_scenario
 
@@ -70,7 +67,7 @@ def run(
         job = job.with_seed(seed)
     if moved is not None:
         job = job.moved(*moved)
-    return run_job(job, out, context.obj, draw=figures, json=json)
+    return console.run_job(job, out, context.obj, draw=figures, json=json)
 
 
 def _run_all(
@@ -104,8 +101,8 @@ def _run_all(
     if directory is not None:
         write_result(directory / RESULTS, results)
     if json:
-        print_json(results)
+        console.print_json(results)
     else:
         typer.echo(text_table(results))
         typer.echo(counts_line(results))
-    return FAILED if results["not_as_expected"] else DONE
+    return console.FAILED if results["not_as_expected"] else console.DONE

@@ -7,21 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from manikin.cli.console import (
-    BAD_INPUT,
-    DONE,
-    Interruption,
-    JsonOption,
-    SexOption,
-    argument,
-    bars,
-    complain,
-    flag,
-    option,
-    print_json,
-    refuse,
-    refuse_given,
-)
+from manikin.cli import console
+from manikin.cli.console import Interruption, JsonOption, SexOption, argument, flag, option
 from manikin.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,17 +17,12 @@ if TYPE_CHECKING:
 
 
 Box = tuple[float, float, float, float, float]
+_FILES = "Recordings (.bvh .amc .c3d .trc); the group is the folder's name unless given."
 
 
 def statistics(
     context: typer.Context,
-    files: Annotated[
-        list[str] | None,
-        argument(
-            "[GROUP=]FILE|DIR|PATTERN",
-            "Recordings (.bvh .amc .c3d .trc); the group is the folder's name unless given.",
-        ),
-    ] = None,
+    files: Annotated[list[str] | None, argument("[GROUP=]FILE|DIR|PATTERN", _FILES)] = None,
     published: Annotated[
         bool, flag("--published", "The motions under a beam of Qiu (2012) instead.")
     ] = False,
@@ -74,7 +56,7 @@ def statistics(
         options = {
             "FILE": files, "--bar": bar, "--box": box, "--limit": limit, "--phases": phases, "--start": start,
         }  # fmt: skip
-        refuse_given(options, "the published motions are numbers already")
+        console.refuse_given(options, "the published motions are numbers already")
         return _published(out, json=json)
     if not files:
         raise InputError("no FILE is given; valid: recordings, folders or patterns, or --published")
@@ -90,7 +72,7 @@ def _recorded(
     from manikin.recordings.statistics.clips import grouped_files, read_clips
 
     chosen = grouped_files(files)
-    with bars(interruption) as progress:
+    with console.bars(interruption) as progress:
         read = read_clips(chosen, sex=sex, report=lambda share, remark: progress("recordings", share, remark))
         result = statistics_of(read.clips, settings)
         content: dict[str, Any] = {
@@ -106,14 +88,14 @@ def _recorded(
             sequences = [settings.phases_of(clip) for clip in read.clips]
             write_statistics(out, content, sequences, clip_figures(read.clips, result, settings, by))
     if json:
-        print_json(content)
+        console.print_json(content)
     else:
         _print(result, by, settings.limit)
     for reason in read.refused.values():
-        complain(reason, BAD_INPUT)
+        console.complain(reason, console.BAD_INPUT)
     if out is not None and read.clips:
         typer.echo(f"files in {out}", err=True)
-    return BAD_INPUT if read.refused else DONE
+    return console.BAD_INPUT if read.refused else console.DONE
 
 
 def _published(out: Path | None, *, json: bool) -> int:
@@ -133,10 +115,10 @@ def _published(out: Path | None, *, json: bool) -> int:
         write_statistics(out, content, published_phases(), published_figures())
         typer.echo(f"files in {out}", err=True)
     if json:
-        print_json(content)
+        console.print_json(content)
     else:
         _print(result, "number", None)
-    return DONE
+    return console.DONE
 
 
 def _settings(
@@ -149,10 +131,9 @@ def _settings(
     from manikin.recordings.statistics.passages import LIMIT, Overhead
     from manikin.recordings.supports.supports import FEET
 
-    refuse(bar is not None and box is not None, "--bar", "a box is given")
-    overhead = None if bar is None else Overhead(bar)
-    if box is not None:
-        overhead = Overhead(box[4], box[:2], box[2:4])
+    console.refuse(bar is not None and box is not None, "--bar", "a box is given")
+    above = None if bar is None else Overhead(bar)
+    overhead = above if box is None else Overhead(box[4], box[:2], box[2:4])
     within = LIMIT if limit is None else finite_number(limit, "--limit [m]", above=0.0)
     active = None if effectors == "all" else FEET
     return StatisticsSettings(overhead, within, active, phases, start, origin=origin)

@@ -5,26 +5,14 @@ from typing import Annotated, Literal
 
 import typer
 
-from manikin.cli.console import (
-    JsonOption,
-    MotionArgument,
-    announce,
-    argument,
-    bars,
-    flag,
-    option,
-    print_json,
-    refuse,
-)
+from manikin.cli import console
+from manikin.cli.console import JsonOption, MotionArgument, argument, flag, option
+
+_SOURCE = "Run directory or motion file (.h5); with --contacts a scenario's name or file."
 
 
 def view(
-    source: Annotated[
-        str,
-        argument(
-            "DIR|FILE", "Run directory or motion file (.h5); with --contacts a scenario's name or file."
-        ),
-    ],
+    source: Annotated[str, argument("DIR|FILE", _SOURCE)],
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 picks a free one.")] = 8080,
     contacts: Annotated[
         bool, flag("--contacts", "Drag the body of a scenario and watch its contacts.")
@@ -44,9 +32,9 @@ def view(
         body, scene = job.build_body(), job.build_scene()
         q, rules = start_posture(job, body, scene), contact_rules(job, body)
         live = LiveContacts(body, scene, q, samples=samples or 10_000, seed=job.seed, rules=rules)
-        serve_contacts(live, port, announce)
+        serve_contacts(live, port, console.announce)
         return
-    refuse(samples is not None, "--samples", "it is for --contacts")
+    console.refuse(samples is not None, "--samples", "it is for --contacts")
     from manikin.motion.file import read_motions
     from manikin.pipeline.run_directory import other_motions
 
@@ -54,7 +42,7 @@ def view(
     others = {name: read_motions(path) for name, path in other_motions(Path(source)).items()}
     from manikin.viewer import serve
 
-    serve(content, port=port, announce=announce, others=others)
+    serve(content, port=port, announce=console.announce, others=others)
 
 
 def compare(
@@ -76,10 +64,10 @@ def compare(
     if out is not None:
         from manikin.reports.export import write_comparison_outputs
 
-        with bars(context.obj) as progress:
+        with console.bars(context.obj) as progress:
             write_comparison_outputs(comparison, out, progress)
     if json:
-        print_json(comparison.as_dict())
+        console.print_json(comparison.as_dict())
         return
     from manikin.reports.comparison_tables import report, report_console
 

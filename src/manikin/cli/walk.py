@@ -7,23 +7,16 @@ from typing import Annotated, Any
 
 import typer
 
+from manikin.cli import console
 from manikin.cli.console import (
     FiguresOption,
     JobsOption,
     JsonOption,
     OutOption,
     SexOption,
-    announce,
     argument,
-    bars,
-    directory_of,
     flag,
     option,
-    print_json,
-    print_report,
-    refuse,
-    refuse_given,
-    run_job,
 )
 from manikin.errors import InputError
 
@@ -34,6 +27,8 @@ SHOWN = (
 """Printed values of a walk; everything is in the JSON."""
 
 Place = tuple[float, float, float]
+_WEIGHTS = "Weights: prose or literal of the thesis, recorded or recorded-turns. Default: prose."
+_FOLDER = "Folder with clips_locomotion.csv and, in mocap, the BVH and AMC files it names."
 
 
 def walk(
@@ -46,12 +41,7 @@ def walk(
         str | None, option("NAME|FILE.yaml", "Scenario whose obstacles stand in the way.", "--in")
     ] = None,
     max_speed: Annotated[float | None, option("M/S", "Limit of the speed. Default: 1.6.")] = None,
-    weights: Annotated[
-        str | None,
-        option(
-            "NAME", "Weights: prose or literal of the thesis, recorded or recorded-turns. Default: prose."
-        ),
-    ] = None,
+    weights: Annotated[str | None, option("NAME", _WEIGHTS)] = None,
     stature: Annotated[float, option("M", "Stature [m].")] = 1.75,
     mass: Annotated[float, option("KG", "Mass [kg].")] = 70.0,
     sex: SexOption = "male",
@@ -69,9 +59,9 @@ def walk(
     body: dict[str, Any] = {"model": "human", "stature_m": stature, "mass_kg": mass, "sex": sex}
     if drive:
         walked = {"--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out}
-        refuse_given(walked | {"--json": json or None}, "it is for a walk to a place")
+        console.refuse_given(walked | {"--json": json or None}, "it is for a walk to a place")
         return _drive(body, start, scene, 8080 if port is None else port)
-    refuse(port is not None, "--port", "it is for --drive")
+    console.refuse(port is not None, "--port", "it is for --drive")
     if to is None:
         raise InputError("--to is missing; valid: X Y HEADING_DEG, or --drive")
     from manikin.scenarios import load_scenario
@@ -79,7 +69,7 @@ def walk(
 
     around = None if scene is None else load_scenario(scene)
     job = walk_task(to, start=start, body=body, max_speed=max_speed, weights=weights, around=around)
-    return run_job(
+    return console.run_job(
         job, out, context.obj, draw=figures, json=json, part="walk", shown=SHOWN,
         beside={"max_stance_slide_m": None},
     )  # fmt: skip
@@ -95,7 +85,7 @@ def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> 
     person = human(body["stature_m"], body["mass_kg"], body["sex"])
     around = None if scene is None else load_scenario(scene).build_scene()
     place = (start[0], start[1], math.radians(start[2]))
-    serve_drive(WalkController(person, place=place), around, port, announce)
+    serve_drive(WalkController(person, place=place), around, port, console.announce)
 
 
 def words(
@@ -112,20 +102,20 @@ def words(
 ) -> None:
     """Partition the goals of a walk by the word of the best path; an interrupted run is continued."""
     headings = _headings(slices)
-    directory = directory_of(out, "words", json=json)
-    refuse(figures is True and directory is None, "--figures", "there is no directory to draw into")
+    directory = console.directory_of(out, "words", json=json)
+    console.refuse(figures is True and directory is None, "--figures", "there is no directory to draw into")
     from joblib import cpu_count
 
     from manikin.reports.directories import solve_partition
     from manikin.walking.words import THESIS_GRID
 
-    with bars(context.obj) as progress:
+    with console.bars(context.obj) as progress:
         summary = solve_partition(
             headings, THESIS_GRID, directory, jobs=jobs or cpu_count(), draw=figures is not False,
             progress=progress,
         )  # fmt: skip
     if json:
-        print_json(summary)
+        console.print_json(summary)
     else:
         width = max(len(word) for word in summary["counts"])
         for word, count in summary["counts"].items():
@@ -160,10 +150,7 @@ def _group() -> None:
 @library.command()
 def build(
     context: typer.Context,
-    directory: Annotated[
-        Path,
-        argument("DIR", "Folder with clips_locomotion.csv and, in mocap, the BVH and AMC files it names."),
-    ],
+    directory: Annotated[Path, argument("DIR", _FOLDER)],
     out: Annotated[Path, typer.Option(help="File to write (.npz).")] = Path("walking_library.npz"),
     json: JsonOption = False,
 ) -> None:
@@ -173,18 +160,16 @@ def build(
 
     if not out.parent.is_dir() or out.is_dir():
         raise InputError(f"--out is {out}; valid: a file in a folder that exists")
-    with bars(context.obj) as progress:
+    with console.bars(context.obj) as progress:
         built = build_library(directory, lambda share, remark: progress("library", share, remark))
         save_library(built.library, out)
     classes = Counter(built.library.kinds)
     summary = {
-        "file": str(out),
-        "size_bytes": out.stat().st_size,
-        "cycles": len(built.library),
+        "file": str(out), "size_bytes": out.stat().st_size, "cycles": len(built.library),
         "classes": dict(classes),
         "windows_without_cycle": [f"{w.file} {w.first}-{w.last}" for w in built.without_cycle],
         "windows_near_others": [f"{w.file} {w.first}-{w.last}" for w in built.near_others],
         "acknowledgements": list(built.library.acknowledgements),
-    }
+    }  # fmt: skip
     counts = ", ".join(f"{number} {kind}" for kind, number in classes.items())
-    print_report(summary, summary | {"classes": counts}, json=json)
+    console.print_report(summary, summary | {"classes": counts}, json=json)

@@ -102,16 +102,10 @@ def requirement_table(rows: Iterable[Requirement | None]) -> RequirementTable:
 
 @dataclass
 class Worst:
-    """Takes measurements of one quantity and keeps the worst one.
+    """Takes measurements of one quantity and keeps the worst one, ``value``, measured at ``where``.
 
-    Attributes:
-        key: Name of the quantity in results; ends in its unit, ``_m``, ``_deg`` or ``_N``, if it has one.
-        name: The quantity in words.
-        limit: The value allowed.
-        tolerance: Rounding up to which the limit counts as kept.
-        sense: What a value has to be relative to the limit; of a ``min_...`` always at least that.
-        value: The worst value so far, or None.
-        where: Where it was measured.
+    Its fields are those of a :class:`Requirement`; the key ends in the unit, ``_m``, ``_deg`` or ``_N``, if
+    there is one. The sense of a ``min_...`` is always at least.
     """
 
     key: str

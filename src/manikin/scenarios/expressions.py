@@ -134,12 +134,7 @@ def _build_call(node: ast.Call, text: str) -> _Evaluator:
 
 @dataclass(frozen=True, eq=False)
 class SupportLevel:
-    """Height of the supports below the CoM, from the start's to the goal's.
-
-    Attributes:
-        start, goal: (2,) horizontal position of the CoM [m].
-        start_level, goal_level: Height of the supports there [m].
-    """
+    """Height of the supports below the CoM [m], from that at its ``start`` (2,) to that at its ``goal``."""
 
     start: FloatArray
     goal: FloatArray
@@ -166,11 +161,8 @@ class SupportLevel:
 class HeightBand:
     """Lower and upper bound of the CoM's height, scaled to the body.
 
-    Attributes:
-        lower_expression, upper_expression: Heights for the reference stature.
-        level: Height of the supports.
-        scale: Stature over reference stature.
-        transform_expressions_to_world: Where the expressions' x and y are measured.
+    Its expressions are heights for the reference stature, of which the body's is ``scale`` times as much;
+    they have x and y in a frame of their own. ``level`` is the height of the supports.
     """
 
     lower_expression: Expression

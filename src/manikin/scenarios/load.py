@@ -109,13 +109,8 @@ def built_in() -> dict[str, Path]:
 def find_scenario(name_or_path: str | Path, folder: Path = Path()) -> tuple[Path, str | None]:
     """Find a scenario file and the variant, or None, that its name carries.
 
-    Args:
-        name_or_path: ``"walls"``, ``"walls@trial-4"``, or the path of a YAML file, likewise with
-            or without ``@`` and a variant.
-        folder: Folder that a relative path starts from.
-
-    Raises:
-        ScenarioError: If there is no such file, in one line with the valid names.
+    It is ``"walls"``, ``"walls@trial-4"``, or the path of a YAML file, from ``folder`` if relative, likewise
+    with or without ``@`` and a variant. ScenarioError if there is no such file.
     """
     known, text = built_in(), str(name_or_path)
     if isinstance(name_or_path, str) and not (text in known or (folder / text).exists()):
@@ -156,13 +151,10 @@ def list_variants(name_or_path: str | Path) -> dict[str, str]:
 def load_scenario(
     name_or_path: str | Path, variant: str | None = None, overrides: Sequence[str] = ()
 ) -> Scenario:
-    """Read a built-in scenario by name, or any scenario file by path.
-
-    Every variant of the file is checked, whichever is asked for.
+    """Read a built-in scenario by name, or any scenario file by path, with all its variants checked.
 
     Args:
-        name_or_path: ``"platform"``, or the path of a YAML file; ``"walls@trial-4"`` asks for a
-            variant as well.
+        name_or_path: ``"platform"``, or the path of a YAML file; ``"walls@trial-4"`` asks for a variant too.
         overrides: Values to set, ``"supports.friction=0.5"`` each; see
             :func:`manikin.scenarios.scenario.override`.
 

@@ -76,11 +76,8 @@ def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
     """A scenario with a walk before its own supports, all in one motion.
 
     The walk ends on the first stance of the supports, from which the plan continues; no stop is asked for.
-    The constraints on the centre of mass stay; it starts as high as in the scenario.
-
-    Raises:
-        ScenarioError: If the scenario has no supports.
-        InputError: If they do not begin on both feet, or the walk ends elsewhere.
+    The constraints on the centre of mass stay; it starts as high as in the scenario. InputError if this has
+    no supports that begin on both feet, or the walk ends elsewhere.
     """
     own = scenario.explicit_supports()
     stance = {contact.effector: contact for contact in flat_sequence(scenario)[0].stance}
@@ -197,7 +194,7 @@ def push_task(
     body: Mapping[str, Any] | None = None, recovery: Mapping[str, Any] | None = None,
     where: Mapping[tuple[str | int, ...], str] | None = None,
 ) -> Scenario:  # fmt: skip
-    """A push of a standing body, which lasts until the body may be at rest again.
+    """A push of a standing body, which lasts until that may rest again; InputError if out of range.
 
     Args:
         force: [N].
@@ -205,9 +202,6 @@ def push_task(
         duration: Of the push [s].
         body, recovery: Sections of the scenario; their defaults when omitted.
         where: What messages call the values, by key.
-
-    Raises:
-        InputError: If a value is out of its range.
     """
     from manikin.simulation.push_search import PUSH_BEGINS, run_duration  # loads the engine
 

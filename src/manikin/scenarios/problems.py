@@ -218,23 +218,16 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
     geometric = _height_constraints(values, automatic=upright)
     with values.refusing(("planning",)):
         return CentroidalProblem(
-            values.moved_mass,
-            sequence,
-            values.start_com,
-            values.goal_com,
+            values.moved_mass, sequence, values.start_com, values.goal_com,
             goal_velocity=None if velocity is None else np.array(velocity),
-            start_acceleration=rest,
-            goal_acceleration=rest if seat is None else None,
-            margin_space=options.margin_space,
-            required_margin=values.required_margin,
+            start_acceleration=rest, goal_acceleration=rest if seat is None else None,
+            margin_space=options.margin_space, required_margin=values.required_margin,
             support_distance=values.max_support_distance,
             regions=_regions(values, sequence, geometric if upright else None),
-            geometric=geometric,
-            key_planes=_key_planes(values),
-            max_duration=options.max_duration_s,
+            geometric=geometric, key_planes=_key_planes(values), max_duration=options.max_duration_s,
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
             **{key: value for key, value in given.items() if value is not None},
-        )
+        )  # fmt: skip
 
 
 def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:

@@ -231,21 +231,12 @@ def _real_path(location: tuple[str | int, ...], data: Any) -> KeyPath:
 
 
 _RULES = {
-    "greater_than": "a number > {gt:g}",
-    "greater_than_equal": "a number >= {ge:g}",
-    "less_than": "a number < {lt:g}",
-    "less_than_equal": "a number <= {le:g}",
-    "literal_error": "{expected}",
-    "too_short": "at least {min_length} entries",
-    "string_too_short": "a text that is not empty",
-    "finite_number": "a finite number",
-    "float_type": "a number",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "string_type": "a text",
-    "bool_type": "true or false",
-    "list_type": "a list",
-    "tuple_type": "a list",
+    "greater_than": "a number > {gt:g}", "greater_than_equal": "a number >= {ge:g}",
+    "less_than": "a number < {lt:g}", "less_than_equal": "a number <= {le:g}",
+    "literal_error": "{expected}", "too_short": "at least {min_length} entries",
+    "string_too_short": "a text that is not empty", "finite_number": "a finite number",
+    "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number",
+    "string_type": "a text", "bool_type": "true or false", "list_type": "a list", "tuple_type": "a list",
     "dict_type": "a mapping",
-}
+}  # fmt: skip
 """What is valid, by the kind of pydantic's error."""

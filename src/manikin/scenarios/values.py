@@ -12,17 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from manikin.body import (
-    BodyModel,
-    carrying,
-    creature_from_urdf,
-    human,
-    insect,
-    kudoh,
-    point_mass,
-    quadruped,
-    with_further_contacts,
-)
+import manikin.body as bodies
+from manikin.body import BodyModel
 from manikin.contact import ContactModel
 from manikin.errors import InputError, ScenarioError
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
@@ -38,11 +29,7 @@ from manikin.scenarios.validation import KeyPath, place
 class ScenarioValues:
     """A checked scenario file and the numbers in it, scaled to the body.
 
-    Attributes:
-        file: The checked content of the scenario file.
-        source: Name of the file, for messages.
-        folder: Folder that relative paths start from.
-        lines: Place (file and line) of each key, for messages.
+    Relative paths start from ``folder``; ``source`` and ``lines``, those of keys, are for messages.
     """
 
     file: ScenarioFile
@@ -280,7 +267,7 @@ def _level(contacts: Mapping[str, ContactSection]) -> float:
     return float(np.mean(feet or [c.position[2] for c in contacts.values()]))
 
 
-_same_human = lru_cache(maxsize=32)(human)
+_same_human = lru_cache(maxsize=32)(bodies.human)
 """One body for equal values, so that what is kept by the body (folds, reach) serves every scenario of it."""
 
 
@@ -291,17 +278,17 @@ def build_body(values: ScenarioValues) -> BodyModel:
         return _creature(values)
     load = data.load if data.load is not None and data.load.lasts else None
     if data.model == "kudoh":
-        return kudoh() if load is None else carrying(kudoh(), load.mass_kg, load.hand)
+        return bodies.kudoh() if load is None else bodies.carrying(bodies.kudoh(), load.mass_kg, load.hand)
     if values.is_point_mass:
-        return point_mass(values.mass)
+        return bodies.point_mass(values.mass)
     length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
     try:
         body = _same_human(
             data.stature_m, data.mass_kg, data.sex, age=data.age, strength=data.strength,
             sole_length=length, sole_width=width,
         )  # fmt: skip
-        body = body if load is None else carrying(body, load.mass_kg, load.hand)
-        return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
+        body = body if load is None else bodies.carrying(body, load.mass_kg, load.hand)
+        return bodies.with_further_contacts(body, data.further_contacts) if data.further_contacts else body
     except InputError as error:
         with values.refusing(("supports", "sole") if "sole" in str(error) else ("body",)):
             raise
@@ -312,9 +299,10 @@ def _creature(values: ScenarioValues) -> BodyModel:
     data = values.file.body
     with values.refusing(("body",)):
         if data.model != "urdf":
-            return (insect if data.model == "insect" else quadruped)(data.length_m, data.mass_kg)
+            make = bodies.insect if data.model == "insect" else bodies.quadruped
+            return make(data.length_m, data.mass_kg)
         sole = data.sole
-        return creature_from_urdf(
+        return bodies.creature_from_urdf(
             values.folder / str(data.urdf),
             {name: limb.model_dump() for name, limb in (data.limbs or {}).items()},
             standing={name: float(np.deg2rad(angle)) for name, angle in (data.standing_deg or {}).items()},

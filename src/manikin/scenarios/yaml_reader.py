@@ -152,12 +152,7 @@ VARIANTS = "variants"
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Plain values with the place that each came from.
-
-    Attributes:
-        data: Mappings, lists and single values, as the YAML reader returns them.
-        lines: Place, such as ``"file.yaml:3"``, of every key and list entry.
-    """
+    """Plain values with the place, such as ``"file.yaml:3"``, of every key and list entry."""
 
     data: Any
     lines: Mapping[KeyPath, str] = field(default_factory=dict)

@@ -12,17 +12,7 @@ import trimesh
 import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
 from manikin.numerics.spatial import FloatArray, axes_of_normal
 from manikin.scene.mesh import IntArray, Mesh, MeshPiece, as_trimesh
-from manikin.scene.obstacle import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    Obstacle,
-    Plane,
-    Shape,
-    Sphere,
-    local_bounds,
-)
+from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Shape, Sphere, extents
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +54,7 @@ def collision_parts(obstacle: Obstacle) -> tuple[CollisionPart, ...]:
         kind = coal.Cylinder if isinstance(shape, Cylinder) else coal.Capsule
         geometry = kind(shape.radius, shape.length)
     place = obstacle.rotation, obstacle.translation
-    return (CollisionPart(obstacle.name, geometry, *place, *local_bounds(shape)),)
+    return (CollisionPart(obstacle.name, geometry, *place, *extents(shape)),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,7 +357,7 @@ def _sample(geometry: coal.CollisionGeometry) -> tuple[FloatArray, float]:
         heights = _spread(shape.length)
         axis = np.column_stack([np.zeros((len(heights), 2)), heights])
         return axis + centre, shape.radius
-    size = 2 * local_bounds(shape)[1]
+    size = 2 * extents(shape)[1]
     axes = np.meshgrid(*(_spread(side, most=7) for side in size), indexing="ij")
     grid = np.stack(axes, axis=-1).reshape(-1, 3)
     return grid[np.argsort(np.linalg.norm(grid, axis=1), kind="stable")] + centre, 0.0

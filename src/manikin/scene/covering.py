@@ -30,8 +30,7 @@ class SphereCover:
 def cover(shape: Shape, *, count: int = 8) -> SphereCover:
     """Cover a shape, or the surface of a mesh that is not closed, with at most so many spheres.
 
-    Raises:
-        SceneError: If the shape is endless, as planes and half-spaces are, or the count no positive integer.
+    SceneError if the shape is endless, as planes and half-spaces are, or the count no positive integer.
     """
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
         raise SceneError(f"cover count is {count!r}; valid: a whole number >= 1")

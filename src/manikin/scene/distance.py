@@ -192,9 +192,8 @@ class Proximity(BodyPairs):
         measured = self._measure(near.tolist(), *_split(placements), activation)
         kept = [row for row, item in enumerate(measured) if item[0] < activation]
         distance = np.array([measured[row][0] for row in kept])
-        normal, on_body, on_other = (
-            np.array([measured[row][part] for row in kept]).reshape(-1, 3) for part in (1, 2, 3)
-        )
+        vectors = (np.array([measured[row][part] for row in kept]).reshape(-1, 3) for part in (1, 2, 3))
+        normal, on_body, on_other = vectors
         return self._result(near[kept], jacobian, distance, (normal, on_body, on_other))
 
     def evaluate_over(
@@ -202,8 +201,7 @@ class Proximity(BodyPairs):
     ) -> ProximitySamples:
         """Measure every close pair of (n, nq) configurations, see :meth:`evaluate_placed`.
 
-        Raises:
-            SceneError: If the number of ignore sets is not n, or a sample is not a finite vector.
+        SceneError if the number of ignore sets is not n, or a sample is not a finite vector.
         """
         return self.evaluate_placed(self.place(q_samples), activation, ignore)
 

@@ -92,9 +92,7 @@ class FootingTable:
     def __init__(self, surfaces: Sequence[Surface], footprint: ArrayLike) -> None:
         self.surfaces = tuple(surfaces)
         self.footprint = np.asarray(footprint, dtype=np.float64)[:, :2]
-        rings = [
-            pair for face in surfaces for pair in ((face.polygon, 1.0), *((r, -1.0) for r in face.holes))
-        ]
+        rings = [one for face in surfaces for one in ((face.polygon, 1.0), *((r, -1.0) for r in face.holes))]
         self._start = np.concatenate([ring for ring, _ in rings]) if rings else np.zeros((0, 3))
         self._end = np.concatenate([np.roll(ring, -1, axis=0) for ring, _ in rings]) if rings else self._start
         self._edges_of_ring = _Ranges([len(ring) for ring, _ in rings])

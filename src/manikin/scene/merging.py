@@ -140,19 +140,12 @@ def _union(shapes: Sequence[Geometry]) -> Geometry:
 
 @dataclass(frozen=True, eq=False)
 class _Solid:
-    """A closed body that hides what is inside.
+    """A closed body that hides what is inside."""
 
-    Attributes:
-        vertices: (n, 3) in the world [m].
-        edges: (e, 2) vertex indices of a convex body's edges.
-        faces: (m, 3) vertex indices of the triangles of one that is not convex, otherwise none.
-        endless: (4,) normal and offset of a half-space, which has no vertices, or None.
-    """
-
-    vertices: FloatArray
-    edges: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    endless: FloatArray | None = None
+    vertices: FloatArray  # (n, 3) in the world [m]
+    edges: NDArray[np.int64]  # (e, 2) vertex indices of a convex body's edges
+    faces: NDArray[np.int64]  # (m, 3) those of the triangles of one that is not convex, otherwise none
+    endless: FloatArray | None = None  # (4,) normal and offset of a half-space, which has no vertices
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:

@@ -62,12 +62,10 @@ class Mesh:
         """Check and clean a mesh.
 
         Args:
-            convex: ``"hull"`` replaces the mesh by its convex hull, ``"parts"`` each
-                connected piece by its own hull; both are larger than the mesh, hence safe.
-            max_faces: More triangles than this (after hulls) are refused.
-
-        Raises:
-            SceneError: If the mesh is empty, not finite, badly indexed, of a suspicious size or too large.
+            convex: ``"hull"`` replaces the mesh by its convex hull, ``"parts"`` each connected piece by its
+                own; both are larger than the mesh, hence safe.
+            max_faces: More triangles (after hulls) are refused by a SceneError, as is a mesh that is empty,
+                not finite, badly indexed or of a suspicious size.
         """
         points = frozen_array(vertices, f"mesh {source!r} vertices", (None, 3), SceneError)
         triangles = _checked_faces(faces, len(points), source)
@@ -102,13 +100,9 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class MeshPiece:
-    """A connected piece of a mesh.
+    """A connected piece of a mesh, of vertices (n, 3) [m] and their indices in each face (m, 3).
 
-    Attributes:
-        vertices: (n, 3) [m].
-        faces: (m, 3) vertex indices, outward when ``closed``.
-        closed: Whether the surface is watertight, so that it has an inside.
-        convex: Whether it is closed and convex.
+    One that is ``closed`` is watertight and has an inside, with faces outward; so is a ``convex`` one.
     """
 
     vertices: FloatArray
@@ -121,7 +115,7 @@ def load_mesh(
     path: str | Path, *, unit: str | None = None, up: str | None = None, scale: float = 1.0,
     convex: Convexity = "no",
 ) -> Mesh:  # fmt: skip
-    """Read an STL, OBJ, PLY or DAE file, as its extension says, into metres.
+    """Read an STL, OBJ, PLY or DAE file, as its extension says, into metres; SceneError if unusable.
 
     Args:
         unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``; when omitted, a DAE file's own, else metres.
@@ -129,9 +123,6 @@ def load_mesh(
             When omitted, a DAE file's own, else z.
         scale: Further factor on every coordinate, > 0.
         convex: As for :class:`Mesh`.
-
-    Raises:
-        SceneError: If the file is missing, of another format, unreadable, or no usable mesh.
     """
     file = Path(path)
     extension = file.suffix.lower().lstrip(".")

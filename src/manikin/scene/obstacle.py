@@ -88,7 +88,7 @@ class HalfSpace(_Endless):
 Shape = Box | Sphere | Cylinder | Capsule | Plane | HalfSpace | Mesh
 
 
-def local_bounds(shape: Shape) -> tuple[FloatArray, FloatArray]:
+def extents(shape: Shape) -> tuple[FloatArray, FloatArray]:
     """Lower and upper corner of the shape in its own frame; infinite for planes and half-spaces."""
     if isinstance(shape, Mesh):
         return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
@@ -129,13 +129,9 @@ DRAWN_HALF_SIZE = 10.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Obstacle(Displayed):
-    """A shape of the scene at a fixed placement.
+    """A shape at a fixed placement in the scene, in which its name is unique.
 
-    Attributes:
-        name: Unique in its scene.
-        shape: Box, sphere, cylinder, capsule, plane, half-space or mesh.
-        rotation: (3, 3) shape-to-world rotation.
-        translation: (3,) origin of the shape's frame in the world [m].
+    Its rotation (3, 3) is shape-to-world, its translation (3,) the origin of the shape's frame there [m].
     """
 
     name: str
@@ -166,7 +162,7 @@ class Obstacle(Displayed):
             placed = self.to_world(self.shape.vertices)
             return placed.min(axis=0), placed.max(axis=0)
         if isinstance(self.shape, (Plane, HalfSpace)):
-            return local_bounds(self.shape)
+            return extents(self.shape)
         reach = _reach(self.shape, self.rotation)
         return self.translation - reach, self.translation + reach
 

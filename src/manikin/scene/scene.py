@@ -179,10 +179,8 @@ class Scene(Displayed):
         """Signed distance [m] of a (3,) world point to each obstacle, and its name; the nearest first."""
         place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
         meters = self._point_meters.items()
-        distances = [
-            (min(meter(place, at, np.inf)[0] for meter, at in parts), name) for name, parts in meters
-        ]
-        return sorted(distances, key=lambda item: item[0])
+        found = [(min(meter(place, at, np.inf)[0] for meter, at in parts), name) for name, parts in meters]
+        return sorted(found, key=lambda item: item[0])
 
     @cached_property
     def _point_meters(self) -> dict[str, list[tuple[Meter, coal.Transform3s]]]:

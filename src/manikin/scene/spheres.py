@@ -51,11 +51,8 @@ class SphereProximity(BodyPairs):
         """Cover the body, as for :class:`manikin.scene.Proximity`, and the scene.
 
         Args:
-            count: Spheres of every shape and obstacle, or by name of a shape or obstacle;
+            count: Spheres of every shape and obstacle, or by name of a shape or obstacle, whole numbers >= 1;
                 4 per body shape and 20 per obstacle for those not named.
-
-        Raises:
-            SceneError: If a count is not a whole number >= 1.
         """
         super().__init__(body)
         objects = list(self._shapes.geometryObjects)

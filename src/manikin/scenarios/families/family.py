@@ -35,14 +35,8 @@ Range = tuple[float, float]
 class Sketch:
     """A scene while it is drawn, in a frame of its own: z up, the body starts near the origin.
 
-    Attributes:
-        rng: Source of all that is random in the scene.
-        stature: Of the person whose way it is, unless :attr:`body` says something else [m].
-        body: Section ``body`` of the scenario: a person whose sex, stature and body mass index are
-            independent and evenly distributed.
-        floor: Height of the floor [m], None for none.
-        keys: Further keys of the scenario.
-        meshes: What is written beside the scenario, by file name.
+    The body is that of a person, whose sex, stature and body mass index are independent and evenly
+    distributed, unless a family says something else.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
@@ -51,9 +45,9 @@ class Sketch:
         self.stature = round(float(rng.uniform(*STATURES)), 2)
         mass = round(float(rng.uniform(*BODY_MASS_INDICES)) * self.stature**2, 1)
         self.body = {"model": "human", "stature_m": self.stature, "mass_kg": mass, "sex": sex}
-        self.floor: float | None = 0.0
-        self.keys: dict[str, Any] = {}
-        self.meshes: dict[str, trimesh.Trimesh] = {}
+        self.floor: float | None = 0.0  # its height [m], None for none
+        self.keys: dict[str, Any] = {}  # further ones of the scenario
+        self.meshes: dict[str, trimesh.Trimesh] = {}  # by the file that is written beside the scenario
         self._scene: list[dict[str, Any]] = []
         self._ends = {"start": self._end(0.0, 0.0, 0.0, {})}
 
@@ -77,7 +71,7 @@ class Sketch:
         self, name: str, x: Range, y: Range, z: Range, *, yaw_deg: float = 0.0,
         about: tuple[float, float] | None = None, tilt_deg: tuple[float, float] = (0.0, 0.0), **keys: Any,
     ) -> None:  # fmt: skip
-        """Add a box by its extents before it is turned [m, deg].
+        """Add a box by its extents, either end first, before it is turned [m, deg].
 
         First by roll and pitch about its middle, then by a yaw about the vertical, there or at ``about``.
         """
@@ -151,12 +145,7 @@ def _angle(degrees: float) -> float:
 
 @dataclass(frozen=True)
 class Family:
-    """Random scenes of one kind.
-
-    Attributes:
-        name: Short name.
-        draw: Draws one into a sketch; its docstring says what is drawn, and why a person can do it.
-    """
+    """Random scenes of one kind; the docstring of ``draw`` says what is drawn, and why a person can do it."""
 
     name: str
     draw: Callable[[Sketch], None]
@@ -170,12 +159,8 @@ class Family:
 def draw_scene(family: Family, seed: int, folder: Path | None = None) -> Scenario:
     """Draw a scene of a family; the same for the same family and seed, whatever else was drawn.
 
-    Args:
-        folder: Where the meshes of the scene are written, made where needed. Without one the scenario cannot
-            build them.
-
-    Raises:
-        MotionFileError: If a mesh cannot be written.
+    The meshes of the scene are written into the folder, which is made where needed; MotionFileError if that
+    fails. Without one the scenario cannot build them.
     """
     rng = np.random.default_rng([*family.name.encode(), seed])
     sketch = Sketch(rng)

@@ -10,9 +10,8 @@ from manikin.scenarios.families.levels import draw_rubble, draw_stairs
 def chairs(sketch: Sketch) -> None:
     """Get up from a chair 0.38 to 0.52 m high, with armrests or without, padded or hard.
 
-    Then go up to half a metre. Possible: feet reach the ground, as who sits on a seat above the hollow of
-    the knee, at 0.25 of the stature, sits near its edge; there is room below the seat to draw the feet
-    back.
+    Then go up to half a metre. Possible: feet reach the ground, as who sits on a seat above the hollow of the
+    knee, at 0.25 of the stature, sits near its edge; there is room below the seat to draw the feet back.
     """
     seat = sketch.between(0.38, 0.52)
     high = seat > 0.25 * sketch.stature

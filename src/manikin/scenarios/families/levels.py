@@ -78,11 +78,11 @@ def blocks(sketch: Sketch) -> None:
     height, away = sketch.between(0.5, 0.7), sketch.between(0.35, 0.6)
     deep, wide = sketch.between(0.7, 1.1), sketch.between(0.8, 1.2)
     side, near = sketch.side(), sketch.between(0.35, 0.45)
-    sketch.box("block", (away, away + deep), sorted_pair(-side * (wide - near), side * near), (0.0, height))
+    sketch.box("block", (away, away + deep), (-side * (wide - near), side * near), (0.0, height))
     end = away + deep
     if sketch.coin():
         top = sketch.between(0.72, 0.8)
-        sketch.box("table", (-0.2, end), sorted_pair(side * near, side * (near + 0.7)), (top - 0.04, top))
+        sketch.box("table", (-0.2, end), (side * near, side * (near + 0.7)), (top - 0.04, top))
     else:
         y, z = side * (near + 0.05), sketch.between(0.9, 1.15)
         sketch.rod("rail", ((-0.2, y, z), (end, y, z)), 0.02)
@@ -90,11 +90,6 @@ def blocks(sketch: Sketch) -> None:
             sketch.rod(name, ((x, y, 0.0), (x, y, z - 0.02)), 0.02)
     sketch.goal(away + 0.5 * deep, 0.0)
     sketch.maybe_turn_back()
-
-
-def sorted_pair(one: float, other: float) -> tuple[float, float]:
-    """Two numbers, the smaller first."""
-    return min(one, other), max(one, other)
 
 
 def stones(sketch: Sketch) -> None:

@@ -134,13 +134,9 @@ _KEYS = {
 """What each kind of body may be given."""
 
 WORDS = {
-    "human": "a human",
-    "point_mass": "a point mass",
-    "kudoh": "the body of Kudoh, who has his own size",
-    "insect": "an insect",
-    "quadruped": "a quadruped",
-    "urdf": "a creature from URDF",
-}
+    "human": "a human", "point_mass": "a point mass", "kudoh": "the body of Kudoh, who has his own size",
+    "insect": "an insect", "quadruped": "a quadruped", "urdf": "a creature from URDF",
+}  # fmt: skip
 """Kinds of bodies in words."""
 
 _OWN_SIZES = {"insect": {"mass_kg": 2.0}, "quadruped": {"length_m": 0.8, "mass_kg": 32.0}}
