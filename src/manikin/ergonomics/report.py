@@ -70,18 +70,12 @@ class LowestMargin:
 def lowest_margin(
     body: BodyModel, motion: Motion, schedule: ContactSchedule | None = None, *, friction: float = FRICTION
 ) -> LowestMargin | None:
-    """Find the smallest margin and its limiting contact.
+    """Find the smallest margin and its limiting contact; None if the margin is not known at any instant.
 
     With the planned contacts the stance is the one among the phase of that instant and its neighbours (an
     executed motion may be late) that gives the margin of the motion best. Without them it is rebuilt from the
-    effectors in contact: soles as large as the body's, points at the hands, the patch of the buttocks.
-
-    Args:
-        motion: Its motion; instants whose margin is NaN are passed over.
-        friction: Coefficient of contacts without a schedule.
-
-    Returns:
-        None if the margin is not known at any instant.
+    effectors in contact with a friction: soles as large as the body's, points at the hands, the patch of the
+    buttocks.
 
     Raises:
         InputError: If the friction is not above 0.

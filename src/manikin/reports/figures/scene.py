@@ -103,8 +103,7 @@ def frame_panels(
     """Set ticks and limits of panels side by side in one pair of axes, to one scale.
 
     Args:
-        across: Both ends of the first panel [m].
-        upwards: Both ends of all [m].
+        across, upwards: Both ends of the first panel, and of all of them [m].
         offsets: Where the zero of each panel is drawn [m].
     """
     left, right = across
