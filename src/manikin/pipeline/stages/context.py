@@ -375,9 +375,9 @@ class RunResult:
         if recovery is not None:
             executed = recovery.trace.motion
         planned = planned if wholebody is None else wholebody.motion
-        motions = (motion_in_world(motion, report.transform) for motion in (planned, executed))
+        planned, executed = (motion_in_world(item, report.transform) for item in (planned, executed))
         stages = centroidal, wholebody, execution, report.path, recovery
-        return cls(report.close(), *motions, *stages, report.transform)
+        return cls(report.close(), planned, executed, *stages, report.transform)
 
     @property
     def succeeded(self) -> bool:

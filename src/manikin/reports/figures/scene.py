@@ -212,7 +212,7 @@ def _label_heads(axes: Axes3D, moments: Moments) -> None:
         head = places.get("effector/head")
         if head is None:
             continue
-        seen = np.array(proj_transform(*head, projection)[:2])
+        seen = np.array(proj_transform(head[0], head[1], head[2], projection)[:2])
         if any(np.all(np.abs(seen - other) < (0.008, 0.005)) for other in taken):
             continue
         taken.append(seen)
