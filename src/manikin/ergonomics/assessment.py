@@ -47,10 +47,9 @@ class CumulativeEffort:
 
 
 def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | None:
-    """Add up what the joints do, with the torque limits of the body; frames without torques are left out.
+    """Add up what the joints do, with the torque limits of the body, in frames with torques.
 
-    Returns:
-        None if there are not two frames with torques, or the body has no joint.
+    None if there are not two of these, or the body has no joint.
     """
     rows = known_torques(motion)
     if not len(body.joint_names) or rows.sum() < 2:
@@ -83,10 +82,8 @@ class JointStrength:
     Attributes:
         limit: (j,) size of the torque limit in the direction in which the largest share is reached [N.m].
         share: (n, j) torque over the limit in its direction; NaN where the torque is not known.
-        peak: (j,) largest share.
-        peak_time: (j,) when it is reached [s].
-        loaded: (j,) share of the time above ``fraction``.
-        fraction: Share of the strength above which a joint counts as loaded.
+        peak, peak_time: (j,) largest share, and when it is reached [s].
+        loaded: (j,) share of the time above ``fraction``, from which on a joint counts as loaded.
         known: Share of the frames with torques.
         source: Where the limits come from.
     """
@@ -113,10 +110,7 @@ class JointStrength:
 
 
 def joint_strength(body: BodyModel, motion: Motion, fraction: float = LOADED) -> JointStrength | None:
-    """Compare torques with the limits of the body; above ``fraction`` of them a joint counts as loaded.
-
-    Returns:
-        None if the motion has no frame with torques, or the body no joint.
+    """Compare torques with the limits of the body; None without a frame with torques, or without joints.
 
     Raises:
         InputError: If the fraction is not from 0 to 1.
@@ -185,13 +179,11 @@ def held(time: FloatArray, angles: FloatArray, duration: float = LONG) -> NDArra
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """One score over time.
+    """One score over time, (n,) [s].
 
     Attributes:
         method: ``"RULA"`` or ``"REBA"``.
-        time: (n,) [s].
-        sides: (n,) scores of the left and the right side.
-        steps: Step scores (n,) of each side.
+        sides, steps: (n,) scores, and step scores, of the left and the right side.
         levels: Meaning of the action levels, the lowest first.
         level_of: Action level of scores.
         static_known: Whether the motion lasted long enough for a posture held for a minute.

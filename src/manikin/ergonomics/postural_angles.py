@@ -69,15 +69,11 @@ class ArmAngles:
 
 @dataclass(frozen=True, eq=False)
 class PosturalAngles:
-    """Angles of a motion, (n,) each.
+    """Angles of a motion, (n,) each; those of the neck are of the head against the chest.
 
     Attributes:
-        trunk_flexion: Forward positive [rad].
-        trunk_side_bend: To the left positive [rad].
-        trunk_twist: To the left positive [rad].
-        neck_flexion: Forward positive, of the head against the chest [rad].
-        neck_side_bend: To the left positive [rad].
-        neck_twist: To the left positive [rad].
+        trunk_flexion, neck_flexion: Forward positive [rad].
+        trunk_side_bend, trunk_twist, neck_side_bend, neck_twist: To the left positive [rad].
         knees: Flexion by side [rad].
     """
 

@@ -15,15 +15,8 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import ContactSchedule, Stance, default_normal_force_cap
 from manikin.contact.from_motion import stance_at
-from manikin.ergonomics.assessment import (
-    LOADED,
-    CumulativeEffort,
-    JointStrength,
-    PosturalAssessment,
-    assess_posture,
-    cumulative_effort,
-    joint_strength,
-)
+from manikin.ergonomics import assessment
+from manikin.ergonomics.assessment import LOADED, CumulativeEffort, JointStrength, PosturalAssessment
 from manikin.ergonomics.body_parts import parts_of
 from manikin.ergonomics.rula_reba import Circumstances
 from manikin.errors import BodyError
@@ -70,18 +63,12 @@ class LowestMargin:
 def lowest_margin(
     body: BodyModel, motion: Motion, schedule: ContactSchedule | None = None, *, friction: float = FRICTION
 ) -> LowestMargin | None:
-    """Find the smallest margin and its limiting contact.
+    """Find the smallest margin and its limiting contact; None if the margin is not known at any instant.
 
     With the planned contacts the stance is the one among the phase of that instant and its neighbours (an
     executed motion may be late) that gives the margin of the motion best. Without them it is rebuilt from the
-    effectors in contact: soles as large as the body's, points at the hands, the patch of the buttocks.
-
-    Args:
-        motion: Its motion; instants whose margin is NaN are passed over.
-        friction: Coefficient of contacts without a schedule.
-
-    Returns:
-        None if the margin is not known at any instant.
+    effectors in contact with a friction: soles as large as the body's, points at the hands, the patch of the
+    buttocks.
 
     Raises:
         InputError: If the friction is not above 0.
@@ -252,10 +239,11 @@ def ergonomics_of(
         if parts_of(body).trunk[-1] in untold:
             missing["posture"] = "the recording says nothing about the trunk"
         else:
-            posture = assess_posture(body, motion, given)
+            posture = assessment.assess_posture(body, motion, given)
     except BodyError as error:
         missing["posture"] = f"RULA and REBA are of humans: {error}"
-    strength, effort = joint_strength(body, motion, fraction), cumulative_effort(body, motion)
+    strength = assessment.joint_strength(body, motion, fraction)
+    effort = assessment.cumulative_effort(body, motion)
     for name, part in (("strength", strength), ("effort", effort)):
         if part is None:
             missing[name] = "the body has no joints" if not body.joint_names else NO_TORQUES

@@ -111,11 +111,8 @@ def run_jobs(
         report: Told the entry of each run that has ended, and how many have.
 
     Returns:
-        ``runs`` in the order of the jobs, each the summary of the run with ``variant``,
-        ``expected``, ``expected_because`` and ``as_expected``; the numbers of runs that were
-        ``planned``, ``proved`` and that ``fell``; ``as_expected`` and ``not_as_expected``, the numbers of
-        runs that did and did not end as their scenario says; ``succeeded`` and ``failed``, the numbers of
-        runs that did and did not succeed; ``wall_s``.
+        ``runs`` in the order of the jobs, each the summary of the run with ``variant``, ``expected``,
+        ``expected_because`` and ``as_expected``; their numbers, see :func:`counts`; ``wall_s``.
     """
     began = clock.perf_counter()
     result: dict[int, dict[str, Any]] = {}
@@ -129,7 +126,7 @@ def run_jobs(
 
 
 def counts(runs: Sequence[Mapping[str, Any]]) -> dict[str, int]:
-    """Number of runs that were planned, proved, fell, succeeded, and ended as their scenario says."""
+    """Numbers of runs planned, proved, fallen, and that did or did not succeed or end as expected."""
     number = {key: sum(bool(run[key]) for run in runs) for key in ("planned", "proved", "succeeded")}
     fell = sum(bool((run["execution"] or {}).get("fell")) for run in runs)
     right = sum(bool(run["as_expected"]) for run in runs)

@@ -199,10 +199,9 @@ def point_mass_track(
 ) -> ComTrack:
     """The planned CoM every millisecond, with its margin by the polytopes of the wrenches of each phase."""
     time = np.concatenate(phase_times(trajectory))
-    derivatives = (trajectory.position, trajectory.velocity, trajectory.acceleration)
-    position, velocity, acceleration = (evaluate(time) for evaluate in derivatives)
+    derivatives = trajectory.position(time), trajectory.velocity(time), trajectory.acceleration(time)
     margin = np.concatenate(phase_margins(problem, trajectory, polytopes))
-    return ComTrack(time, position, velocity, acceleration, margin, problem.margin_unit)
+    return ComTrack(time, *derivatives, margin, problem.margin_unit)
 
 
 def _check_is_run(folder: Path) -> None:

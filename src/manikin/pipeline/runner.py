@@ -43,6 +43,8 @@ def run(
 ) -> RunResult:  # fmt: skip
     """Plan a scenario, execute it in the physics engine and report.
 
+    An infeasible task, or a motion that fell, is a result with ``succeeded`` False.
+
     Args:
         scenario: Name of a built-in scenario, a scenario file, or a scenario.
         overrides: Values to set, ``"supports.friction=0.5"`` each.
@@ -51,9 +53,6 @@ def run(
         settings: Options of the whole-body stage; the defaults in the scenario's manner when omitted.
         requirements: What the execution must keep.
         progress: Called with the stage and the share of it that is done.
-
-    Returns:
-        The result; an infeasible task, or a motion that fell, is a result with ``succeeded`` False.
 
     Raises:
         InputError: If the scenario, or a file it names, is not usable.
@@ -115,8 +114,7 @@ def _followed(
 ) -> tuple[Callable[[], RunResult], ContactSchedule | None]:
     """The centre of mass first, then all joints along it, the act and the execution.
 
-    Returns:
-        What makes the result, and the schedule of the contacts, as far as it came.
+    Returns what makes the result, and the schedule of the contacts, as far as it came.
     """
     centroidal = plan_centre_of_mass(context, report)
     plan = with_key_postures(context, report, centroidal)
@@ -141,8 +139,7 @@ def failed_phase(failure: StageFailure | None, schedule: ContactSchedule | None)
     """Index of the phase in which a stage failed, or None where that is not known."""
     if failure is None:
         return None
-    named = re.match(r"phase (\d+)", failure.where)
-    if named is not None:
+    if (named := re.match(r"phase (\d+)", failure.where)) is not None:
         return int(named[1])
     return None if schedule is None else int(schedule.phase_at(failure.time_s))
 
@@ -150,11 +147,7 @@ def failed_phase(failure: StageFailure | None, schedule: ContactSchedule | None)
 def _refined(
     context: RunContext, report: Report, requirements: ExecutionRequirements
 ) -> tuple[Callable[[], RunResult], ContactSchedule | None]:
-    """Key postures of the contact plan, or of the centre of mass on given supports, then the refinement.
-
-    Returns:
-        As :func:`_followed`.
-    """
+    """As :func:`_followed`, but postures of the contact plan or of the centre of mass are refined."""
     centroidal = None
     if context.plan is not None:
         schedule = context.plan.schedule(context.scenario.contact_model)

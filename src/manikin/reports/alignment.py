@@ -13,13 +13,10 @@ _SAME_PLACE = 1e-3
 
 
 def align_phases(first: Sequence[Stance], second: Sequence[Stance]) -> list[tuple[int | None, int | None]]:
-    """Align two sequences of stances, in order, so that as many phases as possible are paired.
+    """Every phase of two runs once, in order, with as many pairs as possible; None for one without a partner.
 
-    Two phases can be paired when the same effectors are in contact, wherever; among alignments
-    with equally many pairs the one whose contacts are nearest to each other is taken.
-
-    Returns:
-        Every phase of both runs once, in order; None for a phase that has none like it in the other run.
+    Two phases can be paired when the same effectors are in contact, wherever; among alignments with equally
+    many pairs the one whose contacts are nearest to each other is taken.
     """
     gain = np.array([[_likeness(a, b) for b in second] for a in first]).reshape(len(first), len(second))
     best = np.zeros((len(first) + 1, len(second) + 1))
@@ -69,12 +66,7 @@ class PhaseTime:
 
 @dataclass(frozen=True)
 class TimingRow:
-    """A phase of both runs, or of one that the other does not have.
-
-    Attributes:
-        supports: Effectors in contact.
-        first, second: In each run, or None.
-    """
+    """A phase of both runs, or of one that the other does not have, with the effectors in contact."""
 
     supports: tuple[str, ...]
     first: PhaseTime | None

@@ -38,13 +38,7 @@ from manikin.runtime.parallel import side_by_side
 def analyze_files(
     jobs: Sequence[AnalysisJob], options: AnalysisOptions, *, workers: int = 1
 ) -> Iterator[AnalysisEntry]:
-    """Measure files, and write the directory of each as soon as it is known.
-
-    Args:
-        workers: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
-
-    Yields:
-        Entries in the order in which they are done.
+    """Measure files in so many processes, write the directory of each, and yield their entries as they end.
 
     Raises:
         ManikinError: If a process ends before its time.
@@ -158,11 +152,7 @@ def summary_of(analysis: Analysis, plan: Replan | None = None) -> dict[str, Any]
 def write_analysis(
     analysis: Analysis, directory: Path, *, draw: bool = True, plan: Replan | None = None
 ) -> None:
-    """Write the files of one recording, and of it re-planned; the summary comes last.
-
-    Args:
-        directory: Created if it is not there.
-        draw: Whether the report has its figures.
+    """Write the files of one recording and of its plan, with figures or without; the summary comes last.
 
     Raises:
         MotionFileError: If they cannot be written.

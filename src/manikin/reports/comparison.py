@@ -154,7 +154,6 @@ class RunComparison(Displayed):
     """Two runs side by side; differences are second less first.
 
     Attributes:
-        first, second: The runs.
         rows: Their phases, aligned by the effectors in contact; empty without schedules.
         postures_of: ``"planned"`` or ``"executed"``, whichever motion the postures are of, or None.
         postures: At the matching key instants.

@@ -29,30 +29,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from manikin.errors import FigureError, InputError
+from manikin.recordings.statistics import phases
 from manikin.recordings.statistics.clip_statistics import GroupStatistics, StatisticsSettings
 from manikin.recordings.statistics.clips import RecordedClip
-from manikin.recordings.statistics.phases import (
-    By,
-    PhaseSequence,
-    published_distances,
-    published_heights,
-    published_phases,
-)
+from manikin.recordings.statistics.phases import By, PhaseSequence
 from manikin.reports import figures
 from manikin.reports.figures import save_figure
 from manikin.runtime import __version__
 from manikin.runtime.files import ResultDirectory, atomic_path, csv_text, to_json, writing
 from manikin.simulation import PushMap, PushTrials
-from manikin.walking.words import (
-    HEADINGS,
-    THESIS_WORDS,
-    WordGrid,
-    WordSlice,
-    count_words,
-    equal_paths,
-    shares,
-    solve_slices,
-)
+from manikin.walking import words
+from manikin.walking.words import WordGrid, WordSlice
 
 MAP = "map.json"
 TABLE = "map.csv"
@@ -171,15 +158,13 @@ def clip_figures(
     placed = [clip for clip in clips if clip.name not in found[clip.group].unplaced]
     standing = [clip.standing_com for clip in clips if clip.standing_com is not None]
     stood = sum(standing) / len(standing) if standing else None
-    phases, origins = (
-        [settings.phases_of(clip) for clip in clips],
-        [settings.origin_of(clip) for clip in placed],
-    )
+    sequences = [settings.phases_of(clip) for clip in clips]
+    origins = [settings.origin_of(clip) for clip in placed]
     places = {group: item.placements for group, item in found.items()}
     lowest = [figures.LowestPoints.of(item, height) for item in found.values()]
-    known = published_distances()
+    known = phases.published_distances()
     drawn = {
-        "phase_durations": lambda: figures.phase_durations_figure(phases, by),
+        "phase_durations": lambda: figures.phase_durations_figure(sequences, by),
         "placements": lambda: figures.placements_figure(places),
         "com_paths": lambda: figures.com_paths_figure(placed, origins, overhead=height),
         "com_heights": lambda: figures.com_heights_figure(lowest, stood),
@@ -194,11 +179,12 @@ def clip_figures(
 
 def published_figures() -> dict[str, Figure]:
     """Figures of the published motions, by name; those of the means quoted in the thesis."""
-    quoted = [item for item in published_phases("left_foot") if not item.group.endswith("C3")]
+    standing = phases.published_heights().standing
+    quoted = [item for item in phases.published_phases("left_foot") if not item.group.endswith("C3")]
     return {
         "phase_durations": figures.phase_durations_figure(quoted),
-        "com_heights": figures.com_heights_figure(figures.published_lowest(), published_heights().standing),
-        "com_distances": figures.com_distances_figure([], published=published_distances()),
+        "com_heights": figures.com_heights_figure(figures.published_lowest(), standing),
+        "com_distances": figures.com_distances_figure([], published=phases.published_distances()),
     }
 
 
@@ -226,7 +212,7 @@ def partition_as_dict(
 ) -> dict[str, Any]:
     """Content of ``words.json``: ``headings`` that are asked for, and slices known by theirs [deg]."""
     known = [slices[heading] for heading in headings if heading in slices]
-    counts, missed = count_words(known), [item.residuals() for item in known]
+    counts, missed = words.count_words(known), [item.residuals() for item in known]
     names = {"position": "position_m", "heading": "heading_rad", "curvature": "curvature_per_m",
              "adjoint": "adjoint", "hamiltonian": "hamiltonian"}  # fmt: skip
     largest = {
@@ -236,9 +222,9 @@ def partition_as_dict(
     return {
         "manikin": __version__, "complete": len(known) == len(headings), "grid": grid.as_dict(),
         "headings_deg": list(headings), "problems": len(headings) * int(np.prod(grid.shape)),
-        "solved": sum(counts.values()), "counts": counts, "shares": shares(counts),
-        "others": [word for word in counts if word not in THESIS_WORDS], "max_residuals": largest,
-        "slices": {str(round(item.heading_deg)): count_words([item]) for item in known},
+        "solved": sum(counts.values()), "counts": counts, "shares": words.shares(counts),
+        "others": [word for word in counts if word not in words.THESIS_WORDS], "max_residuals": largest,
+        "slices": {str(round(item.heading_deg)): words.count_words([item]) for item in known},
     }  # fmt: skip
 
 
@@ -268,7 +254,7 @@ class WordsDirectory(ResultDirectory):
             if known != json.loads(to_json(grid.as_dict())):
                 valid = "valid: the same, or another directory"
                 raise InputError(f"{file}: is of another grid, {json.dumps(known)}; {valid}")
-        kept = [heading for heading in HEADINGS if self._file(heading).exists()]
+        kept = [heading for heading in words.HEADINGS if self._file(heading).exists()]
         self.slices = {heading: self._slice(self._file(heading), heading) for heading in kept}
 
     def begin(self, headings: Sequence[int]) -> None:
@@ -299,7 +285,7 @@ class WordsDirectory(ResultDirectory):
         slices = [self.slices[heading] for heading in chosen]
         save_figure(figures.words_figure(slices), self.figures / "words.png")
         borders = [(item, jumps[0]) for item in slices if (jumps := item.jumps())]
-        if pairs := [equal_paths(*(item.path(*place) for place in border)) for item, border in borders]:
+        if pairs := [words.equal_paths(*(item.path(*place) for place in border)) for item, border in borders]:
             save_figure(figures.equal_paths_figure(pairs), self.figures / "equal_paths.png")
 
     def _file(self, heading: int) -> Path:
@@ -337,7 +323,7 @@ def solve_partition(
     waiting = [heading for heading in headings if heading not in known]
     count, total = len(headings) - len(waiting), len(headings)
     progress("words", count / total, f"{count} of {total} slices")
-    for done, solved in enumerate(solve_slices(waiting, grid, jobs=jobs), count + 1):
+    for done, solved in enumerate(words.solve_slices(waiting, grid, jobs=jobs), count + 1):
         known[round(solved.heading_deg)] = solved
         if directory is not None:
             directory.keep(solved)

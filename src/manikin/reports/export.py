@@ -113,11 +113,7 @@ _ROOT_ORDER = "YXZ"  # yaw, pitch, roll: the singularity is a pelvis that looks 
 
 
 def to_bvh(body: BodyModel, motion: Motion) -> str:
-    """Text of a BVH file.
-
-    Args:
-        body: Who moves.
-        motion: Evenly sampled; see :func:`resample`.
+    """Text of a BVH file of a motion that is evenly sampled; see :func:`resample`.
 
     Raises:
         MotionFileError: If the motion is not the body's, or is not evenly sampled.
@@ -258,13 +254,10 @@ COMPARISON = "comparison.json"
 def write_outputs(
     directory: str | Path, progress: Callable[[str, float], object] = lambda _stage, _share: None
 ) -> list[Path]:
-    """Draw the figures and write the BVH file of a finished run; a point mass has no skeleton for BVH.
+    """Draw the figures of a finished run and write its BVH file, if it has joints; return the files.
 
     Args:
         progress: Told the stage ``"figures"`` and the share that is done.
-
-    Returns:
-        The files written.
 
     Raises:
         InputError: If the run cannot be read or a file cannot be written.
@@ -284,10 +277,9 @@ def write_outputs(
 def write_comparison_outputs(
     comparison: RunComparison, directory: str | Path, progress: Callable[[str, float], object]
 ) -> None:
-    """Draw the figures of two runs and write ``comparison.json``.
+    """Draw the figures of two runs and write ``comparison.json``; other files of the directory stay.
 
     Args:
-        directory: Created when it is missing; other files in it are left alone.
         progress: Told the stage ``"figures"`` and the share that is done.
 
     Raises:

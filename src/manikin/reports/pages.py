@@ -88,12 +88,9 @@ def run_page(folder: Path, summary: Mapping[str, Any]) -> str:
 def analysis_page(
     analysis: Analysis, summary: Mapping[str, Any], sheet: str, pictures: Mapping[str, bytes]
 ) -> str:
-    """HTML of a measured recording.
+    """HTML of a measured recording with its numbers, and PNG files of the plan by what they show.
 
-    Args:
-        summary: Its numbers.
-        sheet: SVG of :func:`manikin.reports.analysis_sheet.recording_sheet`; empty for none.
-        pictures: PNG files of the plan by what they show.
+    The ``sheet`` is the SVG of :func:`manikin.reports.analysis_sheet.recording_sheet`; empty for none.
     """
     missing = [f"{part}: {reason}" for part, reason in summary["ergonomics"]["missing"].items()]
     shown = {"name": analysis.name, "sheet": sheet, "pictures": pictures, "missing": missing}

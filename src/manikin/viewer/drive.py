@@ -64,16 +64,12 @@ class WalkViewer(Page):
     """Serves a walker that is steered with keys and sliders; every change goes through its methods.
 
     Attributes:
-        controller: The walker.
         directive: (3,) wanted forward, left [m/s] and angular velocity [rad/s].
         notice: What the walker says about the last directive, or None.
     """
 
     def __init__(self, controller: WalkController, scene: Scene | None = None, port: int = 8080) -> None:
-        """Start the server and show the walker standing.
-
-        Args:
-            scene: Drawn, but not looked at by the walker.
+        """Start the server and show the walker standing in a scene that it does not see.
 
         Raises:
             InputError: If the scene has no floor, or the port is taken.

@@ -41,11 +41,7 @@ class ViewerSession(Page):
     def __init__(
         self, content: MotionFile, port: int = 8080, others: Mapping[str, MotionFile] | None = None
     ) -> None:
-        """Start the server and draw the first instant.
-
-        Args:
-            content: At least one motion, and the body.
-            others: Motions of others who are there, by name, on the same clock.
+        """Start the server and draw the first instant, with others who are there on the same clock, by name.
 
         Raises:
             InputError: If a file holds no body, or the port is taken.

@@ -134,6 +134,6 @@ class SearchTally:
             steps = np.linalg.norm(np.diff(guide.places, axis=0), axis=1)
             self.summary["guide_length_m"] = float(steps.sum())
 
-    def _ended(self, plan: ContactPlan | None, *why: str) -> ContactSearch:
+    def _ended(self, plan: ContactPlan | None, reason: str | None = None, where: str = "") -> ContactSearch:
         summary = self.summary | {"wall_s": clock.perf_counter() - self._began}
-        return ContactSearch(None, plan, self.guide, summary, *why)
+        return ContactSearch(None, plan, self.guide, summary, reason, where)

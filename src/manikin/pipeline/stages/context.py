@@ -126,8 +126,6 @@ class RunContext:
         given: The scenario as it was given, in the world.
         transform_task_to_world: From the frame of the task to the world.
         scenario: With the supports that were found, where a file can list them.
-        body: Its body.
-        scene: Its scene.
         scene_in_world: The scene that was given.
         settings: Options of the whole-body stage.
         problem: What the centre of mass is planned for; None as long as there are no supports.
@@ -346,12 +344,9 @@ class RunResult:
         summary: As printed by ``manikin run --json``.
         planned: Planned whole-body motion, or that of a point mass, in the world; None when there is none.
         executed: Executed motion in the world, or None.
-        centroidal: Result of the centre-of-mass stage, or None where there was none; it and those of the
-            other stages are in the frame of the task.
-        wholebody: Result of the whole-body stage, or None.
-        execution: Result of the execution, or None.
+        centroidal, wholebody, execution, recovery: Results of the stages, in the frame of the task; None of
+            those that there were not.
         directory: Where the files are, or None.
-        recovery: Result of a recovery from a push, or None.
         transform_task_to_world: From the frame of the task to the world.
     """
 
@@ -380,9 +375,9 @@ class RunResult:
         if recovery is not None:
             executed = recovery.trace.motion
         planned = planned if wholebody is None else wholebody.motion
-        motions = (motion_in_world(motion, report.transform) for motion in (planned, executed))
+        planned, executed = (motion_in_world(item, report.transform) for item in (planned, executed))
         stages = centroidal, wholebody, execution, report.path, recovery
-        return cls(report.close(), *motions, *stages, report.transform)
+        return cls(report.close(), planned, executed, *stages, report.transform)
 
     @property
     def succeeded(self) -> bool:

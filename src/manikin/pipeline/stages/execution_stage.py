@@ -126,7 +126,9 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
     rub = context.scenario.explicit_supports().friction, context.scenario.contact_model.friction
     largest = push_pull.largest_force(context.body, q, contacts, act, *rub)
     forces = push_pull.share_force(context.body, q, contacts, act, *rub)
-    used = _used_friction(planned, forces, context.scenario.contact_model.friction)
+    used = (
+        None if forces is None else _used_friction(planned, forces, context.scenario.contact_model.friction)
+    )
     report.finish("act", _summary(act, largest, forces) | {"friction": used})
     if forces is not None:
         row = Requirement("max_torque_share", "share of a torque limit in the act", "", forces.torque_share,
@@ -165,17 +167,15 @@ def measured_act_failure(
 
 
 def _used_friction(
-    planned: PlannedMotion, forces: BracedForces | None, model: FrictionModel
-) -> dict[str, float | str] | None:
+    planned: PlannedMotion, forces: BracedForces, model: FrictionModel
+) -> dict[str, float | str]:
     """Largest share of the friction that the feet use while they act."""
-    if forces is None:
-        return None
-    feet = [
+    held = zip(planned.schedule.sequence[-1].stance, forces.contact_force, strict=True)
+    share, effector = max(
         (float(friction_share(contact, force[None, :3], model)[0]), contact.effector)
-        for contact, force in zip(planned.schedule.sequence[-1].stance, forces.contact_force, strict=True)
+        for contact, force in held
         if contact.kind is not ContactKind.GRASP
-    ]
-    share, effector = max(feet)
+    )
     return FrictionUse(model, share, planned.end, effector).summary()
 
 

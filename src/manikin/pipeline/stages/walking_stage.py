@@ -26,12 +26,7 @@ from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import walk_before, walking_supports
-from manikin.scenarios.sections.task_sections import (
-    StandSection,
-    WalkerSection,
-    WalkingSection,
-    WaypointSection,
-)
+from manikin.scenarios.sections.task_sections import StandSection, WalkerSection, WalkingSection
 from manikin.scenarios.validation import KeyPath
 from manikin.scenarios.world import flat_sequence
 from manikin.walking import Walk, WalkRoute, Waypoint
@@ -101,8 +96,7 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
             (left, _), (right, _) = (stance[foot] for foot in FEET)
             rule = replace(rule, standing_width=float(np.hypot(*(left - right)[:2])))
             choices = [walking.place_footprints(path, rule, first=first, height=height) for first in FEET]
-            footprints = _ending_for(scenario, choices)
-            walked = walk_before(footprints, bare)
+            walked = walk_before(footprints := _ending_for(scenario, choices), bare)
         else:
             footprints = walking.place_footprints(path, rule, height=height)
             if _section(scenario).footprints == "library":  # where the feet of the library's walk stand
@@ -228,8 +222,9 @@ def plan_walks(
     obstacles, others = list(standing), {}
 
     def route_of(
-        key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, stops: list[Waypoint]
+        key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, *goal: Waypoint
     ) -> WalkRoute:
+        stops = [*(Waypoint(place_of(stop), stop.speed_m_s, stop.wait_s) for stop in who.via), *goal]
         with scenario.refusing(key):
             return walking.walking_route(
                 begin, stops, objective, obstacles=obstacles, room=section.room_m,
@@ -237,15 +232,14 @@ def plan_walks(
             )  # fmt: skip
 
     for number, other in enumerate(section.others):
-        key: KeyPath = ("walking", "others", number)
-        other_route = route_of(key, other, place_of(other.start), [_waypoint(stop) for stop in other.via])
+        other_route = route_of(("walking", "others", number), other, place_of(other.start))
         others[other.name] = other_route
         if other_route.succeeded:
             obstacles.append(other_route.as_obstacle(other.name, radius))
     began = clock.perf_counter()
     start = end_of(scenario, "start") if start is None else start
     goal = end_of(scenario, "goal") if goal is None else goal
-    route = route_of(("walking",), section, start, [*map(_waypoint, section.via), Waypoint(goal)])
+    route = route_of(("walking",), section, start, Waypoint(goal))
     return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began)
 
 
@@ -274,10 +268,6 @@ def end_of(scenario: Scenario, end: str) -> FloatArray:
 def place_of(stand: StandSection) -> FloatArray:
     """(3,) x, y [m], heading [rad] of a place in a file."""
     return np.array([*stand.at, math.radians(stand.heading_deg)])
-
-
-def _waypoint(section: WaypointSection) -> Waypoint:
-    return Waypoint(place_of(section), section.speed_m_s, section.wait_s)
 
 
 def path_block(plan: PlannedWalks) -> dict[str, Any]:

@@ -13,14 +13,8 @@ from manikin.balance.contact_forces import friction_use
 from manikin.contact import ContactSchedule, SolePart, StanceSequence
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, place, reason_in_world, trajectory_in_world
-from manikin.planning.com import (
-    CentroidalResult,
-    CentroidalTrajectory,
-    KeyframeProblem,
-    KeyframeResult,
-    plan_com,
-    plan_com_through_key_frames,
-)
+from manikin.planning import com
+from manikin.planning.com import CentroidalResult, CentroidalTrajectory, KeyframeProblem, KeyframeResult
 from manikin.planning.com.com_certificate import phase_times
 from manikin.planning.whole_body import (
     Eligibility,
@@ -134,8 +128,8 @@ def _in_world(found: KeyPostures, report: Report) -> KeyPostures:
     transform, postures = report.transform, []
     for item in found.postures:
         reason = None if item.reason is None else reason_in_world(item.reason, transform)
-        com, q = transform.points(item.com), transform.poses(item.q)
-        postures.append(replace(item, com=com, q=q, reason=reason))
+        centre, q = transform.points(item.com), transform.poses(item.q)
+        postures.append(replace(item, com=centre, q=q, reason=reason))
     return replace(found, postures=tuple(postures))
 
 
@@ -182,11 +176,11 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
     if problem is None:
         raise context.scenario.error(("supports",), "are missing; valid: with supports")
     if isinstance(problem, KeyframeProblem):
-        result = plan_com_through_key_frames(problem)
+        result = com.plan_com_through_key_frames(problem)
     else:
-        result = plan_com(problem)
+        result = com.plan_com(problem)
         if result.failure is not None and context.scenario.keeps_upright:  # the task may need a deeper bend
-            result = plan_com(context.scenario.build_centroidal_problem(upright=False))
+            result = com.plan_com(context.scenario.build_centroidal_problem(upright=False))
     report_centre_of_mass(report, result, centroidal_summary(result))
     if (failure := result.failure) is not None:
         where = place(failure.phase, failure.where)
@@ -233,8 +227,8 @@ def least_force_at_com(result: CentroidalResult) -> float | None:
         return None
     times, stances = phase_times(trajectory), [phase.stance for phase in trajectory.schedule.sequence]
     phases, instants = np.repeat(np.arange(len(times)), [*map(len, times)]), np.concatenate(times)
-    wrench, com = trajectory.pseudo_wrench(instants), trajectory.position(instants)
-    return motion_margin(stances, phases, wrench, com, polytopes=result.polytopes).min_force
+    wrench, position = trajectory.pseudo_wrench(instants), trajectory.position(instants)
+    return motion_margin(stances, phases, wrench, position, polytopes=result.polytopes).min_force
 
 
 FORCE_STEP = 0.02

@@ -83,15 +83,10 @@ def write_figures(
     folder: str | Path,
     on_done: Callable[[float], object] = lambda _share: None,
 ) -> list[Path]:
-    """Draw the figures of a run, or of two, that apply and write them as PNG files, each atomically.
-
-    A figure that there is no data for (no execution, no hand, a wall) is left out.
+    """Write the figures of a run, or of two, that apply as PNG files, each atomically; return the files.
 
     Args:
         on_done: Told the share of figures done after each.
-
-    Returns:
-        The files written.
 
     Raises:
         MotionFileError: If the folder cannot be written to.

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
 from matplotlib.lines import Line2D
 
 from manikin.errors import FigureError
@@ -32,10 +31,9 @@ def planes_figure(record: RunRecord) -> Figure:
     colours = colours_of(contact.effector for contact in contacts)
     seen = np.vstack([t.position for t in tracks.values()] + [c.points_in_world for c in contacts])
     low, high = seen.min(axis=0) - 0.12, seen.max(axis=0) + 0.12
-    figure, grid = planes_grid("Centre of mass on the coordinate planes", high - low)
+    figure, panels = planes("Centre of mass on the coordinate planes", high - low)
     first = next(iter(tracks.values()))
-    for column, view in enumerate(VIEWS):
-        axes = figure.add_subplot(grid[column])
+    for view, axes in panels:
         if record.scene is not None:
             draw_obstacles(axes, record.scene, view, low, high)
         for contact in contacts:
@@ -49,16 +47,13 @@ def planes_figure(record: RunRecord) -> Figure:
     return figure
 
 
-def planes_grid(title: str, spans: FloatArray) -> tuple[Figure, GridSpec]:
-    """Figure with a panel for each view, all to one scale as far as that is legible.
-
-    Args:
-        spans: (3,) what is shown along each axis [m].
-    """
+def planes(title: str, spans: FloatArray) -> tuple[Figure, list[tuple[View, Axes]]]:
+    """Figure with each view and its panel, to one scale if legible; ``spans`` are (3,) along the axes [m]."""
     widths = [max(float(view(spans)[0]), 0.3 * float(spans.max())) for view in VIEWS]
     heights = [float(view(spans)[1]) for view in VIEWS]
     height = float(np.clip(max(heights) * 12.8 / sum(widths), 2.5, 6.0))
-    return style.new_grid(15.0, height + 1.4, title, 1, 3, left=0.75, top=0.85, width_ratios=widths)
+    figure, grid = style.new_grid(15.0, height + 1.4, title, 1, 3, left=0.75, top=0.85, width_ratios=widths)
+    return figure, [(view, figure.add_subplot(grid[column])) for column, view in enumerate(VIEWS)]
 
 
 def frame_plane(axes: Axes, view: View, low: FloatArray, high: FloatArray) -> None:
@@ -119,9 +114,7 @@ def published_lowest() -> tuple[LowestPoints, ...]:
 def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = None) -> Figure:
     """Draw lowest centres of mass by group, and the height up to what was passed ([Qiu2012]_ 3.13, 3.14).
 
-    Args:
-        groups: At least one with a height.
-        standing: Height of the centre of mass in standing, drawn as a line [m].
+    The height of the centre of mass in ``standing`` is drawn as a line [m].
     """
     shown = style.need([item for item in groups if item.com], "a height of the centre of mass")
     figure, grid = style.new_grid(9.6, 4.4, "Lowest centre of mass", 1, 2, top=0.8, across=0.9)

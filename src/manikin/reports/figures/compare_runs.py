@@ -13,8 +13,8 @@ from manikin.pipeline.run_directory import ComTrack
 from manikin.reports.alignment import TimingRow
 from manikin.reports.comparison import RunComparison, shared_tracks
 from manikin.reports.figures import scene, style
-from manikin.reports.figures.com import draw_paths, frame_plane, mark_instants, planes_grid
-from manikin.reports.figures.views import ALONG_X, ALONG_Y, VIEWS
+from manikin.reports.figures.com import draw_paths, frame_plane, mark_instants, planes
+from manikin.reports.figures.views import ALONG_X, ALONG_Y
 from manikin.runtime.display import COLOURS, readable
 
 
@@ -178,9 +178,8 @@ def compare_planes_figure(comparison: RunComparison) -> Figure:
     low, high = seen.min(axis=0), seen.max(axis=0)
     room = 0.08 * float((high - low).max()) + 0.01
     low, high = low - room, high + room
-    figure, grid = planes_grid("Centres of mass of two runs on the coordinate planes", high - low)
-    for column, view in enumerate(VIEWS):
-        axes = figure.add_subplot(grid[column])
+    figure, panels = planes("Centres of mass of two runs on the coordinate planes", high - low)
+    for view, axes in panels:
         draw_paths(axes, view, tracks, _styles(comparison))
         frame_plane(axes, view, low, high)
         labels = style.Labels(axes)

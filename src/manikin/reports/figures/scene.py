@@ -26,6 +26,10 @@ MOST = 9
 GAP = 0.12
 """Gap between two panels [m]."""
 
+Corners = tuple[FloatArray, FloatArray]
+Moments = list[tuple[float, dict[str, FloatArray]]]
+"""Key instants [s] and the places of the segments at them."""
+
 
 def postures_figure(record: RunRecord) -> Figure:
     """Draw the body at the key instants, seen along y and along x ([Qiu2012]_ Fig. 5.14, 6.8, 7.10, 7.13).
@@ -43,21 +47,21 @@ def postures_figure(record: RunRecord) -> Figure:
     samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
     low, high = _frame(record, motion.com)
     spans = high - low
-    widths = np.array([spans[0], spans[1]])
-    scale = 1.85 / widths.max()
+    widest = spans[:2].max()
+    scale = 1.85 / widest
     figure, grid = style.new_grid(
-        (widths.max() + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
+        (widest + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
         f"Postures at the key instants ({name})", 2, 1, top=0.65, between=0.5,
     )  # fmt: skip
     for row, view in enumerate((views.ALONG_Y, views.ALONG_X)):
         axes = figure.add_subplot(grid[row, 0])
         left, right = view(np.array([low, high]))[:, 0]
-        offsets = [(widths.max() + GAP) * column for column in range(len(samples))]
+        offsets = [(widest + GAP) * column for column in range(len(samples))]
         for offset, sample, instant in zip(offsets, samples, instants, strict=True):
-            _draw_posture(axes, record, view.moved(offset, 0.0), name, sample, (low, high))
+            _draw_posture(axes, record, motion, sample, view.moved(offset, 0.0), (low, high))
             if row == 0:
-                middle, top = offset + (left + right) / 2, high[2]
-                style.note(axes, f"{instant:.2f} s", (middle, top), 4, fontsize=9)
+                top = offset + (left + right) / 2, high[2]
+                style.note(axes, f"{instant:.2f} s", top, 4, fontsize=9)
         horizontal, vertical = view.labels
         style.dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
@@ -65,14 +69,8 @@ def postures_figure(record: RunRecord) -> Figure:
 
 
 def _draw_posture(
-    axes: Axes,
-    record: RunRecord,
-    view: views.View,
-    name: str,
-    sample: int,
-    box: tuple[FloatArray, FloatArray],
+    axes: Axes, record: RunRecord, motion: Motion, sample: int, view: views.View, box: Corners
 ) -> None:
-    motion = record.motions[name]
     draw_moment(axes, record, motion, sample, view, box)
     if record.schedule is not None:
         end = float(record.schedule.instants[-1])
@@ -82,12 +80,7 @@ def _draw_posture(
 
 
 def draw_moment(
-    axes: Axes,
-    record: RunRecord,
-    motion: Motion,
-    sample: int,
-    view: views.View,
-    box: tuple[FloatArray, FloatArray],
+    axes: Axes, record: RunRecord, motion: Motion, sample: int, view: views.View, box: Corners
 ) -> None:
     """Draw the body among the obstacles in a box [m] at one sample of a motion, with its CoM."""
     if record.scene is not None:
@@ -103,8 +96,7 @@ def frame_panels(
     """Set ticks and limits of panels side by side in one pair of axes, to one scale.
 
     Args:
-        across: Both ends of the first panel [m].
-        upwards: Both ends of all [m].
+        across, upwards: Both ends of the first panel, and of all of them [m].
         offsets: Where the zero of each panel is drawn [m].
     """
     left, right = across
@@ -128,7 +120,7 @@ def eventful_instants(motion: Motion) -> FloatArray:
     return np.interp(np.linspace(0.0, turned[-1], min(MOST, len(turned))), turned, motion.time)
 
 
-def _frame(record: RunRecord, com: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _frame(record: RunRecord, com: FloatArray) -> Corners:
     """Corners of a box around the body during the whole motion [m]."""
     reach = np.array([0.55, 0.55, 1.05])
     low, high = com.min(axis=0) - reach, com.max(axis=0) + reach
@@ -156,9 +148,10 @@ def scene_figure(record: RunRecord) -> Figure:
     corners = draw_scene(axes, record.scene)
     if record.schedule is not None:
         seen.append(draw_soles(axes, record.schedule))
-    figure_of = None if record.body is None or record.body.is_point_mass else record.body
-    if figure_of is not None and motion is not None:
-        seen.append(_draw_figures(axes, figure_of, motion, record.schedule))
+    moments: Moments = []
+    if motion is not None and record.body is not None and not record.body.is_point_mass:
+        moments = _moments(record.body, motion, record.schedule)
+        seen.append(_draw_figures(axes, record.body, moments))
     elif record.schedule is not None:
         _draw_legs(axes, track, record.schedule)
     axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
@@ -168,18 +161,21 @@ def scene_figure(record: RunRecord) -> Figure:
         axes.scatter(*places.T, s=18, depthshade=False, **look)
     frame(axes, np.vstack(seen), corners)
     axes.view_init(14.0, -62.0)
-    if figure_of is not None and motion is not None:
-        _label_heads(axes, figure_of, motion, record.schedule)
+    if moments:
+        _label_heads(axes, moments)
     axes.legend(loc="upper right", fontsize=8, frameon=False)
     return figure
 
 
-def _draw_figures(
-    axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None
-) -> FloatArray:
+def _moments(body: BodyModel, motion: Motion, schedule: ContactSchedule | None) -> Moments:
     instants = phases_of(motion, schedule).instants
     samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
     postures = [segment_positions(body, motion.q[sample]) for sample in samples]
+    return list(zip(instants.tolist(), postures, strict=True))
+
+
+def _draw_figures(axes: Axes3D, body: BodyModel, moments: Moments) -> FloatArray:
+    postures = [places for _, places in moments]
     sticks = _sticks(body)
     sides = [next((s for s in ("left", "right") if s in f"{a} {b}"), None) for a, b in sticks]
     for number, places in enumerate(postures):
@@ -208,14 +204,12 @@ def _draw_legs(axes: Axes3D, track: ComTrack, schedule: ContactSchedule) -> None
         ))  # fmt: skip
 
 
-def _label_heads(axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None) -> None:
+def _label_heads(axes: Axes3D, moments: Moments) -> None:
     """Write the time above each head, the ends first, leaving out what would overlap."""
-    instants = phases_of(motion, schedule).instants
     projection = axes.get_proj()
     taken: list[FloatArray] = []
-    for index in sorted(range(len(instants)), key=lambda i: (i not in (0, len(instants) - 1), i)):
-        sample = int(np.argmin(np.abs(motion.time - instants[index])))
-        head = segment_positions(body, motion.q[sample]).get("effector/head")
+    for instant, places in [moments[0], *moments[-1:], *moments[1:-1]]:
+        head = places.get("effector/head")
         if head is None:
             continue
         seen = np.array(proj_transform(head[0], head[1], head[2], projection)[:2])
@@ -223,7 +217,7 @@ def _label_heads(axes: Axes3D, body: BodyModel, motion: Motion, schedule: Contac
             continue
         taken.append(seen)
         axes.text(
-            head[0], head[1], head[2] + 0.05, f"{instants[index]:.2f} s", fontsize=7.5, ha="center",
+            head[0], head[1], head[2] + 0.05, f"{instant:.2f} s", fontsize=7.5, ha="center",
             color=COLOURS["ink"], zorder=9, path_effects=[style.white_edge()],
         )  # fmt: skip
 

@@ -34,8 +34,7 @@ class View:
     Attributes:
         name: Such as ``"xz"``.
         axes: Indices of the world axes that are drawn to the right and upward.
-        offset: Where the world's origin is drawn [m]; several panels in one pair of axes are
-            much faster to draw than as many pairs.
+        offset: Where the world's origin is drawn [m]; panels in one pair of axes are much faster to draw.
     """
 
     name: str
@@ -181,10 +180,7 @@ def draw_body(axes: Axes, body: BodyModel, q: FloatArray, view: View) -> None:
 def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list[float], list[str]]:
     """Places and labels of some ticks in each of several panels in one pair of axes.
 
-    Args:
-        low: Lower end of a panel [m].
-        high: Upper end [m].
-        offsets: Where the zero of each panel is drawn [m].
+    They reach from ``low`` to ``high``; the zero of each is drawn at an offset [m].
     """
     span = high - low
     fitting = (step for step in (0.1, 0.2, 0.25, 0.5, 1.0, 2.0) if span / step <= 4.0)

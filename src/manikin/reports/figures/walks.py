@@ -12,22 +12,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from scipy.spatial.distance import cdist
 
+from manikin import walking
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.reports.figures.style import draw_heading, dress, legend_in_title, need, new_figure, new_grid
 from manikin.runtime.display import COLOURS
-from manikin.walking import (
-    HOLONOMIC,
-    NONHOLONOMIC,
-    CategoryStatistics,
-    HolonomicZone,
-    ShoulderPaths,
-    Walker,
-    WalkingPath,
-    WalkObstacle,
-    floor_plan,
-    segment_path,
-)
+from manikin.walking import CategoryStatistics, HolonomicZone, WalkingPath, WalkObstacle
 from manikin.walking.goal_categories import THESIS_RADIUS
 from manikin.walking.words import STRAIGHT, THESIS_WORDS, EqualPaths, WordPath, WordSlice
 
@@ -45,7 +35,7 @@ def walk_paths_figure(record: RunRecord) -> Figure:
     figure = new_figure(8.6, 6.4, "Ways over the floor, from above")
     axes = figure.add_subplot()
     if record.scene is not None and record.body is not None:
-        for obstacle in floor_plan(record.scene, record.body.stature or 0.0):
+        for obstacle in walking.floor_plan(record.scene, record.body.stature or 0.0):
             draw_obstacle(axes, obstacle)
     for name, way in walks.items():
         _draw_way(axes, way)
@@ -64,11 +54,11 @@ def _draw_way(axes: Axes, way: FloatArray) -> None:
     """Draw a way (n, 4), coloured by how the body goes along it."""
     time, place = way[:, 0], way[:, 1:]
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    labels = segment_path(ShoulderPaths.of_places(place, rate)).labels
-    kinds = {HOLONOMIC: KINDS["holonomic"], NONHOLONOMIC: KINDS["nonholonomic"]}
+    labels = walking.segment_path(walking.ShoulderPaths.of_places(place, rate)).labels
+    kinds = {walking.HOLONOMIC: KINDS["holonomic"], walking.NONHOLONOMIC: KINDS["nonholonomic"]}
     colours = [kinds.get(str(label), COLOURS["soft"]) for label in labels[:-1]]
     rows = np.searchsorted(time, np.arange(time[0], time[-1] + EVERY, EVERY)).clip(max=len(time) - 1)
-    _draw_places(axes, place, colours, place[rows], Walker().width / 2, (1.8, 0.8))
+    _draw_places(axes, place, colours, place[rows], walking.Walker().width / 2, (1.8, 0.8))
     draw_heading(axes, place[-1], 0.3)
     axes.plot(*place[0, :2], "o", color=COLOURS["ink"], markersize=4, zorder=6)
 
