@@ -24,7 +24,7 @@ class Passage:
     """A motion, recorded, planned or executed, or its part below one thing that is passed.
 
     Heights of the centre of mass are above the floor: of a recording the lowest surface on which feet stood,
-    of a planned motion the lowest limb in contact. They are NaN where the floor is not known.
+    of a planned motion the lowest limb in contact; NaN where it is not known.
 
     Attributes:
         start: [s].
@@ -58,10 +58,8 @@ class Passage:
     ) -> "Passage":  # fmt: skip
         """Measure the path of a centre of mass (n, 3) in the world at instants (n,) [m, s].
 
-        Args:
-            floor: (n,) or one height of the floor in the world [m]; NaN where it is not known.
-            tops: See :class:`Passage`, and so is ``room``.
-            overhead: Height above the floor of what is passed [m]; None if nothing is.
+        The floor (n,) in the world is NaN where it is not known, ``overhead`` the height above it of what is
+        passed, if anything [m].
         """
         height = com[:, 2] - floor
         lowest = int(np.argmin(np.where(np.isnan(height), np.inf, height)))
@@ -96,12 +94,9 @@ def measure_passage(
 ) -> Passage:
     """Least height of the CoM above the lowest limb in contact, and clearance of head and neck.
 
-    Heights count until the body sits down, where it does; the clearance counts over the whole motion, to the
-    scene without its floor and what may be leaned on.
-
-    Args:
-        motion: Planned or executed; what lies beyond the schedule counts as its last phase.
-        padded: Obstacles that any part of the body may lean on.
+    Heights count until the body sits down; the clearance over the whole motion, planned or executed, to the
+    scene without its floor and what is padded, which any part of the body may lean on. What lies beyond the
+    schedule counts as its last phase.
     """
     levels = np.full(len(schedule.sequence), np.nan)
     for index, phase in enumerate(schedule.sequence):

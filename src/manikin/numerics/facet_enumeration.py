@@ -96,8 +96,7 @@ class NormalFan:
     def _tight_multipliers(self, normals: FloatArray) -> FloatArray:
         """(m, k) level multipliers ``-alpha``, tightened to the generators' exact support."""
         r = self.rank
-        multipliers = -normals[:, r:]
-        levels = self.rays[:, r:]
+        multipliers, levels = -normals[:, r:], self.rays[:, r:]
         if self._coupled:
             return multipliers
         values = normals[:, :r] @ self.rays[:, :r].T
@@ -154,8 +153,7 @@ class NormalFan:
     def _most_independent(self, segments: list[FloatArray]) -> int | None:
         if not segments or self.rank == self.basis.shape[0]:
             return None
-        directions = np.array(segments)
-        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        directions = np.array(segments) / np.linalg.norm(segments, axis=1)[:, None]
         distance = np.linalg.norm(self._off_span(directions), axis=1)
         best = int(np.argmax(distance))
         return best if distance[best] > RANK_TOLERANCE else None
@@ -171,15 +169,10 @@ class NormalFan:
         side[m:, -1] = 1, -1
         basis = np.column_stack([self.basis, segment])
         return NormalFan(
-            basis,
-            np.asarray(np.linalg.pinv(basis), dtype=np.float64),
-            np.insert(self.rays, r, 0.0, axis=1),
-            np.vstack([normals, ends]),
-            np.vstack([self.on_generator, np.ones((2, n), dtype=np.bool_)]),
-            np.vstack([self.segments, segment]),
-            side,
-            self.thickness,
-        )
+            basis, np.asarray(np.linalg.pinv(basis), dtype=np.float64), np.insert(self.rays, r, 0.0, axis=1),
+            np.vstack([normals, ends]), np.vstack([self.on_generator, np.ones((2, n), dtype=np.bool_)]),
+            np.vstack([self.segments, segment]), side, self.thickness,
+        )  # fmt: skip
 
     def _refined(self, segment: FloatArray) -> "NormalFan":
         """Sum with a segment of the span: cut the fan by the hyperplane across it."""
@@ -231,11 +224,9 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     Raises:
         PolytopeError: If Qhull fails.
     """
-    n, d = generators.shape
-    k = levels.shape[1]
+    (n, d), k = generators.shape, levels.shape[1]
     y, basis, inverse, thickness = _white_coordinates(generators)
-    r = basis.shape[1]
-    slack = np.eye(k)[bounded_above]
+    r, slack = basis.shape[1], np.eye(k)[bounded_above]
     rays = np.vstack([np.hstack([y, levels]), np.hstack([np.zeros((len(slack), r)), slack])])
     cap = y.T @ levels[:, 0] / n if k == 1 and bounded_above[0] and r else None
     if cap is not None and np.abs(y @ cap - levels[:, 0]).max() < INCIDENCE_TOLERANCE:
@@ -245,8 +236,7 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     else:
         normals = polar_rays(rays, np.append(np.zeros(r), np.ones(k)))
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    cosine = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T
-    on_generator = cosine > -INCIDENCE_TOLERANCE
+    on_generator = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T > -INCIDENCE_TOLERANCE
     once = _without_splinters(on_generator)
     side = np.zeros((len(once), 0), dtype=np.int8)
     return NormalFan(
@@ -316,14 +306,10 @@ def _usable(kinds: FloatArray, present: BoolArray) -> BoolArray:
     index = np.flatnonzero(present)
     n, k = len(index), kinds.shape[1]
     answer = linprog(
-        np.concatenate([np.zeros(n), -np.ones(n)]),
-        A_eq=np.hstack([kinds[index].T, np.zeros((k, n))]),
-        b_eq=np.ones(k),
-        A_ub=np.hstack([-np.eye(n), np.eye(n)]),
-        b_ub=np.zeros(n),
-        bounds=[(0, None)] * n + [(0, 1e-3)] * n,
-        method="highs",
-    )
+        np.concatenate([np.zeros(n), -np.ones(n)]), A_eq=np.hstack([kinds[index].T, np.zeros((k, n))]),
+        b_eq=np.ones(k), A_ub=np.hstack([-np.eye(n), np.eye(n)]), b_ub=np.zeros(n),
+        bounds=[(0, None)] * n + [(0, 1e-3)] * n, method="highs",
+    )  # fmt: skip
     used = np.zeros(len(kinds), dtype=np.bool_)
     if answer.status == 0:
         used[index] = answer.x[n:] > 1e-7

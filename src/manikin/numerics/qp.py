@@ -94,8 +94,7 @@ def solve_sparse_qp(
         matrix[equal] if equalities else None, rows_upper[equal] if equalities else None,
         matrix[rest], None if rows_lower is None else rows_lower[rest], rows_upper[rest], *bounds,
     )  # fmt: skip
-    status = solver.solve()
-    result = solver.result
+    status, result = solver.solve(), solver.result
     return QPSolution(np.array(result.x), status == piqp.PIQP_SOLVED, str(status), int(result.info.iter))
 
 

@@ -18,12 +18,8 @@ HARMONICS = 8
 def fourier_basis(phase: ArrayLike, harmonics: int = HARMONICS) -> FloatArray:
     """(..., 2 harmonics + 1) ``1, cos 2 pi k p, ..., sin 2 pi k p, ...`` ([Truong2010]_ 6.1, period T).
 
-    The thesis prints ``k pi t / T``, which has the period 2 T; a cycle of duration T is ``2 k pi t / T``
-    with ``p = t / T``.
-
-    Args:
-        phase: (...) phases p, 1 a whole cycle.
-        harmonics: Largest k.
+    The thesis prints ``k pi t / T``, which has the period 2 T. Phases ``p = t / T`` (...) are 1 for a whole
+    cycle, ``harmonics`` is the largest k.
     """
     angle = 2.0 * np.pi * np.asarray(phase, dtype=np.float64)[..., None] * np.arange(1, harmonics + 1)
     return np.concatenate([np.ones((*angle.shape[:-1], 1)), np.cos(angle), np.sin(angle)], axis=-1)
@@ -40,11 +36,8 @@ def shifted(coefficients: FloatArray, phase: float) -> FloatArray:
     harmonics = (coefficients.shape[-2] - 1) // 2
     angle = 2.0 * np.pi * phase * np.arange(1, harmonics + 1)[:, None]
     mean, cosine, sine = np.split(coefficients, [1, harmonics + 1], axis=-2)
-    return np.concatenate([
-        mean,
-        cosine * np.cos(angle) + sine * np.sin(angle),
-        sine * np.cos(angle) - cosine * np.sin(angle),
-    ], axis=-2)  # fmt: skip
+    c, s = np.cos(angle), np.sin(angle)
+    return np.concatenate([mean, cosine * c + sine * s, sine * c - cosine * s], axis=-2)
 
 
 def mask_runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
