@@ -260,8 +260,7 @@ class Controller:
         if support.settling:
             upper = np.minimum(upper, cap * self._low_shares(geometry, contact, state, edges))
         if support.fades:
-            limits = state.mass * GRAVITY * self._point_shares(support, contact, edges)
-            upper = np.minimum(upper, limits)
+            upper = np.minimum(upper, state.mass * GRAVITY * self._point_shares(support, contact, edges))
         return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
 
     def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:

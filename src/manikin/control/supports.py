@@ -140,8 +140,7 @@ def support_intervals(
         start = -math.inf if first == 0 else float(schedule.instants[first])
         end = math.inf if index == len(phases) else float(schedule.instants[index])
         flight = start - previous_end
-        long = LONG_FLIGHT < flight < math.inf
-        window = max(early_window, EARLY_SHARE * flight) if long else early_window
+        window = max(early_window, EARLY_SHARE * flight) if LONG_FLIGHT < flight < math.inf else early_window
         early = max(start - window, start - flight / 3) if first else start
         if intervals:  # a long flight rises as slowly as it comes down
             intervals[-1] = replace(intervals[-1], late=previous_end + window)
@@ -177,8 +176,7 @@ class SupportSwitch:
 
         ``touching`` says whether each is felt to touch; the schedule is trusted where it says nothing.
         """
-        felt = touching or {}
-        return {name: self._update(name, time, felt.get(name)) for name in self.effectors}
+        return {name: self._update(name, time, (touching or {}).get(name)) for name in self.effectors}
 
     def _update(self, name: str, time: float, touching: bool | None) -> SupportState:
         number, interval = self._interval(name, time)
@@ -245,8 +243,7 @@ class SupportSwitch:
     def _follow(self, name: str, time: float) -> float:
         """Feedback gains rise smoothly after a lift-off, where plan and reality differ in speed."""
         ends = [interval.end for interval in self._intervals[name] if interval.end <= time + 1e-9]
-        since = time - max(ends, default=-math.inf)
-        return float(np.clip(since / self._settings.follow_time, 0.0, 1.0))
+        return float(np.clip((time - max(ends, default=-math.inf)) / self._settings.follow_time, 0.0, 1.0))
 
     def _interval(self, name: str, time: float) -> tuple[int, SupportInterval | None]:
         every = enumerate(self._intervals[name])

@@ -174,8 +174,7 @@ def _load_from(description: Mapping[str, Any]) -> CarriedLoad:
 
 def _describe_contact(contact: Contact) -> Json:
     """In the order of the fields, the rotation under a shorter name."""
-    values = _plain(contact)
-    return {key.removesuffix("_contact_to_world"): value for key, value in values.items()}
+    return {key.removesuffix("_contact_to_world"): value for key, value in _plain(contact).items()}
 
 
 def _contact_from(data: Mapping[str, Any]) -> Contact:

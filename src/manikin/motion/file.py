@@ -147,14 +147,12 @@ def margin_form(motion: Motion, schedule: ContactSchedule | None) -> str:
 
 def _write_motion(group: h5py.Group, motion: Motion) -> None:
     for key in ("joint_names", "contact_names"):
-        names = np.array(getattr(motion, key), dtype=object)
-        group.attrs.create(key, names, dtype=h5py.string_dtype())
+        group.attrs.create(key, np.array(getattr(motion, key), dtype=object), dtype=h5py.string_dtype())
     for name, array in motion.arrays().items():
         unit, meaning = DATASETS[name]
         unit = motion.margin_unit if name == "margin" else unit
         data = array.astype(np.uint8) if array.dtype == np.bool_ else array
-        dataset = group.create_dataset(name, data=data, track_times=False)
-        dataset.attrs.update(unit=unit, description=meaning)
+        group.create_dataset(name, data=data, track_times=False).attrs.update(unit=unit, description=meaning)
 
 
 def _content(file: h5py.File, source: str) -> MotionFile:

@@ -104,8 +104,7 @@ class Motion(Displayed):
         if n == 0:
             raise MotionFileError("motion has no samples; valid: at least one")
         for name, shape in wanted.items():
-            dtype = np.bool_ if name == "support" else np.float64
-            array = np.array(getattr(self, name), dtype=dtype)
+            array = np.array(getattr(self, name), dtype=np.bool_ if name == "support" else np.float64)
             if array.shape != shape:
                 raise MotionFileError(f"motion {name} has shape {array.shape}; valid: {shape}")
             array.setflags(write=False)
@@ -167,8 +166,7 @@ def phases_of(motion: Motion, schedule: ContactSchedule | None = None) -> PhaseT
     changes = np.flatnonzero(np.any(motion.support[1:] != motion.support[:-1], axis=1)) + 1
     starts = np.concatenate([[0], changes])
     supports = tuple(tuple(compress(motion.contact_names, motion.support[start])) for start in starts)
-    instants = np.append(motion.time[starts], motion.time[-1])
-    return PhaseTable(frozen_array(instants, "instants"), supports)
+    return PhaseTable(frozen_array(np.append(motion.time[starts], motion.time[-1]), "instants"), supports)
 
 
 def com_velocity(motion: Motion) -> FloatArray:

@@ -39,8 +39,7 @@ class SampledBasis:
         first = np.clip(np.searchsorted(knots, time, side="right") - 1, degree, size - 1) - degree
         identity = BSpline(knots, np.eye(size), degree)
         rows, columns = np.arange(len(time))[:, None], first[:, None] + np.arange(degree + 1)
-        values = np.stack([identity(time, nu=order)[rows, columns] for order in range(3)])
-        return cls(first, values, size)
+        return cls(first, np.stack([identity(time, nu=order)[rows, columns] for order in range(3)]), size)
 
     @property
     def starts(self) -> NDArray[np.bool_]:

@@ -78,8 +78,7 @@ class NormalFan:
         Returns:
             H (m, d), h (m,) and the part of each offset that each level pays for (m, k), zero for equalities.
         """
-        real = self._real_facets()
-        normals = self.normals[real]
+        normals = self.normals[self._real_facets()]
         H = normals[:, : self.rank] @ self.inverse
         length = np.linalg.norm(H, axis=1)
         H /= length[:, None]
@@ -130,8 +129,7 @@ class NormalFan:
     def _face_dimension(self, facet: int, live: BoolArray, kinds: FloatArray) -> int:
         across = self.segments[self.side[facet] == 0] @ self.inverse.T
         across = np.hstack([across, np.zeros((len(across), self.rays.shape[1] - self.rank))])
-        spanning = np.vstack([self.rays[self.on_generator[facet] & live], across])
-        return int(_rank(spanning) - _rank(kinds))
+        return int(_rank(np.vstack([self.rays[self.on_generator[facet] & live], across])) - _rank(kinds))
 
     def plus_segments(self, segments: FloatArray) -> "NormalFan":
         """Fan of the Minkowski sum with ``[-s, s]`` for each row s of ``segments`` (q, d)."""

@@ -282,8 +282,7 @@ def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
     along = np.clip((to_point * edges).sum(axis=-1) / squared, 0.0, 1.0)
     distance = np.linalg.norm(to_point - along[..., None] * edges, axis=-1).min(axis=-1)
     left = edges[:, 0] * to_point[..., 1] - edges[:, 1] * to_point[..., 0]
-    inside = np.all(left >= 0, axis=-1) & (len(corners) > 2)
-    return np.where(inside, distance, -distance)
+    return np.where(np.all(left >= 0, axis=-1) & (len(corners) > 2), distance, -distance)
 
 
 def _half_hull(points: FloatArray) -> list[FloatArray]:

@@ -212,8 +212,7 @@ def _same_place(first: Contact, second: Contact) -> bool:
         return False
     if len(one) == len(other) and np.square(one - other).sum(axis=1).max() <= TOUCHING**2:
         return True  # point by point, as from one sample to the next
-    missing = np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1)
-    if missing.max() > TOUCHING:
+    if np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1).max() > TOUCHING:
         return False
     return bool(signed_distance(other[:, :2], convex_polygon(one[:, :2])).min() >= -TOUCHING)
 

@@ -135,8 +135,7 @@ def _primitive(obstacle: Obstacle) -> tuple[Any, list[float], FloatArray, FloatA
     turned, place = rotation_from_normal(normal), normal * offset
     if isinstance(shape, HalfSpace):
         return _GEOM.mjGEOM_PLANE, [0.0, 0.0, 1.0], turned, place
-    half = [PLANE_HALF_SIZE, PLANE_HALF_SIZE, PLANE_THICKNESS / 2]
-    return _GEOM.mjGEOM_BOX, half, turned, place
+    return _GEOM.mjGEOM_BOX, [PLANE_HALF_SIZE, PLANE_HALF_SIZE, PLANE_THICKNESS / 2], turned, place
 
 
 def _add_mesh(spec: Any, obstacle: Obstacle, mesh: Mesh, contact: dict[str, Any]) -> None:
@@ -160,8 +159,7 @@ def _convex_bodies(piece: MeshPiece) -> list[FloatArray]:
     corners = piece.vertices[piece.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    inner = corners - SHEET_THICKNESS * normals[:, None, :]
-    return list(np.concatenate([corners, inner], axis=1))
+    return list(np.concatenate([corners, corners - SHEET_THICKNESS * normals[:, None, :]], axis=1))
 
 
 @dataclass(frozen=True, eq=False)

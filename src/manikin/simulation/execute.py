@@ -138,8 +138,7 @@ class _Run:
         self._segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, self._segments)
         self.failure, self.failure_time = "", None
-        everything = tuple(segment.name for segment in body.segments)
-        self._leaning = [(everything, name) for name in padded]
+        self._leaning = [(tuple(segment.name for segment in body.segments), name) for name in padded]
         self._planned_now: tuple[int, ...] | None = None
         self._leaving = set[str]()
 

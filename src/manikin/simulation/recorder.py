@@ -106,8 +106,6 @@ class Recorder:
                     most = FrictionUse(model, share, sample.sensed.time, name)
         return most
 
-    # --- measures --------------------------------------------------------------------------
-
     def com_errors(self) -> FloatArray:
         """(n,) distance of the CoM from its plan [m]."""
         return _lengths([s.output.state.com - s.output.reference.com for s in self.samples])
@@ -146,8 +144,7 @@ class Recorder:
         """When the planned contacts were due; None where the plan never waited."""
         if not self.samples or self.samples[-1].output.waited == 0.0:
             return None
-        waited = np.array([sample.output.waited for sample in self.samples])
-        planned = np.array([sample.plan_time for sample in self.samples])
+        waited, planned = np.array([(s.output.waited, s.plan_time) for s in self.samples]).T
         instants = self._schedule.instants
         late = waited[np.minimum(np.searchsorted(planned, instants), len(waited) - 1)]
         return ContactSchedule(self._schedule.sequence, instants + late)

@@ -206,8 +206,7 @@ class _RecoveryRun:
         wanted = self.task.until_at_rest
         if wanted is None or time < self.disturbed_until:
             return False
-        velocity = state.momentum[:3] / state.mass
-        if not at_rest(self.placed, self.controller, state.q, state.com, velocity):
+        if not at_rest(self.placed, self.controller, state.q, state.com, state.momentum[:3] / state.mass):
             self.rest_from = time + self.substeps * self.world.model.options.timestep
         return time - self.rest_from >= wanted - 1e-9
 

@@ -91,11 +91,10 @@ def _acting(forces: Forces, contacts: Sequence[Contact], act: HandForce) -> Forc
 
 
 def _block(contact: Contact, origin: FloatArray) -> Forces:
-    arm = contact.position - origin
     if contact.kind is ContactKind.GRASP:
         moments = 3 if contact.max_moment > 0.0 else 0
         wrench = np.zeros((6, 3 + moments))
-        wrench[:3, :3], wrench[3:, :3] = np.eye(3), skew(arm)
+        wrench[:3, :3], wrench[3:, :3] = np.eye(3), skew(contact.position - origin)
         wrench[3:, 3:] = np.eye(3)[:, :moments]
         bound = np.repeat([contact.max_force, contact.max_moment], [3, moments])
         return Forces(wrench, np.zeros((0, 3 + moments)), np.zeros(0), -bound, bound)
@@ -149,8 +148,7 @@ def rest(
     if not contacts:
         return Rest(np.inf, 0.0, None)
     level = float(np.mean([contact.position[2] for contact in contacts]))
-    origin = np.array([com[0], com[1], level])
-    forces = forces_of(contacts, mass, cap, origin)
+    forces = forces_of(contacts, mass, cap, np.array([com[0], com[1], level]))
     if act is not None:
         forces = _acting(forces, contacts, act)
     weight, count = mass * GRAVITY, len(forces.lower)
@@ -162,8 +160,7 @@ def rest(
     rows, limits = [np.hstack([forces.rows, np.zeros((len(forces.rows), 3))])], [forces.limits / weight]
     # From a direction that turns with the contacts, so that results do not depend on the world's axes.
     forward = contacts[0].rotation_contact_to_world[:2, 0]
-    heading = float(np.arctan2(forward[1], forward[0]))
-    turn = heading + np.arange(2 * _DIRECTIONS) * np.pi / _DIRECTIONS
+    turn = float(np.arctan2(forward[1], forward[0])) + np.arange(2 * _DIRECTIONS) * np.pi / _DIRECTIONS
     sides = np.column_stack([np.cos(turn), np.sin(turn)])
     bound = np.zeros((len(sides), count + 3))
     bound[:, count : count + 2] = sides

@@ -184,8 +184,7 @@ class ContactRows:
     def _of_the_sole(self, contact: Contact, hull: FloatArray | None, where: str) -> None:
         self._beyond.take(float(np.abs(contact.points[:, 2]).max()), where)
         if (size := nominal_size(self._body, contact.effector)) is not None:
-            beyond = np.abs(contact.points[:, :2]) - 0.5 * np.array(size)
-            self._beyond.take(float(beyond.max()), where)
+            self._beyond.take(float((np.abs(contact.points[:, :2]) - 0.5 * np.array(size)).max()), where)
             if hull is None and not contact.rolls:
                 self._share.take(0.0, where)
 

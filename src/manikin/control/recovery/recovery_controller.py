@@ -66,12 +66,10 @@ def held_posture(
     stiffness[joints["ankle"]] = 0.5 * settings.ankle_stiffness * toppling
     damping = 2.0 * np.sqrt(stiffness * inertia)
     pull = np.zeros(len(state.v))
-    ahead = state.q[7:] + period * state.v[6:]
-    pull[6:] = stiffness * (standing.posture - ahead) - damping * state.v[6:]
+    pull[6:] = stiffness * (standing.posture - (state.q[7:] + period * state.v[6:])) - damping * state.v[6:]
     matrix = state.mass_matrix.copy()
     matrix[np.arange(6, len(pull)), np.arange(6, len(pull))] += period * damping
-    slowed = np.linalg.solve(matrix, pull)[6:]
-    return resting + pull[6:] - period * damping * slowed
+    return resting + pull[6:] - period * damping * np.linalg.solve(matrix, pull)[6:]
 
 
 SETTLING = 20.0

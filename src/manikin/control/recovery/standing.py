@@ -156,12 +156,11 @@ def close_loop(
     basis = factors.Q[:, held:]
     rate, offset = state.centroidal_map @ basis, state.centroidal_map @ drift + state.momentum_drift
     weight, push_force = np.array([0.0, 0.0, state.mass * GRAVITY]), push.wrench[:3]
-    push_moment = push.wrench[3:] - skew(state.com) @ push_force
     return ClosedLoop(
         LinearMap(basis, drift), LinearMap(basis[6:], drift[6:]),
         com=LinearMap(rate[:3] / state.mass, offset[:3] / state.mass),
         force=LinearMap(rate[:3], offset[:3] + weight - push_force),
-        moment=LinearMap(rate[3:], offset[3:] - push_moment),
+        moment=LinearMap(rate[3:], offset[3:] - (push.wrench[3:] - skew(state.com) @ push_force)),
     )  # fmt: skip
 
 

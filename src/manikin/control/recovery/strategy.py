@@ -77,8 +77,7 @@ def posture_control(
     values[:, 0] += rows.offset
     scale = 1e-12 * np.abs(values).sum(axis=1, keepdims=True)
     shares = _shares(values)
-    excess = np.max(_at(values, shares) - scale, axis=0)
-    inside = (excess <= 0.0) & (shares > 0.0)
+    inside = (np.max(_at(values, shares) - scale, axis=0) <= 0.0) & (shares > 0.0)
     if np.any(inside):
         share = float(shares[inside].max())
     elif always:
@@ -96,8 +95,7 @@ def posture_control(
 def _shares(values: FloatArray) -> FloatArray:
     """0, 1 and the zeros between them of polynomials ``a + b s + c s^2`` (m, 3)."""
     a, b, c = values.T
-    root = np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0))
-    far = -0.5 * (b + np.copysign(root, b))
+    far = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0)), b))
     with np.errstate(divide="ignore", invalid="ignore"):
         zeros = np.concatenate((far / c, a / far))
     return np.concatenate(([0.0, 1.0], zeros[(zeros > 0.0) & (zeros < 1.0)]))

@@ -149,8 +149,7 @@ class StepCheck:
             return False
         corners = contact.points_in_world
         around = np.concatenate((corners, 0.5 * (corners + np.roll(corners, 1, axis=0)), [contact.position]))
-        raised = around + ABOVE * contact.normal
-        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in raised)
+        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in around + ABOVE * contact.normal)
 
     def standing(self, soles: tuple[Contact, ...], q: FloatArray) -> Standing:
         """Posture on given soles with the centre of mass over their middle, near a configuration (nq,)."""
@@ -256,8 +255,7 @@ class SteppingRecovery:
             if output.strategy not in (Strategy.STIFF, Strategy.STEP) and self._must_step(time, output.state):
                 self._lift(time, output.state)
             return output
-        way = swing.foot, swing.sample(time)
-        output = self.balance.step(q, v, push, reacting=reacting, swing=way)
+        output = self.balance.step(q, v, push, reacting=reacting, swing=(swing.foot, swing.sample(time)))
         self._aim(time, output.state, swing)
         return output
 
@@ -298,8 +296,7 @@ class SteppingRecovery:
             return
         capture, inset = self._capture(state), self.settings.inset
         landing = capture_after(capture, standing.area, self._frequency, remaining, inset)
-        wanted = self._goal.position[:2] + landing - self._goal.capture
-        goal = np.array([*wanted, self._goal.position[2]])
+        goal = np.array([*(self._goal.position[:2] + landing - self._goal.capture), self._goal.position[2]])
         moved = sole_at(self.body, swing.foot, swing.rotation, goal, self.balance.friction)
         near = np.linalg.norm(goal - standing.soles[0].position) <= self.settings.reach
         if near and self.check.free(moved):
