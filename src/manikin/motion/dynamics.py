@@ -174,8 +174,7 @@ class CentroidalMotion:
         com: (n, 3) centre of mass [m].
         angular_momentum: (n, 3) about the centre of mass [kg.m^2/s].
         angular_momentum_rate: (n, 3) its derivative [N.m].
-        wrench: (n, 6) ``[m (c'' - g); c x m (c'' - g) + L']`` about the world origin, force [N] and moment
-            [N.m] ([Qiu2012]_ 4.51).
+        wrench: (n, 6) ``[m (c'' - g); c x m (c'' - g) + L']`` about the origin [N, N.m] ([Qiu2012]_ 4.51).
     """
 
     com: FloatArray

@@ -65,8 +65,7 @@ class Motion(Displayed):
         tau: (n, nv) generalised forces; the first six (pelvis) are zero [N, N.m].
         com: (n, 3) centre of mass [m].
         angular_momentum: (n, 3) about the centre of mass [kg.m^2/s].
-        margin: (n,) wrench margin about the CoM, alpha = 1 m [N.m]; of a point mass planned in the force
-            space, the force margin at the CoM [N].
+        margin: (n,) wrench margin about the CoM, alpha = 1 m [N.m], or of a point mass force margin [N].
         support: (n, c) True where the contact is active.
         contact_force: (n, c, 6) force [N] of the scene and moment about the contact frame's origin [N.m].
         contact_names: c effector names.

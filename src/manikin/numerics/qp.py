@@ -33,8 +33,7 @@ class QPSolution:
         solved: Whether it is the minimiser.
         status: The solver's own word.
         iterations: Its iterations.
-        multipliers: Of dense programs, those of the bounds, where there are any, and of the rows; positive at
-            an upper bound.
+        multipliers: Of dense programs, those of bounds, if any, and rows; positive at an upper bound.
     """
 
     x: FloatArray

@@ -126,8 +126,7 @@ def low_passed(
         values: (n, ...), at least two, at an even rate.
         cutoff: Where each of the two passes halves the power [Hz]; above 0 and below half the rate.
         rate: Per second [Hz], or :data:`SHARES`.
-        padding: Most values by which each end is continued, mirrored about the last one; None for those of
-            two periods of the cutoff.
+        padding: Most values by which each end is continued, mirrored; None for two periods of the cutoff.
     """
     wanted = int(np.ceil(2.0 * rate / cutoff)) if padding is None else padding
     sections = _sections(float(cutoff), float(rate))

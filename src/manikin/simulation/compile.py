@@ -40,8 +40,7 @@ class PhysicsOptions:
         timestep: [s]; 1 ms as in [Qiu2012]_ 6.1.
         friction: Coulomb coefficient between the body and the scene and of the body with itself.
         contact_friction: Pairs of a segment and a larger coefficient between it and the scene.
-        segment_friction: Pairs of a segment and its coefficient to whatever it touches; it is soft, see
-            ``soft_time_constant``.
+        segment_friction: Pairs of a segment and its coefficient to whatever it touches; such a one is soft.
         contact_time_constant: How fast a contact pushes penetration out [s]; at least two time steps.
         soft_time_constant: The same for segments with their own friction: flesh on a cushion [s].
         joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
@@ -246,8 +245,7 @@ def compile_model(
     Args:
         scene: Obstacles and floor; None for an empty world without a floor.
         options: Settings; defaults when None.
-        held: Effectors welded to the world, at a rotation (3, 3) and a position (3,) [m]; their segments pass
-            through the scene.
+        held: Effectors welded to the world, by rotation (3, 3) and position (3,) [m], which pass through it.
 
     Raises:
         SceneError: If a mesh is too large to simulate.

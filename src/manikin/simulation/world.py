@@ -190,7 +190,7 @@ class World:
     def mean_wrench(self) -> FloatArray:
         """(6,) mean wrench of scene and grips on the body since the last call, about the world origin.
 
-        Where the body only leans, nothing counts: that acts like a push. Impacts count by their share of time.
+        Where the body only leans, nothing counts: it acts like a push. Impacts count by their share of time.
         """
         mean = self._total / max(self._steps, 1)
         self._total[:], self._steps = 0.0, 0

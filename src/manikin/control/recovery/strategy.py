@@ -120,20 +120,17 @@ class RecoverySettings:
         com_weight: Weight of the squared error of :func:`com_law` against a squared joint acceleration; it
             bends where the limits leave no choice, where the thesis' equality would have no solution.
         calm: Rate at which that law brings the capture point back [1/s] (2.45-2.48).
-        turning: Largest moment with which arms and trunk turn where the ZMP is not enough, and are stopped
-            again, in body weights [m].
+        turning: Largest moment that turns arms and trunk, and stops them again, in body weights [m].
         least_braking: Smallest moment with which they are stopped, in body weights [m].
         late_braking: Moment in body weights [m] beyond which the turning is stopped wherever the capture
             point is: otherwise the stops of the joints do it, all at once.
-        range: Integral over time of the angular momentum that arms, trunk and legs can have, for each
-            kilogram of the body [m^2].
+        range: Integral over time of the angular momentum that limbs and trunk can have, by the mass [m^2].
         friction_model: Friction model of the soles, of margins; control stays inside the cone.
         least_load: Share of the weight that the ground carries where that is possible, to push against.
         stopping: Damping of all joints while the turning is stopped [1/s].
         height: Gains of the same law for the height.
         height_weight: Weight of its squared error; 0, as in the thesis, leaves the height to ``upward``.
-        arm_weight: Weight of a squared acceleration of an arm's joint, against 1 of any other: the diagonal
-            of ``C_theta`` (2.27).
+        arm_weight: Weight of an arm joint's squared acceleration, 1 of any other: of ``C_theta`` (2.27).
         trunk_weight: The same of the trunk: hips fold first, so that both ranges end together.
         upward: Slope of the objective by the upward acceleration of the centre of mass (2.54).
         swing: Gains with which a stepping foot follows its way.
