@@ -26,8 +26,7 @@ YIELDING = 0.2
 """Stiffness with which a hand that should feel a force is held at its place, relative to a stance's."""
 
 RAISED = 0.006
-"""Points this far above the lowest one of a contact that still settles may carry all of its load, twice as
-far none [m]."""
+"""Points this far above the lowest one of a contact that settles may carry load, twice as far none [m]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,8 @@ class SupportState:
         lift_rate: (3,) rate of that offset [m/s].
         follow: Share of the feedback gains with which a flying effector follows its path.
         planned: Whether the time is one of planned support, not of an early touch.
-        fades: Parts of the sole beyond which load limits rise after, or fall before, a change of what touches.
+        fades: Parts of the sole beyond which load limits rise after a change of what touches, or fall before
+            one, and how far, in [0, 1].
     """
 
     effector: str

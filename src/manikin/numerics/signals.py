@@ -18,8 +18,7 @@ HARMONICS = 8
 def fourier_basis(phase: ArrayLike, harmonics: int = HARMONICS) -> FloatArray:
     """(..., 2 harmonics + 1) ``1, cos 2 pi k p, ..., sin 2 pi k p, ...`` ([Truong2010]_ 6.1, period T).
 
-    The thesis prints ``k pi t / T``, which has the period 2 T. Phases ``p = t / T`` (...) are 1 for a whole
-    cycle, ``harmonics`` is the largest k.
+    The thesis prints ``k pi t / T``, of period 2 T. Phases are ``p = t / T`` (...), k is up to ``harmonics``.
     """
     angle = 2.0 * np.pi * np.asarray(phase, dtype=np.float64)[..., None] * np.arange(1, harmonics + 1)
     return np.concatenate([np.ones((*angle.shape[:-1], 1)), np.cos(angle), np.sin(angle)], axis=-1)

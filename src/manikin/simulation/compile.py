@@ -1,9 +1,8 @@
 """The body and the scene as a MuJoCo model, and the translation of states.
 
-The model is built from the same neutral description as the Pinocchio one, through ``MjSpec``. It has one
-MuJoCo body per segment, a free joint on the root, the segment's hinges in the same order, one torque motor
-per hinge, one geometry ``"segment/shape"`` per shape and one site ``"effector/<name>"`` per effector.
-Obstacles of the scene are static geometries.
+The model is built from the same neutral description as the Pinocchio one. It has one MuJoCo body per segment,
+a free joint on the root, the segment's hinges in the same order, one torque motor per hinge, one geometry
+``"segment/shape"`` per shape, one site ``"effector/<name>"`` per effector. Obstacles are static geometries.
 
 The engines describe the free root differently. With ``R`` the rotation from the root's axes to the
 world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocchio:

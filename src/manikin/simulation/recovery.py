@@ -19,8 +19,7 @@ from manikin.simulation.push_force import Push
 from manikin.simulation.recovery_record import RecoveryTrace
 
 STANDS_HEIGHT = 0.95
-"""Least height of the centre of mass of a standing body, as a share of its first one [-]; kneeling, a human
-has some 0.7 of it and lying 0.2."""
+"""Least height of the CoM of a standing body, as a share of its first one [-]; kneeling has some 0.7."""
 
 STANDS_LEAN = 0.3
 """Largest lean of the trunk of a standing body [rad]."""

@@ -1,9 +1,8 @@
 """The quadratic program of one step of the recovery, its objectives and the swing of the arms.
 
 The program is that of [Kudoh2002]_ 2.54-2.64. Unknowns are the accelerations ``phi''`` of the closed loops
-and the forces at the corners of the soles. The thesis has the former alone: without the latter, which pull no
-foot down (``f_z > 0``) and keep to friction, joint torques cannot be limited, since two feet on the ground
-share their load in many ways.
+and the forces at the corners of the soles, which pull no foot down (``f_z > 0``) and keep to friction. The
+thesis has the former alone: without the latter, joint torques on two feet cannot be limited.
 
 Arms help against a fall ahead by being raised and swung; this part is ours. Of hanging arms that swing back,
 the angular momentum about the centre of mass is next to nothing: that of their turning is undone by that of

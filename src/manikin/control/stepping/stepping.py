@@ -64,10 +64,9 @@ class SwingFoot:
 
     def _height(self, time: float) -> tuple[float, float, float]:
         """Height [m] and its two derivatives: up and down with a level start, end and top."""
-        end = self.start + self.duration
+        end, x = self.start + self.duration, self.share(time)
         if time >= end:
             return self.goal[2] - PRESSING * (time - end), -PRESSING, 0.0
-        x = self.share(time)
         bump, slope = 16.0 * x**2 * (1.0 - x) ** 2, 32.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
         bend = 32.0 * (1.0 - 6.0 * x + 6.0 * x**2)
         rise = self.goal[2] - self._ground
@@ -127,15 +126,14 @@ class StepCheck:
         Soles and configuration (nq,) are those before the step; half way the foot has a clearance [m].
         """
         self.refusal = "no step can be reached in time"
-        before = {contact.effector: contact for contact in soles}
         for goal in itertools.islice(goals, TRIED):
             moved = sole_at(self._body, goal.foot, goal.rotation, goal.position, self._friction)
-            stays = next(contact for name, contact in before.items() if name != goal.foot)
+            stays, before = soles if soles[1].effector == goal.foot else soles[::-1]
             if not self.free(moved):
                 self.refusal = f"no room for the {goal.foot.replace('_', ' ')}"
                 continue
-            half = 0.5 * (before[goal.foot].position + goal.position) + np.array([0.0, 0.0, clearance])
-            if self._passes(stays, goal, half, q) and self._stands(stays, moved, q):
+            half = 0.5 * (before.position + goal.position) + np.array([0.0, 0.0, clearance])
+            if self._passes(stays, goal, half, q) and self._stands((stays, moved), q):
                 self.refusal = ""
                 return goal
             self.refusal = f"something is in the way of the {goal.foot.replace('_', ' ')}"
@@ -153,18 +151,15 @@ class StepCheck:
 
     def standing(self, soles: tuple[Contact, ...], q: FloatArray) -> Standing:
         """Posture on given soles with the centre of mass over their middle, near a configuration (nq,)."""
-        area = SupportArea.of(soles)
-        result = generate_posture(self._problem(soles, area, q), q)
-        state = Configuration(self._body, result.q)
-        return Standing(tuple(soles), area, result.q[7:].copy(), state.com.copy())
+        q = generate_posture(self._problem(soles, q), q).q
+        return Standing(soles, SupportArea.of(soles), q[7:].copy(), Configuration(self._body, q).com.copy())
 
-    def _problem(self, soles: tuple[Contact, ...], area: SupportArea, q: FloatArray) -> PostureProblem:
-        reference = np.concatenate((q[:7], self._home[7:]))
-        return PostureProblem(self._body, tuple(soles), com=com_target(*area.centre), reference=reference)
+    def _problem(self, soles: tuple[Contact, ...], q: FloatArray) -> PostureProblem:
+        reference, com = np.concatenate((q[:7], self._home[7:])), com_target(*SupportArea.of(soles).centre)
+        return PostureProblem(self._body, soles, com=com, reference=reference)
 
-    def _stands(self, stays: Contact, moved: Contact, q: FloatArray) -> bool:
-        soles = (stays, moved)
-        result = generate_posture(self._problem(soles, SupportArea.of(soles), q), q)
+    def _stands(self, soles: tuple[Contact, ...], q: FloatArray) -> bool:
+        result = generate_posture(self._problem(soles, q), q)
         return result.succeeded and self._clear(result.q, soles)
 
     def _passes(self, stays: Contact, goal: StepGoal, half: FloatArray, q: FloatArray) -> bool:
