@@ -13,16 +13,8 @@ import numpy as np
 
 from manikin.body import BodyModel, Effector, Hinge, Limb, Segment
 from manikin.body import Shape as BodyShape
-from manikin.contact import (
-    CarriedLoad,
-    Contact,
-    ContactKind,
-    ContactSchedule,
-    Phase,
-    SolePart,
-    Stance,
-    StanceSequence,
-)
+from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance
+from manikin.contact.stance import StanceSequence
 from manikin.numerics.spatial import frozen_array
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.scene.obstacle import Shape

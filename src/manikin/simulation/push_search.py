@@ -8,14 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
-from manikin.control.recovery import (
-    BalanceRecovery,
-    RecoverySettings,
-    edge_limits,
-    held_impulse,
-    joint_groups,
-    sole_at,
-)
+from manikin.control import recovery
+from manikin.control.recovery import BalanceRecovery, RecoverySettings, joint_groups, sole_at
 from manikin.errors import InputError
 from manikin.kinematics import Placement, PostureProblem, com_target, generate_posture
 from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_yaw
@@ -132,8 +126,8 @@ class PushTrials:
         """
         if self.task.feet is Feet.HELD:
             return None
-        limits = edge_limits(self._controller(), self._posture, self.push_duration)
-        return tuple(held_impulse(limits, math.radians(direction)) for direction in directions_deg)
+        limits = recovery.edge_limits(self._controller(), self._posture, self.push_duration)
+        return tuple(recovery.held_impulse(limits, math.radians(direction)) for direction in directions_deg)
 
     @property
     def _posture(self) -> ArrayLike:
