@@ -4,7 +4,7 @@ Nothing of the planner takes part: solids, distances, friction cones and linear 
 the body gives its plain sizes, and Pinocchio the forward kinematics.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -231,7 +231,8 @@ class _Check:
             contacts, com, within = change.carrying, change.com, None
             if com is None:
                 within = {number: self._reach.to_com(item.effector) for number, item in enumerate(contacts)}
-            guess, act = com if com is not None else _middle(change.held), self._act
+            middle = np.mean([item.position for item in change.held], axis=0) if change.held else np.zeros(3)
+            guess, act = middle if com is None else com, self._act
             result = rest(contacts, self._mass, self._cap, guess, within, None if change.after else act)
             names = ", ".join(contact.effector for contact in contacts) or "no contact"
             where = f"{change.where} on {names}"
@@ -254,10 +255,6 @@ class _Check:
         first, last = CentreState(start.com, stage.com_velocity), CentreState(end.com, leaving)
         contacts = tuple(stage.contacts.values())
         return dynamic_shortfall(contacts, self._mass, self._cap, first, last, stage.duration)
-
-
-def _middle(contacts: Sequence[Contact]) -> FloatArray:
-    return np.mean([contact.position for contact in contacts], axis=0) if contacts else np.zeros(3)
 
 
 PLACE = 0.25

@@ -117,13 +117,11 @@ class RecoverySettings:
     Attributes:
         period: Time between two control steps [s]; the thesis has 10 ms ([Kudoh2002]_ 3.2).
         delay: Time from the beginning of the first push until the control reacts [s] (3.2).
-        com_weight: Weight of the squared error of :func:`com_law` against a squared joint acceleration; it
-            bends where the limits leave no choice, where the thesis' equality would have no solution.
+        com_weight: Weight of the squared error of :func:`com_law`, which the thesis has as an equality.
         calm: Rate at which that law brings the capture point back [1/s] (2.45-2.48).
         turning: Largest moment that turns arms and trunk, and stops them again, in body weights [m].
         least_braking: Smallest moment with which they are stopped, in body weights [m].
-        late_braking: Moment in body weights [m] beyond which the turning is stopped wherever the capture
-            point is: otherwise the stops of the joints do it, all at once.
+        late_braking: Moment in body weights [m] beyond which it is stopped, or the joints' ends would do it.
         range: Integral over time of the angular momentum that limbs and trunk can have, by the mass [m^2].
         friction_model: Friction model of the soles, of margins; control stays inside the cone.
         least_load: Share of the weight that the ground carries where that is possible, to push against.
@@ -135,19 +133,16 @@ class RecoverySettings:
         upward: Slope of the objective by the upward acceleration of the centre of mass (2.54).
         swing: Gains with which a stepping foot follows its way.
         swing_weight: Weight of its squared error, and of that of the pelvis' tilt meanwhile.
-        unwinding: Gains of the joint accelerations back to the posture, from which the objective is measured;
-            the thesis has none, so that swung arms go on to their stops.
+        unwinding: Gains back to the posture, from which the objective is measured; the thesis has none.
         posture: Largest gains of the posture control (2.65); less of them at the same damping ratio.
         stiffness: Gains with which muscles hold the posture before they react, and locked joints always.
-        ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react:
-            the stiffness of calf muscles at rest, 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie
-            2002), too little to stand without control.
+        ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react: calf
+            muscles at rest have 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie 2002).
         sole_inset: The ZMP is kept this far inside the edge of the soles [m].
         friction_share: Share of the friction of the soles that is made use of.
         inner, outer: Half sizes of the regions in which posture control begins and ends, as shares of the
             support area's half size about its centre (Fig. 2.8); the gap keeps the choice from chattering.
-        posture_area: Share of the support area about its centre in which posture control keeps the ZMP, so
-            that its own motion does not carry the body away.
+        posture_area: Share of the support area about its centre in which posture control keeps the ZMP.
         locked: Groups of joints that hold the posture whatever happens: ``"arms"``, ``"hips"``.
         posture_control_only: Whether the quadratic program is never chosen.
         strength: Torque and speed limits relative to the body's own.
