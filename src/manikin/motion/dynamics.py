@@ -33,13 +33,13 @@ class MomentumRate:
 
 
 class MomentumRateSamples:
-    """Collects Pinocchio's derivatives sample by sample."""
+    """Collects Pinocchio's derivatives sample by sample, those by acceleration in ``by_a`` (n, 6, nv)."""
 
     def __init__(self, model: pin.Model, count: int) -> None:
         self._model = model
         self._mass = float(pin.computeTotalMass(model))
         self._value = np.zeros((count, 6))
-        self._by_q, self._by_v, self._by_a = np.zeros((3, count, 6, model.nv))
+        self._by_q, self._by_v, self.by_a = np.zeros((3, count, 6, model.nv))
 
     def record(self, sample: int, data: pin.Data, states: StateSamples) -> None:
         """Evaluate one sample; ``data`` then holds its kinematics and joint Jacobians."""
@@ -47,12 +47,7 @@ class MomentumRateSamples:
             self._model, data, states.q[sample], states.v[sample], states.a[sample]
         )
         self._value[sample] = data.dhg.vector
-        self._by_q[sample], self._by_v[sample], self._by_a[sample] = by_q, by_v, by_a
-
-    @property
-    def linear_by_acceleration(self) -> FloatArray:
-        """(n, 3, nv) derivative of the linear part by ``a``: mass times the centre of mass' Jacobian."""
-        return self._by_a[:, :3]
+        self._by_q[sample], self._by_v[sample], self.by_a[sample] = by_q, by_v, by_a
 
     def by_raw(
         self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
@@ -61,10 +56,10 @@ class MomentumRateSamples:
         turn = turn_derivatives(*(part[:, 3:7] for part in raw))
         by_raw, by_rate, by_second = np.zeros((3, *self._by_q.shape[:2], raw[0].shape[1]))
         by_raw[:, :, 7:], by_rate[:, :, 7:] = self._by_q[:, :, 6:], self._by_v[:, :, 6:]
-        by_second[:, :, 7:] = self._by_a[:, :, 6:]
+        by_second[:, :, 7:] = self.by_a[:, :, 6:]
         # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
-        by_omega = self._by_v[:, :, 3:6] + self._by_a[:, :, :3] @ skew(states.v[:, :3])
-        by_alpha = self._by_a[:, :, 3:6]
+        by_omega = self._by_v[:, :, 3:6] + self.by_a[:, :, :3] @ skew(states.v[:, :3])
+        by_alpha = self.by_a[:, :, 3:6]
         # All of the momentum's rate turns with the pelvis, but for the part of the pelvis' own acceleration.
         turning = self._value.copy()
         turning[:, :3] -= self._mass * raw[2][:, :3]
@@ -152,10 +147,8 @@ class MotionSampler:
             rate.value[rows] = own.value
             for block, carried in zip(rate.jacobians, own.jacobians, strict=True):
                 block[rows] = carried
-        return MotionSamples(
-            raw, states, tangent, com, momentum.linear_by_acceleration / self._mass, rate, frames,
-            PlacedShapes(shapes, jacobians),
-        )  # fmt: skip
+        com_jacobian, placed = momentum.by_a[:, :3] / self._mass, PlacedShapes(shapes, jacobians)
+        return MotionSamples(raw, states, tangent, com, com_jacobian, rate, frames, placed)
 
     def frame_jacobian(self, motion: MotionSamples, number: int) -> FloatArray:
         """(n, 6, nv) linear, then angular velocity of frame ``number`` in world axes, per ``v``."""

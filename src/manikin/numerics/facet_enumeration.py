@@ -94,13 +94,11 @@ class NormalFan:
 
     def _tight_multipliers(self, normals: FloatArray) -> FloatArray:
         """(m, k) level multipliers ``-alpha``, tightened to the generators' exact support."""
-        r = self.rank
-        multipliers, levels = -normals[:, r:], self.rays[:, r:]
-        if self._coupled:
-            return multipliers
-        values = normals[:, :r] @ self.rays[:, :r].T
-        for level in range(levels.shape[1]):
-            multipliers[:, level] = values[:, levels[:, level] > 0].max(axis=1)
+        r, multipliers = self.rank, -normals[:, self.rank :]
+        if not self._coupled:
+            values = normals[:, :r] @ self.rays[:, :r].T
+            for level, counted in enumerate(self.rays[:, r:].T > 0):
+                multipliers[:, level] = values[:, counted].max(axis=1)
         return multipliers
 
     @property
@@ -110,9 +108,7 @@ class NormalFan:
 
     def _real_facets(self) -> BoolArray:
         """Rays whose slice is a facet: it reaches every level, and it is of dimension r - 1."""
-        r = self.rank
-        levels = self.rays[:, r:]
-        size = np.linalg.norm(self.normals, axis=1)
+        r, levels, size = self.rank, self.rays[:, self.rank :], np.linalg.norm(self.normals, axis=1)
         real = np.linalg.norm(self.normals[:, :r], axis=1) > INCIDENCE_TOLERANCE * size
         real &= np.all(self.on_generator.astype(np.float32) @ (levels > 0) > 0, axis=1)
         if not self._coupled:

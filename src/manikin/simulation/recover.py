@@ -136,6 +136,7 @@ class _RecoveryRun:
         for push in task.pushes:
             self.world.apply_push(push)
         self.substeps = max(1, round(settings.period / physics.timestep))
+        self.period = self.substeps * physics.timestep
         feet = [name for foot in self.controller.groups.feet for name in end_segments(body, foot)]
         self.world.plan_touches([(feet, obstacle.name) for obstacle in ground])
         self.recorder = RecoveryRecorder(body, self.controller)
@@ -147,8 +148,7 @@ class _RecoveryRun:
         self.pushed_from = min((push.start for push in task.pushes), default=np.inf)
 
     def run(self, progress: Callable[[float], None] | None) -> Recovery:
-        began, control = clock.perf_counter(), 0.0
-        period = self.substeps * self.world.model.options.timestep
+        began, control, period = clock.perf_counter(), 0.0, self.period
         settle, count = round(STANDING / period), math.ceil(self.task.duration / period)
         self.world.reset(self.q, None, -settle * period)
         lowest, fallen = FALLEN * self.controller.standing.height, ""
@@ -207,7 +207,7 @@ class _RecoveryRun:
         if wanted is None or time < self.disturbed_until:
             return False
         if not at_rest(self.placed, self.controller, state.q, state.com, state.momentum[:3] / state.mass):
-            self.rest_from = time + self.substeps * self.world.model.options.timestep
+            self.rest_from = time + self.period
         return time - self.rest_from >= wanted - 1e-9
 
     def _fallen(self, state: DynamicsState, lowest: float, time: float) -> str:

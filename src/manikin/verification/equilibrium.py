@@ -61,10 +61,9 @@ class HandForce:
 
 
 def forces_of(contacts: Sequence[Contact], mass: float, cap: float | None, origin: FloatArray) -> Forces:
-    """Forces that contacts can give.
+    """Forces that contacts, at least one, can give.
 
     Args:
-        contacts: At least one.
         mass: Of the body, for the cap where none is given [kg].
         cap: Largest sum of the normal forces of soles and points [N].
         origin: (3,) point of the moments [m].
@@ -286,23 +285,14 @@ def dynamic_shortfall(
         shared[:, own] = forces.rows
         limits += [level, shared]
         bound += [MAX_ACCELERATION - acceleration, MAX_ACCELERATION + acceleration, forces.limits / weight]
-    return _least_violation(np.array(equality), np.array(target), (limits, bound), forces, weight)
-
-
-def _least_violation(
-    equality: FloatArray, target: FloatArray, limits: tuple[list[FloatArray], list[FloatArray]],
-    forces: Forces, weight: float,
-) -> float:  # fmt: skip
-    """Smallest size of the wrench that is missing at the worst instant, relative to the weight (and 1 m)."""
-    rows, bound = csr_array(np.vstack(limits[0])), np.concatenate(limits[1])
-    width, wanted = equality.shape[-1], target.ravel()
-    matrix, cost = equality.reshape(-1, width), np.eye(1, width, 3)[0]
+    # The smallest size of the wrench that is missing at the worst instant, relative to the weight (and 1 m).
+    matrix, wanted, cost = np.concatenate(equality), np.concatenate(target), np.eye(1, width, 3)[0]
     upper = csr_array(np.vstack([matrix - GRAVITY * cost, -matrix - GRAVITY * cost]))
     low = np.concatenate([[-np.inf] * 3, [0.0], np.tile(forces.lower / weight, SAMPLES)])
     high = np.concatenate([[np.inf] * 4, np.tile(forces.upper / weight, SAMPLES)])
     solved = linprog(
-        cost, A_ub=vstack([upper, rows]), b_ub=np.concatenate([wanted, -wanted, bound]),
-        bounds=np.column_stack([low, high]), method="highs",
+        cost, A_ub=vstack([upper, csr_array(np.vstack(limits))]),
+        b_ub=np.concatenate([wanted, -wanted, *bound]), bounds=np.column_stack([low, high]), method="highs",
     )  # fmt: skip
     return 1.0 if solved.x is None else float(solved.x[3])
 

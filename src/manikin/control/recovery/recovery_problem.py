@@ -161,14 +161,11 @@ def build_recovery_qp(
     """Build the program of one step.
 
     Args:
-        state: Current dynamics.
-        loop: Maps of the accelerations.
         contacts: Force maps of the feet.
         push: What pushes besides the ground.
         bounds: Torque limits and the stops of the joints ([Kudoh2002]_ 2.55-2.56).
         zmp: Rows that are not positive when the ZMP is inside (2.57-2.60).
         symmetry: Rows that are not positive when the legs grow no less alike (2.63-2.64).
-        objective: What is minimised.
         pulling: Whether the ground may pull as well.
     """
     generalised = np.concatenate([basis.generalised for basis in contacts], axis=1)

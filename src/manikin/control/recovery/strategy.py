@@ -276,7 +276,6 @@ def com_law(
     Args:
         home: (3,) centre of mass to return to [m].
         area: Admissible area of the ZMP.
-        settings: Gains.
         turned: (2,) integral over time of :func:`fall_momentum` [kg.m^2].
         may_turn: Whether arms and trunk may turn where the ZMP is not enough; otherwise they are stopped.
     """
