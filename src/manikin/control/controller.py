@@ -162,11 +162,8 @@ class Controller:
     ) -> ControlProblem:  # fmt: skip
         """Build the program of one step, without solving it; wished forces are those of the time [s]."""
         settings = self.settings
-        loaded = [
-            self._wishing(self._loaded(support, support.contact, state), time)
-            for support in supports.values()
-            if support.mode is SupportMode.STANCE and support.contact is not None
-        ]
+        on = [support for support in supports.values() if support.mode is SupportMode.STANCE]
+        loaded = [self._wishing(self._loaded(s, s.contact, state), time) for s in on if s.contact is not None]
         horizon, largest = settings.joint_limit_horizon, settings.max_joint_acceleration
         bounds = JointBounds.of(self.body, state, horizon, largest)
         return build_qp(

@@ -103,9 +103,8 @@ def scene_from(description: Mapping[str, Any]) -> Scene:
         KeyError: If a value is missing.
         SceneError: If a value is not usable.
     """
-    obstacles = [
-        Obstacle(o["name"], _shape_from(o), o["rotation"], o["translation"]) for o in description["obstacles"]
-    ]
+    given = description["obstacles"]
+    obstacles = [Obstacle(o["name"], _shape_from(o), o["rotation"], o["translation"]) for o in given]
     return Scene(obstacles, description["floor_height"])
 
 
@@ -172,8 +171,7 @@ def _describe_contact(contact: Contact) -> Json:
 def _contact_from(data: Mapping[str, Any]) -> Contact:
     values = dict(data)
     shapes = {"position": (3,), "rotation": (3, 3), "points": (None, 3)}
-    position, rotation, points = (
-        frozen_array(values.pop(key), f"contact {key}", shape) for key, shape in shapes.items()
-    )
+    given = ((values.pop(key), f"contact {key}", shape) for key, shape in shapes.items())
+    position, rotation, points = (frozen_array(*item) for item in given)
     kinds = {"kind": ContactKind(values.pop("kind")), "part": SolePart(values.pop("part", SolePart.FULL))}
     return Contact(**values, position=position, rotation_contact_to_world=rotation, points=points, **kinds)

@@ -179,12 +179,10 @@ class NormalFan:
         inherited = np.where(self.side[p] != 0, self.side[p], self.side[q])
         across = np.concatenate([sign, np.zeros(len(p), dtype=np.int8)])
         return replace(
-            self,
-            normals=np.vstack([self.normals, new]),
+            self, normals=np.vstack([self.normals, new]), segments=np.vstack([self.segments, segment]),
             on_generator=np.vstack([self.on_generator, self.on_generator[p] & self.on_generator[q]]),
-            segments=np.vstack([self.segments, segment]),
             side=np.column_stack([np.vstack([self.side, inherited]), across]),
-        )
+        )  # fmt: skip
 
     def _crossing_edges(self, plus: NDArray, minus: NDArray) -> tuple[NDArray, NDArray]:
         """Pairs (one of ``plus``, one of ``minus``) that span an edge of one cell of the fan."""

@@ -134,10 +134,8 @@ class PushTrials:
         return self.body.standing_posture() if self.task.q is None else self.task.q
 
     def _controller(self) -> BalanceRecovery:
-        body, task = self.body, self.task
-        return BalanceRecovery(
-            body, self._posture, self.settings, support=task.support, friction=task.friction
-        )
+        support, friction = self.task.support, self.task.friction
+        return BalanceRecovery(self.body, self._posture, self.settings, support=support, friction=friction)
 
     def push(self, direction_deg: float, impulse: float, *, until_at_rest: float | None = None) -> Recovery:
         """Push once.

@@ -156,11 +156,9 @@ class Recorder:
         mass [kg] closes the polytope of a stance without force limits.
         """
         carrying = CarryingContacts(self._segments, mass)
-        return carried_margin(
-            [self._carrying_stance(carrying, sample) for sample in self.samples],
-            np.array([sample.total for sample in self.samples]),
-            np.array([sample.output.state.com for sample in self.samples]),
-        )
+        stances = [self._carrying_stance(carrying, sample) for sample in self.samples]
+        wrenches, com = [s.total for s in self.samples], [s.output.state.com for s in self.samples]
+        return carried_margin(stances, np.array(wrenches), np.array(com))
 
     def _carrying_stance(self, carrying: CarryingContacts, sample: Sample) -> Stance:
         frames = sample.output.state.frames

@@ -222,13 +222,10 @@ def _check_standing(controller: BalanceRecovery, q: FloatArray) -> None:
     """Refuse a body that lies, leans or is about to fall over."""
     standing = controller.standing
     if standing.area.reach(standing.com[:2]) >= 1.0:
-        raise InputError(
-            f"the body does not stand: its centre of mass is over {np.round(standing.com[:2], 3).tolist()}, "
-            "outside its soles; valid: a posture that stands on both feet"
-        )
+        told = f"its centre of mass is over {np.round(standing.com[:2], 3).tolist()}, outside its soles"
+        raise InputError(f"the body does not stand: {told}; valid: a posture that stands on both feet")
     lean = trunk_lean(Configuration(controller.body, q), controller.groups)
     if lean > UPRIGHT:
-        raise InputError(
-            f"the body does not stand upright: its trunk leans by {math.degrees(lean):.0f} deg; "
-            f"valid: at most {math.degrees(UPRIGHT):.0f} deg"
-        )
+        own, most = math.degrees(lean), math.degrees(UPRIGHT)
+        told = f"its trunk leans by {own:.0f} deg; valid: at most {most:.0f} deg"
+        raise InputError(f"the body does not stand upright: {told}")

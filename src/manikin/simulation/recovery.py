@@ -231,9 +231,8 @@ def _foot_motion(controller: BalanceRecovery, motion: Motion, steps: Sequence[St
     first, last = (Configuration(controller.body, motion.q[row]) for row in (0, -1))
     places = {sole.effector: first.effector_placement(sole.effector)[1] for sole in controller.standing.soles}
     places |= {step.foot: step.position for step in steps}
-    return max(
-        float(np.linalg.norm(last.effector_placement(name)[1] - place)) for name, place in places.items()
-    )
+    moved = (last.effector_placement(name)[1] - place for name, place in places.items())
+    return max(float(np.linalg.norm(way)) for way in moved)
 
 
 def _impulse(push: Push) -> float:

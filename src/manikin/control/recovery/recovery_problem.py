@@ -273,11 +273,9 @@ class Objectives:
         settings, firmness = self._settings, self._settings.swing_weight
         weight = np.full(len(posture), STEPPING_JOINTS)
         joints = self._with_locked(state, posture, pull(settings.posture, state, posture), weight)
-        tasks = (
-            swing_task(foot, state.frames[foot], way, settings.swing, firmness),
-            orientation_task(ROOT, state.frames[ROOT], self._upright, settings.posture, firmness),
-        )
-        return Objective(weight, joints, law.acceleration, self._com_weight, tasks=tasks)
+        swing = swing_task(foot, state.frames[foot], way, settings.swing, firmness)
+        upright = orientation_task(ROOT, state.frames[ROOT], self._upright, settings.posture, firmness)
+        return Objective(weight, joints, law.acceleration, self._com_weight, tasks=(swing, upright))
 
     @property
     def _com_weight(self) -> FloatArray:

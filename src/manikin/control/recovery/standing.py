@@ -259,10 +259,8 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
     normals, offsets = area.half_planes(inset)
     moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)
     constant = _turned(loop.force.offset, loop.moment.offset, com, area.height)
-    return LinearMap(
-        normals @ moments - offsets[:, None] * loop.force.matrix[2],
-        normals @ constant - offsets * loop.force.offset[2],
-    )
+    matrix = normals @ moments - offsets[:, None] * loop.force.matrix[2]
+    return LinearMap(matrix, normals @ constant - offsets * loop.force.offset[2])
 
 
 def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
