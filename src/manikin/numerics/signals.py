@@ -116,9 +116,7 @@ SHARES = 2.0
 """Rate of :func:`low_passed` with which the cutoff is a share of half the actual rate."""
 
 
-def low_passed(
-    values: NDArray[np.float64], cutoff: float, rate: float, padding: int | None = None
-) -> FloatArray:
+def low_passed(values: FloatArray, cutoff: float, rate: float, padding: int | None = None) -> FloatArray:
     """Values without fast changes and without delay ([Qiu2012]_ 3.2.1).
 
     Args:

@@ -57,9 +57,7 @@ class Recorder:
         self._landings: dict[str, FloatArray] = {}
         self.max_slip = 0.0
 
-    def record(
-        self, sensed: Sensed, output: ControlOutput, total: FloatArray, carried: CarriedPoints
-    ) -> None:
+    def record(self, sensed: Sensed, output: ControlOutput, mean: FloatArray, carried: CarriedPoints) -> None:
         """Add one control step: its first engine step, and the mean wrench (6,) of all its points."""
         plan_time, wrenches = sensed.time - output.waited, []
         for name in self.effectors:
@@ -69,7 +67,7 @@ class Recorder:
                 wrenches.append(sensed.grip_wrench(name, contact.position))
             else:
                 wrenches.append(sensed.wrench(contact.position, self._segments[name]))
-        self.samples.append(Sample(sensed, output, np.array(wrenches), total, carried))
+        self.samples.append(Sample(sensed, output, np.array(wrenches), mean, carried))
 
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""

@@ -253,8 +253,9 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
     """Rows that are not positive when the ZMP is inside ([Kudoh2002]_ 2.39-2.44, z up).
 
     With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` at
-    the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and, across, ``s_y f_z + (z - s_z) f_y +
-    n_x``; the rows are ``normal . p f_z - offset f_z`` for ``f_z > 0``, the ZMP ``inset`` [m] from the edge.
+    the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and
+    ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, right where
+    ``f_z > 0``, with the ZMP ``inset`` [m] from the edge.
     """
     normals, offsets = area.half_planes(inset)
     moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)

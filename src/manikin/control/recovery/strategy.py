@@ -121,7 +121,7 @@ class RecoverySettings:
         calm: Rate at which that law brings the capture point back [1/s] (2.45-2.48).
         turning: Largest moment that turns arms and trunk, and stops them again, in body weights [m].
         least_braking: Smallest moment with which they are stopped, in body weights [m].
-        late_braking: Moment in body weights [m] beyond which it is stopped, or the joints' ends would do it.
+        late_braking: Moment in body weights [m] beyond which turning is stopped, or the joints' ends do it.
         range: Integral over time of the angular momentum that limbs and trunk can have, by the mass [m^2].
         friction_model: Friction model of the soles, of margins; control stays inside the cone.
         least_load: Share of the weight that the ground carries where that is possible, to push against.
