@@ -174,7 +174,7 @@ def test_failed_write_keeps_the_old_file_and_no_other(content, tmp_path, monkeyp
     def fail(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("manikin.motion.file.describe_scene", fail)
+    monkeypatch.setattr("manikin.motion.description.describe_scene", fail)
     with pytest.raises(KeyboardInterrupt):
         write_motions(path, content)
     assert path.read_bytes() == before

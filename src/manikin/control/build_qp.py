@@ -120,10 +120,7 @@ def build_qp(
     """Build the program of one control step.
 
     Args:
-        state: Current dynamics.
-        tasks: Weighted tasks on the acceleration.
-        contacts: Contacts that may carry load.
-        bounds: Joint limits.
+        contacts: Those that may carry load.
         damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; the muscles overcome it as it is at the
             middle of the hold, ``damping * (v + a period / 2)``.
         period: Time over which the torques will be held [s].

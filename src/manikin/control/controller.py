@@ -26,8 +26,7 @@ YIELDING = 0.2
 """Stiffness with which a hand that should feel a force is held at its place, relative to a stance's."""
 
 RAISED = 0.006
-"""Points this far above the lowest one of a contact that still settles may carry all of its load, twice as
-far none [m]."""
+"""Points this far above the lowest one of a contact that settles may carry load, twice as far none [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,11 +162,8 @@ class Controller:
     ) -> ControlProblem:  # fmt: skip
         """Build the program of one step, without solving it; wished forces are those of the time [s]."""
         settings = self.settings
-        loaded = [
-            self._wishing(self._loaded(support, support.contact, state), time)
-            for support in supports.values()
-            if support.mode is SupportMode.STANCE and support.contact is not None
-        ]
+        on = [support for support in supports.values() if support.mode is SupportMode.STANCE]
+        loaded = [self._wishing(self._loaded(s, s.contact, state), time) for s in on if s.contact is not None]
         horizon, largest = settings.joint_limit_horizon, settings.max_joint_acceleration
         bounds = JointBounds.of(self.body, state, horizon, largest)
         return build_qp(
@@ -260,8 +256,7 @@ class Controller:
         if support.settling:
             upper = np.minimum(upper, cap * self._low_shares(geometry, contact, state, edges))
         if support.fades:
-            limits = state.mass * GRAVITY * self._point_shares(support, contact, edges)
-            upper = np.minimum(upper, limits)
+            upper = np.minimum(upper, state.mass * GRAVITY * self._point_shares(support, contact, edges))
         return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
 
     def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:

@@ -82,21 +82,19 @@ class Dynamics:
         bias; mass, centre of mass and momentum stay the body's.
         """
         model, data = self._model, self._data
-        mass_matrix = pin.crba(model, data, q).copy()
+        inertia = pin.crba(model, data, q).copy()
         bias = pin.nonLinearEffects(model, data, q, v).copy()
         # ccrba also leaves the joint Jacobians in the data, the next call velocities and drift accelerations.
         pin.ccrba(model, data, q, v)
         centroidal_map, momentum = data.Ag.copy(), data.hg.vector.copy()
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, self._rest)
-        momentum_drift, com = data.dhg.vector.copy(), data.com[0].copy()
+        drift, com = data.dhg.vector.copy(), data.com[0].copy()
         frames = {name: self._frame(index) for name, index in self._frames.items()}
         for name, mass in carried.items():
             jacobian = frames[name].jacobian[:3]
-            mass_matrix += mass * jacobian.T @ jacobian
+            inertia += mass * jacobian.T @ jacobian
             bias += mass * jacobian.T @ (frames[name].drift[:3] - GRAVITY_VECTOR)
-        return DynamicsState(
-            q, v, mass_matrix, bias, self._mass, com, momentum, centroidal_map, momentum_drift, frames
-        )
+        return DynamicsState(q, v, inertia, bias, self._mass, com, momentum, centroidal_map, drift, frames)
 
     def _frame(self, index: int) -> FrameState:
         model, data = self._model, self._data

@@ -85,8 +85,7 @@ def deviation_from_plan(
     actual = state.com[:2] + state.momentum[:2] / state.mass / frequency
     planned = reference.com[:2] + velocity / frequency
     speed, error, grounded = float(np.linalg.norm(velocity)), actual - planned, len(stances) == len(supports)
-    along = float(error @ velocity) / max(speed, LEAST_SPEED)
-    ahead = along / max(float(np.linalg.norm(error)), 1e-9)
+    ahead = float(error @ velocity) / max(speed, LEAST_SPEED) / max(float(np.linalg.norm(error)), 1e-9)
     return Deviation(error, actual, planned, SupportArea(corners, ground), frequency, ahead, speed, grounded)
 
 

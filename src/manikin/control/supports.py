@@ -60,8 +60,8 @@ class SupportState:
         lift_rate: (3,) rate of that offset [m/s].
         follow: Share of the feedback gains with which a flying effector follows its path.
         planned: Whether the time is one of planned support, not of an early touch.
-        fades: Parts of the sole beyond which load limits rise after a change of the touching part, or fall
-            before one, and how far, in [0, 1].
+        fades: Parts of the sole beyond which load limits rise after a change of what touches, or fall before
+            one, and how far, in [0, 1].
     """
 
     effector: str
@@ -140,8 +140,7 @@ def support_intervals(
         start = -math.inf if first == 0 else float(schedule.instants[first])
         end = math.inf if index == len(phases) else float(schedule.instants[index])
         flight = start - previous_end
-        long = LONG_FLIGHT < flight < math.inf
-        window = max(early_window, EARLY_SHARE * flight) if long else early_window
+        window = max(early_window, EARLY_SHARE * flight) if LONG_FLIGHT < flight < math.inf else early_window
         early = max(start - window, start - flight / 3) if first else start
         if intervals:  # a long flight rises as slowly as it comes down
             intervals[-1] = replace(intervals[-1], late=previous_end + window)
@@ -165,11 +164,8 @@ class SupportSwitch:
 
     def __init__(self, schedule: ContactSchedule, settings: SupportSettings) -> None:
         """Start with every support of the first phase fully loaded."""
-        self.effectors = schedule.sequence.effectors
-        self._settings = settings
-        self._intervals = {
-            name: support_intervals(schedule, name, settings.early_window) for name in self.effectors
-        }
+        self.effectors, self._settings, window = schedule.sequence.effectors, settings, settings.early_window
+        self._intervals = {name: support_intervals(schedule, name, window) for name in self.effectors}
         self._memory = {name: _Memory() for name in self.effectors}
 
     def update(self, time: float, touching: Mapping[str, bool] | None = None) -> dict[str, SupportState]:
@@ -177,14 +173,13 @@ class SupportSwitch:
 
         ``touching`` says whether each is felt to touch; the schedule is trusted where it says nothing.
         """
-        felt = touching or {}
-        return {name: self._update(name, time, felt.get(name)) for name in self.effectors}
+        return {name: self._update(name, time, (touching or {}).get(name)) for name in self.effectors}
 
     def _update(self, name: str, time: float, touching: bool | None) -> SupportState:
-        number, interval = self._interval(name, time)
-        memory = self._memory[name]
-        if number != memory.number:
-            memory = self._memory[name] = _Memory(number)
+        memory, every = self._memory[name], enumerate(self._intervals[name])
+        k, interval = next(((k, i) for k, i in every if i.early - 1e-9 <= time < i.end - 1e-9), (-1, None))
+        if k != memory.number:
+            memory = self._memory[name] = _Memory(k)
             if interval is not None and math.isinf(interval.start):
                 memory.landed, memory.touched = interval.start, time
         if interval is None:
@@ -194,7 +189,11 @@ class SupportSwitch:
         # What stands on three tips cannot count on a fourth that has bounced off.
         tip = interval.contact.kind is ContactKind.POINT
         release = TIP_RELEASE if tip else self._settings.release_time
-        self._remember_touch(memory, time, planned if touching is None else touching, release)
+        if planned if touching is None else touching:
+            memory.touched = time
+            memory.landed = time if memory.landed is None else memory.landed
+        elif memory.landed is not None and time - memory.touched > release + 1e-9:
+            memory.landed = None
         if memory.landed is not None:
             since = time - max(memory.landed, interval.start)
             # A seat takes the weight as soon as it is touched.
@@ -223,11 +222,8 @@ class SupportSwitch:
         return SupportState(name, SupportMode.SWING, None, lift=lift, lift_rate=rate)
 
     def _hover(self, interval: SupportInterval) -> float:
-        """Height at which a support is waited for [m]; one made at speed has to press in time.
-
-        A tip has no edge that would touch before the rest of it.
-        """
-        if interval.contact.settle > 0.0:
+        """Height at which a support is waited for [m]; a tip has no edge that would touch first."""
+        if interval.contact.settle > 0.0:  # made at speed, it has to press in time
             return 0.0
         return (TIP_HOVER if interval.contact.kind is ContactKind.POINT else 1.0) * self._settings.hover
 
@@ -245,17 +241,4 @@ class SupportSwitch:
     def _follow(self, name: str, time: float) -> float:
         """Feedback gains rise smoothly after a lift-off, where plan and reality differ in speed."""
         ends = [interval.end for interval in self._intervals[name] if interval.end <= time + 1e-9]
-        since = time - max(ends, default=-math.inf)
-        return float(np.clip(since / self._settings.follow_time, 0.0, 1.0))
-
-    def _interval(self, name: str, time: float) -> tuple[int, SupportInterval | None]:
-        every = enumerate(self._intervals[name])
-        return next(((k, i) for k, i in every if i.early - 1e-9 <= time < i.end - 1e-9), (-1, None))
-
-    def _remember_touch(self, memory: _Memory, time: float, felt: bool, release: float) -> None:
-        if felt:
-            memory.touched = time
-            if memory.landed is None:
-                memory.landed = time
-        elif memory.landed is not None and time - memory.touched > release + 1e-9:
-            memory.landed = None
+        return float(np.clip((time - max(ends, default=-math.inf)) / self._settings.follow_time, 0.0, 1.0))

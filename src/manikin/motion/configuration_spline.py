@@ -1,9 +1,8 @@
 """A whole-body motion as one clamped B-spline in configuration space.
 
 The control points live in R^nq: pelvis position, four quaternion components and the joint angles. The
-quaternion part is normalised on evaluation, so the motion is smooth wherever the raw quaternion does not
-vanish, without the singularity of Euler angles. Velocities and accelerations are exact derivatives, in
-Pinocchio's convention (pelvis frame).
+quaternion is normalised on evaluation, so the motion is smooth wherever the raw one does not vanish.
+Velocities and accelerations are exact derivatives, in Pinocchio's convention (pelvis frame).
 """
 
 import itertools
@@ -48,10 +47,8 @@ class ConfigurationSpline:
         knots = frozen_array(self.knots, f"{what} knots [s]", (None,), SplineError)
         points = frozen_array(self.control_points, f"{what} control points", (None, None), SplineError)
         if len(knots) != len(points) + self.degree + 1:
-            raise SplineError(
-                f"{what} has {len(knots)} knots and {len(points)} control points of degree "
-                f"{self.degree}; valid: knots = control points + degree + 1"
-            )
+            told = f"{what} has {len(knots)} knots and {len(points)} control points of degree {self.degree}"
+            raise SplineError(f"{told}; valid: knots = control points + degree + 1")
         object.__setattr__(self, "knots", knots)
         object.__setattr__(self, "control_points", points)
 
@@ -81,19 +78,15 @@ def states_from_raw(raw: FloatArray, raw_rate: FloatArray, raw_second: FloatArra
     world_to_body = rotation_from_quaternion(u).transpose(0, 2, 1)
     linear = np.einsum("nij,nj->ni", world_to_body, raw_rate[:, :3])
     linear_rate = np.einsum("nij,nj->ni", world_to_body, raw_second[:, :3]) - np.cross(omega, linear)
-    return StateSamples(
-        q=np.hstack([raw[:, :3], u, raw[:, 7:]]),
-        v=np.hstack([linear, omega, raw_rate[:, 7:]]),
-        a=np.hstack([linear_rate, alpha, raw_second[:, 7:]]),
-    )
+    q, v = np.hstack([raw[:, :3], u, raw[:, 7:]]), np.hstack([linear, omega, raw_rate[:, 7:]])
+    return StateSamples(q, v, np.hstack([linear_rate, alpha, raw_second[:, 7:]]))
 
 
 def tangent_map(raw: FloatArray) -> FloatArray:
     """(n, 7, 7) derivative of Pinocchio's tangent vector by the raw coordinates (n, nq) of the pelvis.
 
-    The first six rows map raw pelvis coordinates (position, quaternion) to the pelvis part of the tangent;
-    the last row is the radial direction of the quaternion, which does not move the body. Joint angles map
-    to themselves.
+    The first six rows map raw pelvis coordinates to the pelvis part of the tangent; the last is the radial
+    direction of the quaternion, which does not move the body. Joint angles map to themselves.
     """
     size = np.linalg.norm(raw[:, 3:7], axis=1)
     u = raw[:, 3:7] / size[:, None]
@@ -132,11 +125,8 @@ def turn_derivatives(rho: FloatArray, rho_1: FloatArray, rho_2: FloatArray) -> T
     omega_by_value = -2.0 * q1 / square - 2.0 * omega @ row / square
     alpha = by_second @ rho_2[:, :, None] - 2.0 * omega * stretch / square
     alpha_by_rate = -2.0 * (stretch * by_second + omega @ row) / square
-    alpha_by_value = (
-        -2.0 * q2 / square
-        - 2.0 * alpha @ row / square
-        - 2.0 * (stretch * omega_by_value + omega @ row_1) / square
-    )
+    stretched = stretch * omega_by_value + omega @ row_1
+    alpha_by_value = -2.0 * q2 / square - 2.0 * alpha @ row / square - 2.0 * stretched / square
     return TurnDerivatives(omega_by_value, by_second, alpha_by_value, alpha_by_rate, by_second)
 
 

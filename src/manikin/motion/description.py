@@ -13,16 +13,8 @@ import numpy as np
 
 from manikin.body import BodyModel, Effector, Hinge, Limb, Segment
 from manikin.body import Shape as BodyShape
-from manikin.contact import (
-    CarriedLoad,
-    Contact,
-    ContactKind,
-    ContactSchedule,
-    Phase,
-    SolePart,
-    Stance,
-    StanceSequence,
-)
+from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance
+from manikin.contact.stance import StanceSequence
 from manikin.numerics.spatial import frozen_array
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.scene.obstacle import Shape
@@ -111,9 +103,8 @@ def scene_from(description: Mapping[str, Any]) -> Scene:
         KeyError: If a value is missing.
         SceneError: If a value is not usable.
     """
-    obstacles = [
-        Obstacle(o["name"], _shape_from(o), o["rotation"], o["translation"]) for o in description["obstacles"]
-    ]
+    given = description["obstacles"]
+    obstacles = [Obstacle(o["name"], _shape_from(o), o["rotation"], o["translation"]) for o in given]
     return Scene(obstacles, description["floor_height"])
 
 
@@ -174,15 +165,13 @@ def _load_from(description: Mapping[str, Any]) -> CarriedLoad:
 
 def _describe_contact(contact: Contact) -> Json:
     """In the order of the fields, the rotation under a shorter name."""
-    values = _plain(contact)
-    return {key.removesuffix("_contact_to_world"): value for key, value in values.items()}
+    return {key.removesuffix("_contact_to_world"): value for key, value in _plain(contact).items()}
 
 
 def _contact_from(data: Mapping[str, Any]) -> Contact:
     values = dict(data)
     shapes = {"position": (3,), "rotation": (3, 3), "points": (None, 3)}
-    position, rotation, points = (
-        frozen_array(values.pop(key), f"contact {key}", shape) for key, shape in shapes.items()
-    )
+    given = ((values.pop(key), f"contact {key}", shape) for key, shape in shapes.items())
+    position, rotation, points = (frozen_array(*item) for item in given)
     kinds = {"kind": ContactKind(values.pop("kind")), "part": SolePart(values.pop("part", SolePart.FULL))}
     return Contact(**values, position=position, rotation_contact_to_world=rotation, points=points, **kinds)

@@ -1,8 +1,7 @@
 """Dynamics of sampled motions: the wrench that all contacts together must supply, and momentum rates.
 
-The rate of the centroidal momentum gives the wrench with the centre of mass and the angular momentum
-(:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of a body without
-contacts (:class:`FreeDynamics`). Both agree to rounding.
+:func:`centroidal_motion` gives the wrench with the centre of mass and the angular momentum, and
+:class:`FreeDynamics` with the torques of a body without contacts. Both agree to rounding.
 """
 
 from collections.abc import Sequence
@@ -34,13 +33,13 @@ class MomentumRate:
 
 
 class MomentumRateSamples:
-    """Collects Pinocchio's derivatives sample by sample."""
+    """Collects Pinocchio's derivatives sample by sample, those by acceleration in ``by_a`` (n, 6, nv)."""
 
     def __init__(self, model: pin.Model, count: int) -> None:
         self._model = model
         self._mass = float(pin.computeTotalMass(model))
         self._value = np.zeros((count, 6))
-        self._by_q, self._by_v, self._by_a = np.zeros((3, count, 6, model.nv))
+        self._by_q, self._by_v, self.by_a = np.zeros((3, count, 6, model.nv))
 
     def record(self, sample: int, data: pin.Data, states: StateSamples) -> None:
         """Evaluate one sample; ``data`` then holds its kinematics and joint Jacobians."""
@@ -48,12 +47,7 @@ class MomentumRateSamples:
             self._model, data, states.q[sample], states.v[sample], states.a[sample]
         )
         self._value[sample] = data.dhg.vector
-        self._by_q[sample], self._by_v[sample], self._by_a[sample] = by_q, by_v, by_a
-
-    @property
-    def linear_by_acceleration(self) -> FloatArray:
-        """(n, 3, nv) derivative of the linear part by ``a``: mass times the centre of mass' Jacobian."""
-        return self._by_a[:, :3]
+        self._by_q[sample], self._by_v[sample], self.by_a[sample] = by_q, by_v, by_a
 
     def by_raw(
         self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
@@ -62,21 +56,18 @@ class MomentumRateSamples:
         turn = turn_derivatives(*(part[:, 3:7] for part in raw))
         by_raw, by_rate, by_second = np.zeros((3, *self._by_q.shape[:2], raw[0].shape[1]))
         by_raw[:, :, 7:], by_rate[:, :, 7:] = self._by_q[:, :, 6:], self._by_v[:, :, 6:]
-        by_second[:, :, 7:] = self._by_a[:, :, 6:]
+        by_second[:, :, 7:] = self.by_a[:, :, 6:]
         # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
-        by_omega = self._by_v[:, :, 3:6] + self._by_a[:, :, :3] @ skew(states.v[:, :3])
-        by_alpha = self._by_a[:, :, 3:6]
-        # The whole body turns with the pelvis, and with it all of the momentum's rate but the
-        # part that the pelvis' world acceleration gives.
+        by_omega = self._by_v[:, :, 3:6] + self.by_a[:, :, :3] @ skew(states.v[:, :3])
+        by_alpha = self.by_a[:, :, 3:6]
+        # All of the momentum's rate turns with the pelvis, but for the part of the pelvis' own acceleration.
         turning = self._value.copy()
         turning[:, :3] -= self._mass * raw[2][:, :3]
         pelvis_to_world = tangent[:, :3, :3].transpose(0, 2, 1)
-        turned = [
-            -skew(part) @ pelvis_to_world @ tangent[:, 3:6, 3:7] for part in (turning[:, :3], turning[:, 3:])
-        ]
-        by_raw[:, :, 3:7] = (
-            np.concatenate(turned, axis=1) + by_omega @ turn.omega_by_value + by_alpha @ turn.alpha_by_value
-        )
+        halves = turning[:, :3], turning[:, 3:]
+        turned = [-skew(part) @ pelvis_to_world @ tangent[:, 3:6, 3:7] for part in halves]
+        by_raw[:, :, 3:7] = np.concatenate(turned, axis=1) + by_omega @ turn.omega_by_value
+        by_raw[:, :, 3:7] += by_alpha @ turn.alpha_by_value
         by_rate[:, :, 3:7] = by_omega @ turn.omega_by_rate + by_alpha @ turn.alpha_by_rate
         by_second[:, :, 3:7] = by_alpha @ turn.alpha_by_second
         by_second[:, :3, :3] = self._mass * np.eye(3)
@@ -112,12 +103,9 @@ class MotionSampler:
     """Evaluates splines of one basis with the frames of some effectors, and what is carried at samples."""
 
     def __init__(
-        self,
-        body: BodyModel,
-        frames: tuple[str, ...],
-        basis: SampledBasis,
+        self, body: BodyModel, frames: tuple[str, ...], basis: SampledBasis,
         loads: Sequence[CarriedLoad | None] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._model: pin.Model = body.pinocchio
         self._data = self._model.createData()
         self._geometry, self._geometry_data = body.geometry, pin.GeometryData(body.geometry)
@@ -139,10 +127,8 @@ class MotionSampler:
         raw = basis.evaluate(points), basis.evaluate(points, 1), basis.evaluate(points, 2)
         states, tangent = states_from_raw(*raw), tangent_map(raw[0])
         n, model, data = len(states.q), self._model, self._data
-        momentum = MomentumRateSamples(model, n)
-        com, jacobians = np.empty((n, 3)), np.empty((n, 6, model.nv))
-        frames = np.empty((n, len(self._moving), 4, 4))
-        shapes = np.empty((n, self._geometry.ngeoms, 4, 4))
+        momentum, com, jacobians = MomentumRateSamples(model, n), np.empty((n, 3)), np.empty((n, 6, model.nv))
+        frames, shapes = (np.empty((n, k, 4, 4)) for k in (len(self._moving), self._geometry.ngeoms))
         for s in range(n):
             momentum.record(s, data, states)
             pin.updateFramePlacements(model, data)
@@ -154,23 +140,20 @@ class MotionSampler:
         for loaded, rows in self._loaded:
             # The rate of body and load, about their common centre, where the load is carried.
             part, data = StateSamples(*(item[rows] for item in states)), loaded.createData()
-            of_both = MomentumRateSamples(loaded, len(rows))
+            both = MomentumRateSamples(loaded, len(rows))
             for k in range(len(rows)):
-                of_both.record(k, data, part)
-            own = of_both.by_raw(part, (raw[0][rows], raw[1][rows], raw[2][rows]), tangent[rows])
+                both.record(k, data, part)
+            own = both.by_raw(part, (raw[0][rows], raw[1][rows], raw[2][rows]), tangent[rows])
             rate.value[rows] = own.value
             for block, carried in zip(rate.jacobians, own.jacobians, strict=True):
                 block[rows] = carried
-        return MotionSamples(
-            raw, states, tangent, com, momentum.linear_by_acceleration / self._mass, rate, frames,
-            PlacedShapes(shapes, jacobians),
-        )  # fmt: skip
+        com_jacobian, placed = momentum.by_a[:, :3] / self._mass, PlacedShapes(shapes, jacobians)
+        return MotionSamples(raw, states, tangent, com, com_jacobian, rate, frames, placed)
 
     def frame_jacobian(self, motion: MotionSamples, number: int) -> FloatArray:
         """(n, 6, nv) linear, then angular velocity of frame ``number`` in world axes, per ``v``."""
-        columns = self._moving[number]
+        columns, out = self._moving[number], np.zeros_like(motion.shapes.jacobians)
         joints = motion.shapes.jacobians[:, :, columns]
-        out = np.zeros_like(motion.shapes.jacobians)
         out[:, :3, columns] = joints[:, :3] - skew(motion.frames[:, number, :3, 3]) @ joints[:, 3:]
         out[:, 3:, columns] = joints[:, 3:]
         return out
@@ -184,8 +167,7 @@ class CentroidalMotion:
         com: (n, 3) centre of mass [m].
         angular_momentum: (n, 3) about the centre of mass [kg.m^2/s].
         angular_momentum_rate: (n, 3) its derivative [N.m].
-        wrench: (n, 6) ``[m (c'' - g); c x m (c'' - g) + L']`` about the world origin, force [N] and moment
-            [N.m] ([Qiu2012]_ 4.51).
+        wrench: (n, 6) ``[m (c'' - g); c x m (c'' - g) + L']`` about the origin [N, N.m] ([Qiu2012]_ 4.51).
     """
 
     com: FloatArray
@@ -197,10 +179,7 @@ class CentroidalMotion:
 def centroidal_motion(body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> CentroidalMotion:
     """Wrench that the scene must apply to a body in motion, by the rate of its centroidal momentum.
 
-    Args:
-        q: (n, nq) configurations.
-        v: (n, nv) velocities.
-        a: (n, nv) accelerations.
+    Configurations are (n, nq), velocities and accelerations (n, nv).
     """
     model, data = body.pinocchio, body.pinocchio.createData()
     com, momentum, rate = np.zeros((len(q), 3)), np.zeros((len(q), 3)), np.zeros((len(q), 6))
@@ -265,12 +244,9 @@ class CarriedForces:
         cls, body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, v: FloatArray,
         a: FloatArray,
     ) -> "CarriedForces | None":  # fmt: skip
-        """Of the point masses that a motion carries in some phases; None where it carries nothing.
+        """Of what a body carries in the phases of a schedule at times (n,) [s]; None where it is nothing.
 
-        Args:
-            body: Who moves, without the loads.
-            schedule: The contacts in time, with the loads of the phases.
-            time: (n,) [s]; the others as of :func:`centroidal_motion`.
+        The other arguments are as of :func:`centroidal_motion`, the body without the loads.
         """
         if all(phase.load is None for phase in schedule.sequence):
             return None
@@ -283,11 +259,10 @@ class CarriedForces:
             pin.forwardKinematics(model, data, q[k], v[k], a[k])
             pin.computeJointJacobians(model, data, q[k])
             for effector, mass in load.masses.items():
-                frame = body.effector_frame(effector)
+                frame, axes = body.effector_frame(effector), pin.LOCAL_WORLD_ALIGNED
                 position = pin.updateFramePlacement(model, data, frame).translation
-                rate = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
+                rate = pin.getFrameClassicalAcceleration(model, data, frame, axes).linear
                 force = mass * (rate - GRAVITY_VECTOR)
-                jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
-                needed[k] += jacobian.T @ force
+                needed[k] += pin.getFrameJacobian(model, data, frame, axes)[:3].T @ force
                 wrench[k] += np.concatenate([force, cross(position, force)])
         return cls(needed, wrench)

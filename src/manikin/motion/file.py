@@ -24,14 +24,7 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.errors import InputError, MotionFileError
-from manikin.motion.description import (
-    body_from,
-    describe_body,
-    describe_scene,
-    describe_schedule,
-    scene_from,
-    schedule_from,
-)
+from manikin.motion import description
 from manikin.motion.motion import Motion
 from manikin.runtime import __version__
 from manikin.runtime.display import Displayed
@@ -105,9 +98,8 @@ def write_motions(path: str | Path, content: MotionFile) -> None:
         with atomic_path(path) as temporary, h5py.File(temporary, "w-", libver="v110") as file:
             _fill(file, content)
     except OSError as error:
-        raise MotionFileError(
-            f"{path}: cannot be written ({_reason(error)}); valid: a writable folder"
-        ) from None
+        problem = f"cannot be written ({_reason(error)})"
+        raise MotionFileError(f"{path}: {problem}; valid: a writable folder") from None
 
 
 def read_motions(path: str | Path) -> MotionFile:
@@ -121,16 +113,14 @@ def read_motions(path: str | Path) -> MotionFile:
     """
     file_path = Path(path) / "motion.h5" if Path(path).is_dir() else Path(path)
     if not file_path.is_file():
-        raise MotionFileError(
-            f"{file_path}: there is no such file; valid: a motion file (.h5) or a run directory"
-        )
+        valid = "a motion file (.h5) or a run directory"
+        raise MotionFileError(f"{file_path}: there is no such file; valid: {valid}")
     try:
         with h5py.File(file_path, "r") as file:
             return _content(file, str(file_path))
     except OSError as error:
-        raise MotionFileError(
-            f"{file_path}: cannot be read as HDF5 ({_reason(error)}); valid: a motion file written by manikin"
-        ) from None
+        problem = f"cannot be read as HDF5 ({_reason(error)})"
+        raise MotionFileError(f"{file_path}: {problem}; valid: a motion file written by manikin") from None
 
 
 def _fill(file: h5py.File, content: MotionFile) -> None:
@@ -138,36 +128,31 @@ def _fill(file: h5py.File, content: MotionFile) -> None:
     for name, motion in content.motions.items():
         _write_motion(file.create_group(name), motion)
         file[f"{name}/margin"].attrs["form"] = margin_form(motion, content.schedule)
-    described = {"body": describe_body, "scene": describe_scene, "schedule": describe_schedule}
-    for name, describe in described.items():
+    for name in ("body", "scene", "schedule"):
         if (value := getattr(content, name)) is not None:
             # A dataset, not an attribute: attributes end at 64 kB and a mesh is larger.
-            text = json.dumps(describe(value))
+            text = json.dumps(getattr(description, f"describe_{name}")(value))
             file.create_dataset(name, data=text, dtype=h5py.string_dtype(), track_times=False)
 
 
 def margin_form(motion: Motion, schedule: ContactSchedule | None) -> str:
     """Form of a motion's margin in words, with the friction model where the schedule is known."""
-    form = (
-        "residual ball of the wrench polytope, moments about the centre of mass, alpha = 1 m"
-        if motion.margin_unit == "N.m"
-        else "smallest force at the centre of mass"
-    )
+    form = "smallest force at the centre of mass"
+    if motion.margin_unit == "N.m":
+        form = "residual ball of the wrench polytope, moments about the centre of mass, alpha = 1 m"
     phases = () if schedule is None else schedule.sequence
     models = sorted({phase.stance.friction_model for phase in phases if len(phase.stance)})
     return f"{form}; friction model {' and '.join(models)}" if models else form
 
 
 def _write_motion(group: h5py.Group, motion: Motion) -> None:
-    text = h5py.string_dtype()
-    group.attrs.create("joint_names", np.array(motion.joint_names, dtype=object), dtype=text)
-    group.attrs.create("contact_names", np.array(motion.contact_names, dtype=object), dtype=text)
+    for key in ("joint_names", "contact_names"):
+        group.attrs.create(key, np.array(getattr(motion, key), dtype=object), dtype=h5py.string_dtype())
     for name, array in motion.arrays().items():
         unit, meaning = DATASETS[name]
         unit = motion.margin_unit if name == "margin" else unit
         data = array.astype(np.uint8) if array.dtype == np.bool_ else array
-        dataset = group.create_dataset(name, data=data, track_times=False)
-        dataset.attrs.update(unit=unit, description=meaning)
+        group.create_dataset(name, data=data, track_times=False).attrs.update(unit=unit, description=meaning)
 
 
 def _content(file: h5py.File, source: str) -> MotionFile:
@@ -177,18 +162,17 @@ def _content(file: h5py.File, source: str) -> MotionFile:
     if version != FORMAT_VERSION:
         raise MotionFileError(f"{source}: has format version {version}; valid: {FORMAT_VERSION}")
     content = MotionFile(
-        body=_read_json(file, "body", body_from, source),
-        scene=_read_json(file, "scene", scene_from, source),
-        schedule=_read_json(file, "schedule", schedule_from, source),
+        body=_read_json(file, "body", description.body_from, source),
+        scene=_read_json(file, "scene", description.scene_from, source),
+        schedule=_read_json(file, "schedule", description.schedule_from, source),
         **{name: _read_motion(file, name, source) for name in GROUPS},
     )
     if not content.motions:
         raise MotionFileError(f"{source}: holds no motion; valid: a group {' or '.join(GROUPS)}")
     for name, motion in content.motions.items():
         if content.body is not None and motion.joint_names != content.body.joint_names:
-            raise MotionFileError(
-                f"{source}: {name} has other joints than the body; valid: the body's joint_names"
-            )
+            problem = f"{name} has other joints than the body; valid: the body's joint_names"
+            raise MotionFileError(f"{source}: {problem}")
     return content
 
 
@@ -205,9 +189,7 @@ def _read_motion(file: h5py.File, name: str, source: str) -> Motion | None:
     try:
         values: Any = group  # h5py's stubs cannot say that these are datasets
         arrays: dict[str, Any] = {key: values[key][()] for key in DATASETS}
-        joints, contacts = (
-            tuple(str(text) for text in values.attrs[key]) for key in ("joint_names", "contact_names")
-        )
+        joints, contacts = (tuple(map(str, values.attrs[f"{key}_names"])) for key in ("joint", "contact"))
         unit = str(values["margin"].attrs.get("unit", "N.m"))
         return Motion(**arrays, joint_names=joints, contact_names=contacts, margin_unit=unit)
     except (ValueError, TypeError, MotionFileError) as error:
@@ -223,10 +205,8 @@ def _read_json(
     try:
         return build(json.loads(text.asstr()[()]))
     except (KeyError, ValueError, TypeError, AttributeError, InputError) as error:
-        problem = " ".join(str(error).split())[:120]
-        raise MotionFileError(
-            f"{source}: {name} is damaged ({type(error).__name__}: {problem}); valid: as written by manikin"
-        ) from None
+        told = f"{name} is damaged ({type(error).__name__}: {' '.join(str(error).split())[:120]})"
+        raise MotionFileError(f"{source}: {told}; valid: as written by manikin") from None
 
 
 def _reason(error: OSError) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,12 +26,10 @@ LIFT = 0.08
 def foot_positions(schedule: ContactSchedule, times: FloatArray) -> dict[str, FloatArray]:
     """(n, 3) position of every effector of a schedule [m].
 
-    In flight a foot follows the straight line to its next contact with the smootherstep of time,
-    lifted along the mean of both normals by ``LIFT sin^2(pi u)``; it has no mass, so any path will
-    do. Before its first contact and after its last one it waits at it.
+    In flight a foot follows the straight line to its next contact with the smootherstep of time, lifted along
+    the mean of both normals by ``LIFT sin^2(pi u)``. Before its first contact and after its last it waits.
     """
-    positions, phases = {}, schedule.phase_at(times)
-    swings = schedule.sequence.swings()
+    positions, phases, swings = {}, schedule.phase_at(times), schedule.sequence.swings()
     for name in schedule.sequence.effectors:
         path = np.empty((len(times), 3))
         for number, phase in enumerate(schedule.sequence):
@@ -55,9 +54,8 @@ def foot_positions(schedule: ContactSchedule, times: FloatArray) -> dict[str, Fl
 class Motion(Displayed):
     """Samples of one motion, planned or executed.
 
-    Configuration vectors follow Pinocchio: ``q = [pelvis position, xyzw quaternion, joint
-    angles]``; ``v`` and ``a`` hold the pelvis' linear and angular parts in the *pelvis*
-    frame, then the joints' rates. All other quantities are in the world frame.
+    Configurations follow Pinocchio: ``q = [pelvis position, xyzw quaternion, joint angles]``; ``v`` and ``a``
+    hold the pelvis' parts in the *pelvis* frame, then the joints' rates. All else is in the world frame.
 
     Attributes:
         time: (n,) increasing [s].
@@ -67,11 +65,9 @@ class Motion(Displayed):
         tau: (n, nv) generalised forces; the first six (pelvis) are zero [N, N.m].
         com: (n, 3) centre of mass [m].
         angular_momentum: (n, 3) about the centre of mass [kg.m^2/s].
-        margin: (n,) wrench margin about the CoM, alpha = 1 m [N.m]; of a point mass
-            planned in the force space, the force margin at the CoM [N].
+        margin: (n,) wrench margin about the CoM, alpha = 1 m [N.m], or of a point mass force margin [N].
         support: (n, c) True where the contact is active.
-        contact_force: (n, c, 6) force [N] and moment [N.m] of the scene on the body,
-            moment about the contact frame's origin.
+        contact_force: (n, c, 6) force [N] of the scene and moment about the contact frame's origin [N.m].
         contact_names: c effector names.
         joint_names: nv - 6 hinge names, in the order of ``q[7:]``.
         margin_unit: ``"N.m"`` or ``"N"``.
@@ -107,8 +103,7 @@ class Motion(Displayed):
         if n == 0:
             raise MotionFileError("motion has no samples; valid: at least one")
         for name, shape in wanted.items():
-            dtype = np.bool_ if name == "support" else np.float64
-            array = np.array(getattr(self, name), dtype=dtype)
+            array = np.array(getattr(self, name), dtype=np.bool_ if name == "support" else np.float64)
             if array.shape != shape:
                 raise MotionFileError(f"motion {name} has shape {array.shape}; valid: {shape}")
             array.setflags(write=False)
@@ -165,17 +160,12 @@ class PhaseTable:
 def phases_of(motion: Motion, schedule: ContactSchedule | None = None) -> PhaseTable:
     """Phases of the schedule, or, without one, of the motion's own support table."""
     if schedule is not None:
-        return PhaseTable(
-            schedule.instants, tuple(tuple(phase.stance.effectors) for phase in schedule.sequence)
-        )
+        stances = tuple(tuple(phase.stance.effectors) for phase in schedule.sequence)
+        return PhaseTable(schedule.instants, stances)
     changes = np.flatnonzero(np.any(motion.support[1:] != motion.support[:-1], axis=1)) + 1
     starts = np.concatenate([[0], changes])
-    supports = tuple(
-        tuple(name for name, on in zip(motion.contact_names, motion.support[index], strict=True) if on)
-        for index in starts
-    )
-    instants = np.append(motion.time[starts], motion.time[-1])
-    return PhaseTable(frozen_array(instants, "instants"), supports)
+    supports = tuple(tuple(compress(motion.contact_names, motion.support[start])) for start in starts)
+    return PhaseTable(frozen_array(np.append(motion.time[starts], motion.time[-1]), "instants"), supports)
 
 
 def com_velocity(motion: Motion) -> FloatArray:
@@ -189,11 +179,10 @@ def effector_positions(
     body: BodyModel, motion: Motion, names: tuple[str, ...], schedule: ContactSchedule | None = None
 ) -> dict[str, FloatArray]:
     """(n, 3) position of each named effector [m]; the feet of a point mass follow the schedule."""
-    if body.is_point_mass:
-        if schedule is None:
-            return dict.fromkeys(names, motion.com)
-        return {name: foot_positions(schedule, motion.time)[name] for name in names}
-    return dict(zip(names, point_paths(body, motion.q, names), strict=True))
+    if not body.is_point_mass:
+        return dict(zip(names, point_paths(body, motion.q, names), strict=True))
+    paths = dict.fromkeys(names, motion.com) if schedule is None else foot_positions(schedule, motion.time)
+    return {name: paths[name] for name in names}
 
 
 def point_paths(body: BodyModel, q: FloatArray, names: Sequence[str]) -> FloatArray:
@@ -202,10 +191,8 @@ def point_paths(body: BodyModel, q: FloatArray, names: Sequence[str]) -> FloatAr
     Raises:
         BodyError: If the body has neither of a name.
     """
-    model, data = body.pinocchio, body.pinocchio.createData()
-    frames = [
-        body.effector_frame(name) if name in body.effectors else body.segment_frame(name) for name in names
-    ]
+    model, data, ends = body.pinocchio, body.pinocchio.createData(), body.effectors
+    frames = [body.effector_frame(name) if name in ends else body.segment_frame(name) for name in names]
     # Views of Pinocchio's memory: they follow whatever is computed in these data.
     views = [data.oMf[frame].translation for frame in frames]
     places = np.empty((len(q), len(names), 3))
@@ -216,10 +203,7 @@ def point_paths(body: BodyModel, q: FloatArray, names: Sequence[str]) -> FloatAr
 
 
 def segment_positions(body: BodyModel, q: FloatArray) -> dict[str, FloatArray]:
-    """(3,) origin of each segment and effector in one configuration [m].
-
-    Effectors are under ``effector/NAME``.
-    """
+    """(3,) origin of each segment and effector, under ``effector/NAME``, in one configuration [m]."""
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, q)
     frames = {segment.name: body.segment_frame(segment.name) for segment in body.segments}

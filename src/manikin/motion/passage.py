@@ -1,7 +1,6 @@
 """Passages under obstacles: how low a motion takes the centre of mass, and the room that it leaves.
 
-People who pass under a beam are measured by the lowest height of the centre of mass ([Qiu2012]_ 3.2.3);
-the clearance of the head is our own addition.
+People are measured by the lowest height of the centre of mass ([Qiu2012]_ 3.2.3); the head's room is ours.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +23,7 @@ class Passage:
     """A motion, recorded, planned or executed, or its part below one thing that is passed.
 
     Heights of the centre of mass are above the floor: of a recording the lowest surface on which feet stood,
-    of a planned motion the lowest limb in contact. They are NaN where the floor is not known.
+    of a planned motion the lowest limb in contact; NaN where it is not known.
 
     Attributes:
         start: [s].
@@ -58,10 +57,7 @@ class Passage:
     ) -> "Passage":  # fmt: skip
         """Measure the path of a centre of mass (n, 3) in the world at instants (n,) [m, s].
 
-        Args:
-            floor: (n,) or one height of the floor in the world [m]; NaN where it is not known.
-            tops: See :class:`Passage`, and so is ``room``.
-            overhead: Height above the floor of what is passed [m]; None if nothing is.
+        The floor (n,) is NaN where it is not known, ``overhead`` the height above it of what is passed [m].
         """
         height = com[:, 2] - floor
         lowest = int(np.argmin(np.where(np.isnan(height), np.inf, height)))
@@ -96,12 +92,8 @@ def measure_passage(
 ) -> Passage:
     """Least height of the CoM above the lowest limb in contact, and clearance of head and neck.
 
-    Heights count until the body sits down, where it does; the clearance counts over the whole motion, to the
-    scene without its floor and what may be leaned on.
-
-    Args:
-        motion: Planned or executed; what lies beyond the schedule counts as its last phase.
-        padded: Obstacles that any part of the body may lean on.
+    Heights count until the body sits down; the clearance of the whole motion, to the scene without its floor
+    and what is padded, which may be leaned on. What lies beyond the schedule counts as its last phase.
     """
     levels = np.full(len(schedule.sequence), np.nan)
     for index, phase in enumerate(schedule.sequence):
@@ -109,18 +101,13 @@ def measure_passage(
             break
         heights = [float(item.position[2]) for item in phase.stance if item.kind is not ContactKind.GRASP]
         levels[index] = min(heights, default=np.nan)
-    floor, room = levels[schedule.phase_at(motion.time)], _head_clearance(body, scene, motion, padded)
-    return Passage.of(motion.time, motion.com, floor, room=room)
-
-
-def _head_clearance(body: BodyModel, scene: Scene, motion: Motion, padded: Sequence[str]) -> float | None:
-    obstacles = [item for item in scene if item.name != FLOOR and item.name not in padded]
-    if not obstacles or HEAD not in body.effectors:
-        return None
-    others = {segment.name for segment in body.segments}.difference(head_segments(body))
-    ignored = frozenset((segment, item.name) for segment in others for item in obstacles)
-    proximity = Proximity(body, Scene(obstacles, floor_height=None), self_collision=False)
-    return float(proximity.minimum_over(motion.q, ignored, tolerance=1e-5).distance)
+    obstacles, room = [item for item in scene if item.name != FLOOR and item.name not in padded], None
+    if obstacles and HEAD in body.effectors:
+        others = {segment.name for segment in body.segments}.difference(head_segments(body))
+        ignored = frozenset((segment, item.name) for segment in others for item in obstacles)
+        proximity = Proximity(body, Scene(obstacles, floor_height=None), self_collision=False)
+        room = float(proximity.minimum_over(motion.q, ignored, tolerance=1e-5).distance)
+    return Passage.of(motion.time, motion.com, levels[schedule.phase_at(motion.time)], room=room)
 
 
 def head_segments(body: BodyModel) -> tuple[str, ...]:

@@ -1,11 +1,11 @@
-"""Assembly and solution of the block-banded normal equations of a spline fit.
+"""Assembly and solution of the block-banded normal equations of a spline fit, in linear time.
 
-A clamped B-spline of degree ``p`` couples each control point with ``p`` neighbours, so the
-normal equations of any sum of per-sample residuals are block-banded: they are assembled with
-one sparse product and solved by a banded Cholesky factorisation in linear time.
+A clamped B-spline of degree ``p`` couples each control point with ``p`` neighbours: the normal equations of
+any sum of per-sample residuals are assembled with one sparse product and solved by banded Cholesky factors.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
@@ -38,10 +38,8 @@ class SampledBasis:
         size = len(knots) - degree - 1
         first = np.clip(np.searchsorted(knots, time, side="right") - 1, degree, size - 1) - degree
         identity = BSpline(knots, np.eye(size), degree)
-        rows = np.arange(len(time))[:, None]
-        columns = first[:, None] + np.arange(degree + 1)
-        values = np.stack([identity(time, nu=order)[rows, columns] for order in range(3)])
-        return cls(first, values, size)
+        rows, columns = np.arange(len(time))[:, None], first[:, None] + np.arange(degree + 1)
+        return cls(first, np.stack([identity(time, nu=order)[rows, columns] for order in range(3)]), size)
 
     @property
     def starts(self) -> NDArray[np.bool_]:
@@ -52,24 +50,28 @@ class SampledBasis:
 
     def gather(self, per_sample: FloatArray) -> FloatArray:
         """(size,) sum of (n,) values per sample, shared out to the control points around them."""
-        columns = self.first[:, None] + np.arange(self.values.shape[2])
         shares = (self.values[0] * per_sample[:, None]).ravel()
-        return np.asarray(np.bincount(columns.ravel(), shares, self.size), dtype=np.float64)
+        return np.asarray(np.bincount(self.columns.ravel(), shares, self.size), dtype=np.float64)
 
     def evaluate(self, control_points: FloatArray, order: int = 0) -> FloatArray:
         """(n, d) spline values, or derivatives of ``order`` 1 or 2."""
-        columns = self.first[:, None] + np.arange(self.values.shape[2])
-        return np.einsum("ns,nsd->nd", self.values[order], control_points[columns])
+        return np.einsum("ns,nsd->nd", self.values[order], control_points[self.columns])
+
+    @cached_property
+    def columns(self) -> NDArray[np.int64]:
+        """(n, degree + 1) indices of the control points that matter at each sample."""
+        return self.first[:, None] + np.arange(self.values.shape[2])
 
 
 class BlockBandedSystem:
     """Normal equations ``A x = b`` over control points of dimension ``dimension``."""
 
     def __init__(self, basis: SampledBasis, dimension: int) -> None:
-        self._basis = basis
-        self._dimension = dimension
-        self._bandwidth = basis.values.shape[2]
-        self._spans = _spans(basis.first)
+        self._basis, self._dimension, self._bandwidth = basis, dimension, basis.values.shape[2]
+        # First control point, first sample and sample after the last of each span with samples.
+        points, start = np.unique(basis.first, return_index=True)
+        stop = np.append(start[1:], len(basis.first))
+        self._spans = list(zip(points.tolist(), start.tolist(), stop.tolist(), strict=True))
         self._products = [self._pair_products(order) for order in range(3)]
         self._rows = [self._row_weights(order) for order in range(3)]
         self.reset()
@@ -145,9 +147,8 @@ class BlockBandedSystem:
         memory = np.zeros(size * d * (depth + 1))
         # Below a diagonal element follow the rows of its own block column, so that the same
         # row of the next column lies one place earlier.
-        by_column = as_strided(
-            memory, (size, d, width, d), [memory.itemsize * step for step in (d * (depth + 1), depth, d, 1)]
-        )
+        steps = [memory.itemsize * step for step in (d * (depth + 1), depth, d, 1)]
+        by_column = as_strided(memory, (size, d, width, d), steps)
         blocks = self._blocks.reshape(width, size, d, d)
         # What is above the diagonal would fall on places of the previous column.
         by_column[:, :, 0] = np.tril(blocks[0]).transpose(0, 2, 1)
@@ -162,23 +163,17 @@ class BlockBandedSystem:
 
     def _pair_products(self, order: int) -> csr_matrix:
         values, first, size = self._basis.values[order], self._basis.first, self._basis.size
-        n = len(first)
-        rows, columns, data = [], [], []
-        for b in range(self._bandwidth):
-            for a in range(b, self._bandwidth):
-                rows.append((a - b) * size + first + b)
-                columns.append(np.arange(n))
-                data.append(values[:, a] * values[:, b])
-        shape = (self._bandwidth * size, n)
-        return csr_matrix(
-            (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=shape
-        )
+        n, pairs = len(first), [(a, b) for b in range(self._bandwidth) for a in range(b, self._bandwidth)]
+        rows = np.concatenate([(a - b) * size + first + b for a, b in pairs])
+        data = np.concatenate([values[:, a] * values[:, b] for a, b in pairs])
+        columns = np.tile(np.arange(n), len(pairs))
+        return csr_matrix((data, (rows, columns)), shape=(self._bandwidth * size, n))
 
     def _row_weights(self, order: int) -> csr_matrix:
-        values, first, size = self._basis.values[order], self._basis.first, self._basis.size
+        values, rows = self._basis.values[order], self._basis.columns.ravel()
         n, width = values.shape
-        rows = (first[:, None] + np.arange(width)).ravel()
-        return csr_matrix((values.ravel(), (rows, np.repeat(np.arange(n), width))), shape=(size, n))
+        columns = np.repeat(np.arange(n), width)
+        return csr_matrix((values.ravel(), (rows, columns)), shape=(self._basis.size, n))
 
 
 VANISHED = 1e-3
@@ -248,10 +243,3 @@ class FactorisedSystem:
         """Step for which linearised residuals vanish and nothing else counts; see :meth:`constrained`."""
         right = -(self.rows @ (residual[:, None, :] @ jacobian)[:, 0])
         return self.constrained(right, jacobian, residual, np.zeros_like(residual), rounds)[0]
-
-
-def _spans(first: NDArray[np.int64]) -> list[tuple[int, int, int]]:
-    """Index of the first control point, first sample and sample after the last of each span with samples."""
-    points, start = np.unique(first, return_index=True)
-    stop = np.append(start[1:], len(first))
-    return list(zip(points.tolist(), start.tolist(), stop.tolist(), strict=True))

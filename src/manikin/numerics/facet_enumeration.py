@@ -78,8 +78,7 @@ class NormalFan:
         Returns:
             H (m, d), h (m,) and the part of each offset that each level pays for (m, k), zero for equalities.
         """
-        real = self._real_facets()
-        normals = self.normals[real]
+        normals = self.normals[self._real_facets()]
         H = normals[:, : self.rank] @ self.inverse
         length = np.linalg.norm(H, axis=1)
         H /= length[:, None]
@@ -95,14 +94,11 @@ class NormalFan:
 
     def _tight_multipliers(self, normals: FloatArray) -> FloatArray:
         """(m, k) level multipliers ``-alpha``, tightened to the generators' exact support."""
-        r = self.rank
-        multipliers = -normals[:, r:]
-        levels = self.rays[:, r:]
-        if self._coupled:
-            return multipliers
-        values = normals[:, :r] @ self.rays[:, :r].T
-        for level in range(levels.shape[1]):
-            multipliers[:, level] = values[:, levels[:, level] > 0].max(axis=1)
+        r, multipliers = self.rank, -normals[:, self.rank :]
+        if not self._coupled:
+            values = normals[:, :r] @ self.rays[:, :r].T
+            for level, counted in enumerate(self.rays[:, r:].T > 0):
+                multipliers[:, level] = values[:, counted].max(axis=1)
         return multipliers
 
     @property
@@ -112,9 +108,7 @@ class NormalFan:
 
     def _real_facets(self) -> BoolArray:
         """Rays whose slice is a facet: it reaches every level, and it is of dimension r - 1."""
-        r = self.rank
-        levels = self.rays[:, r:]
-        size = np.linalg.norm(self.normals, axis=1)
+        r, levels, size = self.rank, self.rays[:, self.rank :], np.linalg.norm(self.normals, axis=1)
         real = np.linalg.norm(self.normals[:, :r], axis=1) > INCIDENCE_TOLERANCE * size
         real &= np.all(self.on_generator.astype(np.float32) @ (levels > 0) > 0, axis=1)
         if not self._coupled:
@@ -131,8 +125,7 @@ class NormalFan:
     def _face_dimension(self, facet: int, live: BoolArray, kinds: FloatArray) -> int:
         across = self.segments[self.side[facet] == 0] @ self.inverse.T
         across = np.hstack([across, np.zeros((len(across), self.rays.shape[1] - self.rank))])
-        spanning = np.vstack([self.rays[self.on_generator[facet] & live], across])
-        return int(_rank(spanning) - _rank(kinds))
+        return int(_rank(np.vstack([self.rays[self.on_generator[facet] & live], across])) - _rank(kinds))
 
     def plus_segments(self, segments: FloatArray) -> "NormalFan":
         """Fan of the Minkowski sum with ``[-s, s]`` for each row s of ``segments`` (q, d)."""
@@ -154,8 +147,7 @@ class NormalFan:
     def _most_independent(self, segments: list[FloatArray]) -> int | None:
         if not segments or self.rank == self.basis.shape[0]:
             return None
-        directions = np.array(segments)
-        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        directions = np.array(segments) / np.linalg.norm(segments, axis=1)[:, None]
         distance = np.linalg.norm(self._off_span(directions), axis=1)
         best = int(np.argmax(distance))
         return best if distance[best] > RANK_TOLERANCE else None
@@ -171,15 +163,10 @@ class NormalFan:
         side[m:, -1] = 1, -1
         basis = np.column_stack([self.basis, segment])
         return NormalFan(
-            basis,
-            np.asarray(np.linalg.pinv(basis), dtype=np.float64),
-            np.insert(self.rays, r, 0.0, axis=1),
-            np.vstack([normals, ends]),
-            np.vstack([self.on_generator, np.ones((2, n), dtype=np.bool_)]),
-            np.vstack([self.segments, segment]),
-            side,
-            self.thickness,
-        )
+            basis, np.asarray(np.linalg.pinv(basis), dtype=np.float64), np.insert(self.rays, r, 0.0, axis=1),
+            np.vstack([normals, ends]), np.vstack([self.on_generator, np.ones((2, n), dtype=np.bool_)]),
+            np.vstack([self.segments, segment]), side, self.thickness,
+        )  # fmt: skip
 
     def _refined(self, segment: FloatArray) -> "NormalFan":
         """Sum with a segment of the span: cut the fan by the hyperplane across it."""
@@ -192,12 +179,10 @@ class NormalFan:
         inherited = np.where(self.side[p] != 0, self.side[p], self.side[q])
         across = np.concatenate([sign, np.zeros(len(p), dtype=np.int8)])
         return replace(
-            self,
-            normals=np.vstack([self.normals, new]),
+            self, normals=np.vstack([self.normals, new]), segments=np.vstack([self.segments, segment]),
             on_generator=np.vstack([self.on_generator, self.on_generator[p] & self.on_generator[q]]),
-            segments=np.vstack([self.segments, segment]),
             side=np.column_stack([np.vstack([self.side, inherited]), across]),
-        )
+        )  # fmt: skip
 
     def _crossing_edges(self, plus: NDArray, minus: NDArray) -> tuple[NDArray, NDArray]:
         """Pairs (one of ``plus``, one of ``minus``) that span an edge of one cell of the fan."""
@@ -231,11 +216,9 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     Raises:
         PolytopeError: If Qhull fails.
     """
-    n, d = generators.shape
-    k = levels.shape[1]
+    (n, d), k = generators.shape, levels.shape[1]
     y, basis, inverse, thickness = _white_coordinates(generators)
-    r = basis.shape[1]
-    slack = np.eye(k)[bounded_above]
+    r, slack = basis.shape[1], np.eye(k)[bounded_above]
     rays = np.vstack([np.hstack([y, levels]), np.hstack([np.zeros((len(slack), r)), slack])])
     cap = y.T @ levels[:, 0] / n if k == 1 and bounded_above[0] and r else None
     if cap is not None and np.abs(y @ cap - levels[:, 0]).max() < INCIDENCE_TOLERANCE:
@@ -245,8 +228,7 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     else:
         normals = polar_rays(rays, np.append(np.zeros(r), np.ones(k)))
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    cosine = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T
-    on_generator = cosine > -INCIDENCE_TOLERANCE
+    on_generator = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T > -INCIDENCE_TOLERANCE
     once = _without_splinters(on_generator)
     side = np.zeros((len(once), 0), dtype=np.int8)
     return NormalFan(
@@ -316,14 +298,10 @@ def _usable(kinds: FloatArray, present: BoolArray) -> BoolArray:
     index = np.flatnonzero(present)
     n, k = len(index), kinds.shape[1]
     answer = linprog(
-        np.concatenate([np.zeros(n), -np.ones(n)]),
-        A_eq=np.hstack([kinds[index].T, np.zeros((k, n))]),
-        b_eq=np.ones(k),
-        A_ub=np.hstack([-np.eye(n), np.eye(n)]),
-        b_ub=np.zeros(n),
-        bounds=[(0, None)] * n + [(0, 1e-3)] * n,
-        method="highs",
-    )
+        np.concatenate([np.zeros(n), -np.ones(n)]), A_eq=np.hstack([kinds[index].T, np.zeros((k, n))]),
+        b_eq=np.ones(k), A_ub=np.hstack([-np.eye(n), np.eye(n)]), b_ub=np.zeros(n),
+        bounds=[(0, None)] * n + [(0, 1e-3)] * n, method="highs",
+    )  # fmt: skip
     used = np.zeros(len(kinds), dtype=np.bool_)
     if answer.status == 0:
         used[index] = answer.x[n:] > 1e-7

@@ -1,9 +1,8 @@
 """Convex polytopes ``{x : H x <= h}`` with unit rows, and hulls that may be flat.
 
 A flat (lower-dimensional) hull carries each equality ``n x = c`` as the pair of rows ``n x <= c`` and
-``-n x <= -c`` at the end, both loosened by a trillionth of the size of the hull, so that the margin of
-a point on the flat is zero (to that rounding), never negative. The margin of a point off the flat is at most
-its negative distance to the flat, whatever basis the equalities have.
+``-n x <= -c`` at the end, both loosened by a trillionth of the size of the hull: the margin of a point on the
+flat is zero (to that rounding), off it at most its negative distance to the flat.
 
 Convex polygons in a horizontal plane have hulls, intersections of half-planes and signed distances.
 """
@@ -50,14 +49,12 @@ class Polytope:
         if np.any(zero):
             keep = ~zero | (offsets < -_tolerance(offsets))
             rows, offsets, length, zero = rows[keep], offsets[keep], length[keep], zero[keep]
-            rows[zero] = 0.0
-            length[zero] = 1.0
+            rows[zero], length[zero] = 0.0, 1.0
         rows /= length[:, None]
         offsets /= length
-        rows.setflags(write=False)
-        offsets.setflags(write=False)
-        object.__setattr__(self, "H", rows)
-        object.__setattr__(self, "h", offsets)
+        for name, values in (("H", rows), ("h", offsets)):
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
 
     @property
     def dimension(self) -> int:
@@ -83,11 +80,9 @@ class Polytope:
         x = np.asarray(points, dtype=np.float64)
         if x.shape[-1:] != (self.dimension,):
             raise PolytopeError(f"points have shape {x.shape}; valid: (..., {self.dimension})")
-        flat = x.reshape(-1, self.dimension)
-        margins = np.empty(len(flat))
-        lifted = np.column_stack([self.H, -self.h])
+        flat, lifted = x.reshape(-1, self.dimension), np.column_stack([self.H, -self.h])
         step = max(1, _BLOCK // max(1, len(self.h)))
-        excess = np.empty((len(self.h), step))
+        margins, excess = np.empty(len(flat)), np.empty((len(self.h), step))
         for start in range(0, len(flat), step):
             part = flat[start : start + step]
             columns = np.ones((self.dimension + 1, len(part)))
@@ -128,14 +123,10 @@ class Polytope:
         Raises:
             PolytopeError: If the polytope is empty or holds balls of any size.
         """
-        d = self.dimension
-        cost = np.zeros(d + 1)
-        cost[-1] = -1.0
+        cost = np.append(np.zeros(self.dimension), -1.0)
         lifted = np.column_stack([self.H, np.linalg.norm(self.H, axis=1)])
         scale = max(1.0, float(np.abs(self.h).max(initial=0.0)))
-        answer = linprog(
-            cost, A_ub=lifted, b_ub=self.h / scale, bounds=[(None, None)] * (d + 1), method="highs"
-        )
+        answer = linprog(cost, A_ub=lifted, b_ub=self.h / scale, bounds=(None, None), method="highs")
         if answer.status == 3:
             raise PolytopeError("polytope holds balls of any size; valid: a bounded polytope")
         if answer.x is None or answer.x[-1] * scale < -_tolerance(self.h):
@@ -180,9 +171,7 @@ def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[F
 def least_change(rows: FloatArray, residual: FloatArray) -> FloatArray:
     """(n,) length of the least change ``c`` with ``rows c = residual``; infinite where there is none.
 
-    Args:
-        rows: (e, d) or (n, e, d).
-        residual: (n, e).
+    Rows are (e, d) or (n, e, d), residuals (n, e).
     """
     wanted = residual[..., None]
     change = np.linalg.pinv(rows, rcond=1e-9) @ wanted
@@ -218,24 +207,16 @@ _FAR = 1e4
 
 
 def convex_polygon(points: ArrayLike) -> FloatArray:
-    """Hull of points (n, 2) in the plane (monotone chain).
-
-    Returns:
-        (k, 2) vertices counter-clockwise; k is 0, 1 or 2 for empty and flat hulls.
-    """
+    """(k, 2) hull of points (n, 2) in the plane, counter-clockwise; k is below 3 for empty and flat ones."""
     p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     if len(p) < 2:
         return p.copy()
     p = p[np.lexsort((p[:, 1], p[:, 0]))]
-    chain = [*_half_hull(p)[:-1], *_half_hull(p[::-1])[:-1]]
-    return _without_twins(np.array(chain))
+    return _without_twins(np.array([*_half_hull(p)[:-1], *_half_hull(p[::-1])[:-1]]))
 
 
 def polygon_of_halfplanes(A: ArrayLike, b: ArrayLike) -> FloatArray:
-    """Bounded polygon ``{x : A x <= b}`` of (m, 2) and (m,) rows, by clipping a square of 20 km.
-
-    Returns:
-        (k, 2) vertices counter-clockwise; none when no point satisfies all rows.
+    """(k, 2) bounded polygon ``{x : A x <= b}``, counter-clockwise, of rows (m, 2), from a square of 20 km.
 
     Raises:
         InputError: If the intersection reaches the square: it is unbounded.
@@ -301,8 +282,7 @@ def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
     along = np.clip((to_point * edges).sum(axis=-1) / squared, 0.0, 1.0)
     distance = np.linalg.norm(to_point - along[..., None] * edges, axis=-1).min(axis=-1)
     left = edges[:, 0] * to_point[..., 1] - edges[:, 1] * to_point[..., 0]
-    inside = np.all(left >= 0, axis=-1) & (len(corners) > 2)
-    return np.where(inside, distance, -distance)
+    return np.where(np.all(left >= 0, axis=-1) & (len(corners) > 2), distance, -distance)
 
 
 def _half_hull(points: FloatArray) -> list[FloatArray]:
@@ -323,10 +303,8 @@ def _clipped(polygon: FloatArray, row: FloatArray, offset: float) -> FloatArray:
     outside = polygon @ row - offset
     if outside.max() <= 0:
         return polygon
-    after = np.roll(polygon, -1, axis=0)
-    out_after = np.roll(outside, -1)
-    kept: list[FloatArray] = []
-    for p, q, at_p, at_q in zip(polygon, after, outside, out_after, strict=True):
+    after, kept = np.roll(polygon, -1, axis=0), []
+    for p, q, at_p, at_q in zip(polygon, after, outside, np.roll(outside, -1), strict=True):
         if at_p <= 0:
             kept.append(p)
         if (at_p < 0 < at_q) or (at_q < 0 < at_p):

@@ -33,8 +33,7 @@ class QPSolution:
         solved: Whether it is the minimiser.
         status: The solver's own word.
         iterations: Its iterations.
-        multipliers: Of dense programs, those of the bounds, where there are any, and of the rows; positive at
-            an upper bound.
+        multipliers: Of dense programs, those of bounds, if any, and rows; positive at an upper bound.
     """
 
     x: FloatArray
@@ -94,8 +93,7 @@ def solve_sparse_qp(
         matrix[equal] if equalities else None, rows_upper[equal] if equalities else None,
         matrix[rest], None if rows_lower is None else rows_lower[rest], rows_upper[rest], *bounds,
     )  # fmt: skip
-    status = solver.solve()
-    result = solver.result
+    status, result = solver.solve(), solver.result
     return QPSolution(np.array(result.x), status == piqp.PIQP_SOLVED, str(status), int(result.info.iter))
 
 

@@ -18,12 +18,7 @@ HARMONICS = 8
 def fourier_basis(phase: ArrayLike, harmonics: int = HARMONICS) -> FloatArray:
     """(..., 2 harmonics + 1) ``1, cos 2 pi k p, ..., sin 2 pi k p, ...`` ([Truong2010]_ 6.1, period T).
 
-    The thesis prints ``k pi t / T``, which has the period 2 T; a cycle of duration T is ``2 k pi t / T``
-    with ``p = t / T``.
-
-    Args:
-        phase: (...) phases p, 1 a whole cycle.
-        harmonics: Largest k.
+    The thesis prints ``k pi t / T``, of period 2 T. Phases are ``p = t / T`` (...), k is up to ``harmonics``.
     """
     angle = 2.0 * np.pi * np.asarray(phase, dtype=np.float64)[..., None] * np.arange(1, harmonics + 1)
     return np.concatenate([np.ones((*angle.shape[:-1], 1)), np.cos(angle), np.sin(angle)], axis=-1)
@@ -40,11 +35,8 @@ def shifted(coefficients: FloatArray, phase: float) -> FloatArray:
     harmonics = (coefficients.shape[-2] - 1) // 2
     angle = 2.0 * np.pi * phase * np.arange(1, harmonics + 1)[:, None]
     mean, cosine, sine = np.split(coefficients, [1, harmonics + 1], axis=-2)
-    return np.concatenate([
-        mean,
-        cosine * np.cos(angle) + sine * np.sin(angle),
-        sine * np.cos(angle) - cosine * np.sin(angle),
-    ], axis=-2)  # fmt: skip
+    c, s = np.cos(angle), np.sin(angle)
+    return np.concatenate([mean, cosine * c + sine * s, sine * c - cosine * s], axis=-2)
 
 
 def mask_runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -124,17 +116,14 @@ SHARES = 2.0
 """Rate of :func:`low_passed` with which the cutoff is a share of half the actual rate."""
 
 
-def low_passed(
-    values: NDArray[np.float64], cutoff: float, rate: float, padding: int | None = None
-) -> FloatArray:
+def low_passed(values: FloatArray, cutoff: float, rate: float, padding: int | None = None) -> FloatArray:
     """Values without fast changes and without delay ([Qiu2012]_ 3.2.1).
 
     Args:
         values: (n, ...), at least two, at an even rate.
         cutoff: Where each of the two passes halves the power [Hz]; above 0 and below half the rate.
         rate: Per second [Hz], or :data:`SHARES`.
-        padding: Most values by which each end is continued, mirrored about the last one; None for those of
-            two periods of the cutoff.
+        padding: Most values by which each end is continued, mirrored; None for two periods of the cutoff.
     """
     wanted = int(np.ceil(2.0 * rate / cutoff)) if padding is None else padding
     sections = _sections(float(cutoff), float(rate))

@@ -1,7 +1,6 @@
 """Vectors, wrenches, rotations and frames, single or many at once, and checked, read-only arrays.
 
-Rotations are 3x3 matrices or xyzw quaternions; ``rotation_a_to_b`` maps coordinates in frame *a* to
-coordinates in frame *b*.
+Rotations are 3x3 matrices or xyzw quaternions; ``rotation_a_to_b`` maps coordinates in *a* to those in *b*.
 """
 
 import math
@@ -26,11 +25,9 @@ GRAVITY_VECTOR.setflags(write=False)
 
 
 def frozen_array(
-    value: ArrayLike,
-    name: str,
-    shape: Sequence[int | None] | None = None,
+    value: ArrayLike, name: str, shape: Sequence[int | None] | None = None,
     error: type[InputError] = InputError,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """Copy ``value`` into a finite, read-only float array of the wanted shape.
 
     Args:
@@ -58,14 +55,9 @@ def frozen_array(
 
 
 def finite_number(
-    value: object,
-    name: str,
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    at_most: float | None = None,
-    error: type[InputError] = InputError,
-) -> float:
+    value: object, name: str, *, above: float | None = None, at_least: float | None = None,
+    at_most: float | None = None, error: type[InputError] = InputError,
+) -> float:  # fmt: skip
     """Check one number against its bounds and return it as a float.
 
     Raises:
@@ -190,10 +182,14 @@ def axes_of_normal(normal: FloatArray) -> FloatArray:
 def turned_root(q: ArrayLike, yaw: float) -> FloatArray:
     """(..., nq) configurations with the root turned about the vertical through itself by ``yaw`` [rad]."""
     turned = np.array(q, dtype=np.float64)
-    s, c = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
-    x, y, z, w = np.moveaxis(turned[..., 3:7].copy(), -1, 0)
-    turned[..., 3:7] = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
+    _turn(turned[..., 3:7], np.sin(0.5 * yaw), np.cos(0.5 * yaw))
     return turned
+
+
+def _turn(quaternions: FloatArray, s: float, c: float) -> None:
+    """Turn xyzw quaternions (..., 4) in place about the vertical, by sine and cosine of half the angle."""
+    x, y, z, w = np.moveaxis(quaternions.copy(), -1, 0)
+    quaternions[...] = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
 
 
 def check_rotation(rotation: ArrayLike, name: str, error: type[InputError] = InputError) -> FloatArray:
@@ -254,8 +250,7 @@ class PlanarTransform:
     def points(self, points: ArrayLike) -> FloatArray:
         """(..., 2) or (..., 3) points, moved [m]; heights stay."""
         moved = self.directions(points)
-        moved[..., 0] += self.x
-        moved[..., 1] += self.y
+        moved[..., :2] += self.x, self.y
         return moved
 
     def directions(self, vectors: ArrayLike) -> FloatArray:
@@ -281,9 +276,7 @@ class PlanarTransform:
         moved = np.array(poses, dtype=np.float64)
         moved[..., :3] = self.points(moved[..., :3])
         half = 0.5 * self.yaw_deg
-        c, s = float(cosdg(half)), float(sindg(half))
-        x, y, z, w = np.moveaxis(moved[..., 3:7].copy(), -1, 0)
-        moved[..., 3:7] = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
+        _turn(moved[..., 3:7], float(sindg(half)), float(cosdg(half)))
         return moved
 
 
@@ -299,8 +292,7 @@ def rotation_vector(rotations: FloatArray) -> FloatArray:
 def rotation_vector_jacobian(vectors: FloatArray) -> FloatArray:
     """(n, 3, 3) derivative of rotation vectors (n, 3) [rad] by a turn of the rotated frame in its own axes.
 
-    ``I + [w] / 2 + (1 - (a / 2) cot(a / 2)) / a^2 [w]^2`` with ``a = |w|``, the inverse of the right
-    Jacobian of SO(3).
+    ``I + [w] / 2 + (1 - (a / 2) cot(a / 2)) / a^2 [w]^2`` with ``a = |w|``: the right Jacobian's inverse.
     """
     angle = np.linalg.norm(vectors, axis=-1)
     safe = np.where(angle < 0.02, 1.0, angle)
@@ -332,10 +324,8 @@ def quaternions(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatAr
     cy, sy, cp, sp = np.cos(0.5 * yaw), np.sin(0.5 * yaw), np.cos(0.5 * pitch), np.sin(0.5 * pitch)
     cr, sr = np.cos(0.5 * roll), np.sin(0.5 * roll)
     return np.stack([
-        cy * cp * sr - sy * sp * cr,
-        cy * sp * cr + sy * cp * sr,
-        sy * cp * cr - cy * sp * sr,
-        cy * cp * cr + sy * sp * sr,
+        cy * cp * sr - sy * sp * cr, cy * sp * cr + sy * cp * sr,
+        sy * cp * cr - cy * sp * sr, cy * cp * cr + sy * sp * sr,
     ], axis=-1)  # fmt: skip
 
 

@@ -1,9 +1,8 @@
 """Clamped B-splines of any degree with exact derivatives ([Qiu2012]_ 2.4).
 
-Knots are ``t_0 <= ... <= t_m``, control points ``a_0 ... a_n`` and ``m = n + k + 1`` for the
-degree ``k`` (the thesis says "order"). Knot spans are half-open, ``[t_j, t_j+1)``, and the
-last one is closed, so that the basis functions add up to one everywhere on the domain.
-Arguments ``degree`` are k, ``knots`` (m + 1,) clamped, ``t`` (s,) parameters inside the domain.
+Knots are ``t_0 <= ... <= t_m``, control points ``a_0 ... a_n`` and ``m = n + k + 1`` for the degree ``k``
+(the thesis says "order"). Knot spans are half-open, ``[t_j, t_j+1)``, and the last one is closed. Arguments
+``degree`` are k, ``knots`` (m + 1,) clamped, ``t`` (s,) parameters inside the domain.
 """
 
 from dataclasses import dataclass
@@ -136,9 +135,8 @@ def check_clamped(degree: int, knots: ArrayLike, control_points: int) -> FloatAr
     if control_points <= degree:
         raise SplineError(f"spline has {control_points} control points; valid: more than its degree {degree}")
     if len(times) != needed:
-        raise SplineError(
-            f"spline has {len(times)} knots; valid: {needed} (control points {control_points} + degree + 1)"
-        )
+        sum_of = f"control points {control_points} + degree + 1"
+        raise SplineError(f"spline has {len(times)} knots; valid: {needed} ({sum_of})")
     inner = times[degree + 1 : len(times) - degree - 1]
     clamped = times[degree] == times[0] and times[-1 - degree] == times[-1]
     wanted = None
@@ -204,27 +202,20 @@ def derivative_matrix(degree: int, knots: ArrayLike, order: int) -> FloatArray:
 
 
 def start_control_points(
-    degree: int,
-    knots: ArrayLike,
-    position: ArrayLike,
-    velocity: ArrayLike | None = None,
+    degree: int, knots: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """(1 to 3, d) first control points that give the wanted start ([Qiu2012]_ 2.45-2.47).
 
-    Position p(t_0), first and second derivative are (d,); None leaves a derivative free. An acceleration
-    needs a velocity and a degree of 2 or more.
+    Position and derivatives are (d,); None leaves one free. An acceleration needs a degree of 2 or more.
 
     Raises:
         SplineError: If an acceleration is given without a velocity.
     """
-    t = np.asarray(knots, dtype=np.float64)
-    k = degree
-    points = [np.asarray(position, dtype=np.float64)]
+    t, k, points = np.asarray(knots, dtype=np.float64), degree, [np.asarray(position, dtype=np.float64)]
     if acceleration is not None and velocity is None:
-        raise SplineError(
-            "spline end acceleration is given without a velocity; valid: both or only a velocity"
-        )
+        problem = "spline end acceleration is given without a velocity"
+        raise SplineError(f"{problem}; valid: both or only a velocity")
     if velocity is not None:
         speed = np.asarray(velocity, dtype=np.float64)
         points.append(points[0] + (t[k + 1] - t[0]) / k * speed)
@@ -235,12 +226,9 @@ def start_control_points(
 
 
 def end_control_points(
-    degree: int,
-    knots: ArrayLike,
-    position: ArrayLike,
-    velocity: ArrayLike | None = None,
+    degree: int, knots: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """Last control points that give the wanted end ([Qiu2012]_ 2.48-2.50).
 
     Equation 2.49 is read with ``t_n+k - t_n`` in place of the printed ``t_n+k-1 - t_n-1``.
@@ -263,8 +251,7 @@ def bernstein_matrix(degree: int, s: ArrayLike) -> FloatArray:
 
 
 def _inside(knots: FloatArray, t: ArrayLike) -> FloatArray:
-    times = np.asarray(t, dtype=np.float64)
-    first, last = knots[0], knots[-1]
+    times, first, last = np.asarray(t, dtype=np.float64), knots[0], knots[-1]
     slack = _DOMAIN_TOLERANCE * (last - first)
     if not np.all((times >= first - slack) & (times <= last + slack)):
         raise SplineError(f"spline parameter outside [{first:g}, {last:g}]; valid: values of the domain")

@@ -186,14 +186,11 @@ def carried_margin(stances: Sequence[Stance], wrenches: FloatArray, com: FloatAr
         wrenches: (n, 6) mean wrenches of the scene about the world origin [N, N.m].
         com: (n, 3) [m].
     """
-    numbers, different = dict[tuple[int, ...], int](), list[Stance]()
-    rows = np.empty(len(stances), dtype=np.int64)
-    for row, stance in enumerate(stances):
-        key = tuple(id(contact) for contact in stance)
-        if key not in numbers:
-            numbers[key] = len(different)
+    keys, numbers, different = [tuple(map(id, stance)) for stance in stances], {}, []
+    for key, stance in zip(keys, stances, strict=True):
+        if numbers.setdefault(key, len(different)) == len(different):
             different.append(stance)
-        rows[row] = numbers[key]
+    rows = np.array([numbers[key] for key in keys], dtype=np.int64)
     return motion_margin(different, rows, wrenches.reshape(-1, 6), com.reshape(-1, 3))
 
 
@@ -212,8 +209,7 @@ def _same_place(first: Contact, second: Contact) -> bool:
         return False
     if len(one) == len(other) and np.square(one - other).sum(axis=1).max() <= TOUCHING**2:
         return True  # point by point, as from one sample to the next
-    missing = np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1)
-    if missing.max() > TOUCHING:
+    if np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1).max() > TOUCHING:
         return False
     return bool(signed_distance(other[:, :2], convex_polygon(one[:, :2])).min() >= -TOUCHING)
 
@@ -248,10 +244,7 @@ def _beyond(contact: Contact, positions: FloatArray) -> FloatArray:
 
 
 def _hull(points: FloatArray) -> FloatArray:
-    """Corners of the hull of points in a plane, or the ends of a line, or one point.
-
-    Corners that stand out by less than a tenth of :data:`TOUCHING` are left out.
-    """
+    """Corners of the hull of points in a plane that stand out, or the ends of a line, or one point."""
     flat = points[:, :2] - points[:, :2].mean(axis=0)
     extent, axes = np.linalg.svd(flat, full_matrices=False)[1:]
     if np.abs(flat).max() <= 0.5 * TOUCHING:

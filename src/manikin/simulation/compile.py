@@ -1,9 +1,8 @@
 """The body and the scene as a MuJoCo model, and the translation of states.
 
-The model is built from the same neutral description as the Pinocchio one, through ``MjSpec``. It has one
-MuJoCo body per segment, a free joint on the root, the segment's hinges in the same order, one torque motor
-per hinge, one geometry ``"segment/shape"`` per shape and one site ``"effector/<name>"`` per effector.
-Obstacles of the scene are static geometries.
+The model is built from the same neutral description as the Pinocchio one. It has one MuJoCo body per segment,
+a free joint on the root, the segment's hinges in the same order, one torque motor per hinge, one geometry
+``"segment/shape"`` per shape, one site ``"effector/<name>"`` per effector. Obstacles are static geometries.
 
 The engines describe the free root differently. With ``R`` the rotation from the root's axes to the
 world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocchio:
@@ -40,8 +39,7 @@ class PhysicsOptions:
         timestep: [s]; 1 ms as in [Qiu2012]_ 6.1.
         friction: Coulomb coefficient between the body and the scene and of the body with itself.
         contact_friction: Pairs of a segment and a larger coefficient between it and the scene.
-        segment_friction: Pairs of a segment and its coefficient to whatever it touches; it is soft, see
-            ``soft_time_constant``.
+        segment_friction: Pairs of a segment and its coefficient to whatever it touches; such a one is soft.
         contact_time_constant: How fast a contact pushes penetration out [s]; at least two time steps.
         soft_time_constant: The same for segments with their own friction: flesh on a cushion [s].
         joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
@@ -135,8 +133,7 @@ def _primitive(obstacle: Obstacle) -> tuple[Any, list[float], FloatArray, FloatA
     turned, place = rotation_from_normal(normal), normal * offset
     if isinstance(shape, HalfSpace):
         return _GEOM.mjGEOM_PLANE, [0.0, 0.0, 1.0], turned, place
-    half = [PLANE_HALF_SIZE, PLANE_HALF_SIZE, PLANE_THICKNESS / 2]
-    return _GEOM.mjGEOM_BOX, half, turned, place
+    return _GEOM.mjGEOM_BOX, [PLANE_HALF_SIZE, PLANE_HALF_SIZE, PLANE_THICKNESS / 2], turned, place
 
 
 def _add_mesh(spec: Any, obstacle: Obstacle, mesh: Mesh, contact: dict[str, Any]) -> None:
@@ -160,8 +157,7 @@ def _convex_bodies(piece: MeshPiece) -> list[FloatArray]:
     corners = piece.vertices[piece.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    inner = corners - SHEET_THICKNESS * normals[:, None, :]
-    return list(np.concatenate([corners, inner], axis=1))
+    return list(np.concatenate([corners, corners - SHEET_THICKNESS * normals[:, None, :]], axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,8 +244,7 @@ def compile_model(
     Args:
         scene: Obstacles and floor; None for an empty world without a floor.
         options: Settings; defaults when None.
-        held: Effectors welded to the world, at a rotation (3, 3) and a position (3,) [m]; their segments pass
-            through the scene.
+        held: Effectors welded to the world, by rotation (3, 3) and position (3,) [m], which pass through it.
 
     Raises:
         SceneError: If a mesh is too large to simulate.

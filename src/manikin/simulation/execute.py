@@ -118,12 +118,10 @@ class _Run:
         settings = settings or ControlSettings()
         physics = physics or default_physics(body, schedule)
         self.period = settings.period
-        self.substeps = round(settings.period / physics.timestep)
-        if self.substeps < 1 or abs(self.substeps * physics.timestep - settings.period) > 1e-9:
-            raise InputError(
-                f"control period is {settings.period:g} s and physics timestep {physics.timestep:g} s; "
-                "valid: a whole multiple"
-            )
+        self.substeps, step = round(self.period / physics.timestep), physics.timestep
+        if self.substeps < 1 or abs(self.substeps * step - self.period) > 1e-9:
+            told = f"control period is {self.period:g} s and physics timestep {step:g} s"
+            raise InputError(f"{told}; valid: a whole multiple")
         damping = np.full(body.nv - 6, physics.joint_damping)
         self.controller = Controller(body, motion, schedule, settings, joint_damping=damping, wishes=wishes)
         self.holds: list[_Hold] = []
@@ -138,8 +136,7 @@ class _Run:
         self._segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, self._segments)
         self.failure, self.failure_time = "", None
-        everything = tuple(segment.name for segment in body.segments)
-        self._leaning = [(everything, name) for name in padded]
+        self._leaning = [(tuple(segment.name for segment in body.segments), name) for name in padded]
         self._planned_now: tuple[int, ...] | None = None
         self._leaving = set[str]()
 
@@ -185,9 +182,8 @@ class _Run:
             self._planned_now = now
         grasps = [item.interval for item in self.holds if item.interval.contact.kind is ContactKind.GRASP]
         held = {item.contact.effector: item.contact for item in grasps if item.start <= time < item.end}
-        leaving = {
-            item.contact.effector for item in grasps if item.end <= time < item.end + GRASPING
-        } - held.keys()
+        left = {item.contact.effector for item in grasps if item.end <= time < item.end + GRASPING}
+        leaving = left - held.keys()
         for effector in {item.contact.effector for item in grasps} - held.keys():
             self.world.release(effector)
         for effector in leaving:  # its fingers are still about what it held

@@ -96,7 +96,7 @@ class Execution(Displayed):
         friction: Largest use of friction by the forces that control counted on; None without control.
         schedule: When the planned contacts were due, later where the plan waited; None where it did not.
         min_force_at_com_N: Smallest force at the CoM that would have ended balance; None where none does [N].
-        min_zmp_distance_m: Least distance of the ZMP to the edge of what carries; None without one [m].
+        min_zmp_distance_m: Least distance of the ZMP to the edge of what carries, < 0 outside; or None [m].
     """
 
     motion: Motion

@@ -104,8 +104,7 @@ def push_on_the_way(
     """
     sample = min(int(np.searchsorted(motion.time, start)), len(motion.time) - 1)
     forward = spatial.rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
-    heading = float(np.arctan2(forward[1], forward[0]))
-    way = spatial.rotation_from_yaw(heading + np.deg2rad(direction))[:, 0]
+    way = spatial.rotation_from_yaw(float(np.arctan2(forward[1], forward[0])) + np.deg2rad(direction))[:, 0]
     return Push("thorax", force * way, start, duration, frequency=frequency)
 
 

@@ -8,14 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
-from manikin.control.recovery import (
-    BalanceRecovery,
-    RecoverySettings,
-    edge_limits,
-    held_impulse,
-    joint_groups,
-    sole_at,
-)
+from manikin.control import recovery
+from manikin.control.recovery import BalanceRecovery, RecoverySettings, joint_groups, sole_at
 from manikin.errors import InputError
 from manikin.kinematics import Placement, PostureProblem, com_target, generate_posture
 from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_yaw
@@ -132,18 +126,16 @@ class PushTrials:
         """
         if self.task.feet is Feet.HELD:
             return None
-        limits = edge_limits(self._controller(), self._posture, self.push_duration)
-        return tuple(held_impulse(limits, math.radians(direction)) for direction in directions_deg)
+        limits = recovery.edge_limits(self._controller(), self._posture, self.push_duration)
+        return tuple(recovery.held_impulse(limits, math.radians(direction)) for direction in directions_deg)
 
     @property
     def _posture(self) -> ArrayLike:
         return self.body.standing_posture() if self.task.q is None else self.task.q
 
     def _controller(self) -> BalanceRecovery:
-        body, task = self.body, self.task
-        return BalanceRecovery(
-            body, self._posture, self.settings, support=task.support, friction=task.friction
-        )
+        support, friction = self.task.support, self.task.friction
+        return BalanceRecovery(self.body, self._posture, self.settings, support=support, friction=friction)
 
     def push(self, direction_deg: float, impulse: float, *, until_at_rest: float | None = None) -> Recovery:
         """Push once.

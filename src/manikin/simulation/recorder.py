@@ -57,9 +57,7 @@ class Recorder:
         self._landings: dict[str, FloatArray] = {}
         self.max_slip = 0.0
 
-    def record(
-        self, sensed: Sensed, output: ControlOutput, total: FloatArray, carried: CarriedPoints
-    ) -> None:
+    def record(self, sensed: Sensed, output: ControlOutput, mean: FloatArray, carried: CarriedPoints) -> None:
         """Add one control step: its first engine step, and the mean wrench (6,) of all its points."""
         plan_time, wrenches = sensed.time - output.waited, []
         for name in self.effectors:
@@ -69,7 +67,7 @@ class Recorder:
                 wrenches.append(sensed.grip_wrench(name, contact.position))
             else:
                 wrenches.append(sensed.wrench(contact.position, self._segments[name]))
-        self.samples.append(Sample(sensed, output, np.array(wrenches), total, carried))
+        self.samples.append(Sample(sensed, output, np.array(wrenches), mean, carried))
 
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""
@@ -105,8 +103,6 @@ class Recorder:
                 if share > most.share:
                     most = FrictionUse(model, share, sample.sensed.time, name)
         return most
-
-    # --- measures --------------------------------------------------------------------------
 
     def com_errors(self) -> FloatArray:
         """(n,) distance of the CoM from its plan [m]."""
@@ -146,8 +142,7 @@ class Recorder:
         """When the planned contacts were due; None where the plan never waited."""
         if not self.samples or self.samples[-1].output.waited == 0.0:
             return None
-        waited = np.array([sample.output.waited for sample in self.samples])
-        planned = np.array([sample.plan_time for sample in self.samples])
+        waited, planned = np.array([(s.output.waited, s.plan_time) for s in self.samples]).T
         instants = self._schedule.instants
         late = waited[np.minimum(np.searchsorted(planned, instants), len(waited) - 1)]
         return ContactSchedule(self._schedule.sequence, instants + late)
@@ -159,11 +154,9 @@ class Recorder:
         mass [kg] closes the polytope of a stance without force limits.
         """
         carrying = CarryingContacts(self._segments, mass)
-        return carried_margin(
-            [self._carrying_stance(carrying, sample) for sample in self.samples],
-            np.array([sample.total for sample in self.samples]),
-            np.array([sample.output.state.com for sample in self.samples]),
-        )
+        stances = [self._carrying_stance(carrying, sample) for sample in self.samples]
+        wrenches, com = [s.total for s in self.samples], [s.output.state.com for s in self.samples]
+        return carried_margin(stances, np.array(wrenches), np.array(com))
 
     def _carrying_stance(self, carrying: CarryingContacts, sample: Sample) -> Stance:
         frames = sample.output.state.frames

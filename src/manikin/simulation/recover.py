@@ -136,6 +136,7 @@ class _RecoveryRun:
         for push in task.pushes:
             self.world.apply_push(push)
         self.substeps = max(1, round(settings.period / physics.timestep))
+        self.period = self.substeps * physics.timestep
         feet = [name for foot in self.controller.groups.feet for name in end_segments(body, foot)]
         self.world.plan_touches([(feet, obstacle.name) for obstacle in ground])
         self.recorder = RecoveryRecorder(body, self.controller)
@@ -147,8 +148,7 @@ class _RecoveryRun:
         self.pushed_from = min((push.start for push in task.pushes), default=np.inf)
 
     def run(self, progress: Callable[[float], None] | None) -> Recovery:
-        began, control = clock.perf_counter(), 0.0
-        period = self.substeps * self.world.model.options.timestep
+        began, control, period = clock.perf_counter(), 0.0, self.period
         settle, count = round(STANDING / period), math.ceil(self.task.duration / period)
         self.world.reset(self.q, None, -settle * period)
         lowest, fallen = FALLEN * self.controller.standing.height, ""
@@ -206,9 +206,8 @@ class _RecoveryRun:
         wanted = self.task.until_at_rest
         if wanted is None or time < self.disturbed_until:
             return False
-        velocity = state.momentum[:3] / state.mass
-        if not at_rest(self.placed, self.controller, state.q, state.com, velocity):
-            self.rest_from = time + self.substeps * self.world.model.options.timestep
+        if not at_rest(self.placed, self.controller, state.q, state.com, state.momentum[:3] / state.mass):
+            self.rest_from = time + self.period
         return time - self.rest_from >= wanted - 1e-9
 
     def _fallen(self, state: DynamicsState, lowest: float, time: float) -> str:
@@ -223,13 +222,10 @@ def _check_standing(controller: BalanceRecovery, q: FloatArray) -> None:
     """Refuse a body that lies, leans or is about to fall over."""
     standing = controller.standing
     if standing.area.reach(standing.com[:2]) >= 1.0:
-        raise InputError(
-            f"the body does not stand: its centre of mass is over {np.round(standing.com[:2], 3).tolist()}, "
-            "outside its soles; valid: a posture that stands on both feet"
-        )
+        told = f"its centre of mass is over {np.round(standing.com[:2], 3).tolist()}, outside its soles"
+        raise InputError(f"the body does not stand: {told}; valid: a posture that stands on both feet")
     lean = trunk_lean(Configuration(controller.body, q), controller.groups)
     if lean > UPRIGHT:
-        raise InputError(
-            f"the body does not stand upright: its trunk leans by {math.degrees(lean):.0f} deg; "
-            f"valid: at most {math.degrees(UPRIGHT):.0f} deg"
-        )
+        own, most = math.degrees(lean), math.degrees(UPRIGHT)
+        told = f"its trunk leans by {own:.0f} deg; valid: at most {most:.0f} deg"
+        raise InputError(f"the body does not stand upright: {told}")

@@ -19,8 +19,7 @@ from manikin.simulation.push_force import Push
 from manikin.simulation.recovery_record import RecoveryTrace
 
 STANDS_HEIGHT = 0.95
-"""Least height of the centre of mass of a standing body, as a share of its first one [-]; kneeling, a human
-has some 0.7 of it and lying 0.2."""
+"""Least height of the CoM of a standing body, as a share of its first one [-]; kneeling has some 0.7."""
 
 STANDS_LEAN = 0.3
 """Largest lean of the trunk of a standing body [rad]."""
@@ -232,9 +231,8 @@ def _foot_motion(controller: BalanceRecovery, motion: Motion, steps: Sequence[St
     first, last = (Configuration(controller.body, motion.q[row]) for row in (0, -1))
     places = {sole.effector: first.effector_placement(sole.effector)[1] for sole in controller.standing.soles}
     places |= {step.foot: step.position for step in steps}
-    return max(
-        float(np.linalg.norm(last.effector_placement(name)[1] - place)) for name, place in places.items()
-    )
+    moved = (last.effector_placement(name)[1] - place for name, place in places.items())
+    return max(float(np.linalg.norm(way)) for way in moved)
 
 
 def _impulse(push: Push) -> float:

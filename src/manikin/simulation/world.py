@@ -81,8 +81,6 @@ class World:
         self._carried: list[tuple[NDArray, ...]] = []
         self._is_segment = np.array([segment for _, segment in self._owners], dtype=bool)
 
-    # --- state -----------------------------------------------------------------------------
-
     @property
     def time(self) -> float:
         """Simulated time [s]."""
@@ -99,10 +97,7 @@ class World:
         return self.model.v_from_mujoco(self._data.qpos, self._data.qvel)
 
     def reset(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> None:
-        """Put the body into a state, at rest without ``v``, and a time [s] and forget all measurements.
-
-        Pushes and grips stay.
-        """
+        """Put the body into a state, at rest without ``v``, at a time [s]; only pushes and grips stay."""
         mujoco.mj_resetData(self._model, self._data)
         self._data.time = time
         self.model.set_state(self._data, q, v)
@@ -116,8 +111,6 @@ class World:
         self.penetration, self.padding_compression = 0.0, 0.0
         self._total[:], self._steps = 0.0, 0
         self._carried.clear()
-
-    # --- what acts -------------------------------------------------------------------------
 
     def carry(self, masses: Mapping[str, float]) -> None:
         """Set the point masses that effectors carry, at rest in their frames [kg]; none sets all down."""
@@ -150,10 +143,7 @@ class World:
             self.collide(effector, True)
 
     def collide(self, effector: str, enabled: bool) -> None:
-        """Let the segment of an effector collide with obstacles or not; with the body it does.
-
-        A rigid hand cannot open its fingers around what it is about to hold: it passes through the scene.
-        """
+        """Let the segment of an effector, such as a hand about to grasp, collide with obstacles or not."""
         mask = self._mask((self.model.body.effector(effector).segment,), True)
         bits, affinity = self.model.mujoco.geom_contype[mask], self.model.mujoco.geom_conaffinity[mask]
         # Obstacles do not answer to the bit 4; segments do through their affinity.
@@ -170,10 +160,10 @@ class World:
         Raises:
             InputError: If an obstacle is not in the scene.
         """
-        supports = self._touching(pairs)
-        self._leaning = self._touching(leaning) & ~supports
+        self._planned = self._touching(pairs)
+        self._leaning = self._touching(leaning) & ~self._planned
         self._leans = bool(self._leaning.any())
-        self._planned = supports | self._leaning
+        self._planned |= self._leaning
 
     def _touching(self, pairs: Sequence[tuple[Sequence[str], str]]) -> NDArray[np.bool_]:
         """(geometries, geometries) whether two geometries are a segment and the obstacle of a pair."""
@@ -184,8 +174,6 @@ class World:
                 raise InputError(f"planned touch of obstacle {obstacle!r}; valid: one of {names}")
             touching |= self._table(tuple(segments), obstacle)
         return touching
-
-    # --- time ------------------------------------------------------------------------------
 
     def advance(self, tau: ArrayLike, steps: int = 1) -> None:
         """Hold joint torques (nv - 6,) [N.m] for a number of engine steps."""
@@ -200,33 +188,27 @@ class World:
             self._steps += 1
 
     def mean_wrench(self) -> FloatArray:
-        """(6,) mean wrench of the scene on the body since the last call, grips included.
+        """(6,) mean wrench of scene and grips on the body since the last call, about the world origin.
 
-        Moments are about the world origin. Where the body only leans, nothing counts: that acts like a push.
-        The mean is over all engine steps since then: an impact of one step counts with its share of time.
+        Where the body only leans, nothing counts: it acts like a push. Impacts count by their share of time.
         """
         mean = self._total / max(self._steps, 1)
         self._total[:], self._steps = 0.0, 0
         return mean
 
     def carried(self) -> CarriedPoints:
-        """Contact points of body and scene that carried force since the last call.
+        """Contact points of body and scene that carried force since the last call, but where it only leans.
 
         A point counts as often as it was met, each time with its force over the number of engine steps.
-        Where the body only leans, nothing counts, as in :meth:`mean_wrench`.
         """
         steps, self._carried = self._carried or [_NOTHING], []
         geoms, positions, normals, forces, friction = map(np.concatenate, zip(*steps, strict=True))
         second = self._is_segment[geoms[:, 1]]
-        return CarriedPoints(
-            tuple(self._owners[geom][0] for geom in np.where(second, geoms[:, 1], geoms[:, 0]).tolist()),
-            tuple(self._owners[geom][0] for geom in np.where(second, geoms[:, 0], geoms[:, 1]).tolist()),
-            positions,
-            # The engine's normal goes from the first geometry to the second.
-            np.where(second, 1.0, -1.0)[:, None] * normals,
-            forces / len(steps),
-            friction,
-        )
+        own, other = np.where(second, geoms[:, ::-1].T, geoms.T).tolist()
+        # The engine's normal goes from the first geometry to the second.
+        normals = np.where(second, 1.0, -1.0)[:, None] * normals
+        names, others = (tuple(self._owners[geom][0] for geom in side) for side in (own, other))
+        return CarriedPoints(names, others, positions, normals, forces / len(steps), friction)
 
     def _constraint_wrench(self) -> FloatArray:
         """Wrench of all contacts and grips in the last step; inner forces cancel in the root."""
@@ -279,9 +261,9 @@ class World:
             self._carried.append(_NOTHING)
             return
         contact = self._data.contact
-        geoms, depths = contact.geom, -contact.dist
-        forces, first = np.zeros(self._data.ncon), contact.efc_address
+        geoms, depths, forces = contact.geom, -contact.dist, np.zeros(self._data.ncon)
         if self._data.nefc:
+            first = contact.efc_address
             forces = np.where(first >= 0, self._data.efc_force[np.maximum(first, 0)], 0.0)
         carries = (self._is_segment[geoms[:, 0]] != self._is_segment[geoms[:, 1]]) & (forces > 0.0)
         carries &= ~self._leaning[geoms[:, 0], geoms[:, 1]]
@@ -290,9 +272,8 @@ class World:
             contact.friction[carries, 0],
         ))  # fmt: skip
         if self._pads:
-            padded = self._padded[geoms[:, 0]] | self._padded[geoms[:, 1]]
-            deepest = float(depths[padded].max(initial=0.0))
-            self.padding_compression = max(self.padding_compression, deepest)
+            padded = self._padded[geoms].any(axis=1)
+            self.padding_compression = max(self.padding_compression, float(depths[padded].max(initial=0.0)))
             depths = depths[~padded]
         self.penetration = max(self.penetration, float(depths.max(initial=0.0)))
         planned = self._planned[geoms[:, 0], geoms[:, 1]]
@@ -303,8 +284,6 @@ class World:
         for pair, force in pressed.items():
             known = self._touches.get(pair, Touch(self._before[2], *pair))
             self._touches[pair] = replace(known, force=max(known.force, force))
-
-    # --- what is measured ------------------------------------------------------------------
 
     def touching(self, segments: Sequence[str], obstacle: str) -> bool:
         """Whether one of the segments was in contact with the obstacle in the last engine step."""

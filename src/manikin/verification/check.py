@@ -4,7 +4,7 @@ Nothing of the planner takes part: solids, distances, friction cones and linear 
 the body gives its plain sizes, and Pinocchio the forward kinematics.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -159,8 +159,7 @@ class _Check:
     def _contacts(self) -> ContactRows:
         values, task = self._scenario.contacts, self._scenario.file.task
         rungs = "climbing" in (task.start.posture, task.goal.posture)
-        forefoot = values.forefoot_m is not None
-        rules = Rules(friction_of(self._scenario), values.grasp_force_N, forefoot, rungs)
+        rules = Rules(friction_of(self._scenario), values.grasp_force_N, values.forefoot_m is not None, rungs)
         rows = ContactRows(self._body, self._solids, rules)
         for number, stage in enumerate(self._plan.stages):
             rows.measure(stage.contacts, f"stages[{number}]")
@@ -216,10 +215,9 @@ class _Check:
         missed = Worst("max_reach_gap_m", "miss of the nearest posture", REACHED, 1e-9)
         search = PostureSearch(self._body)
         for change in self._changes:
-            if change.q is None and change.held and all(share <= 1.0 for share, _ in self._shares(change)):
-                same = {contact.effector: contact for contact in change.held}
-                if len(same) == len(change.held):
-                    missed.take(search.gap(change.held, change.com), change.where)
+            single = len({contact.effector for contact in change.held}) == len(change.held) > 0
+            if change.q is None and single and all(share <= 1.0 for share, _ in self._shares(change)):
+                missed.take(search.gap(change.held, change.com), change.where)
         return missed.row
 
     def _balance(self) -> tuple[list[Requirement | None], float]:
@@ -233,7 +231,8 @@ class _Check:
             contacts, com, within = change.carrying, change.com, None
             if com is None:
                 within = {number: self._reach.to_com(item.effector) for number, item in enumerate(contacts)}
-            guess, act = com if com is not None else _middle(change.held), self._act
+            middle = np.mean([item.position for item in change.held], axis=0) if change.held else np.zeros(3)
+            guess, act = middle if com is None else com, self._act
             result = rest(contacts, self._mass, self._cap, guess, within, None if change.after else act)
             names = ", ".join(contact.effector for contact in contacts) or "no contact"
             where = f"{change.where} on {names}"
@@ -256,10 +255,6 @@ class _Check:
         first, last = CentreState(start.com, stage.com_velocity), CentreState(end.com, leaving)
         contacts = tuple(stage.contacts.values())
         return dynamic_shortfall(contacts, self._mass, self._cap, first, last, stage.duration)
-
-
-def _middle(contacts: Sequence[Contact]) -> FloatArray:
-    return np.mean([contact.position for contact in contacts], axis=0) if contacts else np.zeros(3)
 
 
 PLACE = 0.25
@@ -303,8 +298,7 @@ def _end_rows(
         turn.take(abs(float(np.rad2deg(off))), end)
     resting = [seat] if seat is not None else list(feet.values())
     if state.height_m is not None and state.posture != "climbing" and resting:
-        mean = np.mean([contact.position[2] for contact in resting])
-        level.take(abs(float(mean - state.height_m)), end)
+        level.take(abs(float(np.mean([contact.position[2] for contact in resting]) - state.height_m)), end)
     return [seats.row, place.row, turn.row, level.row]
 
 

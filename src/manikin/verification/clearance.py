@@ -164,10 +164,8 @@ def _rounds_to_solid(rounds: Placed, solid: Solid) -> FloatArray:
     start, end = rounds.ends
     result = np.full(len(start), np.inf)
     for number, near in _near_triangles(rounds, solid):
-        corners = solid.triangles.corners[near]
-        result[number] = segment_triangle(start[number], end[number], corners).min()
-    hidden = solid.inside(rounds.position)
-    return np.where(hidden & np.isfinite(result), -result, result) - rounds.radius
+        result[number] = segment_triangle(start[number], end[number], solid.triangles.corners[near]).min()
+    return np.where(solid.inside(rounds.position) & np.isfinite(result), -result, result) - rounds.radius
 
 
 def _near_triangles(shapes: Placed, solid: Solid) -> Iterator[tuple[int, np.ndarray]]:
@@ -228,8 +226,7 @@ def _boxes_to_mesh(boxes: Placed, solid: Solid) -> FloatArray:
         axes = np.concatenate([frame, solid.triangles.normals[near][:, None], crossed], axis=1)
         own = np.broadcast_to(boxes.corners[number], (len(near), 8, 3))
         result[number] = separation(own, corners, axes).min()
-    hidden = solid.inside(boxes.position)
-    return np.where(hidden & np.isfinite(result), -np.abs(result), result)
+    return np.where(solid.inside(boxes.position) & np.isfinite(result), -np.abs(result), result)
 
 
 def separation(first: FloatArray, second: FloatArray, axes: FloatArray) -> FloatArray:

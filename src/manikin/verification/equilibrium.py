@@ -61,10 +61,9 @@ class HandForce:
 
 
 def forces_of(contacts: Sequence[Contact], mass: float, cap: float | None, origin: FloatArray) -> Forces:
-    """Forces that contacts can give.
+    """Forces that contacts, at least one, can give.
 
     Args:
-        contacts: At least one.
         mass: Of the body, for the cap where none is given [kg].
         cap: Largest sum of the normal forces of soles and points [N].
         origin: (3,) point of the moments [m].
@@ -91,11 +90,10 @@ def _acting(forces: Forces, contacts: Sequence[Contact], act: HandForce) -> Forc
 
 
 def _block(contact: Contact, origin: FloatArray) -> Forces:
-    arm = contact.position - origin
     if contact.kind is ContactKind.GRASP:
         moments = 3 if contact.max_moment > 0.0 else 0
         wrench = np.zeros((6, 3 + moments))
-        wrench[:3, :3], wrench[3:, :3] = np.eye(3), skew(arm)
+        wrench[:3, :3], wrench[3:, :3] = np.eye(3), skew(contact.position - origin)
         wrench[3:, 3:] = np.eye(3)[:, :moments]
         bound = np.repeat([contact.max_force, contact.max_moment], [3, moments])
         return Forces(wrench, np.zeros((0, 3 + moments)), np.zeros(0), -bound, bound)
@@ -149,8 +147,7 @@ def rest(
     if not contacts:
         return Rest(np.inf, 0.0, None)
     level = float(np.mean([contact.position[2] for contact in contacts]))
-    origin = np.array([com[0], com[1], level])
-    forces = forces_of(contacts, mass, cap, origin)
+    forces = forces_of(contacts, mass, cap, np.array([com[0], com[1], level]))
     if act is not None:
         forces = _acting(forces, contacts, act)
     weight, count = mass * GRAVITY, len(forces.lower)
@@ -162,8 +159,7 @@ def rest(
     rows, limits = [np.hstack([forces.rows, np.zeros((len(forces.rows), 3))])], [forces.limits / weight]
     # From a direction that turns with the contacts, so that results do not depend on the world's axes.
     forward = contacts[0].rotation_contact_to_world[:2, 0]
-    heading = float(np.arctan2(forward[1], forward[0]))
-    turn = heading + np.arange(2 * _DIRECTIONS) * np.pi / _DIRECTIONS
+    turn = float(np.arctan2(forward[1], forward[0])) + np.arange(2 * _DIRECTIONS) * np.pi / _DIRECTIONS
     sides = np.column_stack([np.cos(turn), np.sin(turn)])
     bound = np.zeros((len(sides), count + 3))
     bound[:, count : count + 2] = sides
@@ -289,23 +285,14 @@ def dynamic_shortfall(
         shared[:, own] = forces.rows
         limits += [level, shared]
         bound += [MAX_ACCELERATION - acceleration, MAX_ACCELERATION + acceleration, forces.limits / weight]
-    return _least_violation(np.array(equality), np.array(target), (limits, bound), forces, weight)
-
-
-def _least_violation(
-    equality: FloatArray, target: FloatArray, limits: tuple[list[FloatArray], list[FloatArray]],
-    forces: Forces, weight: float,
-) -> float:  # fmt: skip
-    """Smallest size of the wrench that is missing at the worst instant, relative to the weight (and 1 m)."""
-    rows, bound = csr_array(np.vstack(limits[0])), np.concatenate(limits[1])
-    width, wanted = equality.shape[-1], target.ravel()
-    matrix, cost = equality.reshape(-1, width), np.eye(1, width, 3)[0]
+    # The smallest size of the wrench that is missing at the worst instant, relative to the weight (and 1 m).
+    matrix, wanted, cost = np.concatenate(equality), np.concatenate(target), np.eye(1, width, 3)[0]
     upper = csr_array(np.vstack([matrix - GRAVITY * cost, -matrix - GRAVITY * cost]))
     low = np.concatenate([[-np.inf] * 3, [0.0], np.tile(forces.lower / weight, SAMPLES)])
     high = np.concatenate([[np.inf] * 4, np.tile(forces.upper / weight, SAMPLES)])
     solved = linprog(
-        cost, A_ub=vstack([upper, rows]), b_ub=np.concatenate([wanted, -wanted, bound]),
-        bounds=np.column_stack([low, high]), method="highs",
+        cost, A_ub=vstack([upper, csr_array(np.vstack(limits))]),
+        b_ub=np.concatenate([wanted, -wanted, *bound]), bounds=np.column_stack([low, high]), method="highs",
     )  # fmt: skip
     return 1.0 if solved.x is None else float(solved.x[3])
 

@@ -190,8 +190,7 @@ _WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 class PostureSearch:
     """Looks for a posture on contacts where a plan gives none: damped Gauss-Newton within the joints' ranges.
 
-    Collisions are not avoided. A local search from a few starts may miss a posture, which a plan then has to
-    give.
+    Collisions are not avoided. A local search from a few starts may miss a posture: a plan has to give it.
     """
 
     def __init__(self, body: BodyModel) -> None:

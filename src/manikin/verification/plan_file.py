@@ -174,8 +174,7 @@ class PlannedContacts:
 
     def __post_init__(self) -> None:
         """Make contacts that are kept one value, and refuse numbers that are none."""
-        kept: dict[str, Contact] = {}
-        stages = []
+        stages, kept = [], dict[str, Contact]()
         _check_finite(self.goal, "goal.posture")
         _check_finite(self.goal_com, "goal.com")
         for number, stage in enumerate(self.stages):
@@ -208,11 +207,8 @@ def _check_finite(values: FloatArray | None, where: str) -> None:
 
 
 def _is_kept(contact: Contact, before: Contact) -> bool:
-    return contact is before or (
-        contact.same_place(before, SAME_PLACE)
-        and contact.points.shape == before.points.shape
-        and bool(np.abs(contact.points - before.points).max() <= SAME_PLACE)
-    )
+    alike = contact.same_place(before, SAME_PLACE) and contact.points.shape == before.points.shape
+    return alike and bool(np.abs(contact.points - before.points).max() <= SAME_PLACE)
 
 
 def load_contact_plan(path: str | Path, scenario: Scenario | None = None) -> tuple[Scenario, PlannedContacts]:
@@ -224,12 +220,11 @@ def load_contact_plan(path: str | Path, scenario: Scenario | None = None) -> tup
     Raises:
         ScenarioError: One line that names the file, the key, what was wrong and what is valid.
     """
-    file = Path(path)
     try:
-        content = read_json(file, "a contact-plan file (.json)")
+        content = read_json(Path(path), "a contact-plan file (.json)")
     except InputError as error:
         raise ScenarioError(str(error)) from None
-    return parse_contact_plan(content, str(file), scenario, file.parent)
+    return parse_contact_plan(content, str(Path(path)), scenario, Path(path).parent)
 
 
 def parse_contact_plan(
@@ -255,11 +250,10 @@ def parse_contact_plan(
             name: before[name] if isinstance(entry, str) else _contact(name, entry, scenario, body, where)
             for name, entry in section.contacts.items()
         }
-        stages.append(PlannedStage(
-            contacts, _posture(section.posture, body, f"{where}.posture"), _array(section.com),
-            np.array(section.com_velocity_m_s), _posture(section.via, body, f"{where}.via"), section.dynamic,
-            section.duration_s,
-        ))  # fmt: skip
+        posture = _posture(section.posture, body, f"{where}.posture")
+        com, velocity = _array(section.com), np.array(section.com_velocity_m_s)
+        via, dynamic = _posture(section.via, body, f"{where}.via"), section.dynamic
+        stages.append(PlannedStage(contacts, posture, com, velocity, via, dynamic, section.duration_s))
         before = contacts
     goal = _posture(file.goal.posture, body, f"{source}: goal.posture")
     return scenario, PlannedContacts(tuple(stages), goal, _array(file.goal.com), file.planner)
@@ -286,13 +280,12 @@ def _contact(
         length, width = nominal_size(body, effector) or (0.01, 0.01)
         whole = SoleSection(length_m=length, width_m=width)
         contact = build_contact(effector, entry, friction_of(scenario), whole)
-        if entry.rotation is not None:
-            rotation = check_rotation(entry.rotation, "rotation")
-            oriented = contact.kind is ContactKind.GRASP
-            contact = replace(contact, rotation_contact_to_world=rotation, oriented=oriented)
+        if entry.rotation is None:
+            return contact
+        rotation, grasps = check_rotation(entry.rotation, "rotation"), contact.kind is ContactKind.GRASP
+        return replace(contact, rotation_contact_to_world=rotation, oriented=grasps)
     except InputError as error:
         raise ScenarioError(f"{where}.contacts.{effector}: {error}") from None
-    return contact
 
 
 def nominal_size(body: BodyModel, effector: str) -> tuple[float, float] | None:

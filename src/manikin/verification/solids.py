@@ -193,8 +193,7 @@ class Solid:
         if isinstance(shape, Sphere):
             return np.linalg.norm(local, axis=-1) - shape.radius
         if isinstance(shape, Capsule):
-            along = np.clip(local[..., 2], -0.5 * shape.length, 0.5 * shape.length)
-            local[..., 2] -= along
+            local[..., 2] -= np.clip(local[..., 2], -0.5 * shape.length, 0.5 * shape.length)
             return np.linalg.norm(local, axis=-1) - shape.radius
         if isinstance(shape, Cylinder):
             across = np.hypot(local[..., 0], local[..., 1]) - shape.radius
@@ -288,16 +287,14 @@ def _half_size(shape: Box | Sphere | Cylinder | Capsule) -> FloatArray:
 
 def box_distance(beyond: FloatArray) -> FloatArray:
     """(...) signed distance to a box from how far (..., d) points are beyond its faces [m]."""
-    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
-    return outside + np.minimum(beyond.max(axis=-1), 0.0)
+    return np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0)
 
 
 def _to_face(shape: Box | Cylinder, local: FloatArray, axis: int, sign: float) -> FloatArray:
     """(n,) distance of points in the shape's frame to one flat face of it."""
     if isinstance(shape, Cylinder):
         height = local[:, 2] - sign * 0.5 * shape.length
-        beside = np.maximum(np.hypot(local[:, 0], local[:, 1]) - shape.radius, 0.0)
-        return np.hypot(height, beside)
+        return np.hypot(height, np.maximum(np.hypot(local[:, 0], local[:, 1]) - shape.radius, 0.0))
     half = 0.5 * shape.size
     off = np.maximum(np.abs(local) - half, 0.0)
     off[:, axis] = local[:, axis] - sign * half[axis]

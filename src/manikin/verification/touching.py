@@ -105,8 +105,13 @@ class ContactRows:
         self._hidden.take(*self._deepest(contact, where))
         hull = None
         if contact.kind is ContactKind.SOLE:
-            hull = outline(contact.points)
-            self._of_the_sole(contact, hull, where)
+            hull, size = outline(contact.points), nominal_size(self._body, contact.effector)
+            self._beyond.take(float(np.abs(contact.points[:, 2]).max()), where)
+            if size is not None:
+                beyond = np.abs(contact.points[:, :2]) - 0.5 * np.array(size)
+                self._beyond.take(float(beyond.max()), where)
+                if hull is None and not contact.rolls:
+                    self._share.take(0.0, where)
         else:
             self._beyond.take(float(np.abs(contact.points).max()), where)
         return self._at_points(contact, where) if hull is None else self._lying(contact, hull, where)
@@ -180,14 +185,6 @@ class ContactRows:
             if depth > deepest:
                 deepest, place = depth, f"{where}, in {solid.name}"
         return deepest, place
-
-    def _of_the_sole(self, contact: Contact, hull: FloatArray | None, where: str) -> None:
-        self._beyond.take(float(np.abs(contact.points[:, 2]).max()), where)
-        if (size := nominal_size(self._body, contact.effector)) is not None:
-            beyond = np.abs(contact.points[:, :2]) - 0.5 * np.array(size)
-            self._beyond.take(float(beyond.max()), where)
-            if hull is None and not contact.rolls:
-                self._share.take(0.0, where)
 
 
 def outline(points: FloatArray) -> FloatArray | None:

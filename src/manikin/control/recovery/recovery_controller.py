@@ -17,27 +17,11 @@ from manikin.control.build_qp import JointBounds, force_variables
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import ContactForceBasis, contact_geometry, segment_key
 from manikin.control.recovery import recovery_problem
+from manikin.control.recovery import standing as mechanics
+from manikin.control.recovery import strategy as strategies
 from manikin.control.recovery.recovery_problem import ROOT, ArmSwing, Objectives, RecoveryProblem
-from manikin.control.recovery.standing import (
-    ClosedLoop,
-    FeltPush,
-    JointGroups,
-    LinearMap,
-    Standing,
-    close_loop,
-    joint_groups,
-    zmp_rows,
-)
-from manikin.control.recovery.strategy import (
-    ComLaw,
-    PostureControl,
-    RecoverySettings,
-    Strategy,
-    StrategySwitch,
-    com_law,
-    fall_momentum,
-    posture_control,
-)
+from manikin.control.recovery.standing import ClosedLoop, FeltPush, JointGroups, LinearMap, Standing
+from manikin.control.recovery.strategy import ComLaw, RecoverySettings, Strategy, StrategySwitch
 from manikin.control.reference import EffectorReference
 from manikin.errors import InputError
 from manikin.numerics.qp import QPSolution, WarmQPSolver
@@ -66,12 +50,10 @@ def held_posture(
     stiffness[joints["ankle"]] = 0.5 * settings.ankle_stiffness * toppling
     damping = 2.0 * np.sqrt(stiffness * inertia)
     pull = np.zeros(len(state.v))
-    ahead = state.q[7:] + period * state.v[6:]
-    pull[6:] = stiffness * (standing.posture - ahead) - damping * state.v[6:]
+    pull[6:] = stiffness * (standing.posture - (state.q[7:] + period * state.v[6:])) - damping * state.v[6:]
     matrix = state.mass_matrix.copy()
     matrix[np.arange(6, len(pull)), np.arange(6, len(pull))] += period * damping
-    slowed = np.linalg.solve(matrix, pull)[6:]
-    return resting + pull[6:] - period * damping * slowed
+    return resting + pull[6:] - period * damping * np.linalg.solve(matrix, pull)[6:]
 
 
 SETTLING = 20.0
@@ -128,7 +110,7 @@ class BalanceRecovery:
             InputError: If its soles are not level, or the support is not of its feet.
         """
         self.body, self.settings = body, settings or RecoverySettings()
-        self.groups, self.friction, joints = joint_groups(body), friction, body.nv - 6
+        self.groups, self.friction, joints = mechanics.joint_groups(body), friction, body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
         feet = self.groups.feet if support is None else tuple(support)
@@ -170,9 +152,9 @@ class BalanceRecovery:
     def problem_at(self, state: DynamicsState) -> RecoveryProblem:
         """The program of a step at a state, with nothing pushing and an objective of no use."""
         felt = FeltPush.none(self.body.nv)
-        loop = close_loop(state, self.standing.feet, felt)
-        rows = zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
-        law = com_law(state, self.standing.com, self.standing.area, self.settings, self._turned)
+        loop = mechanics.close_loop(state, self.standing.feet, felt)
+        rows = mechanics.zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
+        law = strategies.com_law(state, self.standing.com, self.standing.area, self.settings, self._turned)
         objective = self._objectives.balancing(state, self.standing.posture, law, self._time)
         contacts, none = self._contacts(state), LinearMap.none(loop.size)
         return recovery_problem.build_recovery_qp(
@@ -198,10 +180,10 @@ class BalanceRecovery:
             self._previous = np.clip(tau, *self._torque_limits)
             return RecoveryOutput(self._previous, Strategy.STIFF, 0.0, {}, "", state, None, self.standing)
         felt = push if push is not None else FeltPush.none(self.body.nv)
-        loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
+        loop = mechanics.close_loop(state, self.standing.feet, felt, settling=SETTLING)
         law = self._law(state, may_turn=swing is None)
         strategy = self._switch.choose(state.com, law.settled, self.standing.area)
-        rows = zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
+        rows = mechanics.zmp_rows(self.standing.area, loop, state.com, self.settings.sole_inset)
         share, leaving, objective = 0.0, False, None
         if swing is not None:
             strategy = Strategy.STEP
@@ -235,19 +217,19 @@ class BalanceRecovery:
     def _law(self, state: DynamicsState, *, may_turn: bool) -> ComLaw:
         """The law of the centre of mass one period later, with what has been turned meanwhile."""
         self._time += self.settings.period
-        self._turned = self._turned + self.settings.period * fall_momentum(state)
+        self._turned = self._turned + self.settings.period * strategies.fall_momentum(state)
         area, home = self.standing.area, self.standing.com
-        law = com_law(state, home, area, self.settings, self._turned, may_turn=may_turn)
+        law = strategies.com_law(state, home, area, self.settings, self._turned, may_turn=may_turn)
         if law.need > 0.0:
             self._arms.begin(self._time, law.settled - area.centre, law.reach, self._ahead)
         return law
 
-    def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
+    def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> strategies.PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave."""
-        calm, gains = zmp_rows(self._calm, loop, state.com, 0.0), self.settings.posture
-        stiff = gains.stiffness * (self.standing.posture - state.q[7:])
-        damped = -gains.damping * state.v[6:]
-        return posture_control(loop, calm, stiff, damped, always=self.settings.posture_control_only)
+        calm, settings = mechanics.zmp_rows(self._calm, loop, state.com, 0.0), self.settings
+        stiff = settings.posture.stiffness * (self.standing.posture - state.q[7:])
+        damped = -settings.posture.damping * state.v[6:]
+        return strategies.posture_control(loop, calm, stiff, damped, always=settings.posture_control_only)
 
     def _contacts(self, state: DynamicsState) -> list[ContactForceBasis]:
         share, soles = self.settings.friction_share, zip(self.standing.soles, self._geometry, strict=True)

@@ -1,9 +1,8 @@
 """The quadratic program of one step of the recovery, its objectives and the swing of the arms.
 
 The program is that of [Kudoh2002]_ 2.54-2.64. Unknowns are the accelerations ``phi''`` of the closed loops
-and the forces at the corners of the soles. The thesis has the former alone: without the latter, which pull no
-foot down (``f_z > 0``) and keep to friction, joint torques cannot be limited, since two feet on the ground
-share their load in many ways.
+and the forces at the corners of the soles, which pull no foot down (``f_z > 0``) and keep to friction. The
+thesis has the former alone: without the latter, joint torques on two feet cannot be limited.
 
 Arms help against a fall ahead by being raised and swung; this part is ours. Of hanging arms that swing back,
 the angular momentum about the centre of mass is next to nothing: that of their turning is undone by that of
@@ -162,14 +161,11 @@ def build_recovery_qp(
     """Build the program of one step.
 
     Args:
-        state: Current dynamics.
-        loop: Maps of the accelerations.
         contacts: Force maps of the feet.
         push: What pushes besides the ground.
         bounds: Torque limits and the stops of the joints ([Kudoh2002]_ 2.55-2.56).
         zmp: Rows that are not positive when the ZMP is inside (2.57-2.60).
         symmetry: Rows that are not positive when the legs grow no less alike (2.63-2.64).
-        objective: What is minimised.
         pulling: Whether the ground may pull as well.
     """
     generalised = np.concatenate([basis.generalised for basis in contacts], axis=1)
@@ -277,11 +273,9 @@ class Objectives:
         settings, firmness = self._settings, self._settings.swing_weight
         weight = np.full(len(posture), STEPPING_JOINTS)
         joints = self._with_locked(state, posture, pull(settings.posture, state, posture), weight)
-        tasks = (
-            swing_task(foot, state.frames[foot], way, settings.swing, firmness),
-            orientation_task(ROOT, state.frames[ROOT], self._upright, settings.posture, firmness),
-        )
-        return Objective(weight, joints, law.acceleration, self._com_weight, tasks=tasks)
+        swing = swing_task(foot, state.frames[foot], way, settings.swing, firmness)
+        upright = orientation_task(ROOT, state.frames[ROOT], self._upright, settings.posture, firmness)
+        return Objective(weight, joints, law.acceleration, self._com_weight, tasks=(swing, upright))
 
     @property
     def _com_weight(self) -> FloatArray:

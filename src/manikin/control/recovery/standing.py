@@ -156,12 +156,11 @@ def close_loop(
     basis = factors.Q[:, held:]
     rate, offset = state.centroidal_map @ basis, state.centroidal_map @ drift + state.momentum_drift
     weight, push_force = np.array([0.0, 0.0, state.mass * GRAVITY]), push.wrench[:3]
-    push_moment = push.wrench[3:] - skew(state.com) @ push_force
     return ClosedLoop(
         LinearMap(basis, drift), LinearMap(basis[6:], drift[6:]),
         com=LinearMap(rate[:3] / state.mass, offset[:3] / state.mass),
         force=LinearMap(rate[:3], offset[:3] + weight - push_force),
-        moment=LinearMap(rate[3:], offset[3:] - push_moment),
+        moment=LinearMap(rate[3:], offset[3:] - (push.wrench[3:] - skew(state.com) @ push_force)),
     )  # fmt: skip
 
 
@@ -254,16 +253,15 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
     """Rows that are not positive when the ZMP is inside ([Kudoh2002]_ 2.39-2.44, z up).
 
     With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` at
-    the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and, across, ``s_y f_z + (z - s_z) f_y +
-    n_x``; the rows are ``normal . p f_z - offset f_z`` for ``f_z > 0``, the ZMP ``inset`` [m] from the edge.
+    the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and
+    ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, right where
+    ``f_z > 0``, with the ZMP ``inset`` [m] from the edge.
     """
     normals, offsets = area.half_planes(inset)
     moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)
     constant = _turned(loop.force.offset, loop.moment.offset, com, area.height)
-    return LinearMap(
-        normals @ moments - offsets[:, None] * loop.force.matrix[2],
-        normals @ constant - offsets * loop.force.offset[2],
-    )
+    matrix = normals @ moments - offsets[:, None] * loop.force.matrix[2]
+    return LinearMap(matrix, normals @ constant - offsets * loop.force.offset[2])
 
 
 def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:

@@ -77,8 +77,7 @@ def posture_control(
     values[:, 0] += rows.offset
     scale = 1e-12 * np.abs(values).sum(axis=1, keepdims=True)
     shares = _shares(values)
-    excess = np.max(_at(values, shares) - scale, axis=0)
-    inside = (excess <= 0.0) & (shares > 0.0)
+    inside = (np.max(_at(values, shares) - scale, axis=0) <= 0.0) & (shares > 0.0)
     if np.any(inside):
         share = float(shares[inside].max())
     elif always:
@@ -96,8 +95,7 @@ def posture_control(
 def _shares(values: FloatArray) -> FloatArray:
     """0, 1 and the zeros between them of polynomials ``a + b s + c s^2`` (m, 3)."""
     a, b, c = values.T
-    root = np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0))
-    far = -0.5 * (b + np.copysign(root, b))
+    far = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0)), b))
     with np.errstate(divide="ignore", invalid="ignore"):
         zeros = np.concatenate((far / c, a / far))
     return np.concatenate(([0.0, 1.0], zeros[(zeros > 0.0) & (zeros < 1.0)]))
@@ -119,40 +117,32 @@ class RecoverySettings:
     Attributes:
         period: Time between two control steps [s]; the thesis has 10 ms ([Kudoh2002]_ 3.2).
         delay: Time from the beginning of the first push until the control reacts [s] (3.2).
-        com_weight: Weight of the squared error of :func:`com_law` against a squared joint acceleration; it
-            bends where the limits leave no choice, where the thesis' equality would have no solution.
+        com_weight: Weight of the squared error of :func:`com_law`, which the thesis has as an equality.
         calm: Rate at which that law brings the capture point back [1/s] (2.45-2.48).
-        turning: Largest moment with which arms and trunk turn where the ZMP is not enough, and are stopped
-            again, in body weights [m].
+        turning: Largest moment that turns arms and trunk, and stops them again, in body weights [m].
         least_braking: Smallest moment with which they are stopped, in body weights [m].
-        late_braking: Moment in body weights [m] beyond which the turning is stopped wherever the capture
-            point is: otherwise the stops of the joints do it, all at once.
-        range: Integral over time of the angular momentum that arms, trunk and legs can have, for each
-            kilogram of the body [m^2].
+        late_braking: Moment in body weights [m] beyond which turning is stopped, or the joints' ends do it.
+        range: Integral over time of the angular momentum that limbs and trunk can have, by the mass [m^2].
         friction_model: Friction model of the soles, of margins; control stays inside the cone.
         least_load: Share of the weight that the ground carries where that is possible, to push against.
         stopping: Damping of all joints while the turning is stopped [1/s].
         height: Gains of the same law for the height.
         height_weight: Weight of its squared error; 0, as in the thesis, leaves the height to ``upward``.
-        arm_weight: Weight of a squared acceleration of an arm's joint, against 1 of any other: the diagonal
-            of ``C_theta`` (2.27).
+        arm_weight: Weight of an arm joint's squared acceleration, 1 of any other: of ``C_theta`` (2.27).
         trunk_weight: The same of the trunk: hips fold first, so that both ranges end together.
         upward: Slope of the objective by the upward acceleration of the centre of mass (2.54).
         swing: Gains with which a stepping foot follows its way.
         swing_weight: Weight of its squared error, and of that of the pelvis' tilt meanwhile.
-        unwinding: Gains of the joint accelerations back to the posture, from which the objective is measured;
-            the thesis has none, so that swung arms go on to their stops.
+        unwinding: Gains back to the posture, from which the objective is measured; the thesis has none.
         posture: Largest gains of the posture control (2.65); less of them at the same damping ratio.
         stiffness: Gains with which muscles hold the posture before they react, and locked joints always.
-        ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react:
-            the stiffness of calf muscles at rest, 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie
-            2002), too little to stand without control.
+        ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react: calf
+            muscles at rest have 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie 2002).
         sole_inset: The ZMP is kept this far inside the edge of the soles [m].
         friction_share: Share of the friction of the soles that is made use of.
         inner, outer: Half sizes of the regions in which posture control begins and ends, as shares of the
             support area's half size about its centre (Fig. 2.8); the gap keeps the choice from chattering.
-        posture_area: Share of the support area about its centre in which posture control keeps the ZMP, so
-            that its own motion does not carry the body away.
+        posture_area: Share of the support area about its centre in which posture control keeps the ZMP.
         locked: Groups of joints that hold the posture whatever happens: ``"arms"``, ``"hips"``.
         posture_control_only: Whether the quadratic program is never chosen.
         strength: Torque and speed limits relative to the body's own.
@@ -286,7 +276,6 @@ def com_law(
     Args:
         home: (3,) centre of mass to return to [m].
         area: Admissible area of the ZMP.
-        settings: Gains.
         turned: (2,) integral over time of :func:`fall_momentum` [kg.m^2].
         may_turn: Whether arms and trunk may turn where the ZMP is not enough; otherwise they are stopped.
     """

@@ -3,6 +3,4 @@
 from manikin.control.stepping.step_placement import StepSettings, capture_after, step_goals
 from manikin.control.stepping.stepping import SteppingRecovery, StepTaken, SwingFoot
 
-__all__ = [
-    "StepSettings", "StepTaken", "SteppingRecovery", "SwingFoot", "capture_after", "step_goals",
-]  # fmt: skip
+__all__ = ["StepSettings", "StepTaken", "SteppingRecovery", "SwingFoot", "capture_after", "step_goals"]

@@ -103,11 +103,8 @@ def step_goals(
     Where no single step does and two may be taken, those follow from which a second one does. Both feet are
     on the ground, the left one first; capture point (2,) [m] and frequency [1/s] are those of the pendulum.
     """
-    tried = [
-        _reachable(soles, moving, capture, frequency, float(duration), settings)
-        for duration in np.arange(settings.shortest, settings.longest + 1e-9, DURATION_STEP)
-        for moving in (0, 1)
-    ]
+    durations = np.arange(settings.shortest, settings.longest + 1e-9, DURATION_STEP).tolist()
+    tried = [_reachable(soles, k, capture, frequency, time, settings) for time in durations for k in (0, 1)]
     captured = False
     for pair in zip(tried[::2], tried[1::2], strict=True):
         goals = [goal for places in pair for goal in places.captured(settings.inside)]

@@ -64,10 +64,9 @@ class SwingFoot:
 
     def _height(self, time: float) -> tuple[float, float, float]:
         """Height [m] and its two derivatives: up and down with a level start, end and top."""
-        end = self.start + self.duration
+        end, x = self.start + self.duration, self.share(time)
         if time >= end:
             return self.goal[2] - PRESSING * (time - end), -PRESSING, 0.0
-        x = self.share(time)
         bump, slope = 16.0 * x**2 * (1.0 - x) ** 2, 32.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
         bend = 32.0 * (1.0 - 6.0 * x + 6.0 * x**2)
         rise = self.goal[2] - self._ground
@@ -127,15 +126,14 @@ class StepCheck:
         Soles and configuration (nq,) are those before the step; half way the foot has a clearance [m].
         """
         self.refusal = "no step can be reached in time"
-        before = {contact.effector: contact for contact in soles}
         for goal in itertools.islice(goals, TRIED):
             moved = sole_at(self._body, goal.foot, goal.rotation, goal.position, self._friction)
-            stays = next(contact for name, contact in before.items() if name != goal.foot)
+            stays, before = soles if soles[1].effector == goal.foot else soles[::-1]
             if not self.free(moved):
                 self.refusal = f"no room for the {goal.foot.replace('_', ' ')}"
                 continue
-            half = 0.5 * (before[goal.foot].position + goal.position) + np.array([0.0, 0.0, clearance])
-            if self._passes(stays, goal, half, q) and self._stands(stays, moved, q):
+            half = 0.5 * (before.position + goal.position) + np.array([0.0, 0.0, clearance])
+            if self._passes(stays, goal, half, q) and self._stands((stays, moved), q):
                 self.refusal = ""
                 return goal
             self.refusal = f"something is in the way of the {goal.foot.replace('_', ' ')}"
@@ -149,23 +147,19 @@ class StepCheck:
             return False
         corners = contact.points_in_world
         around = np.concatenate((corners, 0.5 * (corners + np.roll(corners, 1, axis=0)), [contact.position]))
-        raised = around + ABOVE * contact.normal
-        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in raised)
+        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in around + ABOVE * contact.normal)
 
     def standing(self, soles: tuple[Contact, ...], q: FloatArray) -> Standing:
         """Posture on given soles with the centre of mass over their middle, near a configuration (nq,)."""
-        area = SupportArea.of(soles)
-        result = generate_posture(self._problem(soles, area, q), q)
-        state = Configuration(self._body, result.q)
-        return Standing(tuple(soles), area, result.q[7:].copy(), state.com.copy())
+        q = generate_posture(self._problem(soles, q), q).q
+        return Standing(soles, SupportArea.of(soles), q[7:].copy(), Configuration(self._body, q).com.copy())
 
-    def _problem(self, soles: tuple[Contact, ...], area: SupportArea, q: FloatArray) -> PostureProblem:
-        reference = np.concatenate((q[:7], self._home[7:]))
-        return PostureProblem(self._body, tuple(soles), com=com_target(*area.centre), reference=reference)
+    def _problem(self, soles: tuple[Contact, ...], q: FloatArray) -> PostureProblem:
+        reference, com = np.concatenate((q[:7], self._home[7:])), com_target(*SupportArea.of(soles).centre)
+        return PostureProblem(self._body, soles, com=com, reference=reference)
 
-    def _stands(self, stays: Contact, moved: Contact, q: FloatArray) -> bool:
-        soles = (stays, moved)
-        result = generate_posture(self._problem(soles, SupportArea.of(soles), q), q)
+    def _stands(self, soles: tuple[Contact, ...], q: FloatArray) -> bool:
+        result = generate_posture(self._problem(soles, q), q)
         return result.succeeded and self._clear(result.q, soles)
 
     def _passes(self, stays: Contact, goal: StepGoal, half: FloatArray, q: FloatArray) -> bool:
@@ -256,8 +250,7 @@ class SteppingRecovery:
             if output.strategy not in (Strategy.STIFF, Strategy.STEP) and self._must_step(time, output.state):
                 self._lift(time, output.state)
             return output
-        way = swing.foot, swing.sample(time)
-        output = self.balance.step(q, v, push, reacting=reacting, swing=way)
+        output = self.balance.step(q, v, push, reacting=reacting, swing=(swing.foot, swing.sample(time)))
         self._aim(time, output.state, swing)
         return output
 
@@ -298,8 +291,7 @@ class SteppingRecovery:
             return
         capture, inset = self._capture(state), self.settings.inset
         landing = capture_after(capture, standing.area, self._frequency, remaining, inset)
-        wanted = self._goal.position[:2] + landing - self._goal.capture
-        goal = np.array([*wanted, self._goal.position[2]])
+        goal = np.array([*(self._goal.position[:2] + landing - self._goal.capture), self._goal.position[2]])
         moved = sole_at(self.body, swing.foot, swing.rotation, goal, self.balance.friction)
         near = np.linalg.norm(goal - standing.soles[0].position) <= self.settings.reach
         if near and self.check.free(moved):
