@@ -30,7 +30,6 @@ class HolonomicEnds:
     Attributes:
         from_origin: PLO, from the origin to the end of the first holonomic part [m].
         to_goal: PLG, from the beginning of the last holonomic part to the goal [m].
-        length: Length of the whole way [m].
     """
 
     from_origin: float
