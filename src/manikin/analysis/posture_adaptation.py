@@ -44,11 +44,9 @@ from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.scene import Proximity, Scene
 from manikin.walking.gait.stance_foot import smooth_step
 
-LARGEST_TILT = float(np.deg2rad(64.0))
-"""Tilt of a foot that stands on its toes, approached but not reached: they bend up to 70 degrees [rad]."""
-
-TILT_BEND = float(np.deg2rad(3.0))
-"""Width of the bend of the tilt below it [rad]."""
+LARGEST_TILT, TILT_BEND = float(np.deg2rad(64.0)), float(np.deg2rad(3.0))
+"""Tilt of a foot that stands on its toes, approached but not reached: they bend up to 70 degrees; and width
+of the bend of the tilt below it [rad]."""
 
 TILTING = 0.08
 """Longest time over which the recorded tilt sets in [s]."""
@@ -67,11 +65,9 @@ pass nearer to the other leg than the body's soles and shanks can."""
 SWING_HEIGHT, CUT_HEIGHT = 0.03, 0.02
 """Least height of a foot's lowest point in mid-flight, and at a clip's end that cuts a flight [m]."""
 
-ROUNDING = 0.005
-"""Width of the bend between a flight that is lifted to that height and one that is not [m]."""
-
-TOES_BACK = 0.5
-"""Share of the flight after which bent toes are straight again."""
+ROUNDING, TOES_BACK = 0.005, 0.5
+"""Width of the bend between a flight that is lifted to that height and one that is not [m], and share of the
+flight after which bent toes are straight again."""
 
 SAME_INSTANT = 1e-6
 """Times nearer to each other are one [s]."""
@@ -275,10 +271,9 @@ LOOSE = replace(SCALES, moment_share=1e3, force=1e3, com=0.01)
 
 @dataclass(frozen=True, eq=False)
 class AdaptedMotion:
-    """A whole-body motion with its certificate.
+    """A whole-body motion every millisecond, with forces, torques and margin, and its certificate.
 
     Attributes:
-        motion: Every millisecond, with forces, torques and whole-body margin.
         posture_rms: Root mean square deviation of all joints from the recorded postures [rad]; without
             toes, which lie flat and which no marker shows.
     """

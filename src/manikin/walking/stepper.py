@@ -111,7 +111,7 @@ def place_footprints(
         InputError: If the path is no solution, the foot has no such name, or the rule's limits keep the feet
             from the goal.
     """
-    rule = StepRule() if rule is None else rule
+    rule = rule or StepRule()
     if not path.succeeded:
         raise InputError(f"walking path {path.failure}; valid: a path that succeeded")
     if first is not None and first not in FEET:

@@ -58,10 +58,9 @@ def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArra
     Their sum over the contacts is the wrench where any is made; they are 0 elsewhere.
 
     Args:
-        wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
+        wrench: (n, 6) to be supplied, about the world's origin [N, N.m], every ``step`` [s].
         held: (n, c) which contacts are made.
         points: (n, c, 3) where they are [m]; any value where they are not made.
-        step: Time between frames [s].
     """
     found = np.where(held[..., None], wrench[:, None], 0.0)
     for first, end in mask_runs(held.sum(axis=1) > 1):
@@ -218,10 +217,9 @@ def _smallest(arms: Sequence[FloatArray], missing: FloatArray) -> FloatArray:
 
 
 def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches: FloatArray) -> FloatArray:
-    """(n, nv) generalised forces beside those of contacts: torques of the joints, and what the pelvis lacks.
+    """(n, nv) generalised forces beside (n, c, 6) wrenches on effectors, about the world's origin [N, N.m].
 
-    Args:
-        wrenches: (n, c, 6) on each, about the world's origin [N, N.m].
+    They are torques of the joints, and what the pelvis lacks.
     """
     torques, body, model = np.array(dynamics.free_torque), dynamics.body, dynamics.body.pinocchio
     for number, effector in enumerate(effectors):
@@ -244,8 +242,7 @@ def _points(schedule: ContactSchedule, phases: NDArray[np.int64]) -> FloatArray:
 def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0) -> FloatArray:
     """(n, c, 6) wrench on each effector of a schedule, about the world's origin [N, N.m]; 0 off its contacts.
 
-    Args:
-        start: The schedule's clock at the motion's first instant [s].
+    The schedule's clock is ``start`` [s] at the motion's first instant.
     """
     names, times = schedule.sequence.effectors, dynamics.time + start
     phases, held = schedule.phase_at(times), schedule.support(times, names)
@@ -268,11 +265,8 @@ def motion_on_contacts(
 
     In flight the torques are those that the motion would need without contacts, the margin is minus the
     length of the missing wrench, and the pelvis' six generalised forces are set to zero; with contacts they
-    are zero but for rounding.
-
-    Args:
-        start: The schedule's clock at the motion's first instant [s].
-        margins: Of the same motion on the same stances, where they are known already.
+    are zero but for rounding. The schedule's clock is ``start`` [s] at the motion's first instant; margins of
+    the same motion on the same stances are taken where they are known already.
     """
     names, times = schedule.sequence.effectors, dynamics.time + start
     wrenches = contact_wrenches(dynamics, schedule, start)

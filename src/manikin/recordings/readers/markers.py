@@ -14,11 +14,9 @@ from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.readers.skeleton_recording import UNKNOWN, Subject
 from manikin.runtime.display import Displayed
 
-LONGEST_GAP = 0.1
-"""Longest gap that is filled when nothing else is said [s]: feet stay within about a centimetre."""
-
-NEIGHBOURS = 6
-"""Frames on either side of a gap that its filling looks at."""
+LONGEST_GAP, NEIGHBOURS = 0.1, 6
+"""Longest gap that is filled when nothing else is said [s]: feet stay within about a centimetre; and frames
+on either side of it that its filling looks at."""
 
 
 @dataclass(frozen=True)
@@ -243,8 +241,7 @@ class MarkerRecording(Displayed):
         """Recording with gaps of up to ``longest`` [s] filled; its :attr:`gaps` are those that are left.
 
         A gap is filled by the cubic spline through the :data:`NEIGHBOURS` frames nearest to it on either side
-        in which the marker was seen. One with fewer than two such frames on a side, as at the ends of the
-        recording, stays.
+        in which the marker was seen. One with fewer than two such frames on a side stays.
         """
         finite_number(longest, "longest gap [s]", at_least=0.0)
         positions = np.array(self.positions)

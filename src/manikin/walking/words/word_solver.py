@@ -240,14 +240,12 @@ def cheapest(
 
     A guess has the largest headings of the free polynomials, in order [rad].
     """
-    size = len(goals)
-    turned, shapes = goals.copy(), np.zeros((size, DEGREE))
-    cost, length = np.full(size, np.inf), np.full(size, np.nan)
+    turned, shapes = goals.copy(), np.zeros((len(goals), DEGREE))
+    cost, length = np.full(len(goals), np.inf), np.full(len(goals), np.nan)
     for some, ends in _turns(start, goals):
         asked = Goals.of(start, ends)
         for guess in amplitudes:
-            shape = np.zeros(DEGREE)
-            free = slice(1, 1 + len(guess))
+            shape, free = np.zeros(DEGREE), slice(1, 1 + len(guess))
             shape[free] = np.asarray(guess) / np.abs(quadrature()[0]).max(axis=0)[free]
             minima = minimise(asked, np.tile(shape, (len(ends), 1)))
             better = minima.cost < cost[some] - _CHEAPER * minima.length
