@@ -32,17 +32,13 @@ from manikin.recordings.supports.supports import TimingError, timing_errors
 from manikin.runtime.display import Displayed
 from manikin.walking.segmentation import PathSegments
 
-LARGE_RESIDUAL = 0.02
-"""Median distance between the body and what was recorded above which the body does not fit [m]."""
+LARGE_RESIDUAL, OTHER_MASS = 0.02, 0.03
+"""Median distance between the body and what was recorded above which the body does not fit [m], and share by
+which the mass of a person is not that on the plates."""
 
-SLOW_RATE = 50.0
-"""Below this rate instants of supports are as coarse as the frames [Hz]."""
-
-LONG_FLIGHT = 0.5
-"""A flight longer than this means a contact that was not recorded [s]."""
-
-OTHER_MASS = 0.03
-"""Share by which the mass of a person is not that on the plates."""
+SLOW_RATE, LONG_FLIGHT = 50.0, 0.5
+"""Below the first rate instants of supports are as coarse as the frames [Hz]; a flight longer than the second
+means a contact that was not recorded [s]."""
 
 
 def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
@@ -152,10 +148,9 @@ class PlateReport:
         mass: Of the person, by them [kg]; None where it is not known.
         timing: Touch-downs and lift-offs beside those of the plates.
         forces: Errors of forces and centres of pressure of the motion as recorded; None where no foot alone
-            was on a plate.
-        shifted: The same of it shifted onto its contacts; None as well if no shift was looked for.
+            was on a plate. ``shifted`` are those of it shifted onto its contacts, if a shift was looked for.
         torques: Of the legs, of the motion as recorded; empty where no foot was on a plate of its own.
-        shifted_torques: The same of the shifted motion; empty if that is not to be believed.
+            ``shifted_torques`` are those of the shifted motion, if that is to be believed.
     """
 
     vertical_force: FloatArray

@@ -105,8 +105,7 @@ class _Path:
         self, body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, name: str
     ) -> None:
         self.body, self.schedule, self.time, self.name = body, schedule, time, name
-        self.phases = schedule.phase_at(time)
-        self.recorded = effector_placements(body, q, name)
+        self.phases, self.recorded = schedule.phase_at(time), effector_placements(body, q, name)
         self.position, self.rotation = (np.array(part) for part in self.recorded)
         n = len(time)
         self.weight, self.rotation_weight, self.toes = np.zeros(n), np.ones(n), np.zeros(n)
@@ -190,9 +189,8 @@ class _Path:
 
     def _straightening(self, first: int, share: FloatArray, lasting: float) -> FloatArray:
         """Angle of the toes after a lift-off: it goes on as it came, and then back to straight [rad]."""
-        before = max(first - 2, 0)
-        angle, since = self.toes[first - 1], max(self.time[first - 1] - self.time[before], 1e-9)
-        rate = (angle - self.toes[before]) / since
+        before, angle = max(first - 2, 0), self.toes[first - 1]
+        rate = (angle - self.toes[before]) / max(self.time[first - 1] - self.time[before], 1e-9)
         gone = np.clip(share / TOES_BACK, 0.0, 1.0)
         found = angle * (1.0 - smooth_step(gone)) + rate * lasting * gone * (1.0 - gone) ** 2
         return _up_to(LARGEST_TILT, np.maximum(found, 0.0))
@@ -341,10 +339,9 @@ def rate_on_plan(
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """Recorded postures and the contacts to put them on, at the samples of a spline.
+    """Recorded postures and the contacts to put them on, at (n,) samples of a spline [s].
 
     Attributes:
-        time: (n,) samples [s].
         reference: (n, nq) recorded postures, with the toes that the contacts need.
         scale: (n, nv) deviation from them that costs one unit [rad].
         ignored: Pairs that may touch, per sample.

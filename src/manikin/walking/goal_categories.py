@@ -129,7 +129,7 @@ class HolonomicZone:
     @property
     def radius(self) -> float:
         """Distance up to which all goals that count are reached holonomically throughout [m], or 0."""
-        return self._radius(self.considered)
+        return self.radius_towards(0.0, np.inf)
 
     @property
     def farthest(self) -> float:
@@ -139,9 +139,7 @@ class HolonomicZone:
     def radius_towards(self, low: float, high: float) -> float:
         """Radius for the goals between two angles to either side of straight ahead [rad], in metres."""
         aside = np.abs(np.arctan2(self.goals[:, 1], self.goals[:, 0]))
-        return self._radius(self.considered & (aside >= low) & (aside <= high))
-
-    def _radius(self, chosen: NDArray[np.bool_]) -> float:
+        chosen = self.considered & (aside >= low) & (aside <= high)
         beyond = np.min(self.distances[chosen & ~self.whole], initial=np.inf)
         inside = chosen & self.whole & (self.distances < beyond - 1e-9)
         return float(np.max(self.distances[inside], initial=0.0))

@@ -245,11 +245,9 @@ def _of_segment(recording: MarkerRecording, found: MarkerSet, segment: str) -> F
     return recording.chosen([name for name, place in found.segments.items() if place == segment]).positions
 
 
-WEIGHT = 0.05
-"""Weight of a guide, against 1 of a joint centre."""
-
-ARM = 0.2
-"""Distance of a guide from the middle of its segment's joints [m]."""
+WEIGHT, ARM = 0.05, 0.2
+"""Weight of a guide, against 1 of a joint centre, and its distance from the middle of its segment's joints
+[m]."""
 
 LOWEST_SHARE, LOWEST = 5.0, 0.01
 """A sole is flat up to this [m] above this percentile of the ankle's height."""

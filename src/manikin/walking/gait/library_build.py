@@ -125,8 +125,7 @@ def build_library(
     """
     body, windows = reference_body(), read_windows(folder)
     person = cache(lambda file: _person(body, folder / "mocap" / file))
-    cycles: list[tuple[Window, MotionLibrary]] = []
-    without: list[Window] = []
+    cycles, without = list[tuple[Window, MotionLibrary]](), list[Window]()
     for number, window in enumerate(windows):
         report(number / len(windows), window.file)
         cycle = _cycle(body, window, *person(window.file))

@@ -93,14 +93,11 @@ class WordGrid:
 
 THESIS_GRID = WordGrid()
 
-SAME_COST = 1e-9
-"""Share of the cost up to which two paths cost the same."""
+SAME_COST, _TWO_BRANCHES = 1e-9, 1e-6
+"""Shares of the cost up to which two paths cost the same, and by which a branch must be the costlier one at
+the other's goal."""
 
-_TWO_BRANCHES = 1e-6
-"""Share of the cost by which a branch must be the costlier one at the other's goal."""
-
-_STEPS = 8
-_BISECTIONS = 60
+_STEPS, _BISECTIONS = 8, 60
 
 
 @dataclass(frozen=True, eq=False)
