@@ -117,9 +117,8 @@ class MeasuredMotion:
         if not known.any():
             return None, None
         lowest = int(np.argmin(np.where(known, margin, np.inf)))
-        if self.shifted.at_floor[lowest]:
-            return None, True
-        return float(margin[lowest]), False
+        is_floor = bool(self.shifted.at_floor[lowest])
+        return None if is_floor else float(margin[lowest]), is_floor
 
     def shifted_dict(self) -> dict[str, Any] | None:
         """JSON-ready numbers of the shifted motion; None if none was looked for."""
@@ -222,11 +221,9 @@ class Analysis(Displayed):
     """Measures of a recorded motion, as of planned ones; instants are on the recording's clock [s].
 
     Attributes:
-        name: What to call it.
         rate: Frames per second [Hz].
         sex: Table of segment masses that was used.
         found: Reconstruction, not smoothed.
-        supports: Of feet, hands and seat.
         motion: As recorded, smoothed, with torques, forces and whole-body margin; its time is 0 at the first
             instant.
         shifted_motion: The same shifted onto its contacts, where that is to be believed; else None.
@@ -236,7 +233,6 @@ class Analysis(Displayed):
         cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
         segments: Holonomic and nonholonomic stretches; None without an upright walk.
         ergonomics: Scores, torques against strength, effort; its time is that of the motion.
-        plates: Comparison with force plates; None without plates.
         remarks: What a reader must know, a line each.
         wall: Time that it took [s].
     """

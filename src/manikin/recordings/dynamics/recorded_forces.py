@@ -142,12 +142,10 @@ def _smooth_run(
     # Rows of the identity, and a last one of zeros for the index -1 of a contact that is not made.
     one = sparse.csr_array(sparse.vstack([sparse.eye_array(count), sparse.csr_array((1, count))]))
     change = one[after[frames, column]] - one[before[frames, column]]
-    known = np.zeros((len(frames), 6))
+    known, start, last = np.zeros((len(frames), 6)), frames == 0, frames == len(before) - 1
     if first > 0:
-        start = frames == 0
         known[start] = _about(found[first - 1, column[start]], places[0, column[start]])
     if end < len(held):
-        last = frames == len(before) - 1
         known[last] = -_about(found[end, column[last]], places[-1, column[last]])
     cost = change.T @ change + (step / SLOW) ** 2 * sparse.eye_array(count)
     frame, contact = np.nonzero(made)

@@ -27,7 +27,6 @@ class Skeleton:
     """A skeleton of an ASF file, y up.
 
     Attributes:
-        name: File it comes from.
         bones: (j,) names, parents first; the first is ``"root"``.
         parents: (j,) index of each bone's parent, -1 for the root.
         vectors: (j, 3) from the begin of each bone to its end in the rest pose [m].

@@ -41,7 +41,6 @@ class ForcePlate:
     """Wrenches that a plate applies to the person on it, at an even rate; the world is z up.
 
     Attributes:
-        name: How messages call it.
         wrenches: (n, 6) force [N] and moment about the world's origin [N.m], world axes.
         origin: (3,) a point of its surface [m].
         rate: Samples per second [Hz].
@@ -145,12 +144,10 @@ class MarkerRecording(Displayed):
     """Markers at n instants; the world is z up.
 
     Attributes:
-        name: Where it comes from, for messages.
         marker_names: (m,) unique names.
         positions: (n, m, 3) [m]; NaN where a marker was not seen.
         rate: Frames per second [Hz].
-        start: Instant of the first frame on the recording's clock [s].
-        plates: Force plates, on the same clock.
+        start: Instant of the first frame on the recording's clock [s], which is that of the plates.
         events: In the order of time.
         subject: What the file says about the person.
     """

@@ -139,6 +139,7 @@ def person_of(
         raise InputError("no recording to take a person's lengths from; valid: at least one")
     for recording in recordings:
         _check(recording)
+    marked = [one for one in recordings if isinstance(one, MarkerRecording)]
     each = [
         centres_of_markers(one) if isinstance(one, MarkerRecording) else joint_centres(one)
         for one in recordings
@@ -149,11 +150,8 @@ def person_of(
         for name in CENTRES
         if any(name in found for found in each)
     }
-    subjects = [recording.subject for recording in recordings if isinstance(recording, MarkerRecording)]
-    masses, statures = (
-        [value for value in values if value is not None]
-        for values in ([one.mass for one in subjects], [one.stature for one in subjects])
-    )
+    masses = [one.subject.mass for one in marked if one.subject.mass is not None]
+    statures = [one.subject.stature for one in marked if one.subject.stature is not None]
     if mass is None and masses:
         mass = float(np.median(masses))
     return human_of(everywhere, sex, mass, float(np.median(statures)) if statures else None)

@@ -71,13 +71,7 @@ SHORTEST_REST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One point of an effector through a recording, without noise.
-
-    Attributes:
-        positions: (n, 3) low-passed [m].
-        speed: (n,) [m/s].
-        rate: Frames per second [Hz].
-    """
+    """One point of an effector through a recording: (n, 3) low-passed places [m], (n,) speeds, rate [Hz]."""
 
     positions: FloatArray
     speed: FloatArray
@@ -200,11 +194,9 @@ class RecordedSole:
 
 @dataclass(frozen=True)
 class RestSurface:
-    """What feet stand on.
+    """What feet stand on, at the median of the heights at which soles rest on it [m].
 
-    Attributes:
-        height: The median of those at which soles rest on it [m].
-        levels: Heights of it, lowest first; more than one where the recorded floor drifts [m].
+    Its levels, lowest first, are more than one where the recorded floor drifts.
     """
 
     height: float
