@@ -117,9 +117,10 @@ def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
         return factor * float(np.mean(found)) if found else None
 
     both = ("kneewidth", "anklewidth", "elbowwidth", "shoulderoffset")
-    lengths = (measure(unit, f"l{name}", f"r{name}") for name in both)
+    knee, ankle, elbow, offset = (measure(unit, f"l{name}", f"r{name}") for name in both)
+    mass, stature = measure(1.0, "bodymass"), measure(unit, "height")
     radius = measure(0.5 * unit, "markerdiameter")
-    return Subject(measure(1.0, "bodymass"), measure(unit, "height"), *lengths, radius)
+    return Subject(mass, stature, knee, ankle, elbow, offset, radius)
 
 
 def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:

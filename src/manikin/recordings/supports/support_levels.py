@@ -233,9 +233,9 @@ def _rests(feet: Sequence[RecordedSole], limit: float, lying: NDArray[np.bool_])
         for first, stop in mask_runs(resting[number]):
             if stop - first >= shortest:
                 here = slice(first, stop)
-                down, *heights = (float(np.median(each[here])) for each in (lying, height, tilt))
+                down, level, rise = (float(np.median(each[here])) for each in (lying, height, tilt))
                 alone = not down and any(np.sum(moving[here]) >= shortest for moving in others)
-                found.append(_Rest(number, *heights, alone, bool(down)))
+                found.append(_Rest(number, level, rise, alone, bool(down)))
     return found
 
 
