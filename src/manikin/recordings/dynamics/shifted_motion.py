@@ -164,8 +164,9 @@ def least_shift(
         shift, bend = spline.values @ coefficients, spline.second @ coefficients
     moved, held, at_floor = dynamics, margins, np.zeros(len(dynamics), dtype=bool)
     if shift.any():
-        left = _about_contacts(margins, _shifted_wrench(dynamics, shift, bend)) - kept
-        at_floor = np.abs(left) <= AT_FLOOR * weight
+        for frames, distance, lengths in _distances(margins, _shifted_wrench(dynamics, shift, bend)):
+            left = (distance / lengths).min(axis=1) - kept
+            at_floor[frames] = np.abs(left) <= AT_FLOOR * weight
         q = np.array(dynamics.q)
         q[:, :3] += shift
         moved = dynamics_of_postures(replace(found, body=dynamics.body), q)
@@ -199,14 +200,6 @@ def _distances(
             frames = np.flatnonzero(margins.phase == number)
             distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
             yield frames, distance, _lengths(polytope)
-
-
-def _about_contacts(margins: RecordedMargins, wrench: FloatArray) -> FloatArray:
-    """(n,) margins of (n, 6) wrenches with moments about the middle of the contacts [N.m]; NaN in flight."""
-    found = np.full(len(wrench), np.nan)
-    for frames, distance, lengths in _distances(margins, wrench):
-        found[frames] = (distance / lengths).min(axis=1)
-    return found
 
 
 def _violated(margins: RecordedMargins, wrench: FloatArray, least: float) -> NDArray[np.int64]:

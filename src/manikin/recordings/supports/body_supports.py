@@ -216,11 +216,6 @@ def ground_supports(found: Reconstruction, floor: FloatArray, start: float) -> I
             yield support_between(name, one, frames, start)
 
 
-def stays(one: Track) -> list[tuple[int, int]]:
-    """Runs of frames in which a point rests: first frame and the one after the last."""
-    return lasting(switch(*slow_and_leaving(one)), SHORTEST * one.rate)
-
-
 def slow_and_leaving(one: Track) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(n,) whether a point that may roll is slow enough to rest, and (n,) fast enough to leave."""
     slow, fast = one.slow_and_fast(ROLLS, SLIDE_WAY)
@@ -261,7 +256,7 @@ def hand_supports(
         places = effector_places(found.body, found.q, (name, name.replace("hand", "upper_arm"), *OWN))
         hand, shoulder = (track(one, found.rate) for one in places[:2])
         beside = np.linalg.norm(places[2:] - places[0], axis=2).min(axis=0)
-        for frames in stays(hand):
+        for frames in lasting(switch(*slow_and_leaving(hand)), SHORTEST * hand.rate):
             one, during = support_between(name, hand, frames, start), slice(*frames)
             own, way = (float(np.linalg.norm(np.ptp(p.positions[during], axis=0))) for p in (hand, shoulder))
             on_ground = float(np.median(hand.positions[during, 2] - floor[during])) < AWAY
@@ -323,9 +318,8 @@ def seat_supports(
             near = height < float(np.median(height[first:stop])) + RISEN
             for begin, end in mask_runs(near):
                 seated[begin:end] |= begin < stop and first < end
-    return tuple(
-        support_between(SEAT, seat, frames, start) for frames in lasting(seated, SHORTEST_SEAT * seat.rate)
-    )
+    runs = lasting(seated, SHORTEST_SEAT * seat.rate)
+    return tuple(support_between(SEAT, seat, frames, start) for frames in runs)
 
 
 def lowest_points(soles: Mapping[str, tuple[FloatArray, FloatArray]]) -> FloatArray:
