@@ -32,17 +32,13 @@ from manikin.recordings.supports.supports import TimingError, timing_errors
 from manikin.runtime.display import Displayed
 from manikin.walking.segmentation import PathSegments
 
-LARGE_RESIDUAL = 0.02
-"""Median distance between the body and what was recorded above which the body does not fit [m]."""
+LARGE_RESIDUAL, OTHER_MASS = 0.02, 0.03
+"""Median distance between the body and what was recorded above which the body does not fit [m], and share by
+which the mass of a person is not that on the plates."""
 
-SLOW_RATE = 50.0
-"""Below this rate instants of supports are as coarse as the frames [Hz]."""
-
-LONG_FLIGHT = 0.5
-"""A flight longer than this means a contact that was not recorded [s]."""
-
-OTHER_MASS = 0.03
-"""Share by which the mass of a person is not that on the plates."""
+SLOW_RATE, LONG_FLIGHT = 50.0, 0.5
+"""Below the first rate instants of supports are as coarse as the frames [Hz]; a flight longer than the second
+means a contact that was not recorded [s]."""
 
 
 def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
@@ -121,9 +117,8 @@ class MeasuredMotion:
         if not known.any():
             return None, None
         lowest = int(np.argmin(np.where(known, margin, np.inf)))
-        if self.shifted.at_floor[lowest]:
-            return None, True
-        return float(margin[lowest]), False
+        is_floor = bool(self.shifted.at_floor[lowest])
+        return None if is_floor else float(margin[lowest]), is_floor
 
     def shifted_dict(self) -> dict[str, Any] | None:
         """JSON-ready numbers of the shifted motion; None if none was looked for."""
@@ -152,10 +147,9 @@ class PlateReport:
         mass: Of the person, by them [kg]; None where it is not known.
         timing: Touch-downs and lift-offs beside those of the plates.
         forces: Errors of forces and centres of pressure of the motion as recorded; None where no foot alone
-            was on a plate.
-        shifted: The same of it shifted onto its contacts; None as well if no shift was looked for.
+            was on a plate. ``shifted`` are those of it shifted onto its contacts, if a shift was looked for.
         torques: Of the legs, of the motion as recorded; empty where no foot was on a plate of its own.
-        shifted_torques: The same of the shifted motion; empty if that is not to be believed.
+            ``shifted_torques`` are those of the shifted motion, if that is to be believed.
     """
 
     vertical_force: FloatArray
@@ -227,11 +221,9 @@ class Analysis(Displayed):
     """Measures of a recorded motion, as of planned ones; instants are on the recording's clock [s].
 
     Attributes:
-        name: What to call it.
         rate: Frames per second [Hz].
         sex: Table of segment masses that was used.
         found: Reconstruction, not smoothed.
-        supports: Of feet, hands and seat.
         motion: As recorded, smoothed, with torques, forces and whole-body margin; its time is 0 at the first
             instant.
         shifted_motion: The same shifted onto its contacts, where that is to be believed; else None.
@@ -241,7 +233,6 @@ class Analysis(Displayed):
         cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
         segments: Holonomic and nonholonomic stretches; None without an upright walk.
         ergonomics: Scores, torques against strength, effort; its time is that of the motion.
-        plates: Comparison with force plates; None without plates.
         remarks: What a reader must know, a line each.
         wall: Time that it took [s].
     """

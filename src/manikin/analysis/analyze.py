@@ -102,10 +102,8 @@ def recordings_in(sources: Iterable[str | Path]) -> tuple[Path, ...]:
     return tuple(found)
 
 
-SEXES = ("male", "female")
-
-FEWEST_FRAMES = 10
-"""Frames that smoothing and differences need."""
+SEXES, FEWEST_FRAMES = ("male", "female"), 10
+"""Tables of segment masses, and frames that smoothing and differences need."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +114,8 @@ class AnalysisOptions:
         frames: First frame and the one after the last; None for all.
         mass: Of the person [kg]; None for the file's, that by the plates, or a usual one.
         sex: Table of segment masses, ``"male"`` or ``"female"``.
-        friction: Of soles on the ground.
-        load: Carried in the hands [kg]: part of the masses, and of RULA and REBA.
-        load_hand: ``"left"``, ``"right"`` or ``"both"``.
+        load: Carried in the hand ``"left"``, ``"right"`` or ``"both"`` [kg]: part of the masses, and of RULA
+            and REBA.
         as_recorded: Whether no shifted motion is looked for, to stand beside the recorded one.
     """
 
@@ -158,8 +155,7 @@ def analyze_file(path: str | Path, options: AnalysisOptions | None = None) -> An
     try:
         found = analyze(recording, given, Path(path).stem)
     except InputError as error:
-        text = str(error)
-        raise InputError(text if str(path) in text else f"{path}: {text}") from None
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
     return replace(found, source=str(path), wall=clock.perf_counter() - began)
 
 
@@ -246,8 +242,7 @@ def _centre_of_pressure(dynamics: RecordedDynamics, motion: Motion, height: floa
 
 def _lowest(motion: Motion, margins: RecordedMargins) -> LowestMargin:
     """The lowest margin of a motion, with its limiting contact."""
-    frame = margins.lowest
-    value = float(margins.whole_body[frame])
+    frame, value = margins.lowest, float(margins.whole_body[margins.lowest])
     on = tuple(name for name, held in zip(motion.contact_names, motion.support[frame], strict=True) if held)
     return LowestMargin(
         value, motion.margin_unit, float(motion.time[frame]), on, margins.limiting(frame), value,

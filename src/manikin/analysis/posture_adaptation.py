@@ -44,11 +44,9 @@ from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.scene import Proximity, Scene
 from manikin.walking.gait.stance_foot import smooth_step
 
-LARGEST_TILT = float(np.deg2rad(64.0))
-"""Tilt of a foot that stands on its toes, approached but not reached: they bend up to 70 degrees [rad]."""
-
-TILT_BEND = float(np.deg2rad(3.0))
-"""Width of the bend of the tilt below it [rad]."""
+LARGEST_TILT, TILT_BEND = float(np.deg2rad(64.0)), float(np.deg2rad(3.0))
+"""Tilt of a foot that stands on its toes, approached but not reached: they bend up to 70 degrees; and width
+of the bend of the tilt below it [rad]."""
 
 TILTING = 0.08
 """Longest time over which the recorded tilt sets in [s]."""
@@ -67,11 +65,9 @@ pass nearer to the other leg than the body's soles and shanks can."""
 SWING_HEIGHT, CUT_HEIGHT = 0.03, 0.02
 """Least height of a foot's lowest point in mid-flight, and at a clip's end that cuts a flight [m]."""
 
-ROUNDING = 0.005
-"""Width of the bend between a flight that is lifted to that height and one that is not [m]."""
-
-TOES_BACK = 0.5
-"""Share of the flight after which bent toes are straight again."""
+ROUNDING, TOES_BACK = 0.005, 0.5
+"""Width of the bend between a flight that is lifted to that height and one that is not [m], and share of the
+flight after which bent toes are straight again."""
 
 SAME_INSTANT = 1e-6
 """Times nearer to each other are one [s]."""
@@ -109,8 +105,7 @@ class _Path:
         self, body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, name: str
     ) -> None:
         self.body, self.schedule, self.time, self.name = body, schedule, time, name
-        self.phases = schedule.phase_at(time)
-        self.recorded = effector_placements(body, q, name)
+        self.phases, self.recorded = schedule.phase_at(time), effector_placements(body, q, name)
         self.position, self.rotation = (np.array(part) for part in self.recorded)
         n = len(time)
         self.weight, self.rotation_weight, self.toes = np.zeros(n), np.ones(n), np.zeros(n)
@@ -194,9 +189,8 @@ class _Path:
 
     def _straightening(self, first: int, share: FloatArray, lasting: float) -> FloatArray:
         """Angle of the toes after a lift-off: it goes on as it came, and then back to straight [rad]."""
-        before = max(first - 2, 0)
-        angle, since = self.toes[first - 1], max(self.time[first - 1] - self.time[before], 1e-9)
-        rate = (angle - self.toes[before]) / since
+        before, angle = max(first - 2, 0), self.toes[first - 1]
+        rate = (angle - self.toes[before]) / max(self.time[first - 1] - self.time[before], 1e-9)
         gone = np.clip(share / TOES_BACK, 0.0, 1.0)
         found = angle * (1.0 - smooth_step(gone)) + rate * lasting * gone * (1.0 - gone) ** 2
         return _up_to(LARGEST_TILT, np.maximum(found, 0.0))
@@ -275,10 +269,9 @@ LOOSE = replace(SCALES, moment_share=1e3, force=1e3, com=0.01)
 
 @dataclass(frozen=True, eq=False)
 class AdaptedMotion:
-    """A whole-body motion with its certificate.
+    """A whole-body motion every millisecond, with forces, torques and margin, and its certificate.
 
     Attributes:
-        motion: Every millisecond, with forces, torques and whole-body margin.
         posture_rms: Root mean square deviation of all joints from the recorded postures [rad]; without
             toes, which lie flat and which no marker shows.
     """
@@ -346,10 +339,9 @@ def rate_on_plan(
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """Recorded postures and the contacts to put them on, at the samples of a spline.
+    """Recorded postures and the contacts to put them on, at (n,) samples of a spline [s].
 
     Attributes:
-        time: (n,) samples [s].
         reference: (n, nq) recorded postures, with the toes that the contacts need.
         scale: (n, nv) deviation from them that costs one unit [rad].
         ignored: Pairs that may touch, per sample.

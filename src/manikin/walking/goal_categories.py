@@ -30,7 +30,6 @@ class HolonomicEnds:
     Attributes:
         from_origin: PLO, from the origin to the end of the first holonomic part [m].
         to_goal: PLG, from the beginning of the last holonomic part to the goal [m].
-        length: Length of the whole way [m].
     """
 
     from_origin: float
@@ -98,11 +97,9 @@ def path_deviation(walks: Sequence[ShoulderPaths]) -> PathDeviation:
     return PathDeviation(shortest.time, mean, frozen_array(deviation, "deviation [m]"))
 
 
-THESIS_RADIUS = THESIS_RULE.diagonal_step
-"""Radius of the zone that the thesis proposes from its recordings [m] ([Truong2010]_ Fig. 4.23)."""
-
-HALF_EIGHTH = float(np.radians(22.5))
-"""Half of the angle between two of the eight final headings [rad]."""
+THESIS_RADIUS, HALF_EIGHTH = THESIS_RULE.diagonal_step, float(np.radians(22.5))
+"""Radius of the zone that the thesis proposes from its recordings [m] ([Truong2010]_ Fig. 4.23), and half of
+the angle between two of the eight final headings [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +129,7 @@ class HolonomicZone:
     @property
     def radius(self) -> float:
         """Distance up to which all goals that count are reached holonomically throughout [m], or 0."""
-        return self._radius(self.considered)
+        return self.radius_towards(0.0, np.inf)
 
     @property
     def farthest(self) -> float:
@@ -142,9 +139,7 @@ class HolonomicZone:
     def radius_towards(self, low: float, high: float) -> float:
         """Radius for the goals between two angles to either side of straight ahead [rad], in metres."""
         aside = np.abs(np.arctan2(self.goals[:, 1], self.goals[:, 0]))
-        return self._radius(self.considered & (aside >= low) & (aside <= high))
-
-    def _radius(self, chosen: NDArray[np.bool_]) -> float:
+        chosen = self.considered & (aside >= low) & (aside <= high)
         beyond = np.min(self.distances[chosen & ~self.whole], initial=np.inf)
         inside = chosen & self.whole & (self.distances < beyond - 1e-9)
         return float(np.max(self.distances[inside], initial=0.0))
@@ -203,9 +198,8 @@ def category_of(goal: ArrayLike, start: ArrayLike = START) -> str | None:
     """Category of a goal (3,) seen from a start (3,), or None if its heading is that of none of its zone.
 
     F is in front, S at the side, B behind. LC, MC, HC are low, medium and high curvature of the way: it is
-    bent least by a final heading in its own direction. The thesis gives the headings once, which makes sense
-    for goals to the right; for goals to the left they are mirrored here. Goals straight ahead or behind count
-    as being to the right.
+    bent least by a final heading in its own direction. The headings of the thesis make sense for goals to the
+    right, as goals straight ahead or behind count; for goals to the left they are mirrored here.
     """
     ahead, left, turn = seen_from([frozen_array(goal, "goal [m, m, rad]", (3,))], start)[0].tolist()
     zone = "F" if ahead >= BESIDE else "B" if ahead <= -BESIDE else "S"

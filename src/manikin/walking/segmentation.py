@@ -161,21 +161,20 @@ class SegmentationRule:
     Attributes:
         tolerance: Angle between heading and a shoulder's motion below which a frame is nonholonomic [rad];
             15 degrees ([Truong2010]_ 4.2.1).
-        half_step: From an instant to those that its tangent joins [s], at least one frame; one frame at the
-            100 Hz of the thesis. On-line, labels come this much later.
+        half_step: From an instant to those that its tangent joins [s], at least one frame, as at the 100 Hz
+            of the thesis. On-line, labels come this much later.
         standing_speed: Both shoulders slower than this stand [m/s]. Not in the thesis, whose walks begin at
             the first motion.
         cutoff: Of the low-pass of the paths, as a share of the Nyquist frequency [-]; 0.5 ([Truong2010]_
-            4.3.4), None without it. Off-line only.
+            4.3.4), None without it. It and what follows, but ``either_way``, count off-line only.
         noise: Holonomic intervals up to this duration may be noise [s], 0 for none; they are judged by
             deviations low-passed at ``1 / (2 noise)``. The thesis ([Truong2010]_ 4.2.2.1) names the filter,
-            not its cutoff or how long noise lasts. Off-line only.
+            not its cutoff or how long noise lasts.
         boundary: Angle below which two headings are the same [rad]; 1 degree ([Truong2010]_ 4.2.2.2), None
-            without this step. Off-line only.
+            without this step.
         diagonal_step: Longest way from rest to rest that can be one flat diagonal step [m]: 0.5 m, the radius
             around the start in which the thesis found single steps ([Truong2010]_ 4.5.2, Fig. 4.23). Longer
             walks have the labels of Function 1, also where they drift aside and end with their first heading.
-            Off-line only.
         either_way: Whether a shoulder that goes straight back counts as one that goes ahead. The thesis says
             so of turns on the spot only ([Truong2010]_ Fig. 4.3 d); its constraint (1.1) and its quotient
             (4.1), which has no quadrants, say so of any motion, so that to walk backward is nonholonomic.
@@ -269,10 +268,7 @@ def segment_path(
     along them; otherwise it is nonholonomic, as any walk of several steps that keeps within the tolerance.
     Walks that are not recorded from rest to rest are left as they are.
 
-    Args:
-        paths: Both shoulders.
-        rule: Thresholds of the segmentation.
-        online: Function 1 alone, which knows a label half a step of the tangent after its frame.
+    On-line, Function 1 alone knows a label half a step of the tangent after its frame.
     """
     if not online and rule.cutoff is not None:
         paths = paths.low_passed(rule.cutoff)
@@ -280,8 +276,7 @@ def segment_path(
     angles = deviations(paths.points, velocities)
     labels = _function_1(angles, velocities, rule)
     if not online:
-        labels = _without_noise(labels, angles, paths.rate, rule)
-        labels = _with_diagonal_steps(labels, paths, rule)
+        labels = _with_diagonal_steps(_without_noise(labels, angles, paths.rate, rule), paths, rule)
     labels.setflags(write=False)
     angles.setflags(write=False)
     times = [*paths.time.tolist(), float(paths.time[-1])]

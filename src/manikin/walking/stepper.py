@@ -111,7 +111,7 @@ def place_footprints(
         InputError: If the path is no solution, the foot has no such name, or the rule's limits keep the feet
             from the goal.
     """
-    rule = StepRule() if rule is None else rule
+    rule = rule or StepRule()
     if not path.succeeded:
         raise InputError(f"walking path {path.failure}; valid: a path that succeeded")
     if first is not None and first not in FEET:
@@ -228,16 +228,9 @@ def walked_footprints(walk: Walk, rule: StepRule | None = None, *, height: float
     Each is where the foot is in the middle of its support, relative to how far behind the path both feet
     stand at the start: the path is that of the middle between the feet, as for :func:`place_footprints`.
     Recorded feet turn in and come close to each other in a way that soles and legs of other sizes cannot:
-    every footprint is moved to the nearest place that the rule allows beside the other foot. Where one foot
-    lands in the frame in which the other one leaves, both stand for one frame.
-
-    Args:
-        walk: A walk from standing to standing.
-        rule: Where a foot may be set down beside the other one.
-        height: Height of the floor [m].
-
-    Raises:
-        InputError: If the walk has a moment without a foot on the floor, or does not begin and end on both.
+    every footprint is moved to the nearest place that the rule allows beside the other foot, on a floor of a
+    height [m]. Where one foot lands in the frame in which the other one leaves, both stand for one frame.
+    InputError if the walk has a moment without a foot on the floor, or does not begin and end on both.
     """
     rule = StepRule() if rule is None else rule
     flying = walk.time[~walk.support.any(axis=1)]

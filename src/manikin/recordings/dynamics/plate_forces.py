@@ -214,11 +214,10 @@ JOINTS = ("hip_flexion", "hip_abduction", "knee_flexion", "ankle_dorsiflexion")
 
 @dataclass(frozen=True)
 class TorqueComparison:
-    """Torques of one hinge, of both sides, while the foot below it is on a plate.
+    """Torques of one hinge, of both sides, in frames in which the foot below it is on a plate.
 
     Attributes:
         joint: The hinge, without its side.
-        frames: Compared, of both sides.
         rms: Root mean square of the difference, ours minus the plates' [N.m]; ``mean`` is its mean.
         peak: Largest magnitude of ours [N.m]; ``peak_by_plates`` is that of theirs.
     """

@@ -1,10 +1,9 @@
 """Smoothed postures of a recorded person, their derivatives, the wrench that they need, and its margins.
 
-One pass of the recursive Newton-Euler equations over postures, velocities and accelerations gives the torques
-that a body without contacts would need; their first six components, those of the free pelvis, are the wrench
-that the ground has to supply.
+One pass of the recursive Newton-Euler equations gives the torques that a body without contacts would need;
+their first six components, those of the free pelvis, are the wrench that the ground has to supply.
 
-A foot that lands stops within a few hundredths of a second, while the rest of a step is slow. One cutoff for
+A foot that lands stops within a few hundredths of a second, while the rest of a step is slow: one cutoff for
 both either smears the impact over the single support before it, or lets the noise of the markers through.
 Here the cutoff may be a function of time, higher at each touch-down: the smooth values ``x`` minimise
 
@@ -61,10 +60,8 @@ from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.supports.body_supports import RecordedSupports
 from manikin.recordings.supports.support_levels import JOINTS
 
-MOTION_CUTOFF = 6.0
+MOTION_CUTOFF, FEWEST_FRAMES = 6.0, 4
 """Frequency above which a walk has little but noise [Hz] (Winter, Biomechanics and Motor Control, 2.2.4)."""
-
-FEWEST_FRAMES = 4
 
 
 def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruction:
@@ -86,11 +83,8 @@ def smoothed_postures(
 ) -> FloatArray:  # fmt: skip
     """(n, nq) postures of :func:`smoothed`, without their residuals.
 
-    Args:
-        limits: Whether hinges are kept to their limits; the kink where an angle meets its limit spoils second
-            derivatives.
-        touch_downs: Instants at which the cutoff rises for a moment, on the clock of ``found`` [s]; none for
-            the Butterworth filter.
+    Hinges may go beyond their limits: the kink where an angle meets its limit spoils second derivatives. At
+    touch-downs, on the clock of ``found`` [s], the cutoff rises; without any it is the Butterworth filter's.
     """
     rate = _rate(found)
     finite_number(cutoff, "cutoff [Hz]", above=0.0)
@@ -147,10 +141,7 @@ cutoff there per rate of the recording: faster motion aliases."""
 
 
 def local_cutoff(time: FloatArray, touch_downs: Sequence[float], cutoff: float) -> FloatArray:
-    """(n,) cutoff at instants (n,) [s]: a bell over each touch-down [s], the highest where they overlap [Hz].
-
-    ``cutoff`` is that away from them.
-    """
+    """(n,) cutoff at instants (n,) [s]: the one given, and a bell over each touch-down, the highest [Hz]."""
     found, rise = np.full(len(time), cutoff), TOUCH_DOWN_CUTOFF - cutoff
     for instant in touch_downs:
         found = np.maximum(found, cutoff + rise * np.exp(-(((time - instant) / TOUCH_DOWN_WIDTH) ** 2)))
@@ -291,8 +282,7 @@ class RecordedMargins:
 
     Attributes:
         body: (n,) of the whole body: margin [N.m], force at the centre of mass that would end balance [N],
-            distance of the zero moment point from the edge [m].
-        mass: (n,) the same without angular momentum.
+            distance of the zero moment point from the edge [m]; ``mass`` is without angular momentum.
         phase: (n,) index of the phase in ``polytopes``, which are None in flight and without frames.
         wrench: (n, 6) of the whole body about the world's origin [N, N.m].
         com: (n, 3) centre of mass [m].

@@ -58,10 +58,9 @@ def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArra
     Their sum over the contacts is the wrench where any is made; they are 0 elsewhere.
 
     Args:
-        wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
+        wrench: (n, 6) to be supplied, about the world's origin [N, N.m], every ``step`` [s].
         held: (n, c) which contacts are made.
         points: (n, c, 3) where they are [m]; any value where they are not made.
-        step: Time between frames [s].
     """
     found = np.where(held[..., None], wrench[:, None], 0.0)
     for first, end in mask_runs(held.sum(axis=1) > 1):
@@ -143,12 +142,10 @@ def _smooth_run(
     # Rows of the identity, and a last one of zeros for the index -1 of a contact that is not made.
     one = sparse.csr_array(sparse.vstack([sparse.eye_array(count), sparse.csr_array((1, count))]))
     change = one[after[frames, column]] - one[before[frames, column]]
-    known = np.zeros((len(frames), 6))
+    known, start, last = np.zeros((len(frames), 6)), frames == 0, frames == len(before) - 1
     if first > 0:
-        start = frames == 0
         known[start] = _about(found[first - 1, column[start]], places[0, column[start]])
     if end < len(held):
-        last = frames == len(before) - 1
         known[last] = -_about(found[end, column[last]], places[-1, column[last]])
     cost = change.T @ change + (step / SLOW) ** 2 * sparse.eye_array(count)
     frame, contact = np.nonzero(made)
@@ -218,10 +215,9 @@ def _smallest(arms: Sequence[FloatArray], missing: FloatArray) -> FloatArray:
 
 
 def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches: FloatArray) -> FloatArray:
-    """(n, nv) generalised forces beside those of contacts: torques of the joints, and what the pelvis lacks.
+    """(n, nv) generalised forces beside (n, c, 6) wrenches on effectors, about the world's origin [N, N.m].
 
-    Args:
-        wrenches: (n, c, 6) on each, about the world's origin [N, N.m].
+    They are torques of the joints, and what the pelvis lacks.
     """
     torques, body, model = np.array(dynamics.free_torque), dynamics.body, dynamics.body.pinocchio
     for number, effector in enumerate(effectors):
@@ -244,8 +240,7 @@ def _points(schedule: ContactSchedule, phases: NDArray[np.int64]) -> FloatArray:
 def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0) -> FloatArray:
     """(n, c, 6) wrench on each effector of a schedule, about the world's origin [N, N.m]; 0 off its contacts.
 
-    Args:
-        start: The schedule's clock at the motion's first instant [s].
+    The schedule's clock is ``start`` [s] at the motion's first instant.
     """
     names, times = schedule.sequence.effectors, dynamics.time + start
     phases, held = schedule.phase_at(times), schedule.support(times, names)
@@ -268,11 +263,8 @@ def motion_on_contacts(
 
     In flight the torques are those that the motion would need without contacts, the margin is minus the
     length of the missing wrench, and the pelvis' six generalised forces are set to zero; with contacts they
-    are zero but for rounding.
-
-    Args:
-        start: The schedule's clock at the motion's first instant [s].
-        margins: Of the same motion on the same stances, where they are known already.
+    are zero but for rounding. The schedule's clock is ``start`` [s] at the motion's first instant; margins of
+    the same motion on the same stances are taken where they are known already.
     """
     names, times = schedule.sequence.effectors, dynamics.time + start
     wrenches = contact_wrenches(dynamics, schedule, start)

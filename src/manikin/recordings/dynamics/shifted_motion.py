@@ -65,11 +65,9 @@ ASIDE = 0.02
 LARGEST_SHIFT = 0.03
 """Bound on the shift ahead, to the left and up, each [m]: more is no error of a recording."""
 
-INSIDE = 0.01
-"""Margin that is imposed, per body weight [m]: so far from the edge of a sole is the centre of pressure."""
-
-AT_FLOOR = 2e-4
-"""Difference from the imposed margin, per body weight, up to which a facet of the program is at it [m]."""
+INSIDE, AT_FLOOR = 0.01, 2e-4
+"""Margin that is imposed, per body weight [m]: so far from the edge of a sole is the centre of pressure; and
+the difference from it up to which a facet of the program is at it."""
 
 KNOTS = 0.04
 """Time between the knots of the spline [s]: a shift up to some 10 Hz."""
@@ -80,10 +78,8 @@ LARGEST_RMS, LEAST_BALANCED = 0.01, 0.9
 PRICE, TOLERANCE = 1e4, 1e-4
 """Price of a violation, per metre, and violations that are let pass, per body weight [m]."""
 
-ROUNDS = 12
-"""Most times that violated facets are added."""
-
-_DEGREE = 5
+ROUNDS, _DEGREE = 12, 5
+"""Most times that violated facets are added; degree of the spline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +87,7 @@ class LeastShift:
     """A recorded motion, shifted so that its contacts can carry it.
 
     Attributes:
-        dynamics: Of the shifted motion.
-        margins: Of the shifted motion.
+        dynamics: Of the shifted motion, as are ``margins``.
         shift: (n, 3) of the whole body in each frame, world frame [m].
         solved: Whether one was found; if not, the motion is as recorded, or shifted too little.
         floor: Margin that was imposed, moments about the middle of the contacts [N.m].
@@ -169,8 +164,9 @@ def least_shift(
         shift, bend = spline.values @ coefficients, spline.second @ coefficients
     moved, held, at_floor = dynamics, margins, np.zeros(len(dynamics), dtype=bool)
     if shift.any():
-        left = _about_contacts(margins, _shifted_wrench(dynamics, shift, bend)) - kept
-        at_floor = np.abs(left) <= AT_FLOOR * weight
+        for frames, distance, lengths in _distances(margins, _shifted_wrench(dynamics, shift, bend)):
+            left = (distance / lengths).min(axis=1) - kept
+            at_floor[frames] = np.abs(left) <= AT_FLOOR * weight
         q = np.array(dynamics.q)
         q[:, :3] += shift
         moved = dynamics_of_postures(replace(found, body=dynamics.body), q)
@@ -206,14 +202,6 @@ def _distances(
             yield frames, distance, _lengths(polytope)
 
 
-def _about_contacts(margins: RecordedMargins, wrench: FloatArray) -> FloatArray:
-    """(n,) margins of (n, 6) wrenches with moments about the middle of the contacts [N.m]; NaN in flight."""
-    found = np.full(len(wrench), np.nan)
-    for frames, distance, lengths in _distances(margins, wrench):
-        found[frames] = (distance / lengths).min(axis=1)
-    return found
-
-
 def _violated(margins: RecordedMargins, wrench: FloatArray, least: float) -> NDArray[np.int64]:
     """(v, 2) frame and facet of its polytope, of all that are nearer than the least distance, or beyond."""
     found = [np.zeros((0, 2), dtype=np.int64)]
@@ -227,11 +215,7 @@ def _violated(margins: RecordedMargins, wrench: FloatArray, least: float) -> NDA
 class _Rows:
     """Lengths that a shift changes: ``base - on . (s, s'')``, a moment or force per body weight [m].
 
-    Attributes:
-        frame: (v,) which frame.
-        base: (v,) without a shift.
-        on_shift: (v, 3) what a shift takes from it.
-        on_bend: (v, 3) what its second derivative takes.
+    In (v,) frames they are ``base`` (v,) without a shift; it and its second derivative take (v, 3) each.
     """
 
     frame: NDArray[np.int64]

@@ -11,14 +11,12 @@ from manikin.recordings.readers.opensim import read_trc
 from manikin.recordings.readers.skeleton_recording import Recording
 
 READERS = {".bvh": read_bvh, ".amc": read_amc, ".c3d": read_c3d, ".trc": read_trc}
-"""Readers with their defaults, by ending."""
-
 PARTS = {".asf": ".amc", ".mot": ".trc", ".sto": ".trc"}
-"""Endings of what is read along with a recording, and of the recording."""
+"""Readers by ending; endings of what is read along with a recording, and of the recording."""
 
 
 def read_recording(path: str | Path, frames: tuple[int, int] | None = None) -> Recording | MarkerRecording:
-    """Read a recording with the reader of its ending; options are those of the readers themselves.
+    """Read a recording with the reader of its ending, with its defaults.
 
     Args:
         path: The file: BVH or AMC for a skeleton, C3D or TRC for markers.

@@ -27,7 +27,6 @@ class Skeleton:
     """A skeleton of an ASF file, y up.
 
     Attributes:
-        name: File it comes from.
         bones: (j,) names, parents first; the first is ``"root"``.
         parents: (j,) index of each bone's parent, -1 for the root.
         vectors: (j, 3) from the begin of each bone to its end in the rest pose [m].
@@ -79,17 +78,15 @@ def read_asf(path: str | Path) -> Skeleton:
 
 def _sections(text: str, file: str) -> dict[str, list[list[str]]]:
     """Lines of each section as words, without comments."""
-    found: dict[str, list[list[str]]] = {}
-    current: list[list[str]] = []
+    found, current = dict[str, list[list[str]]](), list[list[str]]()
     for line in text.splitlines():
         words = line.split("#")[0].replace("(", " ( ").replace(")", " ) ").split()
         if words and words[0].startswith(":"):
             current = found.setdefault(words[0][1:].lower(), [])
         elif words:
             current.append(words)
-    missing = [name for name in ("units", "root", "bonedata", "hierarchy") if name not in found]
-    if missing:
-        raise InputError(f"{file}: no section :{missing[0]}; valid: an ASF file (is it cut short?)")
+    for name in (name for name in ("units", "root", "bonedata", "hierarchy") if name not in found):
+        raise InputError(f"{file}: no section :{name}; valid: an ASF file (is it cut short?)")
     return found
 
 

@@ -156,9 +156,7 @@ def _motion(text: str, channels: int, file: str) -> tuple[float, FloatArray]:
 
 def _unit(joints: list[_Joint], file: str) -> float:
     """Unit of length [m] in which the two longest chains of bones that leave the root are a person's."""
-    lengths: list[float] = []
-    branches: dict[int, float] = {}
-    owner: list[int] = []
+    lengths, owner, branches = list[float](), list[int](), dict[int, float]()
     for number, joint in enumerate(joints):
         before = lengths[joint.parent] + float(np.linalg.norm(joint.offset)) if joint.parent >= 0 else 0.0
         lengths.append(before)

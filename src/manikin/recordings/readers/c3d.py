@@ -69,8 +69,7 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
         _check_moments(parameters, layout)
     declared_up = next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "")
     turn = rotation_to_z_up(up or declared_up or "+z", f"{file}: POINT:Y_SCREEN")
-    rate = layout.real("POINT", "RATE")
-    names, kept = _markers(parameters, layout)
+    rate, (names, kept) = layout.real("POINT", "RATE"), _markers(parameters, layout)
     positions = unit * _finite(points[:3, kept], file, "a point").transpose(2, 1, 0) @ turn.T
     return MarkerRecording(
         Path(path).name, names, without_unseen(positions), rate, (layout.first_frame - 1) / rate,
@@ -118,9 +117,10 @@ def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
         return factor * float(np.mean(found)) if found else None
 
     both = ("kneewidth", "anklewidth", "elbowwidth", "shoulderoffset")
-    lengths = (measure(unit, f"l{name}", f"r{name}") for name in both)
+    knee, ankle, elbow, offset = (measure(unit, f"l{name}", f"r{name}") for name in both)
+    mass, stature = measure(1.0, "bodymass"), measure(unit, "height")
     radius = measure(0.5 * unit, "markerdiameter")
-    return Subject(measure(1.0, "bodymass"), measure(unit, "height"), *lengths, radius)
+    return Subject(mass, stature, knee, ankle, elbow, offset, radius)
 
 
 def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:
@@ -184,7 +184,7 @@ def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
     units = _texts(parameters, "ANALOG", "UNITS")
     for channel in np.unique(layout.integers("FORCE_PLATFORM", "CHANNEL")).tolist():
         declared = units[channel - 1] if 0 < channel <= len(units) else ""
-        plain = "".join(letter for letter in declared.lower() if letter.isalpha())
+        plain = "".join(filter(str.isalpha, declared.lower()))
         if plain in ("nm", "nmm") and plain != f"n{lengths}":
             wrong = f"moments in {declared} of lengths in {lengths}"
             raise layout.error(wrong, f"N{lengths}, or plates=False")

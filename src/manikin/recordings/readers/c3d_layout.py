@@ -54,12 +54,11 @@ def plate_load(
     return force @ axes.T, (moment + np.cross(force, origin)) @ axes.T
 
 
-BLOCK = 512
+BLOCK, _FASTEST = 512, 1e6
 _INTEL, _DEC, _MIPS = 84, 85, 86
 _SIZES = {-1: 1, 1: 1, 2: 2, 4: 4}
 _TEXT, _INTEGERS, _REAL = -1, (1, 2), 4
 _DIMENSIONS, _ENTRIES = 7, 65535  # of one parameter, the most that the format has room for
-_FASTEST = 1e6
 _SINGLE = (
     ("POINT", "FRAMES"), ("POINT", "DATA_START"), ("ANALOG", "RATE"), ("ANALOG", "GEN_SCALE"),
     ("FORCE_PLATFORM", "USED"),
@@ -193,17 +192,15 @@ def _check_counts(layout: C3dLayout, measured: int) -> None:
         raise layout.error(f"ANALOG:RATE is {analog_rate:g} Hz", f"{rate * layout.samples:g}")
     if not all(layout.count("POINT", name) for name in ("UNITS", "SCALE")):
         raise layout.error("no POINT:UNITS or POINT:SCALE", "a complete file")
-    empty = [name for name in _SINGLE if name in layout.parameters and not layout.count(*name)]
-    if empty:
-        raise layout.error(f"{':'.join(empty[0])} is empty", "a value")
+    for name in (name for name in _SINGLE if name in layout.parameters and not layout.count(*name)):
+        raise layout.error(f"{':'.join(name)} is empty", "a value")
     if np.any(layout.integers("ROTATION", "USED")):
         raise layout.error("holds rotations of segments", "markers")
 
 
 def _parameters(content: bytes, place: int, big_endian: bool, file: str) -> dict[tuple[str, str], Parameter]:
     """Parameters by group and name; ``content`` ends where their section does."""
-    groups: dict[int, str] = {}
-    found: list[tuple[int, str, Parameter]] = []
+    groups, found = dict[int, str](), list[tuple[int, str, Parameter]]()
     while True:
         here = _Reader(content, place, file)
         letters = abs(here.signed())
@@ -227,13 +224,11 @@ def _parameters(content: bytes, place: int, big_endian: bool, file: str) -> dict
         place = after + step
         if place < here.place:
             raise here.error(f"record {name[:40]!r} overlaps the next one")
-    lost = [name for group, name, _ in found if group not in groups]
-    if lost:
-        raise InputError(f"{file}: parameter {lost[0][:40]!r} has no group; valid: a complete file")
+    for name in (name for group, name, _ in found if group not in groups):
+        raise InputError(f"{file}: parameter {name[:40]!r} has no group; valid: a complete file")
     names = list(groups.values())
-    twice = [name for name in _READ if names.count(name) > 1]
-    if twice:
-        raise InputError(f"{file}: parameters of {twice[0]} occur twice; valid: once")
+    for name in (name for name in _READ if names.count(name) > 1):
+        raise InputError(f"{file}: parameters of {name} occur twice; valid: once")
     return {(groups[group], name): parameter for group, name, parameter in found}
 
 

@@ -150,6 +150,5 @@ def joint_of(recording: Recording, segment: str, before: Mapping[str, tuple[str,
     for name in names:
         if name in recording.joint_names:
             return recording.joint_names.index(name)
-    raise InputError(
-        f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {', '.join(names)}"
-    )
+    wrong = f"recording {recording.name!r} has no joint for {segment!r}"
+    raise InputError(f"{wrong}; valid: one of {', '.join(names)}")

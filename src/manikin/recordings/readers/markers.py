@@ -14,11 +14,9 @@ from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.readers.skeleton_recording import UNKNOWN, Subject
 from manikin.runtime.display import Displayed
 
-LONGEST_GAP = 0.1
-"""Longest gap that is filled when nothing else is said [s]: feet stay within about a centimetre."""
-
-NEIGHBOURS = 6
-"""Frames on either side of a gap that its filling looks at."""
+LONGEST_GAP, NEIGHBOURS = 0.1, 6
+"""Longest gap that is filled when nothing else is said [s]: feet stay within about a centimetre; and frames
+on either side of it that its filling looks at."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,6 @@ class ForcePlate:
     """Wrenches that a plate applies to the person on it, at an even rate; the world is z up.
 
     Attributes:
-        name: How messages call it.
         wrenches: (n, 6) force [N] and moment about the world's origin [N.m], world axes.
         origin: (3,) a point of its surface [m].
         rate: Samples per second [Hz].
@@ -147,12 +144,10 @@ class MarkerRecording(Displayed):
     """Markers at n instants; the world is z up.
 
     Attributes:
-        name: Where it comes from, for messages.
         marker_names: (m,) unique names.
         positions: (n, m, 3) [m]; NaN where a marker was not seen.
         rate: Frames per second [Hz].
-        start: Instant of the first frame on the recording's clock [s].
-        plates: Force plates, on the same clock.
+        start: Instant of the first frame on the recording's clock [s], which is that of the plates.
         events: In the order of time.
         subject: What the file says about the person.
     """
@@ -243,8 +238,7 @@ class MarkerRecording(Displayed):
         """Recording with gaps of up to ``longest`` [s] filled; its :attr:`gaps` are those that are left.
 
         A gap is filled by the cubic spline through the :data:`NEIGHBOURS` frames nearest to it on either side
-        in which the marker was seen. One with fewer than two such frames on a side, as at the ends of the
-        recording, stays.
+        in which the marker was seen. One with fewer than two such frames on a side stays.
         """
         finite_number(longest, "longest gap [s]", at_least=0.0)
         positions = np.array(self.positions)

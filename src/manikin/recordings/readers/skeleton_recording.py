@@ -57,7 +57,6 @@ class Recording(Displayed):
     looks like differs from file to file.
 
     Attributes:
-        name: Where it comes from, for messages.
         joint_names: (j,) names, parents first; the first is the root.
         parents: (j,) index of each joint's parent, -1 for the root.
         offsets: (j, 3) place of each joint in its parent's frame [m]; zero for the root.
@@ -78,10 +77,8 @@ class Recording(Displayed):
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
-        return {
-            "name": self.name, "frames": str(len(self)), "rate": f"{self.rate:g} Hz",
-            "joints": str(len(self.joint_names)),
-        }  # fmt: skip
+        frames, joints = str(len(self)), str(len(self.joint_names))
+        return {"name": self.name, "frames": frames, "rate": f"{self.rate:g} Hz", "joints": joints}
 
     def __post_init__(self) -> None:
         where, joints = f"recording {self.name!r}", len(self.joint_names)

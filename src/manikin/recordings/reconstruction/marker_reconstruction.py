@@ -35,11 +35,8 @@ from manikin.recordings.readers.skeleton_recording import Subject
 from manikin.recordings.reconstruction.orientation_targets import placing_targets
 from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle, unit
 
-KNEE_WIDTH, ANKLE_WIDTH, ELBOW_WIDTH = 0.10, 0.07, 0.08
-"""Width of a joint where neither the file nor a second marker gives it [m]."""
-
-MARKER_RADIUS = 0.007
-"""Radius of a marker where the file does not give it [m]."""
+KNEE_WIDTH, ANKLE_WIDTH, ELBOW_WIDTH, MARKER_RADIUS = 0.10, 0.07, 0.08, 0.007
+"""Width of a joint where neither the file nor a second marker gives it, and radius of a marker [m]."""
 
 SHOULDER_SHARE = 0.17
 """Depth of a shoulder's centre below its acromion, per distance of both acromia (Rab et al. 2002)."""
@@ -220,17 +217,12 @@ def _upward(marks: Mapping[str, FloatArray]) -> FloatArray | None:
     return None
 
 
-PLACING_FRAMES = 40
-"""Frames on which markers are placed."""
-
-ROUNDS = 2
-"""Times that postures and places are improved in turn."""
+PLACING_FRAMES, COMPLETE, ROUNDS = 40, 0.9, 2
+"""Frames on which markers are placed, share that they see of what the best frame sees, and times that
+postures and places are improved in turn."""
 
 LEAST_SEEN = 0.5
 """Share of the markers followed that the first and the last frame see."""
-
-COMPLETE = 0.9
-"""Markers are placed on frames that see this share of what the best frame sees."""
 
 
 def centres_of_markers(recording: MarkerRecording) -> dict[str, FloatArray]:

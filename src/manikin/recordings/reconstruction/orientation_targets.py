@@ -245,17 +245,13 @@ def _of_segment(recording: MarkerRecording, found: MarkerSet, segment: str) -> F
     return recording.chosen([name for name, place in found.segments.items() if place == segment]).positions
 
 
-WEIGHT = 0.05
-"""Weight of a guide, against 1 of a joint centre."""
+WEIGHT, ARM = 0.05, 0.2
+"""Weight of a guide, against 1 of a joint centre, and its distance from the middle of its segment's joints
+[m]."""
 
-ARM = 0.2
-"""Distance of a guide from the middle of its segment's joints [m]."""
-
-LOWEST_SHARE, LOWEST = 5.0, 0.01
-"""A sole is flat up to this [m] above this percentile of the ankle's height."""
-
-OTHER_FOOT = np.deg2rad(25.0)
-"""A foot's bone differs from ours by less than this when the sole is flat [rad]."""
+LOWEST_SHARE, LOWEST, OTHER_FOOT = 5.0, 0.01, np.deg2rad(25.0)
+"""A sole is flat up to the second [m] above the first percentile of the ankle's height; a foot's bone then
+differs from ours by less than the third [rad]."""
 
 _PARTS = {"pelvis": "thigh", "thorax": "upper_arm"}
 

@@ -171,8 +171,7 @@ class Reconstruction(Displayed):
         return float(np.nanmax(self.residual))
 
 
-REFERENCE_STATURE = 1.75
-REFERENCE_MASS = 79.0
+REFERENCE_STATURE, REFERENCE_MASS = 1.75, 79.0
 """Person of whom others are multiples [m], [kg]."""
 
 _BONES = {

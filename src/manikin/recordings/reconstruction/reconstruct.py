@@ -40,21 +40,18 @@ UPRIGHT = ("lumbar", "thorax", "neck", "left_upper_arm", "right_upper_arm")
 
 _TILTED = ("lumbar", "thorax")
 
-CALMED_SHARE = 1.0 / 3.0
-"""Share of the pelvis' fast motion forward and back that the upper end of an unmeasured trunk has too."""
+CALMED_SHARE, LARGEST_TILT = 1.0 / 3.0, np.deg2rad(10.0)
+"""Share of the pelvis' fast motion forward and back that the upper end of an unmeasured trunk has too, and
+largest tilt of it [rad]."""
 
 SLOW = 1.0
 """Slower motion of the pelvis takes the trunk along [Hz]: below the frequency of steps."""
-
-LARGEST_TILT = np.deg2rad(10.0)
-"""Largest tilt of an unmeasured trunk [rad]."""
 
 
 def unmeasured_upright(found: Reconstruction) -> Reconstruction:
     """A reconstruction with unmeasured trunk, neck and upper arms as in upright standing.
 
-    Angles are kept to the limits of their hinges. Elbows and wrists stay as in standing. Nothing that is
-    followed moves.
+    Angles are kept to the limits of their hinges, elbows and wrists to standing. Nothing followed moves.
     """
     body, standing = found.body, found.body.standing_posture()
     if not set(UPRIGHT) & set(found.neutral):
@@ -116,8 +113,7 @@ def reconstruct(
         mass: Body mass where ``body`` is None [kg]; None for the one in the file, or else a usual one.
 
     Raises:
-        InputError: If the recording has one frame only, lacks a joint, has no markers of a pelvis, or has
-            left and right swapped.
+        InputError: If there is one frame only, no joint or pelvis, or left and right are swapped.
         BodyError: If the person's lengths are not those of an adult.
     """
     _check(recording)
@@ -137,18 +133,13 @@ def person_of(
 ) -> BodyModel:
     """Our human with the lengths of a person of whom there are several recordings, from all their frames.
 
-    Args:
-        sex: Table of segment masses.
-        mass: Body mass [kg]; None for the one in the files, or else a usual one.
-
-    Raises:
-        InputError: As :func:`reconstruct`; if there is no recording.
-        BodyError: As :func:`reconstruct`.
+    Sex, mass and errors are as of :func:`reconstruct`; InputError if there is no recording.
     """
     if not recordings:
         raise InputError("no recording to take a person's lengths from; valid: at least one")
     for recording in recordings:
         _check(recording)
+    marked = [one for one in recordings if isinstance(one, MarkerRecording)]
     each = [
         centres_of_markers(one) if isinstance(one, MarkerRecording) else joint_centres(one)
         for one in recordings
@@ -159,11 +150,8 @@ def person_of(
         for name in CENTRES
         if any(name in found for found in each)
     }
-    subjects = [recording.subject for recording in recordings if isinstance(recording, MarkerRecording)]
-    masses, statures = (
-        [value for value in values if value is not None]
-        for values in ([one.mass for one in subjects], [one.stature for one in subjects])
-    )
+    masses = [one.subject.mass for one in marked if one.subject.mass is not None]
+    statures = [one.subject.stature for one in marked if one.subject.stature is not None]
     if mass is None and masses:
         mass = float(np.median(masses))
     return human_of(everywhere, sex, mass, float(np.median(statures)) if statures else None)

@@ -39,11 +39,9 @@ from manikin.recordings.statistics.phases import (
 From = Literal["stance", "lowest", "highest"]
 FROMS: tuple[From, ...] = ("stance", "lowest", "highest")
 
-PUBLISHED_PHASES = 6
-"""Phases that Table 3.4 gives of a motion with the left foot first: one motion has its last one, too."""
-
-EVERYBODY = "all"
-"""Name of the group of all published motions."""
+PUBLISHED_PHASES, EVERYBODY = 6, "all"
+"""Phases that Table 3.4 gives of a motion with the left foot first: one motion has its last one, too; and the
+name of the group of all published motions."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,6 @@ class GroupStatistics:
     """Measures of the motions of one group; what is not known of them is empty.
 
     Attributes:
-        motions: Names of the motions.
         durations: Of phases seen from beginning to end, by ``number`` (DS-1 and so on), by ``kind`` (DS, SS)
             and by the ``effectors`` that support [s].
         consistency: Of sequences and first steps.

@@ -13,7 +13,7 @@ from manikin.body import BodyModel
 from manikin.body.segments import Shape, ShapeKind
 from manikin.errors import InputError, ManikinError
 from manikin.numerics.spatial import FloatArray, frozen_array
-from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF, smoothed
+from manikin.recordings.dynamics.recorded_dynamics import smoothed
 from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
@@ -35,7 +35,6 @@ class RecordedClip:
 
     Attributes:
         group: What it is compared with: a person, a condition.
-        supports: When and where which effectors support.
         time: (n,) instants, rising [s].
         com: (n, 3) centre of mass in the world [m].
         tops: (n, 3) highest point of each part of the body, by its name [m]; may be empty.
@@ -75,7 +74,7 @@ def clip_of(found: Reconstruction, name: str, group: str, *, start: float = 0.0)
 
     ``start`` is what the first frame of the recording is on its clock [s].
     """
-    known, still = supports_of(found, start=start), smoothed(found, MOTION_CUTOFF)
+    known, still = supports_of(found, start=start), smoothed(found)
     com, tops = com_and_tops(still.body, still.q)
     standing, _ = com_and_tops(still.body, still.body.standing_posture()[None])
     time = known.start + still.time - still.time[0]

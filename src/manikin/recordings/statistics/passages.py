@@ -8,6 +8,7 @@ a collision. A person who crouches on the spot, or is low when the recording beg
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,9 @@ from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.statistics.clips import RecordedClip
 from manikin.recordings.statistics.phases import mirrored
 
-AROUND = 0.25
-"""Time before and after an instant over which the direction of travel is taken [s]."""
-
-FEWEST_TRAVELLED = 0.02
-"""Shortest way that has a direction [m]."""
+AROUND, FEWEST_TRAVELLED = 0.25, 0.02
+"""Time before and after an instant over which the direction of travel is taken [s]; shortest way with one
+[m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +213,7 @@ def shares_within(clips: Sequence[RecordedClip], limit: float = LIMIT) -> dict[s
 def _distances(clips: Sequence[RecordedClip]) -> dict[str, FloatArray]:
     """All distances [m] by effector."""
     every: dict[str, list[FloatArray]] = {}
-    for one in (one for clip in clips for one in support_distances(clip)):
+    for one in chain.from_iterable(map(support_distances, clips)):
         every.setdefault(one.effector, []).append(one.distance)
     return {effector: np.concatenate(each) for effector, each in every.items()}
 
@@ -229,8 +228,7 @@ class Overhead:
 
     Attributes:
         height: Of its underside above the lowest surface on which feet stood [m].
-        x: Where it begins and ends in the world [m]; None for a bar whose place is not known.
-        y: As ``x``.
+        x: Where it begins and ends in the world [m], as ``y``; None for a bar whose place is not known.
     """
 
     height: float

@@ -257,11 +257,9 @@ class PublishedHeights:
 def published_phases(first_step: str | None = None) -> tuple[PhaseSequence, ...]:
     """The 30 motions of Table 3.4, grouped by beam and configuration such as H1C1.
 
-    Times are those of the thesis: frames begin at 1 and a hundred of them are a second.
-
-    Args:
-        first_step: ``left_foot`` or ``right_foot`` for the motions that begin with it; None for all. The
-            means quoted in the thesis are those of ``left_foot`` in C1 and C2.
+    Times are those of the thesis: frames begin at 1 and a hundred of them are a second. A first step of
+    ``left_foot`` or ``right_foot`` chooses the motions that begin with it. The means quoted in the thesis are
+    those of ``left_foot`` in C1 and C2.
     """
     found = (_sequence(name, frames) for name, frames, *_ in _published()["table_3_4"])
     return tuple(one for one in found if first_step is None or one.first_step == first_step)

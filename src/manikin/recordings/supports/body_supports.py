@@ -37,11 +37,9 @@ from manikin.recordings.supports.support_levels import (
 )
 from manikin.runtime.display import Displayed
 
-SMALL = 1e-4
-"""Distances much below this one count by their squares in a median place [m], which makes it unique."""
-
-MEDIAN_STEPS = 60
-"""Steps towards a median place; the same number always, so that equal motions give equal places."""
+SMALL, MEDIAN_STEPS = 1e-4, 60
+"""Distances much below this one count by their squares in a median place [m], which makes it unique; steps
+towards it, always as many, so that equal motions give equal places."""
 
 
 def median_place(positions: FloatArray) -> FloatArray:
@@ -62,14 +60,12 @@ class Support:
     """One effector on a surface from an instant to another.
 
     Attributes:
-        effector: Name of the body's effector.
         start: Touch-down, or the first instant of the recording [s].
         end: Lift-off, or the last instant of the recording [s].
         place: (3,) where the effector is, a :func:`median_place`; of a foot, at its surface's height [m].
         first_contact: (3,) heel or toes, whichever touched down, or the effector, then [m].
         last_contact: (3,) heel or toes, whichever lifted off, or the effector, then [m].
-        start_seen: Whether the touch-down is in the recording.
-        end_seen: Whether the lift-off is in the recording.
+        start_seen: Whether the touch-down is in the recording; ``end_seen`` of the lift-off.
     """
 
     effector: str
@@ -158,7 +154,7 @@ class RecordedSupports(Displayed):
     @cached_property
     def key_frames(self) -> tuple[float, ...]:
         """Instants at which supports change, with the first and the last instant ([Qiu2012]_ 3.2.2) [s]."""
-        inner = {support.start for support in self.supports} | {support.end for support in self.supports}
+        inner = {instant for one in self.supports for instant in (one.start, one.end)}
         return tuple(sorted(inner | {self.start, self.end}))
 
     @cached_property
@@ -166,7 +162,7 @@ class RecordedSupports(Displayed):
         """From each key frame to the next."""
         return tuple(
             SupportPhase(start, end, tuple(sorted({
-                support.effector for support in self.supports if support.start <= start and end <= support.end
+                one.effector for one in self.supports if one.start <= start and end <= one.end
             })))
             for start, end in pairwise(self.key_frames)
         )  # fmt: skip
@@ -220,11 +216,6 @@ def ground_supports(found: Reconstruction, floor: FloatArray, start: float) -> I
             yield support_between(name, one, frames, start)
 
 
-def stays(one: Track) -> list[tuple[int, int]]:
-    """Runs of frames in which a point rests: first frame and the one after the last."""
-    return lasting(switch(*slow_and_leaving(one)), SHORTEST * one.rate)
-
-
 def slow_and_leaving(one: Track) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(n,) whether a point that may roll is slow enough to rest, and (n,) fast enough to leave."""
     slow, fast = one.slow_and_fast(ROLLS, SLIDE_WAY)
@@ -239,14 +230,12 @@ PASSED, STAYS = 0.12, 0.45
 """Way of the shoulder while a hand rests from which the body moves past it [m], and share of that way within
 which a hand that holds something stays."""
 
-SLIDES = 0.40
-"""Median speed up to which a hand holds on to something, sliding along it; else it swings [m/s]."""
+SLIDES, SHORTEST_HOLD = 0.40, 0.25
+"""Median speed up to which a hand holds on to something, sliding along it; else it swings [m/s]. One that
+swings back stays for less than the second while the body runs past it [s]."""
 
 BESIDE_HAND = 0.30
 """Distance of a palm from the nearest hip or knee up to which it rests on the own body, or hangs [m]."""
-
-SHORTEST_HOLD = 0.25
-"""A hand that swings back stays for less while the body runs past it [s]."""
 
 SEAT_NEAR, SEAT_REACH, SEAT_SOON = 0.08, 0.5, 0.5
 """Difference between the heights of a palm and a seat, and level distance from the middle of the buttocks, up
@@ -267,7 +256,7 @@ def hand_supports(
         places = effector_places(found.body, found.q, (name, name.replace("hand", "upper_arm"), *OWN))
         hand, shoulder = (track(one, found.rate) for one in places[:2])
         beside = np.linalg.norm(places[2:] - places[0], axis=2).min(axis=0)
-        for frames in stays(hand):
+        for frames in lasting(switch(*slow_and_leaving(hand)), SHORTEST * hand.rate):
             one, during = support_between(name, hand, frames, start), slice(*frames)
             own, way = (float(np.linalg.norm(np.ptp(p.positions[during], axis=0))) for p in (hand, shoulder))
             on_ground = float(np.median(hand.positions[during, 2] - floor[during])) < AWAY
@@ -291,11 +280,9 @@ def _on_seat(hand: Support, seats: Sequence[Support]) -> bool:
 
 SEAT = "buttocks"
 
-LOW = 0.8
-"""Height of the buttocks, per that in standing, below which a person may sit."""
-
-BESIDE = 0.05
-"""How far behind the heels, or before the toes, of both feet the centre of mass of a seated person is [m]."""
+LOW, BESIDE = 0.8, 0.05
+"""Height of the buttocks, per that in standing, below which a person may sit, and how far the centre of mass
+is then behind the heels, or before the toes, of both feet [m]."""
 
 RISEN = 0.04
 """Height above that of rest from which the buttocks have left a seat: flesh and cushion give way [m]."""
@@ -331,9 +318,8 @@ def seat_supports(
             near = height < float(np.median(height[first:stop])) + RISEN
             for begin, end in mask_runs(near):
                 seated[begin:end] |= begin < stop and first < end
-    return tuple(
-        support_between(SEAT, seat, frames, start) for frames in lasting(seated, SHORTEST_SEAT * seat.rate)
-    )
+    runs = lasting(seated, SHORTEST_SEAT * seat.rate)
+    return tuple(support_between(SEAT, seat, frames, start) for frames in runs)
 
 
 def lowest_points(soles: Mapping[str, tuple[FloatArray, FloatArray]]) -> FloatArray:

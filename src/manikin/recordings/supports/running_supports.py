@@ -33,7 +33,7 @@ fall has about as much left after the low-pass."""
 
 
 def while_carried(supports: Sequence[Support], found: Reconstruction, start: float) -> Iterator[Support]:
-    """Those supports in which the centre of mass does not fall freely; the first frame is at ``start`` [s]."""
+    """Those supports in which the centre of mass does not fall freely; frames begin at ``start`` [s]."""
     falls = -vertical_acceleration(found, SUPPORT_LEVELS_CUTOFF) / GRAVITY
     for one in supports:
         first, last = (round((instant - start) * found.rate) for instant in (one.start, one.end))

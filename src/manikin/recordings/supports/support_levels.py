@@ -71,13 +71,7 @@ SHORTEST_REST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One point of an effector through a recording, without noise.
-
-    Attributes:
-        positions: (n, 3) low-passed [m].
-        speed: (n,) [m/s].
-        rate: Frames per second [Hz].
-    """
+    """One point of an effector through a recording: (n, 3) low-passed places [m], (n,) speeds, rate [Hz]."""
 
     positions: FloatArray
     speed: FloatArray
@@ -200,11 +194,9 @@ class RecordedSole:
 
 @dataclass(frozen=True)
 class RestSurface:
-    """What feet stand on.
+    """What feet stand on, at the median of the heights at which soles rest on it [m].
 
-    Attributes:
-        height: The median of those at which soles rest on it [m].
-        levels: Heights of it, lowest first; more than one where the recorded floor drifts [m].
+    Its levels, lowest first, are more than one where the recorded floor drifts.
     """
 
     height: float
@@ -241,9 +233,9 @@ def _rests(feet: Sequence[RecordedSole], limit: float, lying: NDArray[np.bool_])
         for first, stop in mask_runs(resting[number]):
             if stop - first >= shortest:
                 here = slice(first, stop)
-                down, *heights = (float(np.median(each[here])) for each in (lying, height, tilt))
+                down, level, rise = (float(np.median(each[here])) for each in (lying, height, tilt))
                 alone = not down and any(np.sum(moving[here]) >= shortest for moving in others)
-                found.append(_Rest(number, *heights, alone, bool(down)))
+                found.append(_Rest(number, level, rise, alone, bool(down)))
     return found
 
 

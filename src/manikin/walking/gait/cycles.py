@@ -1,8 +1,8 @@
 """Walking cycles in a recorded motion: when feet touch the floor, and from which toe-off to which to cut.
 
 Skeletons leave the tilt of the pelvis and the level of the feet open; both are settled in the same way for
-every cycle. The reference body is wider than some recorded people: limbs are spread until they are clear of
-it. Blends of several people need the habits of each taken out.
+every cycle. The reference body is wider than some people: limbs are spread until they are clear of it. Blends
+of several people need the habits of each taken out.
 """
 
 from collections import Counter
@@ -27,11 +27,8 @@ from manikin.walking.gait.stance_foot import FootPlacement, Sole
 SLOW, SLOW_SHARE = 0.3, 0.15
 """A point slower than this [m/s], or than this share of its fastest [-], may stand on the floor."""
 
-SHORTEST_GAP, SHORTEST_CONTACT = 0.08, 0.06
-"""Shortest swing and stance of a foot [s]."""
-
-SHORTEST_CYCLE, LONGEST_CYCLE = 0.45, 2.0
-"""Accepted durations of cycles [s]."""
+SHORTEST_GAP, SHORTEST_CONTACT, SHORTEST_CYCLE, LONGEST_CYCLE = 0.08, 0.06, 0.45, 2.0
+"""Shortest swing and stance of a foot, and accepted durations of cycles [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +44,8 @@ class CycleCut:
     """A cycle in a recording.
 
     Attributes:
-        start: Toe-off of ``foot`` [s].
-        end: Its next toe-off [s].
-        foot: ``"left"`` or ``"right"``.
-        landing: Landing of that foot [s].
+        start: Toe-off of ``foot``, ``"left"`` or ``"right"`` [s]; ``end`` is its next one, ``landing`` its
+            landing between them.
         other_off: Toe-off of the other foot [s].
         other_landing: Landing of the other foot before that [s]; before the start in walks, after it in runs.
     """
@@ -160,10 +155,8 @@ INSTANTS = 24
 """Instants of a cycle at which limbs may touch."""
 
 ARM_STEP, LEG_STEP = np.deg2rad(2.5), np.deg2rad(0.75)
-"""Step by which limbs are spread [rad]."""
-
 ARMS, LEGS = 3 * ARM_STEP, 2 * LEG_STEP
-"""Spread of every cycle, so that neighbours differ the less in it [rad]."""
+"""Step by which limbs are spread, and spread of every cycle, so that neighbours differ the less [rad]."""
 
 _ARMS, _LEGS = ("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot", "toes")
 
@@ -279,11 +272,8 @@ TILT, TILT_SHARE = np.deg2rad(10.0), 0.5
 MIDDLE = (0.3, 0.7)
 """Part of a stance in which the sole lies flat."""
 
-MOST_LEVELLED = np.deg2rad(15.0)
-"""A sole with more pitch than this does not lie flat [rad]."""
-
-LIFTED = 0.02
-"""A sole whose lower end is higher than this has left the floor, or not yet landed [m]."""
+MOST_LEVELLED, LIFTED = np.deg2rad(15.0), 0.02
+"""A sole with more pitch does not lie flat [rad]; one whose lower end is higher is off the floor [m]."""
 
 MOST_TRIMMED = 0.25
 """Share of a stance by which either end is moved at most."""

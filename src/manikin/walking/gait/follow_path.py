@@ -94,13 +94,9 @@ class WalkController:
     """
 
     def __init__(
-        self,
-        body: BodyModel | None = None,
-        library: MotionLibrary | None = None,
-        *,
-        place: ArrayLike = (0.0, 0.0, 0.0),
-        acceleration: Sequence[float] = ACCELERATION,
-    ) -> None:
+        self, body: BodyModel | None = None, library: MotionLibrary | None = None, *,
+        place: ArrayLike = (0.0, 0.0, 0.0), acceleration: Sequence[float] = ACCELERATION,
+    ) -> None:  # fmt: skip
         """Stand somewhere; InputError if an argument is not usable.
 
         Args:
@@ -193,21 +189,18 @@ class WalkController:
 def _notice(wanted: FloatArray, asked: Blend) -> str | None:
     if not asked.outside[0]:
         return None
-    forward, left, angular = asked.velocity[0]
+    nearest = ", ".join(f"{value:.2f}" for value in asked.velocity[0])
     return (
         f"directive {wanted[0]:.2f} m/s forward, {wanted[1]:.2f} m/s left, {wanted[2]:.2f} rad/s "
-        f"is beyond the motion library; nearest: {forward:.2f}, {left:.2f}, {angular:.2f}"
+        f"is beyond the motion library; nearest: {nearest}"
     )
 
 
 RATE = 60.0
 """Frames per second [Hz]."""
 
-LONGEST_END = 1.5
-"""Longest time from the end of the path to the end of the last step [s]."""
-
-STANDING_TIME = 0.2
-"""Time of standing at the end [s]."""
+LONGEST_END, STANDING_TIME = 1.5, 0.2
+"""Longest time from the end of the path to the end of the last step, and time of standing then [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,18 +266,14 @@ class Walk:
 
 
 def walk_along(
-    path: WalkingPath | WalkRoute,
-    body: BodyModel | None = None,
-    library: MotionLibrary | None = None,
-    *,
-    rate: float = RATE,
-    height: float = 0.0,
-) -> Walk:
+    path: WalkingPath | WalkRoute, body: BodyModel | None = None, library: MotionLibrary | None = None, *,
+    rate: float = RATE, height: float = 0.0,
+) -> Walk:  # fmt: skip
     """Walk along a path, from standing to standing.
 
     The root follows the path exactly, with the swaying of the gait around it; the path's velocities are the
     directives. Feet have one place on the floor in every stance. After the path's end the last step
-    is finished and the body stands.
+    is finished and the body stands. InputError if the path is none, failed, or the rate is not usable.
 
     Args:
         path: A result of :func:`manikin.walking.walking_path` or :func:`manikin.walking.walking_route`.
@@ -292,9 +281,6 @@ def walk_along(
         library: Cycles; those that come with this package if omitted.
         rate: Frames per second [Hz], 20 to 1000.
         height: Height of the floor [m].
-
-    Raises:
-        InputError: If the path is none, failed, or the rate is not usable.
     """
     if not isinstance(path, WalkingPath | WalkRoute):
         raise InputError(f"path to walk is a {type(path).__name__}; valid: a WalkingPath or a WalkRoute")

@@ -86,11 +86,9 @@ ACKNOWLEDGEMENTS = {
 }
 """Sources by the beginning of a recording's folder."""
 
-NOT_CLOSED = np.deg2rad(15.0)
-"""Root mean square difference of the hinges between both ends of a cycle; more is no cycle [rad]."""
-
-MOST_SLIDE = 0.3
-"""A cycle in which a standing foot slides by more has its landings or toe-offs detected wrongly [m]."""
+NOT_CLOSED, MOST_SLIDE = np.deg2rad(15.0), 0.3
+"""Root mean square difference of the hinges between both ends of a cycle; more is no cycle [rad]. Slide of a
+standing foot; more is a landing or toe-off detected wrongly [m]."""
 
 NEAR = 0.05
 """Cycles nearer to another one than this are left out [m/s]; people differ, and blends would flicker."""
@@ -127,8 +125,7 @@ def build_library(
     """
     body, windows = reference_body(), read_windows(folder)
     person = cache(lambda file: _person(body, folder / "mocap" / file))
-    cycles: list[tuple[Window, MotionLibrary]] = []
-    without: list[Window] = []
+    cycles, without = list[tuple[Window, MotionLibrary]](), list[Window]()
     for number, window in enumerate(windows):
         report(number / len(windows), window.file)
         cycle = _cycle(body, window, *person(window.file))

@@ -28,10 +28,8 @@ as yaw [rad]. The angles of the hinges follow."""
 
 _ROOT_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
-REFERENCE_STATURE = 1.75
-"""Stature of the reference body [m]."""
-
-STAND = "stand"
+REFERENCE_STATURE, STAND = 1.75, "stand"
+"""Stature of the reference body [m], and class of the cycle without steps."""
 
 
 @cache

@@ -25,10 +25,8 @@ class FootState:
 
     Attributes:
         pose: (3,) x, y [m], yaw [rad] where it stands.
-        offset: (3,) correction of the last instant.
-        before: (3,) correction at the begin of the swing.
-        after: (3,) correction aimed at for the end of the swing.
-        standing: Whether it stood.
+        offset: (3,) correction of the last instant, ``before`` and ``after`` are those at the begin and the
+            end of the swing.
     """
 
     pose: FloatArray
@@ -59,12 +57,10 @@ class Sole:
     """Points of either sole of a human in the foot's frame.
 
     Attributes:
-        centre: Middle of the whole sole, ahead of the ankle [m].
-        heel: Rear end, ahead of the ankle (negative) [m].
-        ball: Line of the toe hinges, ahead of the ankle [m].
+        centre: Middle of the whole sole, ahead of the ankle [m]; so are ``heel``, its rear end (negative),
+            and ``ball``, the line of the toe hinges.
         toes: Distance from there to the front end [m].
         depth: Depth below the ankle [m].
-        half_width: Half of the width [m].
     """
 
     centre: float
@@ -145,24 +141,17 @@ def _edge(sole: Sole, pitch: FloatArray, roll: FloatArray) -> FloatArray:
 FLAT = np.deg2rad(4.0)
 """A standing foot pitched by less than this is put flat, more or less [rad]."""
 
-LEAVING, LANDING = 0.2, 0.2
-"""Shares of the swing in which a foot leaves, and in which it reaches, the floor."""
-
-LIFT = 0.15
-"""Least lift of a foot, as a share of the distance by which its step is corrected [-]."""
+LEAVING, LANDING, LIFT = 0.2, 0.2, 0.15
+"""Shares of the swing in which a foot leaves, and in which it reaches, the floor; least lift of a foot, as a
+share of the distance by which its step is corrected [-]."""
 
 STRAIGHTENING = 2.5
 """Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
 they must, faster than toes can move."""
 
-HEEL_UP = np.deg2rad(20.0)
-"""A standing foot with its heel up by this rolls on for its leg, with less heel the less so [rad]."""
-
-OFF_FLOOR = 0.05
-"""A foot higher than this does not roll on [m]."""
-
-MOST_HEEL = np.deg2rad(20.0)
-"""Largest pitch by which it rolls on [rad]."""
+HEEL_UP, MOST_HEEL, OFF_FLOOR = np.deg2rad(20.0), np.deg2rad(20.0), 0.05
+"""A standing foot with its heel up by the first rolls on for its leg, with less heel the less so, by the
+second at most [rad]; one that is higher than the third does not [m]."""
 
 _YIELDING = ("hip_rotation", "ankle_dorsiflexion", "ankle_inversion")
 

@@ -39,8 +39,7 @@ class WordGrid:
     """Places of the goals of every slice; those of the thesis by default ([Truong2010]_ 3.3).
 
     Attributes:
-        x: Smallest and largest x, to the right of the start [m].
-        y: Smallest and largest y, ahead of the start [m].
+        x: Smallest and largest x, to the right of the start [m]; ``y`` is ahead of it.
         step: Distance between neighbours [m].
     """
 
@@ -93,14 +92,11 @@ class WordGrid:
 
 THESIS_GRID = WordGrid()
 
-SAME_COST = 1e-9
-"""Share of the cost up to which two paths cost the same."""
+SAME_COST, _TWO_BRANCHES = 1e-9, 1e-6
+"""Shares of the cost up to which two paths cost the same, and by which a branch must be the costlier one at
+the other's goal."""
 
-_TWO_BRANCHES = 1e-6
-"""Share of the cost by which a branch must be the costlier one at the other's goal."""
-
-_STEPS = 8
-_BISECTIONS = 60
+_STEPS, _BISECTIONS = 8, 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,8 +260,7 @@ def solve_slice(heading_deg: float, grid: WordGrid = THESIS_GRID) -> WordSlice:
 
 def _from_neighbours(grid: WordGrid, turned: FloatArray, best: Minima) -> tuple[FloatArray, Minima]:
     """Minima improved by bending the paths of neighbours."""
-    turned, shapes = turned.copy(), best.shapes.copy()
-    cost, length = best.cost.copy(), best.length.copy()
+    turned, shapes, cost, length = (x.copy() for x in (turned, best.shapes, best.cost, best.length))
     index = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape)
     pairs = [(index[1:], index[:-1]), (index[:-1], index[1:])]
     pairs += [(index[:, 1:], index[:, :-1]), (index[:, :-1], index[:, 1:])]

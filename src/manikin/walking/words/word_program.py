@@ -125,10 +125,8 @@ def minimise(goals: Goals, shapes: FloatArray) -> Minima:
     shapes = shapes.copy()
     shapes[:, 0] = -6.0 * goals.turn
     cost, length = np.full(len(goals), np.inf), np.full(len(goals), np.nan)
-    active = np.arange(len(goals))
-    damping = np.full(len(goals), 1e-2)
-    values = _values(goals, shapes)
-    active, values = active[values.valid], _only(values, values.valid)
+    damping, values = np.full(len(goals), 1e-2), _values(goals, shapes)
+    active, values = np.flatnonzero(values.valid), _only(values, values.valid)
     for _ in range(120):
         if not len(active):
             break
@@ -162,19 +160,14 @@ def _integrals(goals: Goals, b: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _values(goals: Goals, b: FloatArray) -> _Values:
-    turned, _ = quadrature(b.shape[1])
-    cosine, sine = _integrals(goals, b)
-    true = cosine.sum(axis=1)
-    p, q = np.maximum(true, _LEAST), sine.sum(axis=1)
-    free = turned[:, 1:]
-    p_gradient, q_gradient = -sine @ free, cosine @ free
-    weights = squares(b.shape[1])
-    effort = (b**2) @ weights
+    (cosine, sine), free = _integrals(goals, b), quadrature(b.shape[1])[0][:, 1:]
+    true, weights = cosine.sum(axis=1), squares(b.shape[1])
+    p, effort = np.maximum(true, _LEAST), (b**2) @ weights
     cubed = (p / goals.distance) ** 3
     cost = goals.distance / p + cubed * effort
     slope = -goals.distance / p**2 + 3.0 * cubed / p * effort
-    gradient = slope[:, None] * p_gradient + 2.0 * cubed[:, None] * weights[1:] * b[:, 1:]
-    return _Values(cost, q, gradient, q_gradient, true > _LEAST)
+    gradient = slope[:, None] * (-sine @ free) + 2.0 * cubed[:, None] * weights[1:] * b[:, 1:]
+    return _Values(cost, sine.sum(axis=1), gradient, cosine @ free, true > _LEAST)
 
 
 def _step(

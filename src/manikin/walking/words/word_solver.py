@@ -8,14 +8,12 @@ length,
 The thesis ([Truong2010]_ 3.3) speaks of "the minimization of the curvature derivative" and of clothoid arcs
 with :math:`u_2 = \pm c`. Without a price of the length there is no optimum: loops as large as one likes lead
 to any goal, and scaling a loop by :math:`\lambda` divides :math:`\int \dot\kappa^2` by :math:`\lambda^3` and
-:math:`\max |\dot\kappa|` by :math:`\lambda^2`. The least :math:`c` therefore is none, and where a path exists
-that no small change improves, it spells IDI or DID only (:mod:`manikin.walking.words.word_solver`). The norm
-of the control is the criterion of the work that the thesis summarises there [Arechavaleta 2008b]; with it an
-optimum exists and spells the six words. Its arcs are no exact clothoids: as in the thesis, words are read off
-the local extrema of the curvature. Both controls weigh the same in metres, which is a choice of a length
-scale.
-
-Headings are the same modulo :math:`2 \pi`. Considered are all turns of at most one whole turn to either side.
+:math:`\max |\dot\kappa|` by :math:`\lambda^2`. So there is no least :math:`c`, and where a path exists that
+no small change improves, it spells IDI or DID only. The norm of the control is the criterion of the work that
+the thesis summarises there [Arechavaleta 2008b]; with it an optimum exists and spells the six words. Its arcs
+are no exact clothoids: as in the thesis, words are read off the local extrema of the curvature. Both controls
+weigh the same in metres, a choice of a length scale. All turns of at most one whole turn to either side are
+considered.
 
 :func:`residuals` measures without the solver whether paths meet their goals and the necessary conditions of
 optimality. For :math:`\int (1 + u_2^2)` Pontryagin's principle says :math:`u_2 = p_\kappa / 2`,
@@ -142,9 +140,8 @@ class WordResiduals:
     """Largest violations of each of k paths.
 
     Attributes:
-        position: (k,) distance from the goal of the system (3.2) integrated densely under u2 [m].
-        heading: (k,) the same of the heading [rad].
-        curvature: (k,) the same of the curvature, 0 at the goal [1/m].
+        position: (k,) distance from the goal of the system (3.2) integrated densely under u2 [m]; the same of
+            ``heading`` [rad] and ``curvature`` [1/m], 0 at the goal.
         adjoint: (k,) largest difference of u2 and the adjoint's p_kappa / 2, as a share of the largest u2 (at
             least 0.01 / m^2) [-].
         hamiltonian: (k,) largest Hamiltonian; the cost's rate is at least 1 [-].
@@ -243,14 +240,12 @@ def cheapest(
 
     A guess has the largest headings of the free polynomials, in order [rad].
     """
-    size = len(goals)
-    turned, shapes = goals.copy(), np.zeros((size, DEGREE))
-    cost, length = np.full(size, np.inf), np.full(size, np.nan)
+    turned, shapes = goals.copy(), np.zeros((len(goals), DEGREE))
+    cost, length = np.full(len(goals), np.inf), np.full(len(goals), np.nan)
     for some, ends in _turns(start, goals):
         asked = Goals.of(start, ends)
         for guess in amplitudes:
-            shape = np.zeros(DEGREE)
-            free = slice(1, 1 + len(guess))
+            shape, free = np.zeros(DEGREE), slice(1, 1 + len(guess))
             shape[free] = np.asarray(guess) / np.abs(quadrature()[0]).max(axis=0)[free]
             minima = minimise(asked, np.tile(shape, (len(ends), 1)))
             better = minima.cost < cost[some] - _CHEAPER * minima.length
