@@ -223,9 +223,10 @@ def _real_path(location: tuple[str | int, ...], data: Any) -> KeyPath:
     """Keep the parts of pydantic's location that are in the file; it adds names of union members."""
     path: list[str | int] = []
     for part in location:
-        length = len(data) if isinstance(data, list | tuple) else 0
-        if part in (data if isinstance(data, Mapping) else range(length)):
-            data = data[part]
+        inside: Any = data
+        length = len(inside) if isinstance(inside, list | tuple) else 0
+        if part in (inside if isinstance(inside, Mapping) else range(length)):
+            data = inside[part]
             path.append(part)
     return tuple(path)
 

@@ -154,7 +154,8 @@ def close_loop(
     held, factors = len(wanted), np.linalg.qr(jacobian.T, mode="complete")
     drift = factors.Q[:, :held] @ np.linalg.solve(factors.R[:held].T, wanted)
     basis = factors.Q[:, held:]
-    rate, offset = state.centroidal_map @ basis, state.centroidal_map @ drift + state.momentum_drift
+    rate: FloatArray = state.centroidal_map @ basis
+    offset: FloatArray = state.centroidal_map @ drift + state.momentum_drift
     weight, push_force = np.array([0.0, 0.0, state.mass * GRAVITY]), push.wrench[:3]
     return ClosedLoop(
         LinearMap(basis, drift), LinearMap(basis[6:], drift[6:]),

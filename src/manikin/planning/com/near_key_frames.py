@@ -103,7 +103,8 @@ class NearProgramme:
 
     def free(self, shares: FloatArray, wanted: FloatArray) -> FloatArray:
         """(n, 3 or 6) control points, of CoM and turning, near (f, 3) ``wanted`` [m], unbalanced."""
-        return np.hstack([np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)])
+        points: list[FloatArray] = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
+        return np.hstack(points)
 
     def solve(
         self, shares: FloatArray, wanted: FloatArray, margin: FloatArray, near: FloatArray
@@ -138,7 +139,7 @@ class NearProgramme:
     def _balance(self, margin: FloatArray, near: FloatArray) -> tuple[Any, FloatArray]:
         """Rows and bounds of unit length; ``p x b`` is ``p0 x b + p x b0 - p0 x b0`` with ``b = a - g``."""
         blocks, bounds, gravity = [], [], GRAVITY_VECTOR
-        for row, phase in enumerate(self.phases):
+        for row, phase in enumerate(self.phases.tolist()):
             polytope, place, change = self.polytopes[phase], self.position[row], self.acceleration[row]
             force, moment = self.mass * polytope.H[:, :3], self.mass * polytope.H[:, 3:]
             p, b = place @ near[:, :3] - self.reference, change @ near[:, :3] - gravity

@@ -328,4 +328,4 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
         quadratic, linear, rows, None, facets.base,
         (np.where(np.isinf(bound), 0.0, -bound), bound), tolerance=1e-8,
     )  # fmt: skip
-    return solution.x[: 3 * count].reshape(3, count).T if solution.solved else None
+    return solution.x[: 3 * count].reshape(3, count).T if solution.x is not None and solution.solved else None

@@ -118,9 +118,10 @@ def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
 
     both = ("kneewidth", "anklewidth", "elbowwidth", "shoulderoffset")
     knee, ankle, elbow, offset = (measure(unit, f"l{name}", f"r{name}") for name in both)
-    mass, stature = measure(1.0, "bodymass"), measure(unit, "height")
-    radius = measure(0.5 * unit, "markerdiameter")
-    return Subject(mass, stature, knee, ankle, elbow, offset, radius)
+    return Subject(
+        measure(1.0, "bodymass"), measure(unit, "height"), knee, ankle, elbow, offset,
+        measure(0.5 * unit, "markerdiameter"),
+    )  # fmt: skip
 
 
 def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:

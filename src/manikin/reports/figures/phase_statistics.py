@@ -44,8 +44,10 @@ def placements_figure(groups: Mapping[str, Sequence[SupportPlacement]]) -> Figur
         axes.set_aspect("equal", adjustable="box", anchor="W")
         axes.plot(0.0, 0.0, "+", color=COLOURS["ink"], markersize=10, zorder=2)
         _draw(axes, result, colours)
-    look = {"marker": "o", "linestyle": ""}
-    keys = [Line2D([], [], color=colour, label=readable(name), **look) for name, colour in colours.items()]
+    keys = [
+        Line2D([], [], color=colour, label=readable(name), marker="o", linestyle="")
+        for name, colour in colours.items()
+    ]
     style.legend_in_title(figure, handles=keys)
     return figure
 

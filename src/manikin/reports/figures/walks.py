@@ -114,8 +114,10 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
             (goals[wholly], KINDS["holonomic"], KINDS["holonomic"], "holonomic from start to goal"),
             (goals[~wholly], KINDS["nonholonomic"], "none", "with a nonholonomic part"),
         ):
-            look = {"markeredgecolor": edge, "markerfacecolor": face, "linestyle": "none", "label": label}
-            axes.plot(-chosen[:, 1], chosen[:, 0], "o", markersize=4.5, **look)
+            axes.plot(
+                -chosen[:, 1], chosen[:, 0], "o", markersize=4.5, markeredgecolor=edge, markerfacecolor=face,
+                label=label,
+            )  # fmt: skip
         radii = {"radius of the zone": (zone.radius, "-"), "of the thesis": (THESIS_RADIUS, "--")}
         for label, (radius, line) in radii.items():
             x, y = radius * np.cos(circle), radius * np.sin(circle)

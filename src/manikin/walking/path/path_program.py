@@ -191,7 +191,7 @@ def _distance(x: ca.SX, y: ca.SX, corners: ca.SX) -> ca.SX:
         squares.append((dx - along * ex) ** 2 + (dy - along * ey) ** 2)
         depth.append((dx * ey - dy * ex) / ca.sqrt(ex**2 + ey**2))
     outside, inside = reduce(ca.fmin, squares), reduce(ca.fmax, depth)
-    return ca.if_else(inside < 0.0, inside, ca.sqrt(outside + 1e-12))
+    return ca.SX(ca.if_else(inside < 0.0, inside, ca.sqrt(outside + 1e-12)))
 
 
 @dataclass(frozen=True, eq=False)
