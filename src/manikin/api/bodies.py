@@ -115,7 +115,8 @@ def sole(
     Args:
         position: (2,) or (3,) middle of the sole in the world [m]; z is 0 when left out.
         yaw: Direction of the toes, counter-clockwise from x [rad].
-        length, width: [m].
+        length: [m].
+        width: [m].
         friction: Coulomb coefficient.
         options: Further ones of :func:`manikin.contact.sole`.
     """

@@ -200,7 +200,8 @@ def push_task(
         force: [N].
         direction: Of the force, counter-clockwise from the body's forward axis [deg].
         duration: Of the push [s].
-        body, recovery: Sections of the scenario; their defaults when omitted.
+        body: Section of the scenario; its defaults when omitted.
+        recovery: The same.
         where: What messages call the values, by key.
     """
     from manikin.simulation.push_search import PUSH_BEGINS, run_duration  # loads the engine

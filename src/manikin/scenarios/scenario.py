@@ -133,7 +133,8 @@ class Scenario(Displayed, ScenarioValues):
         """The same scenario at another place in the world, with its coordinates there.
 
         Args:
-            x, y: Where the origin of this scenario comes to lie [m].
+            x: Where the origin of this scenario comes to lie [m].
+            y: The same [m].
             yaw_deg: Turn about the vertical through it, counter-clockwise [deg].
 
         Raises:

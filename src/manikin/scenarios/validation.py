@@ -223,9 +223,9 @@ def _real_path(location: tuple[str | int, ...], data: Any) -> KeyPath:
     """Keep the parts of pydantic's location that are in the file; it adds names of union members."""
     path: list[str | int] = []
     for part in location:
-        inside: Any = data
-        length = len(inside) if isinstance(inside, list | tuple) else 0
-        if part in (inside if isinstance(inside, Mapping) else range(length)):
+        listed = data if isinstance(data, list | tuple) else ()
+        inside = data if isinstance(data, Mapping) else dict(enumerate(listed))
+        if part in inside:
             data = inside[part]
             path.append(part)
     return tuple(path)

@@ -152,7 +152,8 @@ def close_loop(
     jacobian = np.concatenate([frame.jacobian for frame in frames])
     wanted = np.concatenate([-frame.drift - settling * frame.twist for frame in frames])
     held, factors = len(wanted), np.linalg.qr(jacobian.T, mode="complete")
-    drift = factors.Q[:, :held] @ np.linalg.solve(factors.R[:held].T, wanted)
+    unmoved: FloatArray = np.asarray(np.linalg.solve(factors.R[:held].T, wanted), dtype=np.float64)
+    drift: FloatArray = factors.Q[:, :held] @ unmoved
     basis = factors.Q[:, held:]
     rate: FloatArray = state.centroidal_map @ basis
     offset: FloatArray = state.centroidal_map @ drift + state.momentum_drift

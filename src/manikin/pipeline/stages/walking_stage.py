@@ -210,7 +210,8 @@ def plan_walks(
     """Find a route for every walker, each around those before.
 
     Args:
-        start, goal: (3,) x, y [m], heading [rad] of the body at both ends; those of the task if omitted.
+        start: (3,) x, y [m], heading [rad] of the body; that of the task if omitted.
+        goal: The same at the end.
 
     Raises:
         ScenarioError: If a route is impossible: no floor, a start in an obstacle, a useless waypoint.

@@ -103,8 +103,8 @@ class NearProgramme:
 
     def free(self, shares: FloatArray, wanted: FloatArray) -> FloatArray:
         """(n, 3 or 6) control points, of CoM and turning, near (f, 3) ``wanted`` [m], unbalanced."""
-        points: list[FloatArray] = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
-        return np.hstack(points)
+        points = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
+        return np.asarray(np.hstack(points), dtype=np.float64)
 
     def solve(
         self, shares: FloatArray, wanted: FloatArray, margin: FloatArray, near: FloatArray

@@ -312,7 +312,7 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
 
     None where the solver finds none, as for postures that jump.
     """
-    count = spline.values.shape[1]
+    count = np.shape(spline.values)[1]
     cost = spline.values.T @ spline.values / PLACE_ERROR**2
     cost = cost + spline.second.T @ spline.second / ACCELERATION_ERROR**2
     aside = sparse.hstack(axes.taken(spline)).tocsr()
@@ -328,4 +328,4 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
         quadratic, linear, rows, None, facets.base,
         (np.where(np.isinf(bound), 0.0, -bound), bound), tolerance=1e-8,
     )  # fmt: skip
-    return solution.x[: 3 * count].reshape(3, count).T if solution.x is not None and solution.solved else None
+    return solution.x[: 3 * count].reshape(3, count).T if solution.solved else None

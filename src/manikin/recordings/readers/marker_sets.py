@@ -79,7 +79,7 @@ def marker_set(recording: MarkerRecording) -> MarkerSet:
     computed = _computed(set(plain.values()))
     roles: dict[str, str] = {}
     segments: dict[str, str] = {}
-    for (name, letters), seen in zip(plain.items(), np.any(recording.seen, axis=0).tolist(), strict=True):
+    for (name, letters), seen in zip(plain.items(), recording.seen.any(axis=0).tolist(), strict=True):
         if letters not in computed and seen and (found := next(_places(name, letters), None)):
             role, segments[name] = found
             if role:

@@ -96,7 +96,8 @@ def frame_panels(
     """Set ticks and limits of panels side by side in one pair of axes, to one scale.
 
     Args:
-        across, upwards: Both ends of the first panel, and of all of them [m].
+        across: Both ends of the first panel [m].
+        upwards: Both ends of all of them [m].
         offsets: Where the zero of each panel is drawn [m].
     """
     left, right = across
