@@ -224,7 +224,7 @@ def _real_path(location: tuple[str | int, ...], data: Any) -> KeyPath:
     path: list[str | int] = []
     for part in location:
         listed = data if isinstance(data, list | tuple) else ()
-        inside = data if isinstance(data, Mapping) else dict(enumerate(listed))
+        inside: Mapping[Any, Any] = data if isinstance(data, Mapping) else dict(enumerate(listed))
         if part in inside:
             data = inside[part]
             path.append(part)

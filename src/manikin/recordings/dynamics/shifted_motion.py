@@ -312,7 +312,7 @@ def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
 
     None where the solver finds none, as for postures that jump.
     """
-    count = np.shape(spline.values)[1]
+    count = (spline.values.shape or (0, 0))[1]
     cost = spline.values.T @ spline.values / PLACE_ERROR**2
     cost = cost + spline.second.T @ spline.second / ACCELERATION_ERROR**2
     aside = sparse.hstack(axes.taken(spline)).tocsr()

@@ -79,8 +79,12 @@ def marker_set(recording: MarkerRecording) -> MarkerSet:
     computed = _computed(set(plain.values()))
     roles: dict[str, str] = {}
     segments: dict[str, str] = {}
-    for (name, letters), seen in zip(plain.items(), recording.seen.any(axis=0).tolist(), strict=True):
-        if letters not in computed and seen and (found := next(_places(name, letters), None)):
+    for number, (name, letters) in enumerate(plain.items()):
+        if (
+            letters not in computed
+            and recording.seen[:, number].any()
+            and (found := next(_places(name, letters), None))
+        ):
             role, segments[name] = found
             if role:
                 roles.setdefault(role, name)
