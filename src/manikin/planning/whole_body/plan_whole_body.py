@@ -65,6 +65,9 @@ again."""
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
 
+STRENGTH_STEP = 0.05
+"""By how much less of the strength a fit may use where the one before was too strong all the same."""
+
 PENALTIES = MappingProxyType({
     "max_meeting_error_m": ("position",),
     "min_clearance_m": ("clearance",),
@@ -341,6 +344,8 @@ class _Planner:
                 broken |= {"max_missing_wrench"}
         scales = self.job.updated(last.scales, broken, narrow=number > 0)
         if inexact or weak:
+            if weak and last.goal.forces is not None:  # the forces held told less of the torques than they are
+                scales = replace(scales, strength_share=scales.strength_share - STRENGTH_STEP)
             goal = replace(goal, forces=last.motion) if weak else goal
             return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
