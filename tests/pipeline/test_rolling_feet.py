@@ -19,6 +19,7 @@ def failed(scenario, stage="wholebody"):
     context = RunContext.of(scenario)
     report = Report(context, None, None, time.perf_counter())
     report.fail(stage, "left_foot misses its position", 1.0, "phase 2")
+    report.summary["centroidal"] = {"duration_s": 5.0}
     return context, report
 
 
@@ -37,7 +38,7 @@ def test_feet_roll_where_the_body_does_not_follow(stage):
     flat = [{c.effector: tuple(c.position) for c in phase.stance} for phase in context.problem.sequence]
     assert [place for place, last in zip(places, [None, *places], strict=False) if place != last] == flat
     assert with_rolling_feet(rolling, report) is None  # nothing has failed since
-    report.fail("wholebody", "again")
+    report.fail("wholebody", "again", 1.0)
     assert with_rolling_feet(rolling, report) is None  # and once is enough
 
 
@@ -65,3 +66,11 @@ def test_the_summary_says_how_feet_stand_and_why():
     block = report.summary["centroidal"]
     assert centroidal_summary(rolling)["feet"] == block["feet"] == "rolling"
     assert block["on_flat_feet"]["reason"] == "left_foot misses its position"
+
+
+@pytest.mark.parametrize("time_s", [0.0, 5.0, 5.5])
+def test_at_the_ends_of_a_motion_both_feet_are_flat(time_s):
+    """Rolling changes no stance there; after the end, at 5 s, the body only stands."""
+    context, report = failed(load_scenario("platform"), "execution")
+    report.fail("execution", "fell", time_s)
+    assert with_rolling_feet(context, report) is None

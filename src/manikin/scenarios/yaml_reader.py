@@ -24,6 +24,7 @@ MAX_ENTRIES = 100_000
 """Most keys and list entries of a file, counted after its aliases are written out."""
 MAX_DEPTH = 100
 """Most mappings and lists inside each other; scenarios have fewer than ten."""
+TOO_DEEP = f"is nested too deeply; valid: at most {MAX_DEPTH} levels"
 
 _REPLACED = tuple(f":{kind}" for kind in ("int", "float", "bool", "timestamp"))
 
@@ -92,6 +93,8 @@ def _parse(text: str, source: str, valid: str) -> tuple[Any, dict[KeyPath, int]]
             line = f":{mark.line + 1}" if mark is not None else ""
             problem = str(error.problem or error.context)
         problem = " ".join(problem.split())
+        if "nesting depth" in problem:  # newer parsers have a limit of their own
+            raise ScenarioError(f"{source}{line}: {TOO_DEEP}") from None
         raise ScenarioError(f"{source}{line}: is not valid YAML ({problem}); valid: {valid}") from None
     return data, lines
 
@@ -105,7 +108,7 @@ def _check_depth(text: str, source: str) -> None:
             if depth > MAX_DEPTH:
                 mark = event.start_mark
                 place = source if mark is None else f"{source}:{mark.line + 1}"
-                raise ScenarioError(f"{place}: is nested too deeply; valid: at most {MAX_DEPTH} levels")
+                raise ScenarioError(f"{place}: {TOO_DEEP}")
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
 

@@ -154,7 +154,7 @@ def with_rolling_feet(context: RunContext, report: Report) -> RunContext | None:
 
     A foot that is about to leave, with the legs far apart, stands on its toes then, as a person's does.
     None where the file says how feet stand, where contacts were searched or recorded, under a push, in an
-    act, and where a phase has ``com_near``.
+    act, where a phase has ``com_near``, and where the body fails at an end of the motion, with both feet flat.
     """
     file, failure = context.scenario.file, report.failure
     if failure is None or failure.stage not in ("wholebody", "execution") or file.supports is None:
@@ -164,6 +164,8 @@ def with_rolling_feet(context: RunContext, report: Report) -> RunContext | None:
     if context.plan is not None or context.scenario.refines or isinstance(context.problem, KeyframeProblem):
         return None
     if file.supports.foot is not None or any(phase.com_near is not None for phase in file.supports.phases):
+        return None
+    if not 0.0 < failure.time_s < (report.summary["centroidal"]["duration_s"] or 0.0):
         return None
     report.try_again()
     return context.with_supports(context.scenario.with_overrides(["supports.foot=rolling"]))
