@@ -154,7 +154,7 @@ def with_rolling_feet(context: RunContext, report: Report) -> RunContext | None:
 
     A foot that is about to leave, with the legs far apart, stands on its toes then, as a person's does.
     None where the file says how feet stand, where contacts were searched or recorded, under a push, in an
-    act, where a phase has ``com_near``, and where the body fails at an end of the motion, with both feet flat.
+    act, where a phase has ``com_near``, and where the body fails at an end of the motion, on flat feet.
     """
     file, failure = context.scenario.file, report.failure
     if failure is None or failure.stage not in ("wholebody", "execution") or file.supports is None:
