@@ -224,7 +224,8 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
             margin_space=options.margin_space, required_margin=values.required_margin,
             support_distance=values.max_support_distance,
             regions=_regions(values, sequence, geometric if upright else None),
-            geometric=geometric, key_planes=_key_planes(values), max_duration=options.max_duration_s,
+            geometric=geometric, key_planes=_key_planes(values), rests=_rests(values),
+            max_duration=options.max_duration_s,
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
             **{key: value for key, value in given.items() if value is not None},
         )  # fmt: skip
@@ -266,6 +267,12 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
     return tuple(planes)
 
 
+def _rests(values: ScenarioValues) -> tuple[FloatArray | None, ...]:
+    """CoM of the posture in which each phase before a seat begins, where the file has one."""
+    phases = values.explicit_supports().phases[: values.seated_from]
+    return tuple(None if phase.com_near is None else np.array(phase.com_near) for phase in phases)
+
+
 def _regions(
     values: ScenarioValues, sequence: StanceSequence, ceilings: Sequence[GeometricConstraint] | None
 ) -> tuple[ComRegion | None, ...]:
@@ -280,9 +287,7 @@ def _regions(
     if values.is_point_mass or values.max_support_distance is not None:
         return ()
     body = build_body(values)
-    reach, phases = ComReach.of(body), values.explicit_supports().phases
-    near = [None if phase.com_near is None else np.array(phase.com_near) for phase in phases]
-    known = [values.start_com, *near[1 : len(sequence)], values.goal_com]
+    reach, known = ComReach.of(body), [values.start_com, *_rests(values)[1:], values.goal_com]
     found = [reach.region(phase.stance.contacts) for phase in sequence]
     tops = [region.top for region in found]
     for number, phase in enumerate(sequence):

@@ -251,6 +251,8 @@ class CentroidalProblem:
             for none at all.
         key_planes: Planes behind which the CoM must be at single key instants, neither the first nor the
             last, where the CoM is given.
+        rests: CoM of a balanced posture at the beginning of each phase [m], None where none is known; empty
+            for none at all. Long motions on other contacts than feet may come to rest there.
         max_duration: Longest duration of the whole motion [s].
         weights: Weights of the objectives (5.28).
         samples: n_s, balance is imposed at j = 0 ... n_s in every phase.
@@ -272,6 +274,7 @@ class CentroidalProblem:
     regions: tuple[ComRegion | None, ...] = ()
     geometric: tuple[GeometricConstraint, ...] = ()
     key_planes: tuple[KeyPlane, ...] = ()
+    rests: tuple[FloatArray | None, ...] = ()
     max_duration: float | None = None
     weights: Weights = Weights()
     samples: int = 10

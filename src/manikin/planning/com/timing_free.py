@@ -7,13 +7,14 @@ import itertools
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 
 from manikin.balance import LimitingConstraint, WrenchPolytope
-from manikin.contact import ContactKind
+from manikin.contact import ContactKind, StanceSequence
 from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, clamped_knots, end_control_points, start_control_points
 from manikin.planning.com.com_certificate import Residuals, measure
@@ -24,6 +25,7 @@ from manikin.planning.com.feasibility import (
     Failure,
     Feasibility,
     assess_feasibility,
+    best_margin_at,
     least_friction,
     polytopes_of,
     with_firm_friction,
@@ -257,6 +259,8 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     feasibility = assess_feasibility(problem, polytopes)
     attempts: list[Attempt] = []
     failure, best = feasibility.failure, None
+    if failure is None and (keys := _resting_keys(problem, polytopes)):
+        return _in_parts(problem, polytopes, feasibility, keys)
     if failure is None:
         for style in guess_styles(problem):
             attempts.extend(_rounds(problem, polytopes, style))
@@ -271,6 +275,84 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
         best.trajectory if best is not None and failure is None else None,
         None if best is None else best.certificate,
         sum(attempt.iterations for attempt in attempts), len(attempts), time.perf_counter() - began,
+    )  # fmt: skip
+
+
+LONG = 24
+"""Phases of a motion on other contacts than feet from which on it is planned in parts."""
+
+PART = 4
+"""Fewest phases of a part."""
+
+CALM = 0.6
+"""Share of the margins of the rests of a part that its motion keeps."""
+
+
+def _resting_keys(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]) -> list[int]:
+    """Key instants that divide a long motion, at rests with the margin that is required; both ends too."""
+    count, keys = len(problem.sequence), [0]
+    if count < LONG or not problem.rests or PENDULUM in guess_styles(problem):
+        return []
+    for key in range(PART, count - PART + 1):
+        if key - keys[-1] >= PART and _rest_margin(problem, polytopes, key) >= problem.required_margin:
+            keys.append(key)
+    return [*keys, count] if len(keys) > 1 else []
+
+
+def _rest_margin(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], key: int) -> float:
+    """Margin at the rest where a phase begins, on its contacts and on those of the phase before."""
+    rest, both = problem.rests[key], polytopes[key - 1 : key + 1]
+    return -np.inf if rest is None else min(best_margin_at(one, problem, rest, np.zeros(3)) for one in both)
+
+
+def _in_parts(
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], feasibility: Feasibility, keys: list[int]
+) -> CentroidalResult:
+    """Plan a long motion in parts from rest to rest, and join them.
+
+    The programme grows faster than the motion, and one that lasts a minute does not end.
+    """
+    began, whole, parts = time.perf_counter(), None, []
+    for first, last in itertools.pairwise(keys):
+        parts.append(found := plan_com(_part(problem, polytopes, first, last)))
+        if found.trajectory is None:
+            break
+        whole = found.trajectory if whole is None else whole.followed_by(found.trajectory)
+    failure, certificate = parts[-1].failure, None
+    if failure is not None:
+        earlier = keys[len(parts) - 1]
+        failure = replace(failure, phase=None if failure.phase is None else failure.phase + earlier)
+    elif whole is not None:
+        certificate = measure(problem, whole, polytopes)
+        worst = certificate.largest
+        if not certificate.within():
+            failure = Failure(worst.requirement, f"{worst} in the joined parts", worst.phase, worst.time)
+    return CentroidalResult(
+        problem, tuple(polytopes), feasibility, failure, whole if failure is None else None, certificate,
+        sum(one.iterations for one in parts), sum(one.rounds for one in parts), time.perf_counter() - began,
+    )  # fmt: skip
+
+
+def _part(
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], first: int, last: int
+) -> CentroidalProblem:
+    """The phases from one key instant to another, at rest at those inside the motion.
+
+    Margin is required instead of wished for: no more is to be had than at the rests, whatever lies between.
+    """
+    count, still = len(problem.sequence), np.zeros(3)
+    margins = [_rest_margin(problem, polytopes, key) for key in range(max(first, 1), min(last + 1, count))]
+    calm = CALM * min((margin for margin in margins if margin > 0.0), default=0.0)
+    planes = [replace(one, key=one.key - first) for one in problem.key_planes if first < one.key < last]
+    ends: dict[str, Any] = {}
+    for key, end in ((first, "start"), (last, "goal")):
+        if 0 < key < count:
+            ends |= {f"{end}_com": problem.rests[key], f"{end}_velocity": still, f"{end}_acceleration": still}
+    return replace(
+        problem, sequence=StanceSequence(problem.sequence.phases[first:last]), rests=(),
+        regions=problem.regions[first:last], key_planes=tuple(planes),
+        required_margin=max(problem.required_margin, calm), weights=replace(problem.weights, margin=0.0),
+        **ends,
     )  # fmt: skip
 
 

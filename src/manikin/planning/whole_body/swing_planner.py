@@ -171,9 +171,24 @@ class FlightPlanner:
         self._touching = cache(partial(touch_pairs, body, scene))
 
     def flights(self) -> tuple[Swing, ...]:
-        """Every flight from a contact or to one; the trunk is not flown."""
-        swings = self.schedule.sequence.swings()
-        return tuple(swing for swing in swings if hangs(self._body, swing.effector))
+        """Every flight from a contact or to one; the trunk is not flown.
+
+        A foot whose knee carries in between is put away and reached with, on its own each.
+        """
+        found: list[Swing] = []
+        for swing in self.schedule.sequence.swings():
+            if hangs(self._body, swing.effector):
+                apart = swing.start and swing.end and self._carries_elsewhere(swing)
+                found += [replace(swing, end=None), replace(swing, start=None)] if apart else [swing]
+        return tuple(found)
+
+    def _carries_elsewhere(self, swing: Swing) -> bool:
+        """Whether another effector of the same limb is in contact during a flight."""
+        body, phases = self._body, self.schedule.sequence.phases[swing.first_phase : swing.last_phase + 1]
+        model, others = body.pinocchio, {name for phase in phases for name in phase.stance.effectors}
+        own = model.frames[body.effector_frame(swing.effector)].parentJoint
+        joints = [model.frames[body.effector_frame(name)].parentJoint for name in others if hangs(body, name)]
+        return any(own in model.supports[joint] or joint in model.supports[own] for joint in joints)
 
     def plan(self, swing: Swing) -> PlannedSwing:
         """Find a smooth curve, or else search one."""
