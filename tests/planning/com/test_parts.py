@@ -8,7 +8,7 @@ import pytest
 from manikin.contact import Phase, Stance, StanceSequence, point
 from manikin.planning.com import CentroidalProblem, plan_com, timing_free
 from manikin.planning.com.feasibility import Failure
-from manikin.planning.com.timing_free import LONG, PART
+from manikin.planning.com.timing_free import LONG
 
 LIMBS = {
     "left_fist": (0.5, 0.15),
@@ -71,7 +71,7 @@ def test_the_parts_meet_at_rest_where_a_posture_is_known(planned, problem):
         if np.abs(trajectory.velocity(instants[key])).max() < 1e-6
         and np.abs(trajectory.acceleration(instants[key])).max() < 1e-4
     ]  # fmt: skip
-    assert len(resting) >= len(problem.sequence) // (2 * PART)
+    assert len(resting) == len(problem.sequence) - 1
     for key in resting:
         np.testing.assert_allclose(trajectory.position(instants[key]), problem.rests[key], atol=1e-7)
 

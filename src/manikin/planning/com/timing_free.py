@@ -281,22 +281,17 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
 LONG = 24
 """Phases of a motion on other contacts than feet from which on it is planned in parts."""
 
-PART = 4
-"""Fewest phases of a part."""
-
 CALM = 0.6
 """Share of the margins of the rests of a part that its motion keeps."""
 
 
 def _resting_keys(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]) -> list[int]:
     """Key instants that divide a long motion, at rests with the margin that is required; both ends too."""
-    count, keys = len(problem.sequence), [0]
+    count, least = len(problem.sequence), problem.required_margin
     if count < LONG or not problem.rests or PENDULUM in guess_styles(problem):
         return []
-    for key in range(PART, count - PART + 1):
-        if key - keys[-1] >= PART and _rest_margin(problem, polytopes, key) >= problem.required_margin:
-            keys.append(key)
-    return [*keys, count] if len(keys) > 1 else []
+    inner = [key for key in range(1, count) if _rest_margin(problem, polytopes, key) >= least]
+    return [0, *inner, count] if inner else []
 
 
 def _rest_margin(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], key: int) -> float:
