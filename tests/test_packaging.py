@@ -1,10 +1,11 @@
-"""Every package that is imported is declared, where it is needed."""
+"""Every package that is imported is declared, where it is needed, and names tell things apart."""
 
 import ast
 import importlib.util
 import re
 import sys
 import tomllib
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,13 @@ def test_benchmarks_and_sweeps_know_the_package_as_it_is(path):
     spec = importlib.util.spec_from_file_location(f"benchmark_{path.stem}", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+
+
+def test_no_two_classes_have_one_name_and_no_file_name_is_used_more_than_twice():
+    """Who reads a name knows what it is; private classes included."""
+    files = sorted((ROOT / "src/manikin").rglob("*.py"))
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in files]
+    classes = Counter(node.name for tree in trees for node in tree.body if isinstance(node, ast.ClassDef))
+    assert [name for name, count in classes.items() if count > 1] == []
+    names = Counter(path.name for path in files if path.name != "__init__.py")
+    assert [name for name, count in names.items() if count > 2] == []

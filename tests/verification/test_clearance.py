@@ -8,7 +8,7 @@ from manikin.body import human
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene.mesh import Mesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
-from manikin.verification.clearance import BodyShapes
+from manikin.verification.clearance import BodySolids
 from manikin.verification.solids import REACH, Solid, segment_segment, segment_triangle, winding_numbers
 
 SHAPES = (
@@ -19,7 +19,7 @@ SHAPES = (
 
 @pytest.fixture(scope="module")
 def shapes():
-    return BodyShapes(human())
+    return BodySolids(human())
 
 
 @pytest.fixture(scope="module")

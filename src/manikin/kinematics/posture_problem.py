@@ -19,8 +19,8 @@ from manikin.kinematics.posture_terms import (
     EdgeTerm,
     Linearised,
     PositionTerm,
+    PostureRequirement,
     ReferenceTerm,
-    Requirement,
     RotationTerm,
     Term,
     UprightTerm,
@@ -184,9 +184,9 @@ class PostureProblem:
         finite_number(self.range_margin, "posture range_margin [rad]", at_least=0.0)
         finite_number(self.learnt_margin or 0.0, "posture learnt_margin [rad]", at_least=0.0)
 
-    def requirements(self) -> tuple[Requirement, ...]:
+    def requirements(self) -> tuple[PostureRequirement, ...]:
         """Terms that must be zero."""
-        terms: list[Requirement] = []
+        terms: list[PostureRequirement] = []
         for contact in self.contacts:
             if contact.part is not SolePart.FULL:
                 terms.append(self._edge(contact))

@@ -37,7 +37,7 @@ class Term(Protocol):
         ...
 
 
-class Requirement(Term, Protocol):
+class PostureRequirement(Term, Protocol):
     """A residual that is to be zero."""
 
     def describe(self, residual: FloatArray) -> str:
@@ -59,7 +59,7 @@ class PositionTerm:
         return Linearised(position - self.position, configuration.effector_jacobian(self.effector)[:3])
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Requirement`."""
+        """See :class:`PostureRequirement`."""
         return f"{self.kind} '{self.effector}' misses its position by {np.linalg.norm(residual):.4f} m"
 
 
@@ -80,7 +80,7 @@ class RotationTerm:
         return Linearised(pin.log3(error), derivative @ configuration.effector_jacobian(self.effector)[3:])
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Requirement`."""
+        """See :class:`PostureRequirement`."""
         angle = np.rad2deg(np.linalg.norm(residual))
         return f"{self.kind} '{self.effector}' misses its orientation by {angle:.2f} deg"
 
@@ -137,7 +137,7 @@ class EdgeTerm:
         return Linearised(np.array(residual), np.vstack(rows))
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Requirement`."""
+        """See :class:`PostureRequirement`."""
         gap, angle = np.linalg.norm(residual[:3]), np.rad2deg(np.linalg.norm(residual[3:]))
         return f"edge of contact '{self.effector}' misses its place by {gap:.4f} m and {angle:.2f} deg"
 
@@ -154,7 +154,7 @@ class ComTerm:
         return Linearised(configuration.com[axes] - self.position[axes], configuration.com_jacobian[axes])
 
     def describe(self, residual: FloatArray) -> str:
-        """See :class:`Requirement`."""
+        """See :class:`PostureRequirement`."""
         axes = [axis for axis, value in zip("xyz", self.position, strict=True) if np.isfinite(value)]
         parts = ", ".join(f"{axis} {value:+.4f}" for axis, value in zip(axes, residual, strict=True))
         return f"centre of mass misses by {np.linalg.norm(residual):.4f} m ({parts})"

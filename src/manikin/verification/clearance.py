@@ -66,7 +66,7 @@ class Placed:
         return self.position - half, self.position + half
 
 
-class BodyShapes:
+class BodySolids:
     """Collision shapes of a body, placed by the forward kinematics of its postures."""
 
     def __init__(self, body: BodyModel) -> None:

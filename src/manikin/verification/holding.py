@@ -13,7 +13,7 @@ from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import FloatArray, turned_root
 from manikin.runtime.requirement import Requirement, Worst
-from manikin.verification.clearance import BodyShapes, worst
+from manikin.verification.clearance import BodySolids, worst
 from manikin.verification.solids import REACH, Solid
 
 CONTACT_ERROR = 1e-3
@@ -104,7 +104,7 @@ class HoldingRows:
             self._range.take(float(np.rad2deg(max(beyond[most], 0.0))), where)
 
     def _clear(self, postures: Sequence[HeldPosture], touched: Mapping[int, frozenset[str]]) -> None:
-        shapes, every = BodyShapes(self._body), np.array([item.q for item in postures])
+        shapes, every = BodySolids(self._body), np.array([item.q for item in postures])
         for solid in self._solids:
             clearance = shapes.to_obstacle(every, solid)
             # Of all that may touch the obstacle in any way, the loosest holds.

@@ -26,7 +26,7 @@ from manikin.planning.contacts import (
 )
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
-from manikin.planning.push_pull.stance_heuristics import Footing, Loads, Mirrored, Natural
+from manikin.planning.push_pull.stance_heuristics import BraceFooting, Loads, Mirrored, Natural
 from manikin.scene import Scene, Surface
 
 ARMS = ("left_arm", "right_arm")
@@ -255,7 +255,7 @@ class _BraceSearch:
         first = self._generator.request(q, LEGS[0], task, order)
         if first.contact is None or first.q is None:
             return q, self._none(_FEET, first.message)
-        balance = Footing(loads, first.contact, natural, self._settings.margin, rules=self._rules)
+        balance = BraceFooting(loads, first.contact, natural, self._settings.margin, rules=self._rules)
         order = WeightedSum([(1.0, heuristic), (BALANCED, natural), (BALANCED, balance)])
         second = self._generator.request(first.q, LEGS[1], task, order)
         if second.contact is None or second.q is None:

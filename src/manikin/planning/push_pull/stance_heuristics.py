@@ -116,7 +116,7 @@ class Mirrored:
 
 
 @dataclass(frozen=True, eq=False)
-class Footing:
+class BraceFooting:
     """Balance of two natural feet under every load ([Tonneau2015]_ 7.5-7.6, forces on the hands): 1 or 0.
 
     Attributes:
