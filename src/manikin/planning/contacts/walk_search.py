@@ -67,7 +67,7 @@ class WalkSettings(Paces):
 
 
 @dataclass(frozen=True, eq=False)
-class _FeetPlace:
+class _Stand:
     """Two footholds, and the number of the trunk's posture between them."""
 
     left: Foothold
@@ -93,12 +93,12 @@ class BodyRoom:
         self._clearance = TrunkClearance(self._postures, scene)
         self._costs = self._postures.costs - 1.0
 
-    def cost(self, place: _FeetPlace) -> float:
+    def cost(self, place: _Stand) -> float:
         """Cost of a step in the cheapest posture that is free, beyond upright [s]; infinite without one."""
         number = int(self._clearance.cheapest(place.between[None])[0])
         return STEP * float(self._costs[number]) if number >= 0 else math.inf
 
-    def postures(self, places: Sequence[_FeetPlace]) -> NDArray[np.int64]:
+    def postures(self, places: Sequence[_Stand]) -> NDArray[np.int64]:
         """(k,) postures to take one after the other at places.
 
         Where no sequence of them passes, the cheapest that is free at each place, upright where none is.
@@ -107,7 +107,7 @@ class BodyRoom:
         along = self._clearance.along(between)
         return np.maximum(self._clearance.cheapest(between), 0) if along is None else along
 
-    def guide(self, place: _FeetPlace) -> FloatArray:
+    def guide(self, place: _Stand) -> FloatArray:
         """Guide of a posture there, on level ground: (7,) pose of the root upright, else the (nq,) whole.
 
         Upright arms hang as the manner wants; otherwise they have to be where the posture has room for them.
@@ -155,7 +155,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _best(self) -> list[int] | str:
         if not self._risen:
-            upright = self._room.guide(_FeetPlace(*feet_of(self.start.contacts)))
+            upright = self._room.guide(_Stand(*feet_of(self.start.contacts)))
             leaving = leave_seat(self.poser, self.start, frozenset(FEET), upright)
             if leaving.failure is not None:
                 self.reasons[leaving.failure] += 1
@@ -189,7 +189,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         names = [feet[k % 2] for k in range(len(way))]
         holds = [self.search.holds[number] for number in way]
         places = [
-            _FeetPlace(one, other) if name == FEET[0] else _FeetPlace(other, one)
+            _Stand(one, other) if name == FEET[0] else _Stand(other, one)
             for name, (one, other) in zip(names[:-1], pairwise(holds), strict=True)
         ]
         trunks = self._room.postures(places).tolist()
@@ -235,14 +235,14 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _pair_cost(self, left: Foothold, right: Foothold) -> float:
         """Cost of the trunk's room, and of hands where feet alone do not make the step."""
-        place = _FeetPlace(left, right)
+        place = _Stand(left, right)
         cost = self._room.cost(place)
         rise = abs(float(left.position[2] - right.position[2]))
         if rise <= HIGHEST * self._scale or not math.isfinite(cost):
             return cost
         return cost + HELD_COST if self._holds_near(place, place) else math.inf
 
-    def _holds_near(self, before: _FeetPlace, after: _FeetPlace) -> list[Contact]:
+    def _holds_near(self, before: _Stand, after: _Stand) -> list[Contact]:
         holds = before.left, before.right, after.left, after.right
         key = *map(id, holds), before.trunk, after.trunk
         if key not in self._near:
@@ -254,8 +254,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     def _moved(
         self,
         feet: Sequence[Contact],
-        before: _FeetPlace,
-        after: _FeetPlace,
+        before: _Stand,
+        after: _Stand,
         hands: dict[str, Contact],
         q: FloatArray,
     ) -> tuple[list[Stage], dict[str, Contact], FloatArray | None, Posed]:
@@ -272,8 +272,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     def _hands_before(
         self,
         feet: Sequence[Contact],
-        before: _FeetPlace,
-        after: _FeetPlace,
+        before: _Stand,
+        after: _Stand,
         hands: dict[str, Contact],
         q: FloatArray,
     ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:
@@ -304,9 +304,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             else:
                 yield stages, held, at
 
-    def _left(
-        self, contacts: Contacts, place: _FeetPlace, hands: Contacts, q: FloatArray
-    ) -> list[Stage] | None:
+    def _left(self, contacts: Contacts, place: _Stand, hands: Contacts, q: FloatArray) -> list[Stage] | None:
         """Stages in which hands leave one after the other; None where they cannot."""
         held, stages = dict(contacts), list[Stage]()
         for hand in hands:
@@ -322,7 +320,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return Stage.of(self.poser.body, contacts, q, self.settings.reach_duration)
 
     def _step(
-        self, feet: Sequence[Contact], before: _FeetPlace, after: _FeetPlace, q: FloatArray, hands: Contacts
+        self, feet: Sequence[Contact], before: _Stand, after: _Stand, q: FloatArray, hands: Contacts
     ) -> tuple[FloatArray | None, Posed]:
         """Postures in which a foot leaves one place and lands on another, the other one stands."""
         leaving, standing, landing = feet
@@ -333,7 +331,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         landed = self._posed({**carrying, landing.effector: landing}, carrying, after, lifted.q)
         return lifted.q, replace(landed, reason=f"{landing.effector} cannot be put down: {landed.reason}")
 
-    def _posed(self, held: Contacts, carrying: Contacts, place: _FeetPlace, q: FloatArray) -> Posed:
+    def _posed(self, held: Contacts, carrying: Contacts, place: _Stand, q: FloatArray) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
         key = frozenset(held.values()), frozenset(carrying), place.trunk
         if key in self._postures:
