@@ -74,3 +74,17 @@ def test_at_the_ends_of_a_motion_both_feet_are_flat(time_s):
     context, report = failed(load_scenario("platform"), "execution")
     report.fail("execution", "fell", time_s)
     assert with_rolling_feet(context, report) is None
+
+
+@pytest.mark.parametrize(
+    ("stage", "told"), [("centroidal", "wholebody"), ("wholebody", "wholebody"), ("execution", "execution")]
+)
+def test_the_failure_of_whichever_came_farther_is_told(stage, told):
+    """That no CoM is found on rolling feet says nothing of why the body does not follow on flat ones."""
+    context, report = failed(load_scenario("platform"))
+    assert with_rolling_feet(context, report) is not None
+    report.fail(stage, "too small", 3.0, "phase 1")
+    report.prefer_earlier_failure()
+    assert report.failure.stage == told
+    assert ("left_foot misses its position" in report.failure.reason) == (stage == "centroidal")
+    assert "too small" in report.failure.reason

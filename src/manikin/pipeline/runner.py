@@ -99,6 +99,7 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     result, schedule = planned(with_contacts, report, requirements)
     if (rolling := with_rolling_feet(with_contacts, report)) is not None:
         result, schedule = planned(rolling, report, requirements)
+        report.prefer_earlier_failure()
     for _ in range(1, context.scenario.contacts.attempts):
         phase = failed_phase(report.failure, schedule)
         again = None if phase is None else plan_contacts_again(with_contacts, report, phase)

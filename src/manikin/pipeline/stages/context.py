@@ -266,6 +266,14 @@ class Report:
         for stage in ("centroidal", "wholebody", "act", "execution"):
             self.summary[stage] = None
 
+    def prefer_earlier_failure(self) -> None:
+        """Tell the failure before the last beginning, where the run has not come as far since."""
+        now, before = self.failure, self.refused[-1]
+        order = ("contacts", "centroidal", "wholebody", "act", "execution")
+        if now is not None and order.index(now.stage) < order.index(before["stage"]):
+            reason = f"{before['reason']}; tried again: {now.reason}"
+            self.failure = StageFailure(before["stage"], reason, before["time_s"], before["where"])
+
     def require(self, stage: str, table: RequirementTable) -> None:
         """Take the requirements of a stage's result into the summary, in place of earlier ones."""
         self._tables[stage] = table

@@ -86,11 +86,6 @@ def plan_guide(
             loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
             retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
             result = retry if retry.succeeded else result
-        if not result.succeeded:  # one after the other, postures may have left the way
-            other = generate_posture(
-                replace(problem, reference=reference[k]), reference[k], settings=settings
-            )
-            result = other if other.succeeded else result
         if not result.succeeded:
             failures.append((instant, result.failure or "posture not found"))
         q = result.q
