@@ -47,8 +47,9 @@ def walking_supports(footprints: Footprints, scenario: Scenario) -> Scenario:
     """A scenario in which the body walks on given footprints, from standing to standing on a level floor.
 
     Friction, soles and force caps are those of the scenario's supports where it has some; its supports, task,
-    constraints on the centre of mass and options of the planner are replaced. The centre of mass starts and
-    ends above the middle between the feet; durations are bounded by those of the walk, from below only.
+    constraints on the centre of mass and options of the planner, but the friction model, are replaced. The
+    centre of mass starts and ends above the middle between the feet; durations are bounded by those of the
+    walk, from below only.
     InputError if the footprints begin and end at different heights.
     """
     first, last = _middle(footprints.first()), _middle(footprints.last())
@@ -67,7 +68,11 @@ def walking_supports(footprints: Footprints, scenario: Scenario) -> Scenario:
             {"height_band": {"lower": f"{lower:.6g}", "upper": f"{upper:.6g}"}},
             {"max_support_distance_m": scale * WALKED_MAX_SUPPORT_DISTANCE},
         ],
-        planning={**WALKED_PLANNING, "min_margin": _margin(scenario)},
+        planning={
+            **WALKED_PLANNING,
+            "min_margin": _margin(scenario),
+            "friction_model": scenario.file.planning.friction_model,
+        },
         manner="walking",
     )
 
