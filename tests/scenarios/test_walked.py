@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from manikin.contact import FRICTION_MODELS
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.scenarios.planned import LEAST, walk_before, walking_supports
@@ -33,6 +34,15 @@ def test_supports_are_the_footprints(ahead):
         assert np.allclose(flight.end.position, step.position)
         assert flight.end.yaw == pytest.approx(step.yaw)
     scenario.check_contacts(scenario.build_scene())
+
+
+@pytest.mark.parametrize("model", FRICTION_MODELS)
+def test_a_walk_keeps_to_the_friction_model_that_is_asked_for(ahead, model):
+    """In the plan of the centre of mass and on the real supports."""
+    asked = load_scenario("walk").with_overrides([f"planning.friction_model={model}"])
+    scenario = walking_supports(ahead, asked)
+    sequences = scenario.build_sequence(), scenario.build_centroidal_problem().sequence
+    assert {phase.stance.friction_model for sequence in sequences for phase in sequence} == {model}
 
 
 def test_supports_last_at_least_as_long_as_in_the_walk(ahead):

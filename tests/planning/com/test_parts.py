@@ -60,7 +60,6 @@ def test_a_crawl_keeps_its_margin_all_along(planned, problem):
     certificate = planned.residuals()
     assert certificate.within()
     assert certificate.min_margin == planned.d_min >= 5.0
-    assert planned.trajectory.schedule.sequence is not None
     assert len(planned.key_instants) == len(problem.sequence) + 1
 
 
@@ -92,11 +91,13 @@ def test_a_part_that_fails_names_its_phase_in_the_whole(problem, monkeypatch):
         found = plan_com(part)
         if len(lengths) == 1:
             return found
-        return replace(found, failure=Failure("balance margin", "too small", 1), trajectory=None)
+        return replace(found, failure=Failure("balance margin", "too small", 1, 0.25), trajectory=None)
 
     monkeypatch.setattr(timing_free, "plan_com", second_fails)
     failed = plan_com(problem)
     assert not failed.succeeded
     assert failed.trajectory is None
-    assert len(lengths) == 2
+    assert len(lengths) == 3  # the second one again with the margin that the problem requires
     assert failed.failure.phase == lengths[0] + 1
+    assert failed.failure.time > 0.25 + problem.sequence[0].min_duration - 1e-9  # after the first part
+    assert "too small" in failed.failure.reason

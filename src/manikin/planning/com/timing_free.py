@@ -309,14 +309,22 @@ def _in_parts(
     """
     began, whole, parts = time.perf_counter(), None, []
     for first, last in itertools.pairwise(keys):
-        parts.append(found := plan_com(_part(problem, polytopes, first, last)))
+        part = _part(problem, polytopes, first, last)
+        found = plan_com(part)
+        if found.failure is not None and part.required_margin > problem.required_margin:
+            found = plan_com(replace(part, required_margin=problem.required_margin))
+        parts.append(found)
         if found.trajectory is None:
             break
         whole = found.trajectory if whole is None else whole.followed_by(found.trajectory)
     failure, certificate = parts[-1].failure, None
     if failure is not None:
-        earlier = keys[len(parts) - 1]
-        failure = replace(failure, phase=None if failure.phase is None else failure.phase + earlier)
+        earlier, passed = keys[len(parts) - 1], 0.0 if whole is None else whole.duration
+        failure = replace(
+            failure, reason=f"in the part from phase {earlier} on, counted from there: {failure.reason}",
+            phase=None if failure.phase is None else failure.phase + earlier,
+            time=None if failure.time is None else failure.time + passed,
+        )  # fmt: skip
     elif whole is not None:
         certificate = measure(problem, whole, polytopes)
         worst = certificate.largest

@@ -344,9 +344,7 @@ class _Planner:
                 broken |= {"max_missing_wrench"}
         scales = self.job.updated(last.scales, broken, narrow=number > 0)
         if inexact or weak:
-            if (
-                weak and last.goal.forces is not None
-            ):  # the forces held told less of the torques than they are
+            if weak and last.goal.forces is not None:  # those held made the torques seem too small
                 scales = replace(scales, strength_share=scales.strength_share - STRENGTH_STEP)
             goal = replace(goal, forces=last.motion) if weak else goal
             return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
