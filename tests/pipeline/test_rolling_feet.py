@@ -1,5 +1,6 @@
 """Feet roll where a person cannot follow the plan on flat ones."""
 
+import json
 import time
 
 import pytest
@@ -11,6 +12,7 @@ from manikin.pipeline.stages.whole_body_stage import (
     plan_centre_of_mass,
     with_rolling_feet,
 )
+from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.scenarios import load_scenario
 
 
@@ -76,15 +78,41 @@ def test_at_the_ends_of_a_motion_both_feet_are_flat(time_s):
     assert with_rolling_feet(context, report) is None
 
 
-@pytest.mark.parametrize(
-    ("stage", "told"), [("centroidal", "wholebody"), ("wholebody", "wholebody"), ("execution", "execution")]
-)
-def test_the_failure_of_whichever_came_farther_is_told(stage, told):
-    """That no CoM is found on rolling feet says nothing of why the body does not follow on flat ones."""
-    context, report = failed(load_scenario("platform"))
+def attempted(report, stage, number):
+    """A report that has gone through the stages up to one and failed there."""
+    order = ("centroidal", "wholebody", "execution")
+    for name in order[: order.index(stage) + 1]:
+        report.finish(name, {"duration_s": 5.0, "attempt": number})
+        row = Requirement("error", "error", "m", number, "<=", 0.0)
+        report.require(name, RequirementTable((row,)))
+    report.planned = stage == "execution"
+    report.fail(stage, f"attempt {number} fails", 1.0 + number, f"phase {number}")
+
+
+@pytest.mark.parametrize("flat", ["wholebody", "execution"])
+@pytest.mark.parametrize("rolling", ["centroidal", "wholebody", "execution"])
+def test_all_of_a_run_is_told_of_whichever_attempt_came_farther(flat, rolling, tmp_path):
+    """Failure, blocks, requirements, files: a CoM missed on rolling feet does not say why flat ones fail."""
+    context = RunContext.of(load_scenario("platform"))
+    report = Report(context, tmp_path / "run", None, time.perf_counter())
+    attempted(report, flat, 1)
     assert with_rolling_feet(context, report) is not None
-    report.fail(stage, "too small", 3.0, "phase 1")
-    report.prefer_earlier_failure()
-    assert report.failure.stage == told
-    assert ("left_foot misses its position" in report.failure.reason) == (stage == "centroidal")
-    assert "too small" in report.failure.reason
+    attempted(report, rolling, 2)
+    order = ("centroidal", "wholebody", "execution")
+    told = 1 if order.index(rolling) < order.index(flat) else 2
+    assert report.prefer_earlier() == (told == 1)
+    assert report.failure.stage == (flat if told == 1 else rolling)
+    assert f"attempt {told} fails" in report.failure.reason
+    assert "attempt 2 fails" in report.failure.reason
+    assert report.failure.where == f"phase {told}"
+    summary = report.close()
+    reached = order[: order.index(report.failure.stage) + 1]
+    for name in order:
+        block = summary[name]
+        assert block == ({"duration_s": 5.0, "attempt": told} if name in reached else None)
+        if block is not None:
+            assert json.loads((tmp_path / f"run/stages/{name}.json").read_text()) == block
+    assert [(row["stage"], row["measured"]) for row in summary["requirements"]] == [
+        (n, told) for n in reached
+    ]
+    assert summary["planned"] == (report.failure.stage == "execution")

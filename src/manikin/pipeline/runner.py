@@ -98,14 +98,14 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     planned = _refined if context.scenario.refines else _followed
     result, schedule = planned(with_contacts, report, requirements)
     if (rolling := with_rolling_feet(with_contacts, report)) is not None:
-        result, schedule = planned(rolling, report, requirements)
-        report.prefer_earlier_failure()
+        again = planned(rolling, report, requirements)
+        result, schedule = (result, schedule) if report.prefer_earlier() else again
     for _ in range(1, context.scenario.contacts.attempts):
         phase = failed_phase(report.failure, schedule)
-        again = None if phase is None else plan_contacts_again(with_contacts, report, phase)
-        if again is None:
+        other = None if phase is None else plan_contacts_again(with_contacts, report, phase)
+        if other is None:
             break
-        with_contacts = again
+        with_contacts = other
         result, schedule = planned(with_contacts, report, requirements)
     return result()
 

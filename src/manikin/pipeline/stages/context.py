@@ -204,6 +204,21 @@ class StageFailure:
     where: str
 
 
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """What a report says of an attempt: its failure, how far it came, its tables, blocks and files."""
+
+    failure: StageFailure
+    planned: bool | None
+    tables: dict[str, RequirementTable]
+    blocks: dict[str, Any]
+    files: dict[str, Callable[[RunDirectory], object]]
+
+
+PLANNED_STAGES = ("centroidal", "wholebody", "act", "execution")
+"""Stages that an attempt on given contacts goes through, in order."""
+
+
 class Report:
     """Summary and files of one run; each is written as soon as it is known.
 
@@ -231,6 +246,8 @@ class Report:
         self.proved = False
         self.refused: list[dict[str, Any]] = []
         self._tables: dict[str, RequirementTable] = {}
+        self._files: dict[str, Callable[[RunDirectory], object]] = {}
+        self._before: _Attempt | None = None
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
         if self._directory is not None:
@@ -260,19 +277,29 @@ class Report:
     def try_again(self, phase: int | None = None) -> None:
         """Begin again after a failure, which is kept among the refused with the phase it was traced to."""
         if self.failure is not None:
+            blocks = {stage: self.summary[stage] for stage in PLANNED_STAGES}
+            self._before = _Attempt(self.failure, self.planned, self._tables, blocks, dict(self._files))
             self.refused.append({"phase": phase, **asdict(self.failure)})
         self.failure, self.planned, self.proved = None, False, False
         self._tables = {}
-        for stage in ("centroidal", "wholebody", "act", "execution"):
-            self.summary[stage] = None
+        self.summary |= dict.fromkeys(PLANNED_STAGES)
 
-    def prefer_earlier_failure(self) -> None:
-        """Tell the failure before the last beginning, where the run has not come as far since."""
-        now, before = self.failure, self.refused[-1]
-        order = ("contacts", "centroidal", "wholebody", "act", "execution")
-        if now is not None and order.index(now.stage) < order.index(before["stage"]):
-            reason = f"{before['reason']}; tried again: {now.reason}"
-            self.failure = StageFailure(before["stage"], reason, before["time_s"], before["where"])
+    def prefer_earlier(self) -> bool:
+        """Report the attempt before the last beginning, where the run has not come as far since.
+
+        Returns:
+            Whether it did: failure, blocks, requirements and files are again those of that attempt.
+        """
+        now, before, order = self.failure, self._before, ("contacts", *PLANNED_STAGES)
+        if now is None or before is None or order.index(now.stage) >= order.index(before.failure.stage):
+            return False
+        self.failure = replace(before.failure, reason=f"{before.failure.reason}; tried again: {now.reason}")
+        self.planned, self._tables = before.planned, before.tables
+        self.summary |= before.blocks
+        self.refused.pop()
+        for name, write in before.files.items():
+            self._write(name, write)
+        return True
 
     def require(self, stage: str, table: RequirementTable) -> None:
         """Take the requirements of a stage's result into the summary, in place of earlier ones."""
@@ -285,8 +312,8 @@ class Report:
 
     def keep(self, name: str, result: Mapping[str, Any]) -> None:
         """Keep what a stage found among the files of the run."""
-        if self._directory is not None:
-            self._directory.write(f"{STAGES}/{name}.json", result)
+        file = f"{STAGES}/{name}.json"
+        self._write(file, lambda directory: directory.write(file, result))
 
     def keep_scenario(self, scenario: Scenario) -> None:
         """Keep a scenario of the task frame with the supports that were found, in the world."""
@@ -311,7 +338,12 @@ class Report:
             motion_in_world(planned, transform), motion_in_world(executed, transform), self._context.body,
             self._context.scene_in_world, schedule_in_world(schedule, transform),
         )  # fmt: skip
-        write_motions(self._directory.path / file, content)
+        self._write(file, lambda directory: write_motions(directory.path / file, content))
+
+    def _write(self, file: str, write: Callable[[RunDirectory], object]) -> None:
+        if self._directory is not None:
+            self._files[file] = write
+            write(self._directory)
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
