@@ -87,6 +87,12 @@ def test_a_sine_is_one_of_time_since_the_push_began():
         np.testing.assert_allclose(push.at(time), [0.0, 80.0 * share, 0.0], atol=1e-9)
 
 
+def test_the_impulse_of_a_recovery_counts_the_whole_push(swayed, from_back):
+    """A sine of 1 Hz for 5 s: the integral of ``|100 sin(2 pi t)|``, as everywhere else."""
+    assert swayed.impulse == pytest.approx(5.0 * 100.0 * 2.0 / np.pi)
+    assert from_back.impulse == pytest.approx(500.0 * 0.1)
+
+
 @pytest.mark.parametrize("body", [KUDOH, HUMAN], ids=["kudoh", "human"])
 def test_momenta_of_the_groups_add_up_to_that_of_the_body(body):
     rng = np.random.default_rng(0)

@@ -15,7 +15,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.simulation.carrying import Touch
-from manikin.simulation.push_force import Push
+from manikin.simulation.push_force import Push, push_impulse
 from manikin.simulation.recovery_record import RecoveryTrace
 
 STANDS_HEIGHT = 0.95
@@ -43,7 +43,7 @@ class Recovery(Displayed):
         feet: ``"held"`` or ``"free"``.
         failure: Why it is no recovery, in one line; empty for one.
         direction: (2,) unit direction of the first push; zero without one.
-        impulse: Of all pushes, the mean force of a sine's half wave for one half wave [N.s].
+        impulse: Of all pushes, a sine's without regard to its sign [N.s].
         zmp_excess: Farthest that the ZMP was outside the soles once the control acted [m].
         time_to_rest: From the first push until the body stands at rest to the end [s]; None if it does not.
         final_height: Of the centre of mass above the ground at the end [m].
@@ -153,7 +153,7 @@ def judge(
     return Recovery(
         trace, feet, failure=_explained(fault, controller, trace, control_from, refused),
         direction=level[0] / float(np.linalg.norm(level[0])) if level else np.zeros(2),
-        impulse=float(sum(_impulse(push) for push in pushes)),
+        impulse=float(sum(push_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
         time_to_rest=None if rests_from is None else max(0.0, rests_from - start),
         final_height=float(motion.com[-1, 2] - standing.area.height),
@@ -233,9 +233,3 @@ def _foot_motion(controller: BalanceRecovery, motion: Motion, steps: Sequence[St
     places |= {step.foot: step.position for step in steps}
     moved = (last.effector_placement(name)[1] - place for name, place in places.items())
     return max(float(np.linalg.norm(way)) for way in moved)
-
-
-def _impulse(push: Push) -> float:
-    """Impulse of a constant force, or of one half wave of a sine [N.s]."""
-    size = float(np.linalg.norm(push.force))
-    return size / (np.pi * push.frequency) if push.frequency > 0.0 else size * push.duration
