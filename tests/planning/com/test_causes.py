@@ -9,7 +9,7 @@ from manikin.balance import wrench_polytope
 from manikin.contact import Phase, Stance, StanceSequence, sole
 from manikin.planning.com import CentroidalProblem, assess_feasibility
 from manikin.planning.com.com_constraints import height_band
-from manikin.planning.com.feasibility import polytopes_of, slipping_slope
+from manikin.planning.com.feasibility import best_margin_at, low_friction, polytopes_of, slipping_slope
 
 SOLE = {"length": 0.28, "width": 0.12}
 
@@ -68,3 +68,27 @@ def test_low_friction_is_blamed_where_more_of_it_would_do(friction, blamed):
     required = 25.0 if blamed else 2000.0
     found = failure_of(problem([both, one], (0.0, -0.1, 0.95), required_margin=required))
     assert ("friction" in found.reason) == blamed
+
+
+@pytest.mark.parametrize(("space", "unit"), [("wrench", "N.m"), ("force", "N")])
+def test_the_margin_with_firm_friction_has_the_unit_of_the_problem(space, unit):
+    """On ice nobody accelerates by 1 m/s^2, on firm ground with the margin that is told, in one unit."""
+    com, acceleration = np.array([0.0, 0.0, 0.95]), np.array([1.0, 0.0, 0.0])
+    options = {"goal_acceleration": acceleration, "required_margin": 1.0, "margin_space": space}
+    icy, firm = (stance((0.0, 0.1, 0.0), (0.0, -0.1, 0.0), friction=mu) for mu in (0.05, 0.7))
+    found = failure_of(problem([icy], com, **options))
+    assert found.requirement == "goal balance"
+    value, told = found.reason.split("too low: with 0.7 it would be ")[1].split()
+    assert told == unit
+    task = problem([firm], com, **options)
+    measured = best_margin_at(polytopes_of(task)[0], task, com, acceleration)
+    assert float(value) == pytest.approx(measured, abs=0.006)
+
+
+@pytest.mark.parametrize(("unit", "blamed"), [("N", False), ("N.m", True)])
+def test_a_margin_in_another_unit_than_that_asked_for_counts_by_its_sign(unit, blamed):
+    """The ball in both of two polytopes is a moment, which says nothing of the 200 N that are asked for."""
+    icy = stance((0.0, 0.1, 0.0), (0.0, -0.1, 0.0), friction=0.05)
+    task = problem([icy], (0.0, 0.0, 0.95), required_margin=200.0, margin_space="force")
+    told = low_friction([icy], task, lambda _: 5.0, unit)
+    assert told.endswith("with 0.7 it would be 5.00 N.m") == blamed == bool(told)

@@ -52,17 +52,19 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
 
 def low_friction(
     stances: Sequence[Stance], problem: CentroidalProblem,
-    measure: Callable[[Sequence[WrenchPolytope]], float],
+    measure: Callable[[Sequence[WrenchPolytope]], float], unit: str,
 ) -> str:  # fmt: skip
     """Message that firm friction would give some stances the required margin; empty where it would not.
 
-    ``measure`` gives their margin from their polytopes.
+    Args:
+        measure: Gives their margin from their polytopes.
+        unit: Of that margin; where it is not the problem's, any margin counts as enough.
     """
-    least = least_friction(stances)
+    least, required = least_friction(stances), problem.required_margin
     if least < FIRM_FRICTION:
         value = measure(wrench_polytopes([_firm(s) for s in stances], reference=problem.reference))
-        if value > problem.required_margin:
-            firm = f"{FIRM_FRICTION:g} it would be {value:.2f} N.m"
+        if value > (required if unit == problem.margin_unit else VANISHING_MARGIN):
+            firm = f"{FIRM_FRICTION:g} it would be {value:.2f} {unit}"
             return f"; the friction of {least:g} is too low: with {firm}"
     return ""
 
@@ -369,7 +371,7 @@ def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Fail
         else:
             continue
         stances = [problem.sequence[number].stance for number in (index, index + 1)]
-        reason += low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))
+        reason += low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()), "N.m")
         return Failure("intersection", reason, index, where=where)
     return None
 
@@ -387,7 +389,9 @@ def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytop
                 f"{name} CoM {np.round(end[1], 3).tolist()} {what} on {held or 'no contact'}; "
                 f"required {problem.required_margin:g} {problem.margin_unit}"
             )
-            reason += low_friction([stance], problem, lambda firm, end=end: best_margin_at(firm[0], *end))
+            reason += low_friction(
+                [stance], problem, lambda firm, end=end: best_margin_at(firm[0], *end), problem.margin_unit
+            )
             return Failure(f"{name} balance", reason, phase, where=held)
     return None
 
