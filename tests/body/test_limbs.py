@@ -118,6 +118,27 @@ def test_forward_kinematics_of_a_limb_are_those_of_the_whole_body(body, limb):
         assert np.abs(rotation @ found.jacobians[number] - jacobian).max(initial=0.0) < 1e-9
 
 
+@pytest.mark.parametrize("rigid", [(), ("upper_arm",), ("forearm",), ("hand",), ("upper_arm", "hand")])
+def test_segments_of_a_limb_are_placed_whether_hinges_move_them_or_not(rigid):
+    """Axes and origins against those of the whole body; some segments are rigid on their parents."""
+    person, names = human(), [f"left_{part}" for part in rigid]
+    segments = [replace(part, hinges=()) if part.name in names else part for part in person.segments]
+    kept = {hinge.name for segment in segments for hinge in segment.hinges}
+    angles = {name: angle for name, angle in person.standing_angles.items() if name in kept}
+    body = replace(person, segments=tuple(segments), standing_angles=angles)
+    rng, limb = np.random.default_rng(8), limb_named(body, "left_arm")
+    chain, samples = LimbKinematics(body, limb), [random_configuration(body, rng) for _ in range(5)]
+    placed = list(chain.segment_placements(np.array([q[chain.slots] for q in samples])))
+    assert [name for name, _, _ in placed] == list(limb.segments)
+    for number, q in enumerate(samples):
+        state = Configuration(body, q)
+        rotation, origin = limb_placement(state, limb)
+        for name, turns, places in placed:
+            turn, place = state.segment_placement(name)
+            np.testing.assert_allclose(rotation @ turns[number], turn, atol=1e-9)
+            np.testing.assert_allclose(origin + rotation @ np.array(places)[number], place, atol=1e-9)
+
+
 @given(st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
 def test_the_jacobian_of_an_arm_is_the_derivative_of_its_position(shares):
     body = BODIES["human"]

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from manikin.body import Configuration, human
-from manikin.kinematics.fold import HEAD_CLEARANCE, STEP, fold_under, lowest_ceiling
+from manikin.body import Configuration, human, insect
+from manikin.errors import BodyError
+from manikin.kinematics.fold import FEET_APART, HEAD_CLEARANCE, STEP, fold_under, level_feet, lowest_ceiling
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 BODY = human(1.75, 79.0)
@@ -56,3 +57,15 @@ def test_the_footprint_covers_trunk_and_head():
     (front, left), (back, right) = fold.footprint[0], fold.footprint[2]
     assert back < -0.2 < head[0] < front
     assert right < -0.15 < 0.15 < left
+
+
+@pytest.mark.parametrize("stature", [1.52, 1.75, 1.93])
+def test_feet_of_a_person_stand_side_by_side_as_far_apart_as_the_stature_asks(stature):
+    """Whole soles on the floor, mirrored in the plane y = 0; a body without soles is refused."""
+    left, right = level_feet(human(stature, 24.0 * stature**2))
+    assert (left.effector, right.effector) == ("left_foot", "right_foot")
+    np.testing.assert_allclose(left.position, [0.0, 0.5 * FEET_APART * stature, 0.0])
+    np.testing.assert_array_equal(left.position, right.position * [1.0, -1.0, 1.0])
+    np.testing.assert_array_equal(left.points, right.points)
+    with pytest.raises(BodyError, match="has no stature or soles"):
+        level_feet(insect())

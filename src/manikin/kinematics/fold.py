@@ -5,7 +5,6 @@ Under a ceiling a body can squat with an upright trunk or stoop on straight legs
 mean of our two extremes).
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -72,6 +71,15 @@ def fold_under(body: BodyModel, height: float) -> Fold | None:
     return Fold(low, stoop, folder.com_height(chosen), folder.footprint(chosen), chosen)
 
 
+def level_feet(body: BodyModel) -> tuple[Contact, Contact]:
+    """Soles of a person about the origin of a level floor, toes along x; BodyError without soles."""
+    if body.stature is None or body.sole_length is None or body.sole_width is None:
+        raise BodyError(f"body {body.name!r} has no stature or soles; valid: a human body")
+    size = {"length": body.sole_length, "width": body.sole_width, "friction": 0.7}
+    half = 0.5 * FEET_APART * body.stature
+    return sole("left_foot", (0.0, half, 0.0), **size), sole("right_foot", (0.0, -half, 0.0), **size)
+
+
 def lowest_ceiling(body: BodyModel) -> float:
     """Height of the lowest ceiling under which the body was found to fold, to :data:`STEP` [m]."""
     return _squat(body, STEP)[1]
@@ -100,7 +108,7 @@ class _Folder:
         self._body = body
         ceiling = Obstacle("ceiling", Box((10.0, 10.0, 1.0)), translation=(0.0, 0.0, height + 0.5))
         self._proximity = Proximity(body, Scene([ceiling]))
-        self._feet = tuple(_feet(body))
+        self._feet = level_feet(body)
         self._ignored = touching_pairs(body, ((foot.effector, "floor") for foot in self._feet))
         self._configuration = Configuration(body)
 
@@ -147,11 +155,3 @@ def _half_extents(shape: Shape, rotation: FloatArray) -> FloatArray:
         return np.abs(rotation) @ (0.5 * shape.size)
     half_length = 0.5 * shape.size[1] if shape.kind is ShapeKind.CAPSULE else 0.0
     return shape.size[0] + half_length * np.abs(rotation[:, 2])
-
-
-def _feet(body: BodyModel) -> Iterator[Contact]:
-    if body.stature is None or body.sole_length is None or body.sole_width is None:
-        raise BodyError(f"body {body.name!r} has no stature or soles; valid: a human body")
-    half = 0.5 * FEET_APART * body.stature
-    for effector, y in (("left_foot", half), ("right_foot", -half)):
-        yield sole(effector, (0.0, y, 0.0), 0.0, length=body.sole_length, width=body.sole_width, friction=0.7)

@@ -147,13 +147,13 @@ class LimbKinematics:
         self.limb = limb
         self.slots = limb_slots(body, limb)
         hinges = limb_hinges(body, limb)
-        self._hinges = [(name, len(body.segment(name).hinges)) for name in limb.segments]
+        self._hinges = [len(body.segment(name).hinges) for name in limb.segments]
         self.lower, self.upper, self.torque_lower, self.torque_upper = (
             frozen_array([getattr(hinge, name) for hinge in hinges], name)
             for name in ("lower", "upper", "torque_lower", "torque_upper")
         )
         self.axes = frozen_array(np.reshape([hinge.axis for hinge in hinges], (-1, 3)), "axes")
-        offsets, tip = _offsets(body, limb)
+        offsets, self._origins, tip = _offsets(body, limb)
         self.offsets, self.tip = frozen_array(offsets, "offsets"), frozen_array(tip, "tip")
         self.tip_rotation = frozen_array(body.effector(limb.effector).rotation, "tip_rotation")
         self._crosses = skew(self.axes)
@@ -193,8 +193,13 @@ class LimbKinematics:
             return
         frames, places = self._frames(np.asarray(angles, dtype=np.float64))
         last = 0
-        for name, count in self._hinges:
-            yield name, frames[:, last + count], places[:, last]
+        for name, count, origin in zip(self.limb.segments, self._hinges, self._origins, strict=True):
+            before = places[:, last - 1] if last else 0.0
+            yield (
+                name,
+                frames[:, last + count],
+                places[:, last] if count else before + frames[:, last] @ origin,
+            )
             last += count
 
     def _frames(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -212,14 +217,19 @@ class LimbKinematics:
         return frames, np.cumsum((frames[:, :-1] @ self.offsets[..., None])[..., 0], axis=1)
 
 
-def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
-    """Translations before each hinge (k, 3), and from the last hinge to the effector (3,) [m]."""
+def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, list[FloatArray], FloatArray]:
+    """Translations [m] from each hinge (the limb's origin before the first) to the next (k, 3).
+
+    Also from the hinge before it to each segment's origin (3,), and from the last hinge to the effector (3,).
+    """
     offsets: list[FloatArray] = []
+    origins: list[FloatArray] = []
     offset = np.zeros(3)
     for number, name in enumerate(limb.segments):
         segment = body.segment(name)
         offset = offset + (segment.origin if number else 0.0)  # the limb's frame is at the first one's origin
+        origins.append(offset)
         for _ in segment.hinges:
             offsets.append(offset)
             offset = np.zeros(3)
-    return np.reshape(offsets, (-1, 3)), offset + body.effector(limb.effector).translation
+    return np.reshape(offsets, (-1, 3)), origins, offset + body.effector(limb.effector).translation

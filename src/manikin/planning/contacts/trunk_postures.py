@@ -25,10 +25,9 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import mirrored
-from manikin.contact import Contact, sole
 from manikin.errors import BodyError
 from manikin.kinematics import PostureProblem, SolverSettings, com_target, generate_posture, touching_pairs
-from manikin.kinematics.fold import FEET_APART
+from manikin.kinematics.fold import level_feet
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw, turned_root
 from manikin.planning.contacts.seat import of_both_sides
 from manikin.scene import Box, Obstacle, Proximity, Scene
@@ -166,7 +165,7 @@ def _between(
         ]
     if height is not None:
         solids.append(Obstacle("top", Box((4.0, 4.0, _WALL)), translation=(0.0, 0.0, height + 0.5 * _WALL)))
-    feet = tuple(_feet(body))
+    feet = level_feet(body)
     problem = PostureProblem(
         body, feet, com=com_target(0.0, 0.0, com_height), clearance=SKIN, self_clearance=0.014,
         proximity=Proximity(body, Scene(solids)), reference=reference, range_margin=0.05,
@@ -174,15 +173,6 @@ def _between(
     )  # fmt: skip
     result = generate_posture(problem, start, settings=_SETTINGS)
     return result.q if result.succeeded else None
-
-
-def _feet(body: BodyModel) -> Iterator[Contact]:
-    assert body.stature is not None
-    assert body.sole_length is not None
-    assert body.sole_width is not None
-    half = 0.5 * FEET_APART * body.stature
-    for effector, y in (("left_foot", half), ("right_foot", -half)):
-        yield sole(effector, (0.0, y, 0.0), 0.0, length=body.sole_length, width=body.sole_width, friction=0.7)
 
 
 def _with(body: BodyModel, q: FloatArray, angles: dict[str, float]) -> FloatArray:
