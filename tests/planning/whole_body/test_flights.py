@@ -1,15 +1,19 @@
 """Flights over the platform's threshold: smooth curves, and the Bi-RRT where they fail."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from manikin.body import human
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, point, sole
 from manikin.planning.com import plan_com
 from manikin.planning.whole_body import swing_planner
 from manikin.planning.whole_body.swing import SwingLimits, check_swing
 from manikin.planning.whole_body.swing_planner import FlightPlanner
 from manikin.scenarios import load_scenario
+from manikin.scene import Scene
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +68,23 @@ def test_a_foot_does_not_pass_round_the_far_side_of_the_one_that_stands(planner)
     for swing in planner.flights()[:2]:
         sides = {np.sign(lateral) for lateral in planner._laterals(swing)}
         assert sides == ({0.0, 1.0} if swing.effector == "left_foot" else {0.0, -1.0})
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize(("carrier", "apart"), [("knee", True), ("hand", False), (None, False)])
+def test_a_foot_whose_knee_carries_meanwhile_is_put_away_and_reached_with(side, carrier, apart):
+    """The leg stands on its knee in the middle of the foot's flight; a hand does not matter."""
+    other = {"left": "right", "right": "left"}[side]
+    size = {"length": 0.28, "width": 0.12, "friction": 0.7}
+    standing = sole(f"{other}_foot", (0.0, -0.1, 0.0), **size)
+    before, after = (sole(f"{side}_foot", (x, 0.1, 0.0), **size) for x in (0.0, 0.3))
+    between = [] if carrier is None else [point(f"{side}_{carrier}", (0.3, 0.1, 0.0), friction=0.7)]
+    stances = [[standing, before], [standing], [standing, *between], [standing], [standing, after]]
+    sequence = StanceSequence([Phase(Stance(contacts, 1500.0), 0.5) for contacts in stances])
+    trajectory = SimpleNamespace(schedule=ContactSchedule(sequence, np.arange(6.0)))
+    planner = FlightPlanner(human(), Scene(), trajectory, SwingLimits(), np.random.default_rng(0), None)
+    found = [
+        (swing.start and swing.start.position[0], swing.end and swing.end.position[0])
+        for swing in planner.flights() if swing.effector == f"{side}_foot"
+    ]  # fmt: skip
+    assert found == ([(0.0, None), (None, 0.3)] if apart else [(0.0, 0.3)])
