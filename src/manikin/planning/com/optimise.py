@@ -24,8 +24,8 @@ from manikin.planning.com.transcription import (
     transcribe,
 )
 
-FIRST_COUNT = 12
-"""Facets per phase in the first round."""
+FIRST_COUNT, FIRST_FACES = 12, 6
+"""Facets, and faces of the region, per phase in the first round. Without faces there may be no optimum."""
 
 Rows = tuple[NDArray[np.int64], ...]
 """Indices of the chosen facets of each phase's polytope, or faces of its region."""
@@ -60,15 +60,27 @@ def with_violated(
     return tuple(grown)
 
 
+def nearest_faces(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Rows:
+    """Indices of the :data:`FIRST_FACES` faces of each phase's region to which a trajectory is nearest."""
+    beyond = _beyond_faces(problem, trajectory)
+    return tuple(np.sort(np.argsort(-values, kind="stable")[:FIRST_FACES]) for values in beyond)
+
+
 def with_broken_faces(problem: CentroidalProblem, trajectory: CentroidalTrajectory, chosen: Rows) -> Rows:
     """Add to each phase the faces of its region that a trajectory breaks, or is about to break."""
-    grown = list(chosen)
-    for phase, (region, times) in enumerate(zip(problem.regions, phase_times(trajectory), strict=False)):
-        if region is not None and not region.empty:
-            beyond = (trajectory.position(times) @ region.normals.T - region.offsets).max(axis=0)
-            if (beyond > TOLERANCE).any():
-                grown[phase] = np.union1d(chosen[phase], np.flatnonzero(beyond > -FACE_ROOM))
-    return tuple(grown)
+    return tuple(
+        np.union1d(faces, np.flatnonzero(beyond > -FACE_ROOM)) if (beyond > TOLERANCE).any() else faces
+        for faces, beyond in zip(chosen, _beyond_faces(problem, trajectory), strict=True)
+    )
+
+
+def _beyond_faces(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> list[FloatArray]:
+    """How far a trajectory gets beyond each face of each phase's region [m]; empty where there is none."""
+    return [
+        np.zeros(0) if region is None or region.empty
+        else (trajectory.position(times) @ region.normals.T - region.offsets).max(axis=0)
+        for region, times in zip(problem.regions, phase_times(trajectory), strict=False)
+    ]  # fmt: skip
 
 
 FACE_ROOM = 0.02

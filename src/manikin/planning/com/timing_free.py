@@ -34,6 +34,7 @@ from manikin.planning.com.optimise import (
     Attempt,
     MarginTargets,
     facet_distances,
+    nearest_faces,
     nearest_facets,
     optimise,
     trajectory_of,
@@ -366,7 +367,7 @@ def _rounds(
     bezier, durations = guess(problem, style, polytopes)
     trajectory = trajectory_of(problem, bezier, durations)
     facets = nearest_facets(facet_distances(problem, trajectory, polytopes))
-    targets, faces = MarginTargets.of(problem), (np.zeros(0, dtype=np.int64),) * len(problem.regions)
+    targets, faces = MarginTargets.of(problem), nearest_faces(problem, trajectory)
     for _ in range(MAX_ROUNDS):
         attempt = optimise(problem, polytopes, facets, targets, bezier, durations, faces)
         yield attempt
