@@ -85,8 +85,9 @@ def carried_motion(
 
 _RAMP, _SUDDEN_RAMP = 0.08, 0.02
 """Time over which a contact takes or loses its share of the load, and the same for one made at speed [s]."""
-TORQUE_SHARE = 0.98
-"""Share of the joints' strength that the forces are shared for where it does not suffice at once."""
+TORQUE_SHARES = (0.85, 0.98)
+"""Shares of the strength for which forces are shared where the least ones take more than the first: it leaves
+control some in reserve; the other is for where it does not suffice."""
 _MISSING_COST = 1.0e-6
 """Square of the cost of force relative to that of missing the wrench."""
 
@@ -178,13 +179,16 @@ def plan_forces(
         matrix, target = generators.centred(part.wrench)
         magnitude = share(matrix, target, cost**-2.0, _MISSING_COST).magnitude
         tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
-        over = np.any(body.torque_share(tau[rows, 6:]) > 1.0, axis=1)
+        over = np.any(body.torque_share(tau[rows, 6:]) > TORQUE_SHARES[0], axis=1)
         for k in np.flatnonzero(over | np.any(magnitude > generators.upper, axis=1)):
             joint_map = _joint_map(part.jacobians[k], generators)
-            other = _share_within_limits(
-                generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
-                TORQUE_SHARE * body.torque_lower, TORQUE_SHARE * body.torque_upper,
+            others = (
+                _share_within_limits(
+                    generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
+                    most * body.torque_lower, most * body.torque_upper,
+                ) for most in TORQUE_SHARES
             )  # fmt: skip
+            other = next((found for found in others if found is not None), None)
             if other is not None:
                 magnitude[k] = other
                 tau[rows[k]] = part.needed[k] - joint_map @ other

@@ -21,7 +21,7 @@ class MotionScales:
         joint_velocity: Violation of the velocity limits [rad/s].
         velocity_share: Share of the velocity limits that may be used.
         torque_share: Share of a joint's strength beyond ``strength_share``, where contact forces are held.
-        strength_share: Share of the strength that may be used.
+        strength_share: Share of the strength that may be used there; the rest is in reserve for control.
         acceleration: Joint acceleration [rad/s^2].
         pelvis_acceleration: Linear [m/s^2] and angular [rad/s^2] pelvis acceleration.
         rest: Velocity at both ends [m/s, rad/s].
@@ -45,7 +45,7 @@ class MotionScales:
     joint_velocity: float = 0.1
     velocity_share: float = 0.9
     torque_share: float = 0.02
-    strength_share: float = 0.93
+    strength_share: float = 0.85
     acceleration: float = 8.0
     pelvis_acceleration: float = 4.0
     rest: float = 1.0e-3
