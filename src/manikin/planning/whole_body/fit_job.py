@@ -36,7 +36,7 @@ STRONGER, NEARER, LEAST_SAFE_DISTANCE = 0.5, 0.75, 0.014
 """Factor of the scales of what was missed; factor of the wanted clearance where the required one is missed,
 and the wanted clearance that this leaves [m]: more than the required one."""
 
-RESERVED = 0.9
+RESERVED = 0.93
 """Share of the strength above which a motion is fitted on, so that control has some in reserve."""
 
 SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])

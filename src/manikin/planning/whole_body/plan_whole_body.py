@@ -347,7 +347,8 @@ class _Planner:
         if inexact or weak:
             if weak and last.goal.forces is not None:  # those held made the torques seem too small
                 scales = replace(scales, strength_share=scales.strength_share - STRENGTH_STEP)
-            goal = replace(goal, forces=last.motion) if weak else goal
+            if weak or last.goal.forces is not None:  # what was too strong once would be so again
+                goal = replace(goal, forces=last.motion)
             return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
 

@@ -262,14 +262,14 @@ class Refinement:
         slower = number > 0 and self.settings.retime and not weak and bool(broken & _SLOWED)
         # How often the spline's knots near the key instants are doubled at most.
         fine = last.fine + (last.fine < 2 and bool(broken & _EXACT))
-        if weak:
-            return job.attempt(replace(goal, forces=last.motion), scales, fine, last.result.spline)
-        if not slower and fine == last.fine:
+        if not weak and not slower and fine == last.fine:
             return job.improve(last, scales)
         near = last.result.spline
         if slower:
             goal = self._slower(last)
             near = _retimed(near, last.goal.schedule, goal.schedule)
+        elif weak or last.goal.forces is not None:  # what was too strong once would be so again
+            goal = replace(goal, forces=last.motion)
         return job.attempt(goal, scales, fine, near)
 
     def _hurried(self, best: FitAttempt[_RefineGoal], share: float) -> FitAttempt[_RefineGoal]:
