@@ -6,6 +6,7 @@ import time
 import pytest
 
 from manikin.contact import SolePart
+from manikin.pipeline import runner
 from manikin.pipeline.stages import Report, RunContext
 from manikin.pipeline.stages.whole_body_stage import (
     centroidal_summary,
@@ -116,3 +117,21 @@ def test_all_of_a_run_is_told_of_whichever_attempt_came_farther(flat, rolling, t
         (n, told) for n in reached
     ]
     assert summary["planned"] == (report.failure.stage == "execution")
+
+
+@pytest.mark.parametrize(("rolling", "told"), [("centroidal", 0), ("execution", 1)])
+def test_a_run_returns_the_attempt_that_came_farther(rolling, told, monkeypatch):
+    """The results of the stages are those of the attempt that the summary tells."""
+    returned = []
+
+    def followed(_context, report, _requirements):
+        number, stage = len(returned), rolling if returned else "execution"
+        returned.append(number)
+        attempted(report, stage, number)
+        return lambda: (number, report.close()), None
+
+    monkeypatch.setattr(runner, "_followed", followed)
+    number, summary = runner.run(load_scenario("platform"))
+    assert (returned, number) == ([0, 1], told)
+    assert summary["centroidal"]["attempt"] == told
+    assert f"attempt {told} fails" in summary["failure"]["reason"]
