@@ -4,7 +4,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from manikin.numerics.spatial import rotation_vector, rotation_vector_jacobian
+from manikin.numerics.spatial import (
+    rotation_from_normal,
+    rotation_vector,
+    rotation_vector_jacobian,
+    yaw_about_normal,
+)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-4, 0.019, 0.021, 1.0, 3.0])
@@ -16,3 +21,11 @@ def test_rotation_vectors_and_their_jacobians(size):
     np.testing.assert_allclose(rotation_vector(rotations), vectors, atol=1e-10)
     expected = np.array([pin.Jlog3(rotation) for rotation in rotations])
     np.testing.assert_allclose(rotation_vector_jacobian(vectors), expected, atol=1e-10)
+
+
+def test_a_normal_and_the_yaw_about_it_give_the_rotation_back():
+    """On the level, on slopes and on walls, where the toes point up."""
+    rng = np.random.default_rng(0)
+    for normal in [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], *rng.normal(size=(20, 3))]:
+        yaw = rng.uniform(-3.1, 3.1)
+        assert yaw_about_normal(rotation_from_normal(normal, yaw)) == pytest.approx(yaw, abs=1e-9)

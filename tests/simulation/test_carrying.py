@@ -62,6 +62,12 @@ def test_planned_on_two_feet_and_carried_by_one_is_the_margin_of_one(force):
     assert margin(found, com) < margin(Stance(list(FEET.values()), cap), com)
 
 
+def test_what_counts_as_carrying_goes_by_the_weight():
+    """Half a newton is nothing under a person, and a quarter of the weight of a body of 0.2 kg."""
+    points = touches(*pressed("left_foot", 1.5), *pressed("right_foot", 0.5))
+    assert CarryingContacts(SEGMENTS, 0.2).stance(points, flat, FEET).effectors == ("left_foot", "right_foot")
+
+
 def test_the_middle_of_two_feet_is_out_of_balance_on_one_of_them():
     """4 cm beyond the inner edge of the left foot: what the planned stance would call balanced."""
     com = np.array([0.0, 0.0, 0.9])

@@ -71,5 +71,5 @@ def test_a_hand_that_grasps_twice_holds_on_both_times_and_only_then(body, stand,
             assert held == {}, time
     force = result.motion.contact_force[:, result.motion.contact_names.index("right_hand"), 2]
     second = (result.motion.time > INSTANTS[3] + 0.02) & (result.motion.time < INSTANTS[4] - 0.01)
-    # One millimetre above the hand, the grip pulls it up: 20 N at first, less as the hand gives way.
+    # One millimetre above the hand, the grip pulls it up: by 50 N at first, less as the hand gives way.
     assert np.all(force[second] > 1.0)

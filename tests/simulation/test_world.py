@@ -2,10 +2,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from manikin.body import Configuration
 from manikin.errors import BodyError, InputError
 from manikin.numerics.spatial import GRAVITY_VECTOR
 from manikin.scene import Box, Obstacle, Scene
 from manikin.simulation import PhysicsOptions, Push, World, compile_model
+from manikin.simulation.execute import CONTACT_TIME
 from manikin.simulation.world import Grip
 
 
@@ -117,6 +119,16 @@ def test_grip_holds_a_hand_with_limited_force(body):
         assert np.abs(pull).max() <= force + 1e-9
         world.release("right_hand")
         assert np.array_equal(world.sense().grip_wrench("right_hand", start), np.zeros(6))
+
+
+def test_a_grip_is_as_stiff_as_the_other_contacts(body):
+    """Critically damped with their time constant, for the mass that the scene feels of a hand."""
+    state = Configuration(body, body.standing_posture())
+    rows = state.effector_jacobian("right_hand")[:3]
+    felt = 1.0 / np.linalg.eigvalsh(rows @ np.linalg.solve(state.mass_matrix, rows.T)).max()
+    grip = Grip("right_hand", np.zeros(3), 400.0)
+    assert grip.stiffness * CONTACT_TIME**2 == pytest.approx(felt, rel=0.1)
+    assert grip.damping == pytest.approx(2.0 * felt / CONTACT_TIME, rel=0.1)
 
 
 def test_gripping_hand_passes_through_what_it_grips(body):

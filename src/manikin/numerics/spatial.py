@@ -172,6 +172,12 @@ def rotation_from_normal(normal: ArrayLike, yaw: float = 0.0) -> FloatArray:
     return tilt @ rotation_from_yaw(yaw)
 
 
+def yaw_about_normal(rotation: FloatArray) -> float:
+    """Yaw [rad] with which :func:`rotation_from_normal` gives a rotation (3, 3) for its z axis."""
+    x, y, _ = rotation_from_normal(rotation[:, 2]).T @ rotation[:, 0]
+    return float(np.arctan2(y, x))
+
+
 def axes_of_normal(normal: FloatArray) -> FloatArray:
     """(3, 3) rotation with z along a unit ``normal`` (3,), x across the world axis farthest from it."""
     across = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)

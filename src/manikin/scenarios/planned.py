@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from manikin.contact import Contact, ContactKind
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, yaw_about_normal
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.contacts.transition import MARGIN as RISING_MARGIN
 from manikin.scenarios.scenario import Scenario
@@ -312,7 +312,8 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
             turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
             entry["rpy_deg"] = turn.tolist()
         return entry
-    entry = {"position": position, "yaw_deg": math.degrees(contact.yaw)}
+    turn = contact.rotation_contact_to_world
+    entry = {"position": position, "yaw_deg": math.degrees(yaw_about_normal(turn))}
     if contact.kind is ContactKind.POINT:
         entry["kind"] = "point"
     if abs(contact.normal[2] - 1.0) > 1e-12:

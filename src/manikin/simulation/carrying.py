@@ -18,8 +18,9 @@ from manikin.contact import Contact, ContactKind, ContactModel, SolePart, Stance
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, cross, rotation_from_normal
 
-PRESSES = 1.0
-"""Force from which something counts as a support [N]."""
+PRESSES = 1.0 / 75.0
+"""Force from which something counts as a support, relative to the body's mass [N/kg]: 1 N of a person, and of
+an insect of 2 kg, whose six tips share 20 N, a fortieth of that."""
 
 TOUCHING = 1e-3
 """A point of a pressing sole this near to its surface touches [m]: the engine's soft contacts let corners
@@ -135,8 +136,8 @@ class CarryingContacts:
     """Turns carried points into stances, sample after sample; a contact that stays is the same object."""
 
     def __init__(self, segments: Mapping[str, Sequence[str]], mass: float) -> None:
-        """Start with the segments with which each effector touches, and the mass [kg], by which caps go."""
-        self._segments, self._mass = dict(segments), mass
+        """Start with the segments with which each effector touches, and the mass [kg] by which forces go."""
+        self._segments, self._mass, self._least = dict(segments), mass, PRESSES * mass
         self._last: dict[str, Contact] = {}
 
     def stance(
@@ -158,13 +159,13 @@ class CarryingContacts:
             if name in gripping or contact.kind is ContactKind.GRASP:
                 continue
             chosen = left & points.of(self._segments[name]) & (points.normals @ contact.normal > ALONG)
-            if points.forces[chosen].sum() < PRESSES:
+            if points.forces[chosen].sum() < self._least:
                 continue
             left &= ~chosen
             contacts.append(self._known(*_touched(contact, pose(name), points, chosen)))
         for segment, other in dict.fromkeys(zip(points.segments, points.others, strict=True)):
             chosen = left & (np.array(points.others) == other) & points.of([segment])
-            if points.forces[chosen].sum() >= PRESSES:
+            if points.forces[chosen].sum() >= self._least:
                 unplanned = _unplanned(f"{segment} on {other}", points, chosen)
                 contacts.append(self._known(unplanned, partial=True))
         return Stance(contacts, model=model).bounded(self._mass)

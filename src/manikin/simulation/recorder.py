@@ -184,14 +184,16 @@ def executed_motion(
 ) -> Motion:  # fmt: skip
     """Motion of n states, (n, nv - 6) joint torques [N.m] and (n, contacts, 6) wrenches [N, N.m].
 
-    A contact supports where it presses by more than :data:`PRESSES`; ``series`` are the other fields.
+    A contact supports where it presses by more than :data:`PRESSES` times the mass; ``series`` are the other
+    fields.
     """
     return Motion(
         time, q=np.array([state.q for state in states]), v=np.array([state.v for state in states]),
         tau=np.concatenate((np.zeros((len(tau), 6)), tau), axis=1),
         com=np.array([state.com for state in states]),
         angular_momentum=np.array([state.momentum[3:] for state in states]),
-        support=np.linalg.norm(contact_force[..., :3], axis=-1) > PRESSES, contact_force=contact_force,
+        support=np.linalg.norm(contact_force[..., :3], axis=-1) > PRESSES * states[0].mass,
+        contact_force=contact_force,
         **series,
     )  # fmt: skip
 

@@ -29,7 +29,10 @@ _INERTIAL = (
 class Grip:
     """A hand's hold on a point of the scene: a stiff, damped spring of limited force.
 
-    It stands for a grasp by fingers, and saturates (the hand slips) where too much is asked of it.
+    It stands for a grasp by fingers, and saturates (the hand slips) where too much is asked of it. Plans
+    take every contact as rigid, so that a grip is as stiff as the other contacts: with their time constant
+    ``T`` of 3 ms, and the least mass ``m`` against which the scene moves an adult's hand, about 0.55 kg, its
+    stiffness is ``m / T^2`` and its damping ``2 m / T``. It gives way by 3.3 mm under 200 N.
 
     Attributes:
         effector: Name of the gripping effector.
@@ -42,8 +45,8 @@ class Grip:
     effector: str
     position: FloatArray
     max_force: float
-    stiffness: float = 2e4
-    damping: float = 200.0
+    stiffness: float = 6e4
+    damping: float = 370.0
 
 
 class World:

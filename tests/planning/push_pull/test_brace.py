@@ -59,6 +59,28 @@ def test_a_body_acts_at_a_turned_object_on_a_raised_floor(body, samples):
         np.testing.assert_allclose(hand.normal, (0.0, -1.0, 0.0), atol=1e-9)
 
 
+def test_who_would_slide_puts_a_foot_to_the_wall(body, samples):
+    """300 N are more than the friction of a floor with 0.3 holds; one foot is on the wall behind the bar."""
+    wall = Obstacle("wall", Box((0.2, 1.2, 1.9)), translation=(1.9, 0.0, 0.95))
+    bar = Obstacle("bar", Box((0.05, 0.6, 0.06)), translation=(1.425, 0.0, 0.95))
+    act = Act("pull", "bar", (-1.0, 0.0, 0.0), 300.0)
+    asked = BraceSettings(enough=1, friction=0.3)
+    brace = find_braced_posture(
+        body, Scene([wall, bar], 0.0), samples, act, np.zeros(2), settings=asked
+    ).brace
+    assert brace is not None
+    np.testing.assert_allclose(brace.feet["right_foot"].normal, (-1.0, 0.0, 0.0), atol=1e-9)
+    assert 0.3 < brace.feet["right_foot"].position[2] < 0.6
+    assert brace.feet["left_foot"].position[2] == pytest.approx(0.0)
+    pressing = brace.forces.contact_force[list(brace.contacts).index("right_foot"), 0]
+    assert pressing < -300.0 + 0.3 * body.mass * GRAVITY
+    # The hands hold on before the foot leaves the ground.
+    before, holding, lifting, acting = (set(stage.contacts) for stage in brace.stages)
+    assert before == {"left_foot", "right_foot"}
+    assert holding == acting == before | {"left_hand", "right_hand"}
+    assert lifting == acting - {"right_foot"}
+
+
 def test_an_object_out_of_reach_is_explained(body, samples, push):
     high = Scene([Obstacle("cupboard", Box((0.6, 1.2, 0.6)), translation=(0.8, 0.0, 3.2))], floor_height=0.0)
     found = find_braced_posture(body, high, samples, push, np.zeros(2))

@@ -137,7 +137,7 @@ class _FootSearch(_ContactSearch):
         if result.brace is None:
             return result.failure or ""
         self._brace = result.brace
-        return arrival(self._body, result.brace)
+        return arrival(result.brace)
 
 
 STANDING_HEIGHT = 0.92

@@ -3,7 +3,7 @@
 import itertools
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +11,7 @@ import pinocchio as pin
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, FrictionModel, grasp
 from manikin.kinematics import Preferences
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts import (
     ContactGenerator,
     ContactPlan,
@@ -22,11 +22,18 @@ from manikin.planning.contacts import (
     PostureFinder,
     PostureFinderSettings,
     Stage,
+    Task,
     WeightedSum,
 )
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
-from manikin.planning.push_pull.stance_heuristics import BraceFooting, Loads, Mirrored, Natural
+from manikin.planning.push_pull.stance_heuristics import (
+    LEVEL,
+    BraceFooting,
+    Loads,
+    Mirrored,
+    Natural,
+)
 from manikin.scene import Scene, Surface
 
 ARMS = ("left_arm", "right_arm")
@@ -41,6 +48,24 @@ FLAT_PALMS = 3.0
 
 HANDS_ROOM = 0.2
 """Distance of the body's middle to the sides of what it acts on [m]; our choice."""
+
+REACHING_TIME = 1.2
+"""Shortest time in which the hands go to the object [s]; our choice."""
+
+TOUCHING_TIME = 0.5
+"""Shortest time from their touch to the act [s]."""
+
+ROOM = (0.02, 0.02, 0.02)
+"""How far from that of the posture the centre of mass may be when the hands touch [m]."""
+
+LIFTING_TIME = 1.2
+"""Shortest time in which a foot goes to a wall [s]; our choice, as the next ones."""
+
+BESIDE = 0.2
+"""Distance of two feet that stand, of a body of 1.75 m [m]."""
+
+HIGHEST = 0.6
+"""Height of a foot on a wall, relative to that of the root that stands."""
 
 UNBALANCED = "no stance of the feet is balanced without and with the force"
 
@@ -85,6 +110,7 @@ class Brace:
         forces: With the act's force, torques as even as can be.
         largest: With the largest force the posture can exert.
         margin: Least margin of the feet alone with no force and with all of it [N.m].
+        stages: From both feet on the ground, the hands still free, to the posture.
     """
 
     q: FloatArray
@@ -93,6 +119,7 @@ class Brace:
     forces: BracedForces
     largest: BracedForces
     margin: float
+    stages: tuple[Stage, ...]
 
     @property
     def contacts(self) -> dict[str, Contact]:
@@ -145,7 +172,7 @@ class _BraceSearch:
         asked = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
         self._poser = PostureFinder(body, scene, self._reference, asked)
         self._reasons: dict[int, Counter[str]] = {step: Counter() for step in _STEPS}
-        self._tried, self._strongest = 0, 0.0
+        self._tried, self._strongest, self._highest = 0, 0.0, np.inf
         facing = act.facing
         self._across = np.array([-facing[1], facing[0], 0.0])
         self._yaw = float(np.arctan2(facing[1], facing[0]))
@@ -159,10 +186,14 @@ class _BraceSearch:
         if not faces:
             reason = f"{self._act.obstacle} has no face against {self._act.kind}ing hands"
             return BraceResult(None, self._tried, self._strongest, reason)
-        tries = (self._at(q, hands_by, feet_by) for q in self._trunks(faces, near))
-        found = (brace for brace in tries if brace is not None)
-        braces = list(itertools.islice(found, self._settings.enough))
-        if not braces:
+        self._highest = float(near[2]) + HIGHEST * float(self._reference[2])
+        for on_wall in (False, True):
+            tries = (self._at(q, hands_by, feet_by, on_wall=on_wall) for q in self._trunks(faces, near))
+            found = (brace for brace in tries if brace is not None)
+            braces = list(itertools.islice(found, self._settings.enough))
+            if braces:
+                break
+        else:
             return BraceResult(None, self._tried, self._strongest, self._why())
         best = min(braces, key=lambda item: item.forces.torque_share)
         return BraceResult(best, self._tried, self._strongest)
@@ -185,14 +216,14 @@ class _BraceSearch:
             q[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, forwards * lean, self._yaw)).coeffs()
             yield q
 
-    def _at(self, q: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> Brace | None:
-        """Contacts and posture of one trunk, or None."""
+    def _at(self, q: FloatArray, hands_by: Heuristic, feet_by: Heuristic, *, on_wall: bool) -> Brace | None:
+        """Contacts and posture of one trunk, with a foot on a wall or none, or None."""
         posture, hands = self._hands(q, hands_by)
         if hands is None:
             return None
         both = np.array([np.zeros(6), self._act.load(hands.values())])
         loads = Loads(self._body.mass, both, self._settings.friction_model)
-        posture, feet = self._feet(posture, loads, feet_by)
+        posture, feet = self._feet(posture, loads, feet_by, on_wall=on_wall)
         if feet is None:
             return None
         near = Configuration(self._body, posture).com
@@ -207,6 +238,30 @@ class _BraceSearch:
         if posed.q is None:
             return self._none(_POSTURE, posed.reason)
         return self._strong(posed.q, feet, hands, margin)
+
+    def _stages(
+        self, q: FloatArray, feet: dict[str, Contact], hands: dict[str, Contact]
+    ) -> tuple[Stage, ...] | str:
+        """From both feet on the ground to a posture, or why not; the hands hold on before a foot goes up."""
+        acting = Stage.of(self._body, {**feet, **hands}, q, TOUCHING_TIME, ROOM)
+        up = next((foot for foot, contact in feet.items() if contact.normal[2] < LEVEL), None)
+        if up is None:
+            return Stage.of(self._body, feet, q, REACHING_TIME), acting
+        ((name, ground),) = ((foot, contact) for foot, contact in feet.items() if foot != up)
+        aside = BESIDE * stature_of(self._body) / 1.75 * (1.0 if up.startswith("left") else -1.0)
+        beside = replace(ground, effector=up, position=frozen_array(
+            ground.position + aside * self._across, "place beside the other foot [m]", (3,)
+        ))  # fmt: skip
+        standing, rest = {name: ground, up: beside}, {name: ground, **hands}
+        steps = (standing, standing), ({**standing, **hands}, standing), ({**standing, **hands}, rest)
+        postures = list[FloatArray]()
+        for held, carrying in steps:
+            posed = self._poser.pose(held, carrying, postures[-1] if postures else q, q[:7], restarts=True)
+            if posed.q is None:
+                return f"{up} does not come to the wall: {posed.reason}"
+            postures.append(posed.q)
+        contacts, times = (standing, steps[1][0], rest), (REACHING_TIME, TOUCHING_TIME, LIFTING_TIME)
+        return *(Stage.of(self._body, *item) for item in zip(contacts, postures, times, strict=True)), acting
 
     def _none(self, step: int, reason: str) -> None:
         """Keep a reason for which a step found nothing."""
@@ -224,7 +279,10 @@ class _BraceSearch:
         if largest is None or forces is None or forces.torque_share > self._settings.torque_share:
             joint = "friction" if forces is None else forces.tightest
             return self._none(_STRENGTH, f"{joint} is too weak")
-        return Brace(q, feet, hands, forces, largest, margin)
+        stages = self._stages(q, feet, hands)
+        if isinstance(stages, str):
+            return self._none(_STRENGTH, stages)
+        return Brace(q, feet, hands, forces, largest, margin, stages)
 
     def _hands(self, q: FloatArray, heuristic: Heuristic) -> tuple[FloatArray, dict[str, Contact] | None]:
         task, hands, middle, order = self._act.hand_task(ARMS), {}, np.array(q[:3]), heuristic
@@ -248,11 +306,13 @@ class _BraceSearch:
         return q, hands
 
     def _feet(
-        self, q: FloatArray, loads: Loads, heuristic: Heuristic
+        self, q: FloatArray, loads: Loads, heuristic: Heuristic, *, on_wall: bool
     ) -> tuple[FloatArray, dict[str, Contact] | None]:
+        """Posture and contacts of both feet, the first one on a wall or not."""
         task, natural = self._act.foot_task(self._body), Natural(self._yaw)
-        order = WeightedSum([(1.0, heuristic), (BALANCED, natural)])
-        first = self._generator.request(q, LEGS[0], task, order)
+        bracing = replace(natural, wall=True, highest=self._highest) if on_wall else natural
+        order = WeightedSum([(1.0, heuristic), (BALANCED, bracing)])
+        first = self._generator.request(q, LEGS[0], Task(self._act.direction) if on_wall else task, order)
         if first.contact is None or first.q is None:
             return q, self._none(_FEET, first.message)
         balance = BraceFooting(loads, first.contact, natural, self._settings.margin, rules=self._rules)
@@ -275,24 +335,20 @@ class _BraceSearch:
         )
 
 
-REACHING_TIME = 1.2
-"""Shortest time in which the hands go to the object [s]; our choice."""
-
-TOUCHING_TIME = 0.5
-"""Shortest time from their touch to the act [s]."""
-
-ROOM = (0.02, 0.02, 0.02)
-"""How far from that of the posture the centre of mass may be when the hands touch [m]."""
-
-
-def arrival(body: BodyModel, brace: Brace) -> Stage:
-    """Goal of the way: the feet of the act, the hands still free."""
-    return Stage.of(body, brace.feet, brace.q, REACHING_TIME)
+def arrival(brace: Brace) -> Stage:
+    """Goal of the way: both feet on the ground, the hands still free."""
+    return brace.stages[0]
 
 
 def with_hands(body: BodyModel, way: ContactPlan, brace: Brace) -> ContactPlan:
-    """The way to the feet of an act, and the hands put to the object, both at once."""
+    """The way to the feet of an act, the hands put to the object, both at once, and a foot to a wall."""
     last = way.stages[-1]
     reaching = Stage.of(body, last.contacts, last.q, REACHING_TIME, last.com_room)
-    acting = Stage.of(body, {**last.contacts, **brace.hands}, brace.q, TOUCHING_TIME, ROOM)
-    return ContactPlan.of(body, [*way.stages[:-1], reaching, acting], brace.q)
+    acting = [replace(stage, contacts=_kept(last.contacts, stage.contacts)) for stage in brace.stages[1:]]
+    return ContactPlan.of(body, [*way.stages[:-1], reaching, *acting], brace.q)
+
+
+def _kept(before: Mapping[str, Contact], contacts: Mapping[str, Contact]) -> dict[str, Contact]:
+    """Contacts, those of before where they are at the same place."""
+    same = {n: c for n, c in before.items() if n in contacts and contacts[n].same_place(c)}
+    return {**same, **{name: contact for name, contact in contacts.items() if name not in same}}

@@ -10,6 +10,9 @@ from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about
 from manikin.planning.contacts import Candidates, ContactRules, Situation
 from manikin.planning.contacts.heuristics import cached_score, contact_at
 
+LEVEL = 0.7
+"""Upward part of the normal from which on a surface is ground and no wall; our choice."""
+
 
 @dataclass(frozen=True, eq=False)
 class Loads:
@@ -69,28 +72,36 @@ class Loads:
 
 @dataclass(frozen=True)
 class Natural:
-    """A foot that points ahead, on its own side: 1 or 0; our choice.
+    """A foot that points ahead, up on a wall, on its own side: 1 or 0; our choice.
 
     Attributes:
         yaw: Heading of the body [rad].
         turn: Largest angle between a foot and that heading [rad].
         aside: Least distance from the middle of the body to its own side [m].
+        wall: Whether it is on a wall, or on the ground.
+        highest: Largest height of its middle [m].
     """
 
     yaw: float
     turn: float = float(np.deg2rad(25.0))
     aside: float = 0.07
+    wall: bool = False
+    highest: float = np.inf
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`manikin.planning.contacts.Heuristic`."""
         ahead = np.array([np.cos(self.yaw), np.sin(self.yaw), 0.0])
         across = np.array([-ahead[1], ahead[0], 0.0])
         side = 1.0 if situation.limb.name.startswith("left") else -1.0
-        toes = (situation.rotation @ candidates.rotations)[:, :, 0]
-        level = np.linalg.norm(toes[:, :2], axis=1)
-        straight = toes @ ahead >= np.cos(self.turn) * level
+        toes, normals = (situation.rotation @ candidates.rotations)[:, :, 0], candidates.normals
+        flat = toes - np.sum(toes * normals, axis=1)[:, None] * normals
+        # What is ahead on the level, turned with it by the shortest way.
+        steep = (normals @ ahead) / np.maximum(1.0 + normals[:, 2], 1e-9)
+        ahead = ahead - steep[:, None] * (normals + np.array([0.0, 0.0, 1.0]))
+        straight = np.sum(flat * ahead, axis=1) >= np.cos(self.turn) * np.linalg.norm(flat, axis=1)
         beside = side * ((candidates.points - situation.state.q[:3]) @ across) >= self.aside
-        return (straight & beside).astype(np.float64)
+        there = ((normals[:, 2] < LEVEL) == self.wall) & (candidates.points[:, 2] <= self.highest)
+        return (straight & beside & there).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
