@@ -12,8 +12,10 @@ import pytest
 from manikin.body import human, insect, integrate, with_knees_and_elbows
 from manikin.contact import ContactKind
 from manikin.numerics.spatial import rotation_from_rpy
-from manikin.planning.contacts import ContactGenerator, Task, sample_limb, sample_limbs
-from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
+from manikin.planning.contacts import ContactGenerator, Efort, Task, sample_limb, sample_limbs
+from manikin.planning.contacts.efort import usable_efort
+from manikin.planning.contacts.generator import UsableEfort
+from manikin.planning.contacts.single_contact import Role, ask_limb
 from manikin.scene import Box, Obstacle, Scene
 
 PLACES = 20
@@ -124,35 +126,45 @@ def random_scene(q, rng):
     return Scene(boxes)
 
 
-def random_question(body, rng, count):
-    limb = body.limbs[rng.integers(len(body.limbs))].name
-    role = ("auto", "auto", "body", "object")[rng.integers(4)]
-    return ContactQuestion.of(
-        limb, tuple(rng.normal(size=3)), role=role, samples=count, seed=int(rng.integers(1000))
-    )
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 def test_random_questions(benchmark, seed):
-    """Wall time of single questions, their average, worst and how they ended, is in ``extra_info`` [ms]."""
+    """CPU time of single requests, each of a body somewhere else, is in ``extra_info`` [ms].
+
+    The first time it is asked counts, and beside it the least of three, which other work disturbs less. As
+    in a dialogue about one body and scene: 20 places, limbs and tasks for each, 10,000 samples of a limb.
+    """
     rng = np.random.default_rng(seed)
-    answers = []
+    took, least, ends, efforts = [], [], [], []
 
     def ask():
-        for _ in range(100):
+        for _ in range(12):
             body = random_body(rng)
             q = body.standing_posture()
-            scene = random_scene(q, rng)
-            answers.append(find_contact(body, scene, q, random_question(body, rng, 10_000)))
+            limbs = [body.limbs[k] for k in rng.permutation(len(body.limbs))[:4]]
+            samples = {limb.name: sample_limb(body, limb, rng) for limb in limbs}
+            generator = ContactGenerator(body, random_scene(q, rng), samples)
+            for _ in range(20):
+                move = np.zeros(body.nv)
+                move[:2], move[5] = rng.uniform(-0.3, 0.3, 2) * q[2], rng.uniform(-np.pi, np.pi)
+                place, limb = integrate(body, q, move), limbs[rng.integers(len(limbs))]
+                role = (Role.AUTO, Role.AUTO, Role.BODY, Role.OBJECT)[rng.integers(4)]
+                usable = UsableEfort(usable_efort(body, limb))
+                asked = generator, place, limb, rng.normal(size=3), role, Efort(), None, usable
+                times = []
+                for _ in range(3):
+                    start = time.process_time()
+                    _, result, value = ask_limb(*asked)
+                    times.append(1e3 * (time.process_time() - start))
+                took.append(times[0])
+                least.append(min(times))
+                ends.append(str(result.failure or "found"))
+                efforts.append(np.inf if value is None else value / usable.least)
 
     benchmark.pedantic(ask, rounds=1)
-    took = [1e3 * item.wall_s for item in answers]
-    ends = [str(item.result.failure or "found") for item in answers]
     benchmark.extra_info["average_ms"] = float(np.mean(took))
+    benchmark.extra_info["average_of_least_of_three_ms"] = float(np.mean(least))
+    benchmark.extra_info["median_ms"] = float(np.median(took))
+    benchmark.extra_info["95_percent_ms"] = float(np.percentile(took, 95))
     benchmark.extra_info["worst_ms"] = float(np.max(took))
     benchmark.extra_info["ends"] = {name: ends.count(name) for name in sorted(set(ends))}
-    benchmark.extra_info["average_ms_by_end"] = {
-        name: float(np.mean([t for t, end in zip(took, ends, strict=True) if end == name]))
-        for name in sorted(set(ends))
-    }
-    assert all(item.efort >= item.usable for item in answers if item.result.found)
+    assert min(efforts) >= 1.0

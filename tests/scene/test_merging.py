@@ -137,6 +137,34 @@ def test_footing_is_the_overlap_of_sole_and_surface():
     assert kinds == {0, 1, 2, 3}
 
 
+@pytest.mark.parametrize("lean", [0.0, 0.2])
+def test_many_soles_at_once_lie_as_single_ones_do(lean):
+    """On rectangles, also leaning ones and ones narrower than a sole, on what others cut away, and on discs.
+
+    Cut by edges and clipped, the areas agree to rounding; a sole that stands is near its surface.
+    """
+    rng = np.random.default_rng(5)
+    items = []
+    for turn, *at in rng.uniform(-1, 1, (9, 3)):
+        leaning = rotation_from_rpy(*rng.uniform(-lean, lean, 2), turn)
+        size = (*rng.uniform(0.05, 0.6, 2), 0.3)
+        items.append(Obstacle(f"b{len(items)}", Box(size), leaning, (*at, 0.0)))
+    items.append(Obstacle("disc", Cylinder(0.3, 0.6), translation=(0.3, 0.2, 0.0)))
+    table = FootingTable(Scene(items).surfaces_facing(UP, 0.5), SOLE)
+    xy, yaw = rng.uniform(-1.3, 1.3, (3000, 2)), rng.uniform(-4, 4, 3000)
+    places = table.under(xy, yaw)
+    footing = table.place(places.numbers, places.positions, places.rotations)
+    np.testing.assert_allclose(
+        table.standing(places), np.where(footing.stands, footing.share, 0.0), rtol=0.0, atol=1e-12
+    )
+    np.testing.assert_array_equal(table.meets(places, 0.3), footing.share > 0.3)
+    assert table.near(places, 0.0)[footing.stands].all()
+    assert 0.2 < footing.stands.mean() < 0.8
+    level = table.under(xy, yaw, 0.1, 0.25)
+    between = (places.positions[:, 2] >= 0.1) & (places.positions[:, 2] <= 0.25)
+    np.testing.assert_array_equal(level.positions, places.positions[between])
+
+
 def test_footing_with_a_corner_below_the_middle_of_the_sole():
     """A quarter of the sole is on the box, the middle on its corner: it does not stand there."""
     table = FootingTable(Scene([box("a", (0, 0, 0), (1, 1, 0.2))]).surfaces_facing(UP, 0.1)[1:], SOLE)

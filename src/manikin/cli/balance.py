@@ -42,7 +42,10 @@ def contact(
     figure: Annotated[Path | None, option("FILE.png", "Draw the answer.")] = None,
     json: JsonOption = False,
 ) -> int:
-    """Find the contact of one limb that serves a task best."""
+    """Find the contact of one limb that serves a task best.
+
+    No answer has less than the usable EFORT, with which the limb at all its strength carries its weight.
+    """
     from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
     from manikin.scenarios import load_scenario
     from manikin.scenarios.world import contact_rules, start_posture
@@ -60,7 +63,10 @@ def contact(
 
             write_contact_figure(body, scene, answer, figure)
     report = answer.as_dict()
-    console.print_report(report, {key: value for key, value in report.items() if key != "q"}, json=json)
+    names = {"efort": "efort [N per N.m]", "usable_efort": "usable_efort [N per N.m]"}
+    console.print_report(
+        report, {names.get(key, key): value for key, value in report.items() if key != "q"}, json=json
+    )
     if not (json or report["found"]):
         typer.echo(f"no contact: {report['failure']}", err=True)
     return console.DONE if report["found"] else console.FAILED

@@ -50,6 +50,25 @@ class AlignmentStep:
         self._evaluate()
         return self._read[0], self._read[1]
 
+    def descend(
+        self, angles: FloatArray, point: FloatArray, normal: FloatArray, lever: float
+    ) -> tuple[float, float]:
+        """Take steps from angles (k,) until the effector is there or gets no nearer; as :meth:`__call__`."""
+        q, moved, evaluate, read = self.q, self.moved, self._evaluate, self._read
+        q[:], self.point[:], self.normal[:] = angles, point, normal
+        last = np.inf
+        evaluate()
+        for _ in range(STEPS):
+            error, tilt = read
+            left = error + lever * tilt
+            arrived = error <= POSITION_TOLERANCE and (tilt <= TILT_TOLERANCE or lever == 0.0)
+            if arrived or left > _STALLED * last:
+                break
+            last = left
+            q[:] = moved
+            evaluate()
+        return read[0], read[1]
+
 
 def _step(chain: LimbKinematics, *, level: bool) -> ca.Function:
     q, point, normal = ca.SX.sym("q", len(chain)), ca.SX.sym("point", 3), ca.SX.sym("normal", 3)
@@ -183,26 +202,10 @@ class Aligner:
             normal: (3,) unit vector in the limb's frame.
             max_tilt: Angle between z axis and normal that the caller will accept [rad].
         """
-        level = _descend(self._level, angles, point, normal, LEVER)
-        if max_tilt <= TILT_TOLERANCE or level.error <= POSITION_TOLERANCE:
-            return level
-        return _descend(self._shift, level.angles, point, normal, 0.0)
-
-
-def _descend(
-    step: AlignmentStep, angles: FloatArray, point: FloatArray, normal: FloatArray, lever: float
-) -> Alignment:
-    """Take steps until the effector has arrived or gets no nearer."""
-    step.q[:], step.point[:], step.normal[:] = angles, point, normal
-    last = np.inf
-    error, tilt = step()
-    for _ in range(STEPS):
-        left = error + lever * tilt
-        arrived = error <= POSITION_TOLERANCE and (tilt <= TILT_TOLERANCE or lever == 0.0)
-        if arrived or left > _STALLED * last:
-            break
-        last = left
-        step.q[:] = step.moved
-        error, tilt = step()
-    turn, product = step.rotation.reshape(3, 3).T.copy(), step.product.reshape(3, 3).copy()
-    return Alignment(step.q.copy(), turn, error, tilt, product)
+        step = self._level
+        error, tilt = step.descend(angles, point, normal, LEVER)
+        if max_tilt > TILT_TOLERANCE and error > POSITION_TOLERANCE:
+            step, start = self._shift, step.q
+            error, tilt = step.descend(start, point, normal, 0.0)
+        turn, product = step.rotation.reshape(3, 3).T.copy(), step.product.reshape(3, 3).copy()
+        return Alignment(step.q.copy(), turn, error, tilt, product)

@@ -108,6 +108,20 @@ class FootingTable:
         self._low = np.array([item.polygon[:, :2].min(axis=0) for item in surfaces]).reshape(-1, 2)
         self._high = np.array([item.polygon[:, :2].max(axis=0) for item in surfaces]).reshape(-1, 2)
         self._faces_up = self._normals[:, 2] > 0.1
+        walled = [item.walls for item in surfaces]
+        self._convex = np.array([item is not None for item in walled], dtype=bool)
+        most = max((len(item[1]) for item in walled if item is not None), default=1)
+        self._walls, self._wall_offsets = (
+            np.zeros((len(walled), most, 3)),
+            np.full((len(walled), most), np.inf),
+        )
+        for number, item in enumerate(walled):
+            if item is not None:
+                self._walls[number, : len(item[1])], self._wall_offsets[number, : len(item[1])] = item
+        self._rectangle = np.array([
+            item is not None and len(item[0]) == 4 and abs(item[0][0] @ item[0][1]) < 1e-9
+            and abs(item[0][1] @ item[0][2]) < 1e-9 and abs(item[0][2] @ item[0][3]) < 1e-9 for item in walled
+        ], dtype=bool)  # fmt: skip
 
     def place(self, numbers: ArrayLike, positions: FloatArray, rotations: FloatArray) -> Footing:
         """Lay soles on surfaces.
@@ -150,17 +164,85 @@ class FootingTable:
         stands[hanging] = (share[hanging] >= LEAST_SHARE) & _around_origin(*spanning, hanging)
         return Footing(share, stands, self.footprint, *spanning)
 
-    def under(self, xy: FloatArray, yaw: FloatArray) -> Places:
+    def standing(self, places: Places) -> FloatArray:
+        """(k,) share of its area of each sole that stands, 0 of others: :meth:`place` without polygons."""
+        room = self._room(places)
+        share, known = self._cut(places, room, room.min(axis=1) <= 0.0, LEAST_SHARE)
+        share[known & (share < LEAST_SHARE)] = 0.0
+        rest = np.flatnonzero(~known)
+        if len(rest):
+            found = self.place(places.numbers[rest], places.positions[rest], places.rotations[rest])
+            share[rest] = np.where(found.stands, found.share, 0.0)
+        return share
+
+    def meets(self, places: Places, least: float = 1e-6) -> NDArray[np.bool_]:
+        """(k,) whether more than a share of each sole's area is on its surface."""
+        room = self._room(places)
+        share, known = self._cut(places, room, room.min(axis=1) <= -self._sole.radius, least)
+        rest = np.flatnonzero(~known)
+        if len(rest):
+            share[rest] = self.place(
+                places.numbers[rest], places.positions[rest], places.rotations[rest]
+            ).share
+        return share > least
+
+    def near(self, places: Places, distance: float) -> NDArray[np.bool_]:
+        """(k,) whether the middle of each sole may be on its surface, or within a distance of it [m]."""
+        return self._room(places).min(axis=1) > -distance
+
+    def _room(self, places: Places) -> FloatArray:
+        """(k, e) distance inside each edge of a convex surface [m], endless for what has fewer or is none."""
+        along = np.einsum("kei,ki->ke", self._walls[places.numbers], places.positions)
+        return self._wall_offsets[places.numbers] - along
+
+    def _cut(
+        self, places: Places, room: FloatArray, off: NDArray[np.bool_], least: float
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Shares (k,) of soles on convex surfaces, and which are known: cut by one edge, or by a rectangle's.
+
+        Those that are ``off``, or have less than ``least`` after one of several cuts, are known to have none.
+        """
+        on, sole = places.numbers, self._sole
+        known = self._convex[on]
+        row, wall = ((room < sole.radius) & (known & ~off)[:, None]).nonzero()
+        flat = np.einsum("pi,pij->pj", self._walls[on[row], wall], places.rotations[row, :, :2])
+        cuts, outward = np.zeros(room.shape), np.zeros((*room.shape, 2))
+        cuts[row, wall] = sole.beyond(flat[:, None], room[row, wall, None])
+        outward[row, wall] = flat
+        several = np.count_nonzero(cuts, axis=1) > 1
+        off |= several & (1.0 - cuts.max(axis=1) < least)
+        share, cornered = 1.0 - cuts.sum(axis=1), self._rectangle[on]
+        # What is beyond two edges of a rectangle is cut off once, not twice.
+        some = np.flatnonzero(several & cornered & ~off)
+        if len(some):
+            row, wall = ((cuts[some, :4] > 0.0) & (cuts[some][:, [1, 2, 3, 0]] > 0.0)).nonzero()
+            pair = some[row, None], np.column_stack([wall, (wall + 1) % 4])
+            share += np.bincount(some[row], sole.beyond(outward[pair], room[pair]), len(on))
+        return np.where(off, 0.0, np.clip(share, 0.0, 1.0)), known & (~several | cornered | off)
+
+    def under(
+        self, xy: FloatArray, yaw: FloatArray, low: ArrayLike = -np.inf, high: ArrayLike = np.inf
+    ) -> Places:
         """Soles at places (n, 2) [m] with headings (n,) [rad], on every surface that they may meet.
 
         Surfaces steeper than 84 degrees have no soles; one at the very edge of a surface may have a share of
-        0. Rows are ordered by place, then by surface.
+        0. Rows are ordered by place, then by surface; heights are from ``low`` to ``high``, (n,) or one [m].
         """
-        beside = self._low - self._sole.radius, self._high + self._sole.radius
-        within = ((xy[:, None] >= beside[0]) & (xy[:, None] <= beside[1])).all(axis=2)
-        rows, numbers = (within & self._faces_up).nonzero()
+        radius = self._sole.radius
+        first, last = (xy.min(axis=0), xy.max(axis=0)) if len(xy) else (np.zeros(2), np.zeros(2))
+        beside = (self._low <= last + radius) & (self._high >= first - radius)
+        near = (self._faces_up & beside[:, 0] & beside[:, 1]).nonzero()[0]
+        within = np.ones((len(xy), len(near)), dtype=bool)
+        for axis in range(2):
+            along = xy[:, axis, None]
+            within &= (along >= self._low[near, axis] - radius) & (along <= self._high[near, axis] + radius)
+        rows, column = within.nonzero()
+        numbers = near[column]
         normals = self._normals[numbers]
         height = (self._offsets[numbers] - np.einsum("ki,ki->k", normals[:, :2], xy[rows])) / normals[:, 2]
+        lowest, highest = (np.broadcast_to(limit, len(xy))[rows] for limit in (low, high))
+        level = np.flatnonzero((height >= lowest) & (height <= highest))
+        rows, numbers, normals, height = rows[level], numbers[level], normals[level], height[level]
         across = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))])[rows]
         forward = cross(across, normals)
         forward /= np.linalg.norm(forward, axis=1, keepdims=True)
@@ -215,7 +297,24 @@ class _Sole:
         doubled = hull[:, 0] * np.roll(hull[:, 1], -1) - hull[:, 1] * np.roll(hull[:, 0], -1)
         self.area = float(0.5 * doubled.sum())
         self._corners, self._angles = hull, angle
+        self._after = np.roll(np.arange(len(hull)), -1)
         self._swept = np.concatenate([[0.0], np.cumsum(0.5 * doubled)])
+
+    def beyond(self, out: FloatArray, distance: FloatArray) -> FloatArray:
+        """(p,) share of the area beyond a line, or two that are perpendicular.
+
+        The lines have unit normals (p, 1 or 2, 2) and are at distances (p, 1 or 2) of the origin [m].
+        """
+        side = out @ self._corners.T - distance[..., None]
+        after, there = side[..., self._after], side >= 0.0
+        share = side / np.where(side == after, 1.0, side - after)
+        enters = np.where(there, 0.0, np.where(there[..., self._after], share, 1.0)).max(axis=1)
+        leaves = np.where(there[..., self._after], 1.0, np.where(there, share, 0.0)).min(axis=1)
+        # Seen from where the lines meet, they sweep no area.
+        corner = self._corners - np.einsum("pwi,pw->pi", out, distance)[:, None]
+        edge = self._corners[self._after] - self._corners
+        swept = corner[..., 0] * edge[:, 1] - corner[..., 1] * edge[:, 0]
+        return 0.5 * (swept * np.maximum(leaves - enters, 0.0)).sum(axis=1) / self.area
 
     def clip(self, start: FloatArray, end: FloatArray) -> _Clipped:
         """Cut edges (p, 2) to what of them is inside (Cyrus and Beck)."""

@@ -56,10 +56,21 @@ class Surface:
         rings = (self.polygon, *self.holes)
         return np.concatenate(rings), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
 
+    @cached_property
+    def walls(self) -> tuple[FloatArray, FloatArray] | None:
+        """Outward normals (e, 3) and offsets (e,) [m] of its edges in the world; None if it is not convex."""
+        corners = self.polygon
+        out = np.cross(np.roll(corners, -1, axis=0) - corners, self.normal)
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+        offsets = np.einsum("ei,ei->e", out, corners)
+        slack = 1e-9 * max(1.0, float(np.abs(corners).max()))
+        convex = not self.holes and bool((corners @ out.T <= offsets + slack).all())
+        return (out, offsets) if convex else None
+
     @property
     def area(self) -> float:
         """[m^2]; without the holes."""
-        start, end = (self._flat(points) for points in self.edges)
+        start, end = self._flat_edges
         return float(0.5 * np.sum(start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]))
 
     @property
@@ -73,13 +84,22 @@ class Surface:
 
     def outside(self, points: FloatArray) -> FloatArray:
         """(k,) distance in the plane from each projected point to the polygon [m]; 0 inside."""
-        start, end = (self._flat(corners) for corners in self.edges)
+        start, end = self._flat_edges
         flat, edge = self._flat(points), end - start
         to_point = flat[:, None] - start
         along = np.einsum("kei,ei->ke", to_point, edge) / np.einsum("ei,ei->e", edge, edge)
         nearest = to_point - np.clip(along, 0.0, 1.0)[..., None] * edge
         gap = np.sqrt(np.einsum("kei,kei->ke", nearest, nearest).min(axis=1))
         return np.where(inside_edges(flat, start, end), 0.0, gap)
+
+    def holds(self, points: FloatArray) -> NDArray[np.bool_]:
+        """(k,) whether (k, 3) points [m], seen along the normal, are inside."""
+        return inside_edges(self._flat(points), *self._flat_edges)
+
+    @cached_property
+    def _flat_edges(self) -> tuple[FloatArray, FloatArray]:
+        start, end = self.edges
+        return self._flat(start), self._flat(end)
 
     def distance(self, points: FloatArray) -> FloatArray:
         """(k,) distance of (k, 3) points to the polygon in space [m]."""

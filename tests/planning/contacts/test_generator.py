@@ -15,6 +15,7 @@ from manikin.kinematics import Aligner, LimbKinematics
 from manikin.kinematics.alignment import DAMPING, LARGEST_STEP, LEVER, AlignmentStep
 from manikin.numerics.spatial import PlanarTransform, rotation_from_rpy
 from manikin.planning.contacts import (
+    HEURISTICS,
     ClosestDistance,
     ContactGenerator,
     ContactRules,
@@ -26,9 +27,12 @@ from manikin.planning.contacts import (
     Situation,
     SurfaceTable,
     Task,
+    efort,
     find_candidates,
+    sample_limb,
     sample_limbs,
 )
+from manikin.planning.contacts.contact_plan import footprint
 from manikin.planning.contacts.efort import usable_efort
 from manikin.planning.contacts.generator import NATURAL_SLACK, UsableEfort, _order
 from manikin.planning.contacts.limb_collisions import TOUCH, DeepSamples, yielding
@@ -155,6 +159,149 @@ def test_no_answer_has_less_than_the_usable_efort(person):
             assert "the best EFORT is" in answer.result.message
             assert f"usable {answer.usable:.2g}" in answer.result.message
     assert causes >= {None, Hindrance.DIRECTION}
+
+
+def random_boxes(q, rng):
+    """Up to ten boxes of any heading around a body, every fourth of them leaning, on the floor."""
+    size, boxes = float(q[2]), []
+    for number in range(rng.integers(1, 11)):
+        lean = rng.uniform(-0.5, 0.5, 2) if number % 4 == 3 else np.zeros(2)
+        away, angle = size * rng.uniform(0.3, 0.9), rng.uniform(-np.pi, np.pi)
+        place = (q[0] + away * np.cos(angle), q[1] + away * np.sin(angle), size * rng.uniform(0.0, 1.8))
+        turn = rotation_from_rpy(*lean, rng.uniform(-np.pi, np.pi))
+        boxes.append(Obstacle(f"box{number}", Box(size * rng.uniform(0.05, 0.7, 3)), turn, place))
+    return Scene(boxes)
+
+
+def turned(body, rng):
+    move = np.zeros(body.nv)
+    move[5] = rng.uniform(-np.pi, np.pi)
+    return integrate(body, body.standing_posture(), move)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_efort_of_every_answer_is_usable_and_that_of_its_posture(seed, person, creature):
+    """Any limb, scene, direction, role, heuristic and way to touch: anew from the posture's Jacobian."""
+    rng, found = np.random.default_rng(seed), 0
+    for number in range(30):
+        body = creature if number % 4 == 3 else person
+        q = turned(body, rng)
+        limb = body.limbs[rng.integers(len(body.limbs))]
+        pulls = bool(limb.name.endswith("arm") and rng.integers(2))
+        question = ContactQuestion.of(
+            limb.name, tuple(rng.normal(size=3)), role=("auto", "body", "object")[rng.integers(3)],
+            pulling=pulls, heuristic=HEURISTICS[number % 4], samples=600, seed=int(rng.integers(1000)),
+        )  # fmt: skip
+        answer = find_contact(body, random_boxes(q, rng), q, question)
+        assert answer.usable == usable_efort(body, limb)
+        if not answer.result.found:
+            assert answer.efort is None
+            assert answer.result.message
+            continue
+        found += 1
+        assert answer.efort >= answer.usable > 0.0
+        chain, state = LimbKinematics(body, limb), Configuration(body, answer.result.q)
+        situation = Situation.of(state, limb, np.zeros(3))
+        jacobian = situation.rotation @ chain.place(answer.result.q[chain.slots][None]).jacobians[0]
+        v = Task(question.task, {limb.name} if answer.role == "object" else ()).reaction_on(limb.name)
+        ratio = (v @ jacobian @ jacobian.T @ v) ** -0.5
+        alpha = (-1.0 if pulls else 1.0) * ratio * (v @ answer.result.contact.normal)
+        assert answer.efort == pytest.approx(alpha, rel=1e-6)
+    assert found >= 5
+
+
+def exhaustive(generator, scene, q, limb, samples, task, usable):
+    """The same request without trees, bounds and early ends: all samples on all surfaces, tried in order."""
+    body, settings = generator.body, generator.settings
+    situation = Situation.of(Configuration(body, q), limb, task.reaction_on(limb.name))
+    flat, chain = limb.kind is ContactKind.SOLE, LimbKinematics(body, limb)
+    sole = footprint(body, limb, limb.kind, generator.rules)
+    places, turns = situation.to_world(samples.positions), situation.rotation @ samples.rotations
+    rows, points = [], []
+    for number, surface in enumerate(scene.surfaces):
+        height = surface.height(places)
+        lies = (np.abs(height) <= settings.tolerance) & (
+            turns[:, :, 2] @ surface.normal >= np.cos(settings.max_tilt)
+        )
+        for row in np.flatnonzero(lies).tolist():
+            point = places[row] - height[row] * surface.normal
+            if surface.holds(point[None] + sole @ turns[row].T).all() and surface.holds(point[None])[0]:
+                rows.append((row, number))
+                points.append(point)
+    points = [points[k] for k in sorted(range(len(rows)), key=rows.__getitem__)]
+    rows = sorted(rows)
+    normals = np.array([scene.surfaces[number].normal for _, number in rows]).reshape(-1, 3)
+    v = situation.reaction @ situation.rotation
+    values = efort(samples.products[[row for row, _ in rows]], v, normals @ situation.rotation)
+    good = np.flatnonzero(values >= usable.least)
+    collisions = LimbCollisions(body, limb, scene)
+    aligner, allowed = Aligner(chain), 1e-4 if flat else settings.point_tilt
+    for k in good[_order(values[good])].tolist():
+        (row, number), local = rows[k], (points[k] - situation.origin) @ situation.rotation
+        found = aligner.align(samples.angles[row], local, normals[k] @ situation.rotation, allowed)
+        changed, turn = np.array(q), situation.rotation @ found.rotation
+        changed[chain.slots] = found.angles
+        alpha = efort(found.product[None], v, (normals[k] @ situation.rotation)[None])[0]
+        if not found.lies(allowed) or alpha < usable.least:
+            continue
+        if flat and not scene.surfaces[number].holds(points[k] + sole @ turn.T).all():
+            continue
+        touched = scene.surfaces[number].obstacles
+        if collisions.first(changed, touched) is None:
+            return changed, touched
+    return None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_request_has_the_answer_of_an_exhaustive_search(seed, person, creature):
+    """Trees of samples, bounds of surfaces, and what is known to collide change no answer."""
+    rng, found = np.random.default_rng(seed), 0
+    for number in range(12):
+        body = creature if number % 4 == 3 else person
+        q = turned(body, rng)
+        limb, scene = body.limbs[rng.integers(len(body.limbs))], random_boxes(q, rng)
+        samples, task = sample_limb(body, limb, rng, 1000), Task(rng.normal(size=3))
+        usable = UsableEfort(usable_efort(body, limb))
+        generator = ContactGenerator(body, scene, {limb.name: samples}, GeneratorSettings(tries=10_000))
+        answer = generator.request(q, limb.name, task, usable=usable)
+        wanted = exhaustive(generator, scene, q, limb, samples, task, usable)
+        assert answer.found == (wanted is not None), answer.message
+        if wanted is not None:
+            np.testing.assert_allclose(answer.q, wanted[0], rtol=0.0, atol=1e-9)
+            assert answer.obstacles == wanted[1]
+            found += 1
+    assert found >= 3
+
+
+def test_a_limb_that_begins_in_a_box_is_said_to_collide(creature, creature_samples):
+    """A box about the hip: every posture collides there, wherever the sample."""
+    limb, q = creature.limbs[0], creature.standing_posture()
+    hip = Situation.of(Configuration(creature, q), limb, np.zeros(3)).origin
+    scene = Scene([Obstacle("box", Box((0.03, 0.03, 0.03)), translation=hip)])
+    answer = ContactGenerator(creature, scene, creature_samples).request(q, limb.name, UP)
+    assert answer.failure is Hindrance.COLLISION
+    assert answer.message.endswith("_femur/femur in box")
+    collisions, chain = LimbCollisions(creature, limb, scene), LimbKinematics(creature, limb)
+    for angles in chain.random_angles(np.random.default_rng(1), 50):
+        q[chain.slots] = angles
+        assert collisions.first(q) is not None
+
+
+def test_what_is_over_a_hole_is_on_no_surface():
+    """A slab with a hole of 1.2 m by 0.5 m and nothing in it."""
+    ring = [
+        Obstacle(f"side{k}", Box((1.0, 3.0, 0.1) if k < 2 else (1.2, 1.0, 0.1)), translation=at)
+        for k, at in enumerate([(1.1, 0, 0.0), (-1.1, 0, 0.0), (0.0, 0.75, 0.0), (0.0, -0.75, 0.0)])
+    ]
+    surfaces = Scene(ring, None).surfaces_facing((0.0, 0.0, 1.0), 0.1)
+    whole = int(np.argmax([item.area for item in surfaces]))
+    assert surfaces[whole].holes
+    points = np.random.default_rng(0).uniform((-1.8, -1.4, 0.05), (1.8, 1.4, 0.05), (300, 3))
+    x, y = np.abs(points[:, :2].T)
+    inside = (x < 1.6) & (y < 1.25) & ((x > 0.6) | (y > 0.25))
+    middle = (x < 0.6) & (y < 1.25)  # the sides are longer than what is between them
+    over = SurfaceTable(surfaces).over(points, np.full(300, whole))
+    np.testing.assert_array_equal(over[middle], inside[middle])
 
 
 def test_a_nearer_surface_that_does_not_push_is_no_answer(person, person_samples):

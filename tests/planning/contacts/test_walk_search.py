@@ -2,6 +2,7 @@
 
 from itertools import islice, pairwise
 
+import coal
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from manikin.balance import StaticRegion
 from manikin.body import Configuration, human
 from manikin.contact import ContactKind, Stance, sole, soles_overlap
-from manikin.numerics.spatial import rotation_from_yaw
+from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.contacts import (
     Endpoints,
     Footholds,
@@ -20,8 +21,10 @@ from manikin.planning.contacts import (
     WalkSettings,
     certify_plan,
 )
+from manikin.planning.contacts.footsteps import _column_is_free
 from manikin.planning.contacts.handholds import Handholds
-from manikin.scene import Box, Cylinder, Obstacle, Scene
+from manikin.scene import Box, Capsule, Cylinder, Obstacle, Scene
+from manikin.scene.collision import collision_parts
 
 BODY = human(1.75, 75.0, "male")
 ALONG_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -51,6 +54,30 @@ def test_a_foothold_keeps_the_clearance_of_a_foot_to_what_is_beside_it():
         footholds = Footholds(BODY, Scene([curb]))
         laid = footholds.lay(np.zeros((1, 2)), np.zeros(1), 0.0, 0.001)
         assert footholds.is_free(footholds.hold(laid, 0)) is free
+
+
+@pytest.mark.parametrize("lean", [0.0, 1.0])
+def test_a_column_is_free_where_no_part_meets_its_capsule(lean):
+    """Against Coal for every place and part: the floor, boxes that stand or lean, and round things."""
+    rng = np.random.default_rng(3)
+    shapes = [Box(rng.uniform(0.1, 1.5, 3)) for _ in range(6)] + [Cylinder(0.2, 0.8), Capsule(0.1, 0.5)]
+    scene = Scene([
+        Obstacle(f"thing{k}", shape, rotation_from_rpy(*rng.uniform(-lean, lean, 2), rng.uniform(-3, 3)),
+                 rng.uniform(-2, 2, 3)) for k, shape in enumerate(shapes)
+    ])  # fmt: skip
+    places, (radius, bottom, top) = rng.uniform((-3, -3, -1), (3, 3, 1), (400, 3)), (0.12, 0.5, 0.9)
+    shape, meets = coal.Capsule(radius, top - bottom - 2.0 * radius), np.zeros(len(places), dtype=bool)
+    for part in (part for item in scene for part in collision_parts(item)):
+        there = coal.Transform3s(part.rotation, part.translation)
+        for row, place in enumerate(places):
+            here, result = (
+                coal.Transform3s(np.eye(3), place + np.array([0.0, 0.0, 0.7])),
+                coal.CollisionResult(),
+            )
+            coal.collide(shape, here, part.geometry, there, coal.CollisionRequest(), result)
+            meets[row] |= result.isCollision()
+    np.testing.assert_array_equal(_column_is_free(scene, places, (radius, bottom, top)), ~meets)
+    assert 0.2 < meets.mean() < 0.8
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """Samples of a limb whose effector is near a surface of the scene: steps 1 and 2 of a request."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from manikin.scene import Surface
 
 IntArray = NDArray[np.int64]
 
-_ROUNDING = 1e-9
+_ROUNDING = np.float32(1e-6)  # of a cosine in single precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,11 @@ class Candidates:
     def __len__(self) -> int:
         return len(self.samples)
 
+    def on(self, surfaces: IntArray) -> "Candidates":
+        """Those on some surfaces, by their indices."""
+        rows = np.flatnonzero(np.isin(self.surfaces, surfaces))
+        return Candidates(**{item.name: getattr(self, item.name)[rows] for item in fields(self)})
+
 
 class SurfaceTable:
     """The surfaces of a scene as arrays, so that all are tested at once.
@@ -76,6 +81,7 @@ class SurfaceTable:
         offsets: (m,) of their planes along the normals [m].
         group: (m,) number of the direction that a surface has for its normal.
         frames: (g, 3, 3) of each direction the normal and two axes in its planes.
+        extents: (m, 3, 2) least and largest coordinates of the polygons along the axes of their frames [m].
         side_low: (m, 2) smallest coordinates of the polygons along these axes [m].
         side_high: (m, 2) largest ones.
         filled: (m,) whether a polygon is all of the rectangle between them, as the faces of boxes are.
@@ -87,7 +93,7 @@ class SurfaceTable:
         self.offsets = np.array([item.polygon[0] @ item.normal for item in surfaces])
         self._low = np.array([item.polygon.min(axis=0) for item in surfaces]).reshape(-1, 3)
         self._high = np.array([item.polygon.max(axis=0) for item in surfaces]).reshape(-1, 3)
-        walls = [_walls(item) for item in surfaces]
+        walls = [item.walls for item in surfaces]
         self._convex = np.array([item is not None for item in walls], dtype=bool)
         # Missing walls hold everything inside.
         most = max((len(item[1]) for item in walls if item is not None), default=1)
@@ -105,6 +111,9 @@ class SurfaceTable:
         ]
         self.side_low = np.array([item.min(axis=0) for item in shadows]).reshape(-1, 2)
         self.side_high = np.array([item.max(axis=0) for item in shadows]).reshape(-1, 2)
+        level = np.repeat(self.offsets[:, None, None], 2, axis=2)
+        sideways = np.stack([self.side_low, self.side_high], axis=2)
+        self.extents = np.concatenate([level, sideways], axis=1)
         areas = np.array([item.area for item in self.surfaces])
         self.filled: NDArray[np.bool_] = areas >= np.prod(self.side_high - self.side_low, axis=1) * (1 - 1e-9)
 
@@ -117,28 +126,22 @@ class SurfaceTable:
         hull, radius = samples.hull
         away = np.clip(situation.origin, self._low, self._high) - situation.origin
         near = np.flatnonzero(np.einsum("mi,mi->m", away, away) <= (radius + tolerance) ** 2)
-        # Extents of the hull along the normals and sides of their directions, from the limb's origin.
-        used, group = np.unique(self.group[near], return_inverse=True)
-        frames = self.frames[used]
-        extents = (frames.reshape(-1, 3) @ situation.rotation) @ hull.T
-        low = extents.min(axis=1).reshape(-1, 3) - tolerance
-        high = extents.max(axis=1).reshape(-1, 3) + tolerance
-        offset = frames @ situation.origin
-        heights = self.offsets[near] - offset[group, 0]
-        meets = (heights >= low[group, 0]) & (heights <= high[group, 0])
-        sides = offset[group, 1:]
-        meets &= (self.side_high[near] - sides >= low[group, 1:]).all(axis=1)
-        meets &= (self.side_low[near] - sides <= high[group, 1:]).all(axis=1)
-        return near[meets]
+        # Extents of the hull along the normals, then the sides, of their directions, from the limb's origin.
+        for axis in range(3):
+            along = self.frames[self.group[near], axis]
+            extents, offset = (along @ situation.rotation) @ hull.T, along @ situation.origin
+            low, high = self.extents[near, axis].T - offset
+            near = near[(high >= extents.min(axis=1) - tolerance) & (low <= extents.max(axis=1) + tolerance)]
+        return near
 
     def over(self, points: FloatArray, numbers: IntArray) -> NDArray[np.bool_]:
         """(n,) whether world points (n, 3) [m] project into the polygons of their surfaces, (n,) indices."""
         beyond = np.einsum("nei,ni->ne", self._walls[numbers], points) - self._wall_offsets[numbers]
         inside = (beyond <= 0.0).all(axis=1)
         loose = np.flatnonzero(~self._convex[numbers])
-        for number in np.unique(numbers[loose]):
+        for number in set(numbers[loose].tolist()):
             mine = loose[numbers[loose] == number]
-            inside[mine] = self.surfaces[number].outside(points[mine]) <= 0.0
+            inside[mine] = self.surfaces[number].holds(points[mine])
         return inside
 
     def carries(
@@ -162,7 +165,7 @@ class SurfaceTable:
         """Whether all (c, 3) corners of one footprint in the world project into a polygon [m]."""
         if self._convex[number]:
             return bool((corners @ self._walls[number].T <= self._wall_offsets[number]).all())
-        return bool((self.surfaces[number].outside(corners) <= 0.0).all())
+        return bool(self.surfaces[number].holds(corners).all())
 
 
 def find_candidates(
@@ -210,33 +213,25 @@ def _near_planes(
     With them go the positions of their surfaces in ``numbers``, and the heights over the planes [m].
     """
     leaves, frames = samples.leaves, table.frames[table.group[numbers]]
-    shift = frames @ situation.origin
     axes = frames @ situation.rotation  # (m, 3, 3): the normal and two sides, in the limb's frame
-    planes = table.offsets[numbers]
-    low = np.column_stack([planes - tolerance, table.side_low[numbers]]) - shift
-    high = np.column_stack([planes + tolerance, table.side_high[numbers]]) - shift
-    slopes = axes[:, 0] @ leaves.axes.T
-    near = slopes >= np.cos(np.minimum(max_tilt + leaves.spreads + _ROUNDING, np.pi))
-    for axis in range(3):
-        at = axes[:, axis] @ leaves.centres.T
-        near &= at >= low[:, axis, None] - leaves.radii
-        near &= at <= high[:, axis, None] + leaves.radii
-    owner, leaf = near.nonzero()
-    upright = np.einsum("pki,pi->pk", leaves.upward[leaf], axes[owner, 0]) >= np.cos(max_tilt)
-    pair, place = upright.nonzero()
-    owner, leaf = owner[pair], leaf[pair]
-    at = np.einsum("pai,pi->pa", axes[owner], leaves.positions[leaf, place])
-    inside = ((at >= low[owner]) & (at <= high[owner])).all(axis=1).nonzero()[0]
-    owner = owner[inside]
-    height = at[inside, 0] + shift[owner, 0] - planes[owner]
-    return leaves.rows[leaf[inside], place[inside]], owner, height
-
-
-def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:
-    """Outward normals (e, 3) and offsets (e,) of a convex polygon's edges, or None if it is not convex."""
-    corners = surface.polygon
-    out = np.cross(np.roll(corners, -1, axis=0) - corners, surface.normal)
-    out /= np.linalg.norm(out, axis=1, keepdims=True)
-    offsets = np.einsum("ei,ei->e", out, corners)
-    convex = bool((corners @ out.T <= offsets + 1e-9 * max(1.0, float(np.abs(corners).max()))).all())
-    return (out, offsets) if convex else None
+    ends = table.extents[numbers] - (frames @ situation.origin)[..., None]
+    ends[:, 0] += [-tolerance, tolerance]
+    middle, half = ends.mean(axis=2), 0.5 * (ends[..., 1] - ends[..., 0])
+    # Leaves in single precision, which their bounds allow for, samples in double.
+    rough = axes.astype(np.float32)
+    at = (rough.reshape(-1, 3) @ leaves.centres).reshape(len(numbers), 3, len(leaves.rows))
+    at -= middle.astype(np.float32)[..., None]
+    within = np.abs(at, out=at) <= half.astype(np.float32)[..., None] + leaves.radii
+    near = rough[:, 0] @ leaves.axes >= np.cos(np.minimum(leaves.spreads + max_tilt, np.pi)) - _ROUNDING
+    near &= within[:, 0] & within[:, 1] & within[:, 2]
+    owner, leaf = np.divmod(near.ravel().nonzero()[0], len(leaves.rows))
+    parts, heads, axis = leaves.positions[leaf], leaves.upward[leaf], axes[owner, 0][..., None]
+    height = parts[:, 0] * axis[:, 0] + parts[:, 1] * axis[:, 1] + parts[:, 2] * axis[:, 2]
+    height -= table.offsets[numbers[owner], None] - (frames[:, 0] @ situation.origin)[owner, None]
+    upright = heads[:, 0] * axis[:, 0] + heads[:, 1] * axis[:, 1] + heads[:, 2] * axis[:, 2]
+    pair, place = ((upright >= np.cos(max_tilt)) & (np.abs(height) <= tolerance)).nonzero()
+    rows, owner, height = leaves.rows[leaf[pair], place], owner[pair], height[pair, place]
+    at = np.einsum("pai,pi->pa", axes[owner, 1:], samples.positions.take(rows, axis=0))
+    beside = (at >= ends[owner, 1:, 0]) & (at <= ends[owner, 1:, 1])
+    inside = (beside[:, 0] & beside[:, 1]).nonzero()[0]
+    return rows[inside], owner[inside], height[inside]

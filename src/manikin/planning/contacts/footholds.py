@@ -103,10 +103,17 @@ class Footholds:
         self.size, self.steepest = size or (body.sole_length, body.sole_width), steepest
         surfaces = scene.surfaces_facing((0.0, 0.0, 1.0), steepest)
         self._table = FootingTable(surfaces, 0.5 * np.array(self.size) * _CORNERS)
+        parts = [part for item in scene for part in collision_parts(item)]
         self._parts = [
             (part.obstacle, part.geometry, coal.Transform3s(part.rotation, part.translation))
-            for item in scene for part in collision_parts(item)
-        ]  # fmt: skip
+            for part in parts
+        ]
+        self._rotations = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
+        self._places, self._low, self._high = (
+            np.array([getattr(part, name) for part in parts]).reshape(-1, 3)
+            for name in ("translation", "low", "high")
+        )
+        self._reach = 0.5 * float(np.linalg.norm([*self.size, FOOT_HEIGHT])) + 2.0 * FOOT_CLEARANCE
         gap = 2.0 * FOOT_CLEARANCE
         self._foot = coal.Box(*self.size, FOOT_HEIGHT)
         self._wide_foot = coal.Box(self.size[0] + gap, self.size[1] + gap, FOOT_HEIGHT)
@@ -127,8 +134,8 @@ class Footholds:
             level: Height from which the foot comes [m].
             rise: Largest difference in height to there [m].
         """
-        put = self._table.under(places, yaws)
-        put = put[np.abs(put.positions[:, 2] - level) <= rise]
+        put = self._table.under(places, yaws, level - rise, level + rise)
+        put = put[self._table.near(put, SHIFT * float(np.linalg.norm(_SHIFTS, axis=1).max()))]
         value = self._lies(put)
         partly = np.flatnonzero(value < WHOLE)
         if len(partly):
@@ -162,7 +169,11 @@ class Footholds:
         What it stands on may be as near as it is, but not beside the foot.
         """
         touched = self._table.surfaces[hold.surface].obstacles if hold.surface >= 0 else ()
-        for name, geometry, place in self._parts:
+        middle = hold.position + 0.5 * FOOT_HEIGHT * hold.rotation[:, 2]
+        local = np.einsum("nji,nj->ni", self._rotations, middle - self._places)
+        away = np.maximum(np.maximum(self._low - local, local - self._high), 0.0)
+        for number in np.flatnonzero(np.einsum("ni,ni->n", away, away) <= self._reach**2).tolist():
+            name, geometry, place = self._parts[number]
             on = name in touched
             foot, request, lift = (self._wide_foot, _REQUEST, 2e-3) if on else (self._foot, _CLEAR, 0.0)
             above = (0.5 * FOOT_HEIGHT + lift) * hold.rotation[:, 2]
@@ -201,8 +212,7 @@ class Footholds:
 
     def _lies(self, put: Places) -> FloatArray:
         """(k,) share of each sole on its surface; 0 where it cannot stand or something is in its way."""
-        found = self._table.place(put.numbers, put.positions, put.rotations)
-        shares = np.where(found.stands, found.share, 0.0)
+        shares = self._table.standing(put)
         some = np.flatnonzero(shares)
         shares[some[self._blocked(put[some])]] = 0.0
         return shares
@@ -211,12 +221,9 @@ class Footholds:
         """(k,) whether another surface rises in the way of each foot, seen from above."""
         blocked = np.zeros(len(put.rows), dtype=bool)
         yaws = np.arctan2(put.rotations[:, 1, 0], put.rotations[:, 0, 0])
-        over = self._table.under(put.positions[:, :2], yaws)
-        above = over.positions[:, 2] - put.positions[over.rows, 2]
-        pairs = np.flatnonzero((above > ON_PLANE) & (above < 2.0 * FOOT_HEIGHT))
-        if len(pairs):
-            met = self._table.place(over.numbers[pairs], over.positions[pairs], over.rotations[pairs])
-            blocked[over.rows[pairs[met.share > 1e-6]]] = True
+        height = put.positions[:, 2]
+        over = self._table.under(put.positions[:, :2], yaws, height + ON_PLANE, height + 2.0 * FOOT_HEIGHT)
+        blocked[over.rows[self._table.meets(over)]] = True
         return blocked
 
     def _moved(self, put: Places, rows: NDArray[np.int64], away: FloatArray) -> Places:

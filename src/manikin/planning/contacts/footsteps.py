@@ -10,7 +10,7 @@ footholds has postures, closes one without with :meth:`FootstepSearch.close`, an
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from itertools import pairwise, product
 from typing import NamedTuple
@@ -26,7 +26,7 @@ from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import Graph
 from manikin.planning.contacts.footholds import Feet, Foothold, Footholds
 from manikin.scene import Scene
-from manikin.scene.collision import collision_parts, local_box
+from manikin.scene.collision import collision_parts
 
 STEP = 0.7  # time of a short step [s]; our choice, as the next ones
 EASY = 3.0**0.25  # way at twice the cost of a short step, over that of the cheapest gait: of a quartic
@@ -49,13 +49,16 @@ BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothin
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.  They bound
 no cost: the estimate counts turns, and may be more than the least cost."""
+FAR = 20.0  # estimate of the cost from which on the first factor is left out [s]; our choice
 SAME_GREED = 3  # ways after which the search for another one begins with the factor that found the last
 ALIKE = 0.08  # distance of footholds up to which a step is much like one that was refused [m]; our choice
 SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1  # up to which steps are as hard [m, rad, 1]; our choice
 TURN_COST = 0.9  # cost of a turn [s/rad]: two steps turn a body by a right angle
 TURN_WAY = 0.6  # way on which going backwards costs as much as a turn by two radians [m]
 LOOK = 5  # cells of the way that tell where it leads
+_KEY_BITS = 42, 21, 16  # where place and heading of a foothold begin in the number of its cell and surface
 _REQUEST = coal.CollisionRequest()
+_UNTURNED = np.eye(3)
 
 
 class _Node(NamedTuple):
@@ -92,20 +95,21 @@ class FootstepSearch:
         self._footholds, self._scale, self._reach, self._pair_cost = footholds, scale, reach, pair_cost
         self._stride, self._highest, self.expanded = stride, highest, 0
         self.holds = [*start, *goal]
-        self._keys: dict[tuple[int, ...], int] = {}
+        self._keys: dict[int, int] = {}
         self._is_free = cache(lambda number: number < 4 or footholds.is_free(self.holds[number]))
         self._pairs: dict[tuple[int, int], float] = {}
-        self._next: dict[tuple[int, int], list[tuple[int, float]]] = {}
+        self._next: dict[tuple[int, int], list[tuple[_Node, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
         self._refused: list[tuple[FloatArray, FloatArray]] = []
         self._too_hard: list[FloatArray] = []
         self._offsets = _offsets(scale)
-        self._first_greed = self._ways = 0
         heights = HIGHEST * scale, highest * scale
         self._field = _Field(scene, footholds, start, goal, column, stride * scale, heights)
         places = np.array([hold.position for hold in self.holds])
         yaws = np.array([hold.yaw for hold in self.holds])
         self._ahead: list[float] = self._field.costs(places, yaws).tolist()
+        # With the first factor nearly all footholds about a far way would be expanded before its end.
+        self._first_greed, self._ways = int(min(self._ahead[:2]) > FAR), 0
 
     def close(self, stand: int, step: int) -> None:
         """Close a pair of footholds, which has no posture."""
@@ -157,11 +161,10 @@ class FootstepSearch:
         # The foot that is not the first to stand is where it is at the start.
         return None if way is None else [1 - way[0].hold, *(node.hold for node in way)]
 
-    def _followers(self, node: _Node) -> Iterator[tuple[_Node, float]]:
-        ends = self._at_goal(node)
-        for number, cost in self._steps(node):
-            if (node.hold, number) not in self._closed and math.isfinite(self._ahead[number]):
-                yield _Node(number, -node.side, ends), cost
+    def _followers(self, node: _Node) -> list[tuple[_Node, float]]:
+        if not self._closed:
+            return self._steps(node)
+        return [item for item in self._steps(node) if (node.hold, item[0].hold) not in self._closed]
 
     def farthest(self) -> tuple[float, Foothold]:
         """Least cost that was left at a foothold which was reached [s], and that foothold."""
@@ -193,8 +196,8 @@ class FootstepSearch:
             np.linalg.norm(first - a) < ALIKE and np.linalg.norm(last - b) < ALIKE for a, b in self._refused
         )
 
-    def _steps(self, node: _Node) -> list[tuple[int, float]]:
-        """Footholds to which the other foot may go, with the cost of the step alone."""
+    def _steps(self, node: _Node) -> list[tuple[_Node, float]]:
+        """The other foot on footholds to which it may go, with the cost of the step alone."""
         key = node.hold, node.side
         if key in self._next:
             return self._next[key]
@@ -219,21 +222,25 @@ class FootstepSearch:
             steps[goal] = float(costs[0])
             rows = rows[1:]
         rows -= 1
-        keys = np.column_stack([
-            np.rint(found.positions[rows, :2] / MERGED),
-            np.rint(found.yaws[rows] % (2.0 * math.pi) / MERGED_TURN), found.surfaces[rows],
-        ]).astype(np.int64)  # fmt: skip
+        at, turned = found.positions[rows, :2] / MERGED, found.yaws[rows] % (2.0 * math.pi) / MERGED_TURN
+        cells = np.rint(np.column_stack([at, turned])).astype(np.int64)
+        keys = cells @ (1 << np.array(_KEY_BITS)) + found.surfaces[rows]
         fresh: list[int] = []
-        for row, label in zip(rows.tolist(), map(tuple, keys.tolist()), strict=True):
+        for row, label, cost in zip(rows.tolist(), keys.tolist(), costs[1 + rows].tolist(), strict=True):
             number = self._keys.setdefault(label, len(self.holds))
             if number == len(self.holds):
                 self.holds.append(self._footholds.hold(found, row))
                 fresh.append(row)
             # A place close by stands for the one that was asked for.
-            steps[number] = min(steps.get(number, math.inf), float(costs[1 + row]))
+            if cost < steps.get(number, math.inf):
+                steps[number] = cost
         self._ahead.extend(self._field.costs(found.positions[fresh], found.yaws[fresh]).tolist())
-        self._next[key] = list(steps.items())
-        return self._next[key]
+        arrived = self._at_goal(node)
+        self._next[key] = followers = [
+            (_Node(number, -node.side, arrived), cost) for number, cost in steps.items()
+            if self._ahead[number] < math.inf
+        ]  # fmt: skip
+        return followers
 
     def _step_costs(
         self, stand: Foothold, out: int, positions: FloatArray, yaws: FloatArray, shares: FloatArray
@@ -416,26 +423,28 @@ def _angle(difference: FloatArray) -> FloatArray:
 def _column_is_free(scene: Scene, places: FloatArray, column: tuple[float, float, float]) -> np.ndarray:
     """(k,) whether a vertical capsule above each place meets nothing."""
     radius, bottom, top = column
-    shape = coal.Capsule(radius, max(top - bottom - 2.0 * radius, 1e-3))
-    free, lift = np.ones(len(places), dtype=bool), np.array([0.0, 0.0, 0.5 * (bottom + top)])
+    length = max(top - bottom - 2.0 * radius, 1e-3)
+    shape, middle = coal.Capsule(radius, length), np.array([0.0, 0.0, 0.5 * (bottom + top)])
+    free = np.ones(len(places), dtype=bool)
     for part in (part for item in scene for part in collision_parts(item)):
+        # The distance of the capsule's axis to the box about the part is that of their extents along the
+        # sides of the box where the axis is along one of them, and no less than it elsewhere.
+        half, rows = 0.5 * length * np.abs(part.rotation[2]), np.flatnonzero(free)
+        if np.isfinite(part.low).all():
+            centre = part.translation + 0.5 * part.rotation @ (part.low + part.high)
+            reach = (0.5 * np.abs(part.rotation) @ (part.high - part.low))[:2] + radius
+            away = np.abs(places[rows, :2] - centre[:2])
+            rows = rows[(away[:, 0] <= reach[0]) & (away[:, 1] <= reach[1])]
+        centres = (places[rows] + (middle - part.translation)) @ part.rotation
+        gaps = np.maximum(np.maximum(part.low - half - centres, centres - half - part.high), 0.0)
+        near = rows[np.einsum("ki,ki->k", gaps, gaps) <= radius**2]
+        upright = np.count_nonzero(half > 1e-9 * length) == 1
+        if isinstance(part.geometry, coal.Halfspace) or (isinstance(part.geometry, coal.Box) and upright):
+            free[near] = False
+            continue
         there = coal.Transform3s(part.rotation, part.translation)
-        low, high = _bounds(part.geometry, there)
-        near = (places[:, :2] >= low[:2] - radius).all(axis=1)
-        near &= (places[:, :2] <= high[:2] + radius).all(axis=1)
-        near &= (places[:, 2] + bottom <= high[2]) & (places[:, 2] + top >= low[2])
-        for row in np.flatnonzero(near & free):
-            here, result = coal.Transform3s(np.eye(3), places[row] + lift), coal.CollisionResult()
+        for row in near:
+            here, result = coal.Transform3s(_UNTURNED, places[row] + middle), coal.CollisionResult()
             coal.collide(shape, here, part.geometry, there, _REQUEST, result)
             free[row] = not result.isCollision()
     return free
-
-
-def _bounds(geometry: coal.CollisionGeometry, place: coal.Transform3s) -> tuple[FloatArray, FloatArray]:
-    """Corners of the box about a placed geometry along the axes; infinite where it is endless."""
-    low, high = (np.asarray(corner) for corner in local_box(geometry))
-    if not (np.isfinite(low).all() and np.isfinite(high).all()) or np.abs([low, high]).max() > 1e6:
-        return np.full(3, -np.inf), np.full(3, np.inf)
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-    turned = corners @ place.getRotation().T + place.getTranslation()
-    return turned.min(axis=0), turned.max(axis=0)

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TypeVar
 
@@ -207,6 +207,10 @@ class ContactGenerator:
             near = near[near < self._faces]  # on what is round only a palm can lie
         if not len(near):
             return _failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")
+        stuck = tools.collisions.stuck(situation.origin)
+        if stuck is not None:
+            why = f"{limb} collides wherever its joints are: {stuck[0]} in {stuck[1]}"
+            return _failure(limb, Hindrance.COLLISION, why)
         sole = footprint(self.body, tools.limb, touch, self.rules)
         return _WithinReach(tools, situation, near, touch, sole)
 
@@ -236,6 +240,8 @@ class ContactGenerator:
 
     def _samples_in_contact(self, reached: "_WithinReach", numbers: IntArray) -> Candidates:
         """Step 2: samples on some of the surfaces within reach."""
+        if reached.lying:
+            return reached.lying[0].on(numbers)
         candidates = find_candidates(
             self._table, numbers, reached.situation, reached.tools.samples,
             tolerance=self.settings.tolerance, max_tilt=self.settings.max_tilt, footprint=reached.footprint,
@@ -248,6 +254,7 @@ class ContactGenerator:
         """Failure of a limb of which no sample lies on a surface, or on none that pushes it the asked way."""
         limb, near = reached.tools.limb.name, reached.surfaces
         candidates = self._samples_in_contact(reached, near)
+        reached.lying[:] = [candidates]
         if usable is None or not len(candidates):
             where = f"flat on a surface of {self._names(near)}, though these are near"
             return _failure(limb, Hindrance.SURFACE, f"no sample of {limb} lies {where}")
@@ -255,7 +262,7 @@ class ContactGenerator:
         does = "holds" if usable.pulling else "pushes"
         message = (
             f"no surface in reach of {limb} ({self._names(candidates.surfaces)}) {does} it that way: "
-            f"the best EFORT is {best:.2g} N per N.m, usable {usable.least:.2g}"
+            f"the best EFORT is {round(best, 6) + 0.0:.2g} N per N.m, usable {usable.least:.2g}"
         )
         return _failure(limb, Hindrance.DIRECTION, message, len(candidates))
 
@@ -273,8 +280,7 @@ class ContactGenerator:
         faults: _Faults = Counter()
         tried, flat = 0, kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
-        tools.collisions.begin(situation)
-        q, direction = np.array(situation.state.q), situation.reaction @ situation.rotation
+        q, direction, begun = np.array(situation.state.q), situation.reaction @ situation.rotation, False
         order = rows[_order(scores[rows])[: _LOOKED_AT * self.settings.tries]]
         for row, goal in self._worth_trying(reached, candidates, order, faults):
             if tried == self.settings.tries:
@@ -286,6 +292,9 @@ class ContactGenerator:
                 faults[_UNNATURAL if lies else _TILTED] += 1
                 continue
             q[tools.chain.slots] = aligned.angles
+            if not begun:
+                tools.collisions.begin(situation)
+                begun = True
             surface = int(candidates.surfaces[row])
             hit = tools.collisions.first(q, self._table.surfaces[surface].obstacles)
             if hit is not None:
@@ -337,13 +346,17 @@ class ContactGenerator:
 
 @dataclass(frozen=True, eq=False)
 class _WithinReach:
-    """Surfaces within reach of a limb, by their numbers; the situation has no direction yet."""
+    """Surfaces within reach of a limb, by their numbers; the situation has no direction yet.
+
+    Samples on all of them are in ``lying`` as soon as they are known.
+    """
 
     tools: "_LimbTools"
     situation: Situation
     surfaces: IntArray
     kind: ContactKind
     footprint: FloatArray
+    lying: list[Candidates] = field(default_factory=list)
 
 
 class _LimbTools:

@@ -24,6 +24,7 @@ from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene, segment_of
 from manikin.scene.collision import collision_parts, local_box
 
+_SURE = 1e-6  # depth beyond that from which on two ways to measure it agree [m]
 TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]
 YIELD = 0.8
 """Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius:
@@ -73,6 +74,7 @@ class LimbCollisions:
         self._results, self._frames = list(self._placed.collisionResults), list(self._placed.oMg)
         self._tested = list(zip(self.names, self._results, strict=True))
         self.active: NDArray[np.bool_] = np.ones(len(pairs), dtype=bool)
+        self._begun = np.zeros(0)
         self.soft, self._depth = yielding(body, limb)
         self._touched: tuple[str, ...] = ()
         self._yielding: dict[str, list[int]] = {}
@@ -91,9 +93,28 @@ class LimbCollisions:
             for name in ("translation", "low", "high")
         )
         self._gaps = np.full(len(names), -np.inf)  # what belongs to the limb is always near
+        self._root, self._held = _root_ball(body, limb), [part.obstacle for part in parts]
+        solids = [isinstance(part.geometry, (coal.Box, coal.Halfspace)) for part in parts]
+        self._solid = np.array(solids, dtype=bool)
+
+    def stuck(self, origin: FloatArray) -> tuple[str, str] | None:
+        """Shape of the limb, and box, that collide wherever its joints are; None where none is known.
+
+        The origin (3,) of the limb's frame has a ball of its first shape about it that no joint moves [m].
+        """
+        name, radius = self._root
+        local = np.einsum("nji,nj->ni", self._rotations, origin - self._places)
+        beyond = np.maximum(self._low - local, local - self._high)
+        outside = np.sqrt((np.maximum(beyond, 0.0) ** 2).sum(axis=1))
+        depth = radius - outside - np.minimum(beyond.max(axis=1), 0.0)
+        deep = np.flatnonzero(self._solid & (depth > TOUCH + _SURE))
+        return (name, self._held[int(deep[0])]) if len(deep) else None
 
     def begin(self, situation: Situation) -> None:
-        """Leave out what the limb cannot reach wherever its joints are, until the next call."""
+        """Leave out what the limb cannot reach wherever its joints are, until the body is elsewhere."""
+        if np.array_equal(situation.state.q, self._begun):
+            return
+        self._begun = np.array(situation.state.q)
         pin.updateGeometryPlacements(
             self._model, self._data, self._shapes, self._placed, np.asarray(situation.state.q)
         )
@@ -148,6 +169,20 @@ def _reaches(body: BodyModel, limb: Limb) -> dict[str, float]:
         f"{name}/{shape.name}": length + float(np.linalg.norm(shape.translation)) + _extent(shape)
         for name, length in along.items() for shape in body.segment(name).shapes
     }  # fmt: skip
+
+
+def _root_ball(body: BodyModel, limb: Limb) -> tuple[str, float]:
+    """Capsule of the limb's first segment, and radius of a ball in it about the segment's joint [m].
+
+    The radius is negative where there is none, or it may give way.
+    """
+    segment, balls = body.segment(limb.segments[0]), [("", -np.inf)]
+    if segment.parent is not None and segment.name not in yielding(body, limb)[0]:
+        for shape in (item for item in segment.shapes if item.kind is ShapeKind.CAPSULE):
+            half = 0.5 * float(shape.size[1]) * shape.rotation[:, 2]
+            away = min(float(np.linalg.norm(shape.translation + sign * half)) for sign in (1.0, -1.0))
+            balls.append((f"{segment.name}/{shape.name}", float(shape.size[0]) - away))
+    return max(balls, key=lambda item: item[1])
 
 
 def _extent(shape: Shape) -> float:

@@ -87,7 +87,7 @@ class LimbSamples:
         return hull_of(self.limb, self.segment, self.positions + self.origin)
 
 
-_ROUNDING = 1e-9
+_SINGLE = 1e-4  # what rounding to single precision takes at most, 1,000 m away [m, 1]
 _LEAF = 16  # largest number of samples in a leaf
 
 
@@ -97,21 +97,21 @@ class SampleLeaves:
 
     Attributes:
         rows: (l, k) rows of the samples.
-        positions: (l, k, 3) of the effector [m].
-        upward: (l, k, 3) its z axes; NaN for what only fills a group up.
-        centres: (l, 3) middle of the box about the positions [m].
-        radii: (l,) of a ball about it that holds them [m].
-        axes: (l, 3) unit direction in the middle of the z axes.
+        positions: (l, 3, k) of the effector [m].
+        upward: (l, 3, k) its z axes; NaN for what only fills a group up.
+        centres: (3, l) middle of the box about the positions [m], in single precision.
+        radii: (l,) of a ball about it that holds them with what is lost by that [m].
+        axes: (3, l) unit direction in the middle of the z axes.
         spreads: (l,) largest angle of a z axis to it [rad].
     """
 
     rows: NDArray[np.int64]
     positions: FloatArray
     upward: FloatArray
-    centres: FloatArray
-    radii: FloatArray
-    axes: FloatArray
-    spreads: FloatArray
+    centres: NDArray[np.float32]
+    radii: NDArray[np.float32]
+    axes: NDArray[np.float32]
+    spreads: NDArray[np.float32]
 
     @staticmethod
     def of(positions: FloatArray, upward: FloatArray) -> "SampleLeaves":
@@ -130,13 +130,15 @@ class SampleLeaves:
         real, rows = rows < len(positions), rows % len(positions)
         places, directions = positions[rows], upward[rows]
         centres = 0.5 * (places.min(axis=1) + places.max(axis=1))
-        radii = np.sqrt(((places - centres[:, None]) ** 2).sum(axis=2).max(axis=1)) + _ROUNDING
+        radii = np.sqrt(((places - centres[:, None]) ** 2).sum(axis=2).max(axis=1)) + _SINGLE
         axes = directions.mean(axis=1)
         axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-12)
         cosines = np.einsum("lki,li->lk", directions, axes).min(axis=1)
-        spreads = np.arccos(np.clip(cosines, -1.0, 1.0))
+        spreads = np.arccos(np.clip(cosines, -1.0, 1.0)) + _SINGLE
         directions[~real] = np.nan
-        return SampleLeaves(rows, places, directions, centres, radii, axes, spreads)
+        exact = [np.ascontiguousarray(item.transpose(0, 2, 1)) for item in (places, directions)]
+        rough = [np.asarray(item.T, np.float32, order="C") for item in (centres, radii, axes, spreads)]
+        return SampleLeaves(rows, exact[0], exact[1], *rough)
 
 
 def manipulability(products: FloatArray) -> FloatArray:

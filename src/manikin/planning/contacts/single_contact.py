@@ -130,7 +130,7 @@ def find_contact(
     samples = sample_limb(body, limb, np.random.default_rng(question.seed), question.samples)
     generator = ContactGenerator(body, scene, {limb.name: samples}, rules=rules)
     usable = UsableEfort(usable_efort(body, limb), question.pulling)
-    ask = partial(_ask, generator, q, limb, question.task, question.role, heuristic, kind, usable)
+    ask = partial(ask_limb, generator, q, limb, question.task, question.role, heuristic, kind, usable)
     ask()  # as in a dialogue, where caches are filled
     prepared = time.perf_counter()
     role, result, value = ask()
@@ -144,7 +144,7 @@ def check_limbs(body: BodyModel) -> None:
         raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
 
 
-def _ask(
+def ask_limb(
     generator: ContactGenerator, q: FloatArray, limb: Limb, direction: ArrayLike, role: Role,
     heuristic: Heuristic, kind: ContactKind | None, usable: UsableEfort,
 ) -> tuple[Role, GeneratedContact, float | None]:  # fmt: skip
@@ -246,7 +246,7 @@ class LiveContacts:
         for name in self.limbs:
             limb = limb_named(self.body, name)
             usable = UsableEfort(usable_efort(self.body, limb), self.pulling)
-            _, answers[name], value = _ask(
+            _, answers[name], value = ask_limb(
                 self._generator, q, limb, self.direction, self.role, heuristic, kind, usable
             )
             efforts |= {} if value is None else {name: value}
