@@ -1,13 +1,14 @@
 """Obstacles as Coal geometries (exact primitives, convex and triangle pieces), and distances of pairs."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import coal
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
 from manikin.numerics.spatial import FloatArray, axes_of_normal
@@ -107,6 +108,7 @@ class ClosedSurface:
         return of_faces, sums[index.reshape(-1)].reshape(-1, 3, 3), np.asarray(mesh.vertex_normals)
 
 
+_MEETS = coal.CollisionRequest()
 _REQUEST = coal.DistanceRequest()
 _POINT = coal.Sphere(1e-9)
 _HERE = coal.Transform3s.Identity()
@@ -188,6 +190,41 @@ def shape_of(geometry: coal.CollisionGeometry) -> tuple[Shape, FloatArray]:
         return Box(2 * geometry.halfSide), centre
     low, high = local_box(geometry)
     return Box(np.maximum(high - low, 1e-6)), (low + high) / 2
+
+
+def column_is_free(
+    scene: Iterable[Obstacle], places: FloatArray, column: tuple[float, float, float]
+) -> NDArray[np.bool_]:
+    """(k,) whether a vertical capsule above each place (k, 3) meets nothing of some obstacles.
+
+    The column has a radius, and a lowest and a highest end above the place [m].
+    """
+    radius, bottom, top = column
+    length = max(top - bottom - 2.0 * radius, 1e-3)
+    shape, middle = coal.Capsule(radius, length), np.array([0.0, 0.0, 0.5 * (bottom + top)])
+    free = np.ones(len(places), dtype=bool)
+    for part in (part for item in scene for part in collision_parts(item)):
+        # The distance of the capsule's axis to the box about the part is that of their extents along the
+        # sides of the box where the axis is along one of them, and no less than it elsewhere.
+        half, rows = 0.5 * length * np.abs(part.rotation[2]), np.flatnonzero(free)
+        if np.isfinite(part.low).all():
+            centre = part.translation + 0.5 * part.rotation @ (part.low + part.high)
+            reach = (0.5 * np.abs(part.rotation) @ (part.high - part.low))[:2] + radius
+            away = np.abs(places[rows, :2] - centre[:2])
+            rows = rows[(away[:, 0] <= reach[0]) & (away[:, 1] <= reach[1])]
+        centres = (places[rows] + (middle - part.translation)) @ part.rotation
+        gaps = np.maximum(np.maximum(part.low - half - centres, centres - half - part.high), 0.0)
+        near = rows[np.einsum("ki,ki->k", gaps, gaps) <= radius**2]
+        upright = np.count_nonzero(half > 1e-9 * length) == 1
+        if isinstance(part.geometry, coal.Halfspace) or (isinstance(part.geometry, coal.Box) and upright):
+            free[near] = False
+            continue
+        there = coal.Transform3s(part.rotation, part.translation)
+        for row in near.tolist():
+            here, result = coal.Transform3s(np.eye(3), places[row] + middle), coal.CollisionResult()
+            coal.collide(shape, here, part.geometry, there, _MEETS, result)
+            free[row] = not result.isCollision()
+    return free
 
 
 def local_box(geometry: coal.CollisionGeometry) -> tuple[FloatArray, FloatArray]:

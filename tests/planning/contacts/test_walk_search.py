@@ -21,10 +21,9 @@ from manikin.planning.contacts import (
     WalkSettings,
     certify_plan,
 )
-from manikin.planning.contacts.footsteps import _column_is_free
 from manikin.planning.contacts.handholds import Handholds
 from manikin.scene import Box, Capsule, Cylinder, Obstacle, Scene
-from manikin.scene.collision import collision_parts
+from manikin.scene.collision import collision_parts, column_is_free
 
 BODY = human(1.75, 75.0, "male")
 ALONG_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -76,7 +75,7 @@ def test_a_column_is_free_where_no_part_meets_its_capsule(lean):
             )
             coal.collide(shape, here, part.geometry, there, coal.CollisionRequest(), result)
             meets[row] |= result.isCollision()
-    np.testing.assert_array_equal(_column_is_free(scene, places, (radius, bottom, top)), ~meets)
+    np.testing.assert_array_equal(column_is_free(scene, places, (radius, bottom, top)), ~meets)
     assert 0.2 < meets.mean() < 0.8
 
 

@@ -15,7 +15,6 @@ from functools import cache
 from itertools import pairwise, product
 from typing import NamedTuple
 
-import coal
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
@@ -26,7 +25,7 @@ from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import Graph
 from manikin.planning.contacts.footholds import Feet, Foothold, Footholds
 from manikin.scene import Scene
-from manikin.scene.collision import collision_parts
+from manikin.scene.collision import column_is_free
 
 STEP = 0.7  # time of a short step [s]; our choice, as the next ones
 EASY = 3.0**0.25  # way at twice the cost of a short step, over that of the cheapest gait: of a quartic
@@ -57,8 +56,6 @@ TURN_COST = 0.9  # cost of a turn [s/rad]: two steps turn a body by a right angl
 TURN_WAY = 0.6  # way on which going backwards costs as much as a turn by two radians [m]
 LOOK = 5  # cells of the way that tell where it leads
 _KEY_BITS = 42, 21, 16  # where place and heading of a foothold begin in the number of its cell and surface
-_REQUEST = coal.CollisionRequest()
-_UNTURNED = np.eye(3)
 
 
 class _Node(NamedTuple):
@@ -296,10 +293,10 @@ class _Field:
         covered = np.zeros(len(rows), dtype=bool)
         covered[:-1] = (rows[1:] == rows[:-1]) & (np.diff(height) < 0.45)
         points = np.column_stack([grid[rows], height])[~covered]
-        self._points = points = points[_column_is_free(scene, points, column)]
+        self._points = points = points[column_is_free(scene, points, column)]
         slow, size = np.ones(len(points)), len(points)
         for share, more in ((1.35, 0.8), (1.8, 0.5)):
-            slow[~_column_is_free(scene, points, (*column[:2], share * column[2]))] += more
+            slow[~column_is_free(scene, points, (*column[:2], share * column[2]))] += more
         self._tree = cKDTree(points)
         near = cKDTree(points[:, :2]).query_pairs(1.6 * CELL, output_type="ndarray")
         # Over gaps: cells at the edge of the ground reach farther.
@@ -334,7 +331,7 @@ class _Field:
         ends = self._points[pairs]
         ends[..., 2] = ends[..., 2].max(axis=1, keepdims=True)
         between = ends[:, :1] + BETWEEN[:, None] * (ends[:, 1:] - ends[:, :1])
-        free = _column_is_free(scene, between.reshape(-1, 3), column)
+        free = column_is_free(scene, between.reshape(-1, 3), column)
         return np.asarray(free.reshape(len(pairs), -1).all(axis=1))
 
     def way(self, place: FloatArray) -> FloatArray | None:
@@ -402,11 +399,11 @@ def low_way(
     corners, rest = [start], [*cells, goal]
     while rest:
         ways = [_between(corners[-1], end) for end in rest]
-        far = next((k for k in range(len(rest) - 1, 0, -1) if _column_is_free(scene, ways[k], low).all()), 0)
+        far = next((k for k in range(len(rest) - 1, 0, -1) if column_is_free(scene, ways[k], low).all()), 0)
         corners.append(rest[far])
         rest = rest[far + 1 :]
     places = np.vstack([start[None], *(_between(*pair)[1:] for pair in pairwise(corners))])
-    return places, _column_is_free(scene, places, high)
+    return places, column_is_free(scene, places, high)
 
 
 def _between(first: FloatArray, last: FloatArray) -> FloatArray:
@@ -418,33 +415,3 @@ def _between(first: FloatArray, last: FloatArray) -> FloatArray:
 def _angle(difference: FloatArray) -> FloatArray:
     """Size of angles [rad], at most half a turn."""
     return np.abs(np.mod(difference + math.pi, 2.0 * math.pi) - math.pi)
-
-
-def _column_is_free(scene: Scene, places: FloatArray, column: tuple[float, float, float]) -> np.ndarray:
-    """(k,) whether a vertical capsule above each place meets nothing."""
-    radius, bottom, top = column
-    length = max(top - bottom - 2.0 * radius, 1e-3)
-    shape, middle = coal.Capsule(radius, length), np.array([0.0, 0.0, 0.5 * (bottom + top)])
-    free = np.ones(len(places), dtype=bool)
-    for part in (part for item in scene for part in collision_parts(item)):
-        # The distance of the capsule's axis to the box about the part is that of their extents along the
-        # sides of the box where the axis is along one of them, and no less than it elsewhere.
-        half, rows = 0.5 * length * np.abs(part.rotation[2]), np.flatnonzero(free)
-        if np.isfinite(part.low).all():
-            centre = part.translation + 0.5 * part.rotation @ (part.low + part.high)
-            reach = (0.5 * np.abs(part.rotation) @ (part.high - part.low))[:2] + radius
-            away = np.abs(places[rows, :2] - centre[:2])
-            rows = rows[(away[:, 0] <= reach[0]) & (away[:, 1] <= reach[1])]
-        centres = (places[rows] + (middle - part.translation)) @ part.rotation
-        gaps = np.maximum(np.maximum(part.low - half - centres, centres - half - part.high), 0.0)
-        near = rows[np.einsum("ki,ki->k", gaps, gaps) <= radius**2]
-        upright = np.count_nonzero(half > 1e-9 * length) == 1
-        if isinstance(part.geometry, coal.Halfspace) or (isinstance(part.geometry, coal.Box) and upright):
-            free[near] = False
-            continue
-        there = coal.Transform3s(part.rotation, part.translation)
-        for row in near:
-            here, result = coal.Transform3s(_UNTURNED, places[row] + middle), coal.CollisionResult()
-            coal.collide(shape, here, part.geometry, there, _REQUEST, result)
-            free[row] = not result.isCollision()
-    return free
