@@ -14,7 +14,7 @@ from manikin.contact.contact import MOST_CORNERS
 from manikin.numerics.polytope import convex_polygon, fewer_corners, walls
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.scene.mesh import IntArray
-from manikin.scene.surface import Surface
+from manikin.scene.surface import Surface, walls_of
 
 LEAST_SHARE = 0.6
 """Least share of a sole's area that has to lie on its surface."""
@@ -108,16 +108,8 @@ class FootingTable:
         self._low = np.array([item.polygon[:, :2].min(axis=0) for item in surfaces]).reshape(-1, 2)
         self._high = np.array([item.polygon[:, :2].max(axis=0) for item in surfaces]).reshape(-1, 2)
         self._faces_up = self._normals[:, 2] > 0.1
+        self._convex, self._walls, self._wall_offsets = walls_of(surfaces)
         walled = [item.walls for item in surfaces]
-        self._convex = np.array([item is not None for item in walled], dtype=bool)
-        most = max((len(item[1]) for item in walled if item is not None), default=1)
-        self._walls, self._wall_offsets = (
-            np.zeros((len(walled), most, 3)),
-            np.full((len(walled), most), np.inf),
-        )
-        for number, item in enumerate(walled):
-            if item is not None:
-                self._walls[number, : len(item[1])], self._wall_offsets[number, : len(item[1])] = item
         self._rectangle = np.array([
             item is not None and len(item[0]) == 4 and abs(item[0][0] @ item[0][1]) < 1e-9
             and abs(item[0][1] @ item[0][2]) < 1e-9 and abs(item[0][2] @ item[0][3]) < 1e-9 for item in walled

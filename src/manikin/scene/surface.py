@@ -109,6 +109,17 @@ class Surface:
         return (np.asarray(points) - self.polygon[0]) @ self.rotation[:, :2]
 
 
+def walls_of(surfaces: Sequence[Surface]) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """Which (m,) surfaces are convex, and their walls (m, e, 3) and offsets (m, e) [m], else endless."""
+    found = [item.walls for item in surfaces]
+    most = max((len(item[1]) for item in found if item is not None), default=1)
+    out, offsets = np.zeros((len(found), most, 3)), np.full((len(found), most), np.inf)
+    for number, item in enumerate(found):
+        if item is not None:
+            out[number, : len(item[1])], offsets[number, : len(item[1])] = item
+    return np.array([item is not None for item in found], dtype=bool), out, offsets
+
+
 def inside_edges(points: FloatArray, start: FloatArray, end: FloatArray) -> NDArray[np.bool_]:
     """(...,) whether points (..., 2) are inside closed rings of edges (..., e, 2), by the even-odd rule."""
     x, y = points[..., None, 0], points[..., None, 1]

@@ -10,6 +10,7 @@ from manikin.body import Configuration, Limb, limb_placement
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Surface
+from manikin.scene.surface import walls_of
 
 IntArray = NDArray[np.int64]
 
@@ -93,14 +94,7 @@ class SurfaceTable:
         self.offsets = np.array([item.polygon[0] @ item.normal for item in surfaces])
         self._low = np.array([item.polygon.min(axis=0) for item in surfaces]).reshape(-1, 3)
         self._high = np.array([item.polygon.max(axis=0) for item in surfaces]).reshape(-1, 3)
-        walls = [item.walls for item in surfaces]
-        self._convex = np.array([item is not None for item in walls], dtype=bool)
-        # Missing walls hold everything inside.
-        most = max((len(item[1]) for item in walls if item is not None), default=1)
-        self._walls, self._wall_offsets = np.zeros((len(walls), most, 3)), np.full((len(walls), most), np.inf)
-        for number, item in enumerate(walls):
-            if item is not None:
-                self._walls[number, : len(item[1])], self._wall_offsets[number, : len(item[1])] = item
+        self._convex, self._walls, self._wall_offsets = walls_of(surfaces)
         # Of normals the faces of boxes have few; sideways the surfaces are bounded.
         _, first, group = np.unique(np.round(self.normals, 9), axis=0, return_index=True, return_inverse=True)
         self.group: IntArray = group.ravel()
