@@ -8,6 +8,7 @@ from scipy import sparse
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control import Controller, ControlSettings, SupportMode, TaskWeights
 from manikin.control.controller import RAISED
+from manikin.control.edge_forces import contact_geometry, points_along
 from manikin.errors import InputError
 from manikin.numerics.qp import QPSolution, solve_sparse_qp
 
@@ -242,3 +243,22 @@ def test_a_foot_carries_on_what_touches_where_it_stands(body, contacts, still):
         farthest[time] = max(along)
     assert farthest[0.1] > 0.1
     assert farthest[0.6] <= 0.02
+
+
+@pytest.mark.parametrize("middle", [0.0, 0.05])
+def test_a_foot_on_a_rod_carries_at_a_line_of_its_own_segment(body, middle):
+    """Wherever the rod is below the foot: a moment about the line, or force of the toes, is not there."""
+    edge = [[x + middle, y] for x, y in ((0.007, 0.05), (-0.007, 0.05), (-0.007, -0.05), (0.007, -0.05))]
+    rung = sole("left_foot", np.zeros(3), length=0.26, width=0.1, friction=0.7, polygon=edge)
+    geometry = contact_geometry(body, rung, 0.01)
+    assert [segment for segment, _ in geometry.patches] == ["left_foot"]
+    assert points_along(body, geometry) == pytest.approx([middle, middle])
+
+
+def test_a_foot_carries_nothing_beyond_the_rung_below_its_middle(body):
+    """A rung 8 cm deep ends before the toes, which carry nothing there."""
+    edge = [[0.04, 0.05], [-0.04, 0.05], [-0.04, -0.05], [0.04, -0.05]]
+    rung = sole("left_foot", np.zeros(3), length=0.26, width=0.1, friction=0.7, polygon=edge)
+    geometry = contact_geometry(body, rung, 0.01)
+    assert [segment for segment, _ in geometry.patches] == ["left_foot"]
+    assert np.abs(points_along(body, geometry)).max() <= 0.03 + 1e-9

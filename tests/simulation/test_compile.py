@@ -13,7 +13,7 @@ from manikin.body import Configuration, human, integrate, random_configuration
 from manikin.errors import InputError, SceneError
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Proximity, Scene, Sphere
 from manikin.simulation import PhysicsOptions, compile_model
-from manikin.simulation.compile import obstacle_of, root_rotation
+from manikin.simulation.compile import add_scene, obstacle_of, root_rotation
 
 EXACT = 1e-9
 SEEDS = st.integers(0, 2**32 - 1)
@@ -284,3 +284,25 @@ def test_damping_and_armature_reach_the_hinges_only():
     damping = np.asarray(model.mujoco.dof_damping).reshape(model.mujoco.nv, -1)[:, 0]
     np.testing.assert_allclose(damping, [0.0] * 6 + [1.5] * 39)
     np.testing.assert_allclose(model.mujoco.dof_armature, [0.0] * 6 + [0.02] * 39)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-4, 1e-3])
+def test_a_sole_across_a_rung_touches_it_along_both_edges(tilt):
+    """0.5 mm deep, a sole that is tilted by up to 1 mrad (0.08 mm on a rung of 0.08 m) is on all of it.
+
+    The engine's own test of two boxes finds a single point in a third of these placements.
+    """
+    spec, size = mujoco.MjSpec(), (0.08, 0.375, 0.025)
+    add_scene(spec, Scene([Obstacle("rung", Box(size), translation=(0.0, 0.0, -0.0125))], None), {})
+    sole = spec.worldbody.add_body()
+    sole.add_freejoint()
+    sole.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.09, 0.06, 0.01], mass=1.0)
+    model, rng = spec.compile(), np.random.default_rng(0)
+    data = mujoco.MjData(model)
+    for _ in range(50):
+        turn = np.array([*rng.uniform(-tilt, tilt, 2), rng.uniform(-0.02, 0.02)])
+        mujoco.mju_axisAngle2Quat(data.qpos[3:], turn / np.linalg.norm(turn), np.linalg.norm(turn))
+        data.qpos[:3] = [0.03, rng.uniform(-0.05, 0.05), 0.01 - 5e-4]
+        mujoco.mj_forward(model, data)
+        assert np.ptp(data.contact.pos[:, 0]) > 0.06
+        assert np.ptp(data.contact.pos[:, 1]) > 0.1

@@ -57,7 +57,7 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
         heel, tips = (none, points) if on_toes else (points, none)
     elif contact.kind is not ContactKind.SOLE:
         heel, tips = contact.points, none
-    elif contact.hangs_over:
+    elif contact.hangs_over or contact.length <= ROUND or (line is not None and 2.0 * line >= contact.length):
         polygon = inset_polygon(contact.outline, inset)
         if contact.length <= ROUND:  # on a rod: a line, about which the foot could turn
             middle, side = contact.centre, 0.5 * contact.width - inset

@@ -46,7 +46,11 @@ class ReachVolume:
 
     def residual(self, points: ArrayLike) -> FloatArray:
         """(...) residual radius ``min(b - A s)`` of (..., 3) points ([Tonneau2015]_ algorithm 1) [m]."""
-        return np.min(self.b - np.asarray(points, dtype=np.float64) @ self.A.T, axis=-1)
+        points = np.asarray(points, dtype=np.float64)
+        rows = points.reshape(-1, 3)
+        # Blocks that stay in the cache: pages for one large table cost more than the products.
+        parts = [np.min(self.b - rows[k : k + 64] @ self.A.T, axis=-1) for k in range(0, len(rows), 64)]
+        return np.concatenate([np.zeros(0), *parts]).reshape(points.shape[:-1])
 
     @cached_property
     def inscribed_sphere(self) -> tuple[FloatArray, float]:

@@ -83,6 +83,9 @@ SHEET_THICKNESS = 5e-3
 MAX_SHEETS = 3000
 """More triangles than this in pieces that are not convex are refused."""
 
+NARROW = 0.15
+"""Largest side but one of a box that a sole lies across [m]; our choice."""
+
 _GEOM = mujoco.mjtGeom
 
 
@@ -91,11 +94,15 @@ def add_scene(spec: Any, scene: Scene, contact: dict[str, Any]) -> None:
 
     A convex mesh piece becomes one convex geometry. One that is not, of which MuJoCo would take the hull,
     becomes a prism per triangle, :data:`SHEET_THICKNESS` thick towards its inside; too many are refused.
+    Narrow boxes are convex meshes as well, see :func:`is_narrow`.
     """
     for obstacle in scene:
         shape = obstacle.shape
         if isinstance(shape, Mesh):
             _add_mesh(spec, obstacle, shape, contact)
+        elif isinstance(shape, Box) and is_narrow(obstacle):
+            corners = 0.5 * shape.size * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+            _add_convex(spec, obstacle, f"{PREFIX}{obstacle.name}", corners, contact)
         else:
             kind, size, rotation, translation = _primitive(obstacle)
             spec.worldbody.add_geom(
@@ -144,10 +151,26 @@ def _add_mesh(spec: Any, obstacle: Obstacle, mesh: Mesh, contact: dict[str, Any]
             f"valid: at most {MAX_SHEETS} to simulate, so decimate it or set convex to 'parts'"
         )
     for number, vertices in enumerate(body for piece in mesh.pieces for body in _convex_bodies(piece)):
-        name = f"{PREFIX}{obstacle.name}/{number}"
-        item = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
-        item.uservert = (vertices @ obstacle.rotation.T + obstacle.translation).ravel()
-        spec.worldbody.add_geom(name=name, type=_GEOM.mjGEOM_MESH, meshname=name, **contact)
+        _add_convex(spec, obstacle, f"{PREFIX}{obstacle.name}/{number}", vertices, contact)
+
+
+def _add_convex(
+    spec: Any, obstacle: Obstacle, name: str, vertices: FloatArray, contact: dict[str, Any]
+) -> None:
+    """Add the hull of points (n, 3) of an obstacle's frame [m]."""
+    item = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+    item.uservert = (vertices @ obstacle.rotation.T + obstacle.translation).ravel()
+    spec.worldbody.add_geom(name=name, type=_GEOM.mjGEOM_MESH, meshname=name, **contact)
+
+
+def is_narrow(obstacle: Obstacle) -> bool:
+    """Whether an obstacle is a box with two sides of at most :data:`NARROW`, such as a rung.
+
+    A sole that lies across its edges touches it at four points.  The engine's own test of two boxes takes the
+    crossing of two edges instead, a single point, as soon as their faces are not quite parallel: a foot on a
+    rung rocks between the two and creeps off by millimetres a second.  Convex meshes have all the points.
+    """
+    return isinstance(obstacle.shape, Box) and float(np.sort(obstacle.shape.size)[1]) <= NARROW
 
 
 def _convex_bodies(piece: MeshPiece) -> list[FloatArray]:

@@ -154,6 +154,10 @@ LEAN = 0.35
 """Largest lean of the root in any direction [rad]; our choice."""
 RETREATS = (0.25, 0.45)
 """Distances from a climber's best place before its holds at which it is tried as well, by the reach."""
+HOLDING_PACE, HOLDING_ACCELERATION = 1.0, 1.0
+"""Mean speed of hinges [rad/s] and largest acceleration of the CoM [m/s^2] on rungs; our choice."""
+RUNG_GREED = ((6.0, 1500),)
+"""Factor on the estimate on rungs, where every limb is away from its best place: less finds nothing."""
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
@@ -222,7 +226,10 @@ class _LimbSearch(_ContactSearch):
         if self._body.stature is not None:
             plain = replace(plain, turns=False, around=1.5, beyond=0.1, comfort=10.0, sway=0.3)
         if self._on_rungs:
-            plain = replace(plain, retreats=RETREATS)
+            plain = replace(
+                plain, retreats=RETREATS, greeds=RUNG_GREED, hinge_pace=HOLDING_PACE,
+                com_acceleration=HOLDING_ACCELERATION,
+            )  # fmt: skip
         return replace(
             plain, stride=STRIDE * self._reach, lets_go=self._body.stature is not None and not self._climbs,
             lift=plain.lift * safe, swing_duration=plain.swing_duration * pace,

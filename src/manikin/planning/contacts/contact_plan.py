@@ -131,12 +131,14 @@ class Paces:
         swing_speed: Its mean speed on longer ways [m/s].
         shift_duration: Shortest time between two flights [s].
         hinge_pace: Mean speed of the hinge that turns most [rad/s].
+        com_acceleration: Largest acceleration of the centre of mass from rest to rest [m/s^2].
     """
 
     swing_duration: float = 0.7
     swing_speed: float = 0.7
     shift_duration: float = 0.35
     hinge_pace: float = HINGE_PACE
+    com_acceleration: float = math.inf
 
     def flight(self, before: Contact, after: Contact) -> float:
         """Duration of a limb's flight from one contact to another [s]."""
@@ -203,13 +205,15 @@ class ContactPlan:
 
     @classmethod
     def of(
-        cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray, hinge_pace: float = HINGE_PACE
+        cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray, paces: Paces | None = None
     ) -> "ContactPlan":
-        """Plan that ends with a posture (nq,), with time for each change at an unhurried pace [rad/s]."""
+        """Plan that ends with a posture (nq,), with time for each change at an unhurried pace."""
         com = frozen_array(Configuration(body, goal).com, "goal com [m]", (3,))
         ends = [(stage.q, stage.com) for stage in stages[1:]] + [(goal, com)]
         timed = [
-            replace(stage, min_duration=max(stage.min_duration, _least_time(stage, q, there, hinge_pace)))
+            replace(
+                stage, min_duration=max(stage.min_duration, _least_time(stage, q, there, paces or Paces()))
+            )
             for stage, (q, there) in zip(stages, ends, strict=True)
         ]
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
@@ -249,11 +253,17 @@ class ContactPlan:
         return sum(len(set(after.contacts) - set(before.contacts)) for before, after in pairwise(self.stages))
 
 
-def _least_time(stage: Stage, q: FloatArray, com: FloatArray, hinge_pace: float) -> float:
-    """Time that the change to the next posture takes at an unhurried pace [s]."""
+def _least_time(stage: Stage, q: FloatArray, com: FloatArray, paces: Paces) -> float:
+    """Time that the change to the next posture takes at an unhurried pace [s].
+
+    From rest to rest over a way ``d`` in a time ``T``, the smoothest motion accelerates by ``10 d / (sqrt(3)
+    T^2)`` (minimum jerk: Flash and Hogan 1985, J Neurosci 5:1688).
+    """
     between = stage.q[None] if stage.via is None else np.array([stage.q, stage.via])
     turn = float(np.abs(np.diff([*between[:, 7:], q[7:]], axis=0)).max(axis=1, initial=0.0).sum())
-    return max(turn / hinge_pace, float(np.linalg.norm(com - stage.com)) / COM_PACE)
+    way = float(np.linalg.norm(com - stage.com))
+    accelerating = math.sqrt(10.0 / math.sqrt(3.0) * way / paces.com_acceleration)
+    return max(turn / paces.hinge_pace, way / COM_PACE, accelerating)
 
 
 _QUANTITIES: tuple[tuple[str, str, str, Sense, float], ...] = (

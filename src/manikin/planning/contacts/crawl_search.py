@@ -181,7 +181,7 @@ class CrawlSearch:
             if walk is None:
                 return "no walk leads on from where the body would get up"
             stages, goal = [*stages, *walk.stages[1:]], walk.goal
-        return ContactPlan.of(self._body, stages, goal, self._settings.hinge_pace)
+        return ContactPlan.of(self._body, stages, goal, self._settings)
 
     # --- kneeling down and getting up -------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -73,6 +74,7 @@ class LimbSettings(Paces):
         retreats: Distances behind where the root should be from which postures are tried too, by that reach;
             for who climbs on whole soles, which also keep apart and on their own sides then.
         lets_go: Whether hands may let go, as those of one who stands at the goal.
+        greeds: Factors on the estimate, and states expanded with each.
     """
 
     stride: float = 0.4
@@ -87,6 +89,7 @@ class LimbSettings(Paces):
     turns: bool = True
     lets_go: bool = False
     retreats: tuple[float, ...] = ()
+    greeds: tuple[tuple[float, int], ...] = GREED
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +151,14 @@ class LimbHolds:
         """(k,) distance of places (k, 3) seen from the root to the end of the reach [m]; negative outside."""
         turn, at = self.root_to_segment
         return self.samples.reach.residual((places - at) @ turn)
+
+
+class _Guess(NamedTuple):
+    """Pose (7,) of the root, posture (nq,) to begin with, (2,) place of the CoM [m]; None: by the pose."""
+
+    root: FloatArray
+    q: FloatArray
+    near: FloatArray | None
 
 
 def within_strength(body: BodyModel, posed: Posed, carrying: Contacts, most: float = 1.0) -> Posed:
@@ -216,7 +227,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         graph = Graph(
             self._ahead.__getitem__, self._followers, self._tested, lambda state: self._ahead[state] <= 0.0
         )
-        return graph.best([first], GREED)[0] or "no contacts lead to the goal"
+        return graph.best([first], self.settings.greeds)[0] or "no contacts lead to the goal"
 
     @cached_property
     def _walled_off(self) -> str:
@@ -511,15 +522,16 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             if len(way) > 1:
                 self._close((way[-2], way[-1]))
             return None
-        return ContactPlan.of(body, stages, end.q, self.settings.hinge_pace)
+        return ContactPlan.of(body, stages, end.q, self.settings)
 
     def _guesses(
         self, guide: FloatArray, q: FloatArray, landing: tuple[LimbHolds, Contact] | None = None
-    ) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Poses (7,) of the root, with postures (nq,): as it should be, as it is, and farther back.
+    ) -> Iterator[_Guess]:
+        """As the root should be, as it is, and farther back.
 
         Farther from what a climber holds on to, knees that bend have room before them.  A limb that lands
-        reaches for its contact from there.
+        reaches for its contact from there.  Who stays where it is keeps the centre of mass there too: over
+        the root, behind legs that are bent, each change of contact would swing it farther back.
         """
         back, roots = pin.XYZQUATToSE3(guide).rotation[:, 0], [guide]
         if self.settings.retreats:
@@ -527,7 +539,9 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         for away in self.settings.retreats:
             roots.append(np.concatenate([guide[:3] - away * self.size * back, guide[3:7]]))
         for root in roots:
-            yield root, q if landing is None else landing[0].stretched(q, root, landing[1], self._state)
+            start = q if landing is None else landing[0].stretched(q, root, landing[1], self._state)
+            stays = bool(self.settings.retreats) and np.array_equal(root, q[:7])
+            yield _Guess(root, start, self._state.update(q).com[:2] if stays else None)
 
     def _refused(self, before: State, after: State, reason: str) -> None:
         self.reasons[reason] += 1
@@ -556,18 +570,31 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     def _posed(
         self, held: Contacts, carrying: Contacts,
-        guesses: Iterable[tuple[FloatArray, FloatArray]], key: tuple[object, ...],
+        guesses: Iterable[_Guess], key: tuple[object, ...],
         wishes: Mapping[str, Placement] | None = None,
     ) -> Posed:  # fmt: skip
         """A posture whose points stand upright on their surfaces, as far as they can; looked for once.
 
-        It is near one of some poses (7,) of the root, each with a posture (nq,) to begin with.
+        It is near the first of some guesses from which there is one.
         """
         if key not in self._postures:
             posed, placements = Posed(None), {**upright_points(held), **(wishes or {})}
-            for guide, start in guesses:
-                posed = self.poser.pose(held, carrying, start, guide, placements=placements)
+            for guide, start, near in guesses:
+                place = None
+                if self.settings.retreats:
+                    near = self._over_feet(carrying, guide[:2] if near is None else near)
+                    place = self.poser.resting_place(carrying, near, self.poser.settings.inset)
+                posed = self.poser.pose(held, carrying, start, guide, place=place, placements=placements)
                 if posed.q is not None:
                     break
             self._postures[key] = within_strength(self.poser.body, posed, carrying)
         return self._postures[key]
+
+    def _over_feet(self, carrying: Contacts, near: FloatArray) -> FloatArray:
+        """(2,) place beside another that is over the middle of the feet that carry, seen from behind [m].
+
+        Hands could carry a climber that is beside its foot, at the end of their strength.
+        """
+        feet = [item.position[:2] for item in carrying.values() if item.kind is not ContactKind.GRASP]
+        aside = rotation_from_yaw(self._yaws[1])[:2, 1]
+        return near + float(aside @ (np.mean(feet, axis=0) - near)) * aside if feet else near

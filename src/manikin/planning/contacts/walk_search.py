@@ -221,7 +221,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             self.reasons[f"at the goal: {posed.reason}"] += 1
             self.search.close(way[-2], way[-1])
             return None
-        return ContactPlan.of(body, stages, posed.q, self.settings.hinge_pace)
+        return ContactPlan.of(body, stages, posed.q, self.settings)
 
     def _refuse(self, stand: int, step: int, reason: str, *, too_hard: bool = False) -> None:
         self.reasons[reason] += 1
