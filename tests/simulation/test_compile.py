@@ -293,7 +293,9 @@ def test_a_sole_across_a_rung_touches_it_along_both_edges(tilt):
     The engine's own test of two boxes finds a single point in a third of these placements.
     """
     spec, size = mujoco.MjSpec(), (0.08, 0.375, 0.025)
-    add_scene(spec, Scene([Obstacle("rung", Box(size), translation=(0.0, 0.0, -0.0125))], None), {})
+    add_scene(
+        spec, Scene([Obstacle("rung", Box(size), translation=(0.0, 0.0, -0.0125))], None), {}, ("rung",)
+    )
     sole = spec.worldbody.add_body()
     sole.add_freejoint()
     sole.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.09, 0.06, 0.01], mass=1.0)

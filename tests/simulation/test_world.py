@@ -2,7 +2,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from manikin.body import Configuration
+from manikin.body import Configuration, human
 from manikin.errors import BodyError, InputError
 from manikin.numerics.spatial import GRAVITY_VECTOR
 from manikin.scene import Box, Obstacle, Scene
@@ -121,14 +121,19 @@ def test_grip_holds_a_hand_with_limited_force(body):
         assert np.array_equal(world.sense().grip_wrench("right_hand", start), np.zeros(6))
 
 
-def test_a_grip_is_as_stiff_as_the_other_contacts(body):
-    """Critically damped with their time constant, for the mass that the scene feels of a hand."""
+@pytest.mark.parametrize(("stature", "mass"), [(1.5, 45.0), (1.75, 79.0), (1.95, 120.0)])
+def test_a_grip_is_as_stiff_as_the_other_contacts(stature, mass):
+    """Critically damped with their time constant, for the mass that the scene feels of this body's hand."""
+    body = human(stature=stature, mass=mass)
     state = Configuration(body, body.standing_posture())
     rows = state.effector_jacobian("right_hand")[:3]
     felt = 1.0 / np.linalg.eigvalsh(rows @ np.linalg.solve(state.mass_matrix, rows.T)).max()
-    grip = Grip("right_hand", np.zeros(3), 400.0)
-    assert grip.stiffness * CONTACT_TIME**2 == pytest.approx(felt, rel=0.1)
-    assert grip.damping == pytest.approx(2.0 * felt / CONTACT_TIME, rel=0.1)
+    world = World(compile_model(body, Scene(floor_height=None)))
+    world.reset(body.standing_posture())
+    assert world.least_mass("right_hand") == pytest.approx(felt, rel=1e-6)
+    grip = Grip.of_mass("right_hand", np.zeros(3), 400.0, felt, CONTACT_TIME)
+    assert grip.stiffness * CONTACT_TIME**2 == pytest.approx(felt)
+    assert grip.damping**2 == pytest.approx(4.0 * felt * grip.stiffness)
 
 
 def test_gripping_hand_passes_through_what_it_grips(body):

@@ -45,6 +45,7 @@ class PhysicsOptions:
         joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
         armature: Inertia added to the axis of each hinge [kg.m^2]; 0 keeps the planning model's mass matrix.
         joint_limits: Whether hinges stop at the ends of their ranges.
+        crossed: Boxes that soles lie across, see :func:`is_narrow`; they are convex meshes.
         self_collision: Whether :attr:`~manikin.body.BodyModel.collision_pairs` may touch.
     """
 
@@ -58,6 +59,7 @@ class PhysicsOptions:
     armature: float = 0.0
     joint_limits: bool = True
     self_collision: bool = True
+    crossed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("timestep", "friction", "contact_time_constant", "soft_time_constant"):
@@ -89,18 +91,18 @@ NARROW = 0.15
 _GEOM = mujoco.mjtGeom
 
 
-def add_scene(spec: Any, scene: Scene, contact: dict[str, Any]) -> None:
+def add_scene(spec: Any, scene: Scene, contact: dict[str, Any], crossed: tuple[str, ...] = ()) -> None:
     """Add every obstacle to the world body of a ``mujoco.MjSpec``, with the same contact settings.
 
     A convex mesh piece becomes one convex geometry. One that is not, of which MuJoCo would take the hull,
     becomes a prism per triangle, :data:`SHEET_THICKNESS` thick towards its inside; too many are refused.
-    Narrow boxes are convex meshes as well, see :func:`is_narrow`.
+    Boxes that are ``crossed`` by soles are convex meshes as well, see :func:`is_narrow`.
     """
     for obstacle in scene:
         shape = obstacle.shape
         if isinstance(shape, Mesh):
             _add_mesh(spec, obstacle, shape, contact)
-        elif isinstance(shape, Box) and is_narrow(obstacle):
+        elif isinstance(shape, Box) and obstacle.name in crossed:
             corners = 0.5 * shape.size * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
             _add_convex(spec, obstacle, f"{PREFIX}{obstacle.name}", corners, contact)
         else:
@@ -289,7 +291,7 @@ def compile_model(
         if frozenset((first, second)) not in allowed:
             spec.add_exclude(bodyname1=first, bodyname2=second)
     if scene is not None:
-        add_scene(spec, scene, _contact(options, scenery=True))
+        add_scene(spec, scene, _contact(options, scenery=True), options.crossed)
     for name, (rotation, position) in (held or {}).items():
         _hold(spec, body, name, rotation, position)
     return SimulationModel(body, scene, options, spec.compile())

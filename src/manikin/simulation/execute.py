@@ -3,6 +3,7 @@
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
 from manikin.numerics.spatial import finite_number
 from manikin.scene import Scene
-from manikin.simulation.compile import PhysicsOptions, compile_model
+from manikin.simulation.compile import PhysicsOptions, compile_model, is_narrow
 from manikin.simulation.execution import Execution, push_outcome
 from manikin.simulation.push_force import Push
 from manikin.simulation.recorder import SWITCHING, Recorder, near
@@ -116,7 +117,7 @@ class _Run:
     ) -> None:  # fmt: skip
         self.body, self.plan, self.schedule = body, motion, schedule
         settings = settings or ControlSettings()
-        physics = physics or default_physics(body, schedule)
+        physics = physics or replace(default_physics(body, schedule), crossed=_crossed(scene, schedule))
         self.period = settings.period
         self.substeps, step = round(self.period / physics.timestep), physics.timestep
         if self.substeps < 1 or abs(self.substeps * step - self.period) > 1e-9:
@@ -139,6 +140,7 @@ class _Run:
         self._leaning = [(tuple(segment.name for segment in body.segments), name) for name in padded]
         self._planned_now: tuple[int, ...] | None = None
         self._leaving = set[str]()
+        self._hand_mass = cache(self.world.least_mass)
 
     def run(self, hold: float, progress: Callable[[float], None] | None) -> Execution:
         began, control, start = clock.perf_counter(), 0.0, float(self.plan.time[0])
@@ -192,7 +194,9 @@ class _Run:
             self.world.collide(effector, True)
         self._leaving = leaving
         for contact in held.values():
-            self.world.grip(Grip(contact.effector, contact.position, contact.max_force))
+            mass = self._hand_mass(contact.effector)
+            grip = Grip.of_mass(contact.effector, contact.position, contact.max_force, mass, CONTACT_TIME)
+            self.world.grip(grip)
         for item in grasps:
             if item.start - GRASPING <= time < item.start and item.contact.effector not in held:
                 self.world.collide(item.contact.effector, False)
@@ -246,6 +250,13 @@ class _Run:
             fallbacks=tuple(fallbacks), max_slip_m=recorder.max_slip, friction=recorder.friction_use(),
             push=push_outcome(self.pushes, recorder, self.failure), schedule=recorder.delayed_schedule(),
         )  # fmt: skip
+
+
+def _crossed(scene: Scene, schedule: ContactSchedule) -> tuple[str, ...]:
+    """Names of narrow boxes on which soles stand."""
+    soles = {c for phase in schedule.sequence for c in phase.stance if c.kind is ContactKind.SOLE}
+    touched = {name for contact in soles for name in scene.touched_obstacles(contact)}
+    return tuple(item.name for item in scene if item.name in touched and is_narrow(item))
 
 
 def _expected(interval: SupportInterval, time: float) -> bool:
