@@ -19,7 +19,12 @@ from manikin.body import BodyModel, Configuration
 from manikin.contact import ContactKind, Stance, default_normal_force_cap
 from manikin.errors import InputError
 from manikin.numerics.polytope import convex_polygon, inset_polygon, polygon_of_halfplanes, signed_distance
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_array, skew
+
+SHARE_PRICE, SHARE_WEIGHT, FORCE_WEIGHT = 10.0, 1e-3, 1e-4
+"""Price of a share of the strength against half the square of a motion [rad^2], and the weights that make
+shares and forces over the weight unique; our choice."""
 
 
 def support_polygon(stance: Stance) -> FloatArray:
@@ -210,61 +215,107 @@ def static_torque_share(
 ) -> float:
     """Smallest share of the joints' torque limits with which a posture is held at rest; infinite if none is.
 
-    Minimises the largest share of a torque limit over the contact forces, with
-    ``tau = g(q) - sum J^T w`` and the six rows of the root in equilibrium.
-
     Args:
         q: (nq,) posture that holds the contacts.
         stance: The contacts that carry it, with a cap as in :func:`static_room`.
         acceleration: (3,) of the whole body, which moves as one [m/s^2]; none when omitted.
     """
-    return torque_share_gradient(body, q, stance, acceleration)[0]
+    return RestingTorques(body, q, stance, acceleration).share
 
 
-def torque_share_gradient(
-    body: BodyModel, q: FloatArray, stance: Stance, acceleration: FloatArray | None = None
-) -> tuple[float, FloatArray | None]:
-    """The share of :func:`static_torque_share`, and its gradient (nv,) along motions that keep the contacts.
+class RestingTorques:
+    """Joint torques ``tau = g(q) - sum J^T w`` of a posture at rest, the six rows of the root in equilibrium.
 
-    That is, of the optimal value of a linear program, its multipliers times the derivatives of the torques
-    under constant contact forces.  It leaves the acceleration out, and is None where the share is infinite.
+    Attributes:
+        share: Their largest share of a torque limit, the smallest over all contact forces; infinite where no
+            forces hold the posture.
     """
-    if not len(stance):
-        return np.inf, None
-    generators, state = ContactGenerators.of(stance), Configuration(body, q)
-    origins = np.array([contact.position for contact in stance])[generators.contact]
-    wrenches = generators.about(origins).T
-    model, data, q = body.pinocchio, body.pinocchio.createData(), np.asarray(q)
-    moving = np.zeros(model.nv)
-    if acceleration is not None:
-        moving[:3] = pin.XYZQUATToSE3(q[:7]).rotation.T @ acceleration
-    gravity = pin.rnea(model, data, q, np.zeros(model.nv), moving)
-    jacobians = [state.effector_jacobian(contact.effector) for contact in stance]
-    pairs = zip(generators.contact, wrenches, strict=True)
-    columns = np.column_stack([jacobians[number].T @ wrench for number, wrench in pairs])
-    count = len(wrenches)
-    above = np.column_stack([columns[6:], body.torque_lower])
-    below = np.column_stack([-columns[6:], -body.torque_upper])
-    solution = linprog(
-        np.append(np.zeros(count), 1.0),
-        A_ub=np.vstack([above, below, np.append(generators.normal, 0.0)]),
-        b_ub=np.concatenate([gravity[6:], -gravity[6:], [_cap(stance, body.mass)]]),
-        A_eq=np.column_stack([columns[:6], np.zeros(6)]), b_eq=gravity[:6],
-        bounds=[*((0.0, limit) for limit in generators.upper), (0.0, None)], method="highs",
-    )  # fmt: skip
-    if not solution.success:
-        return np.inf, None
-    upper, lower = solution.ineqlin.marginals[:-1].reshape(2, -1)
-    multipliers = np.concatenate([solution.eqlin.marginals, upper - lower])
-    forces = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
-    for number, contact in enumerate(stance):
-        mine = generators.contact == number
-        frame = model.frames[body.effector_frame(contact.effector)]
-        turn = pin.SE3(state.effector_placement(contact.effector)[0], np.zeros(3))
-        wrench = turn.actInv(pin.Force(solution.x[:-1][mine] @ wrenches[mine]))
-        forces[frame.parentJoint] += frame.placement.act(wrench)
-    slopes = pin.computeStaticTorqueDerivatives(model, data, q, forces)
-    return float(solution.x[-1]), slopes.T @ multipliers
+
+    def __init__(
+        self, body: BodyModel, q: FloatArray, stance: Stance, acceleration: FloatArray | None = None
+    ) -> None:
+        """Share the weight; the arguments are those of :func:`static_torque_share`."""
+        self.share, self._body, self._stance, self._q = np.inf, body, stance, np.asarray(q)
+        if not len(stance):
+            return
+        self._state, self._generators = Configuration(body, q), ContactGenerators.of(stance)
+        origins = np.array([contact.position for contact in stance])[self._generators.contact]
+        self._wrenches = self._generators.about(origins).T
+        model, moving = body.pinocchio, np.zeros(body.nv)
+        if acceleration is not None:
+            moving[:3] = pin.XYZQUATToSE3(self._q[:7]).rotation.T @ acceleration
+        self._gravity = pin.rnea(model, model.createData(), self._q, np.zeros(body.nv), moving)
+        jacobians = [self._state.effector_jacobian(contact.effector) for contact in stance]
+        pairs = zip(self._generators.contact, self._wrenches, strict=True)
+        self._columns = np.column_stack([jacobians[number].T @ wrench for number, wrench in pairs])
+        count = len(self._wrenches)
+        above = np.column_stack([self._columns[6:], body.torque_lower])
+        below = np.column_stack([-self._columns[6:], -body.torque_upper])
+        solution = linprog(
+            np.append(np.zeros(count), 1.0),
+            A_ub=np.vstack([above, below, np.append(self._generators.normal, 0.0)]),
+            b_ub=np.concatenate([self._gravity[6:], -self._gravity[6:], [_cap(stance, body.mass)]]),
+            A_eq=np.column_stack([self._columns[:6], np.zeros(6)]), b_eq=self._gravity[:6],
+            bounds=[*((0.0, limit) for limit in self._generators.upper), (0.0, None)], method="highs",
+        )  # fmt: skip
+        if solution.success:
+            self.share, self._forces = float(solution.x[-1]), solution.x[:-1]
+
+    def easing(
+        self, still: FloatArray, bounds: tuple[FloatArray, FloatArray], wanted: float
+    ) -> tuple[FloatArray, float] | None:
+        """Motion (nv,) towards a posture that asks for less, and the share that it leads to to first order.
+
+        A quadratic program in the motion, the contact forces and the share: the smallest motion that takes
+        the share to the wanted one, or a little more where that is dear. As the forces are free in it, all
+        joints that limit the posture are eased at once.
+
+        Args:
+            still: (m, nv) rows along which the body does not move: Jacobians of contacts that are held.
+            bounds: (nv,) lower and (nv,) upper bounds of the motion.
+            wanted: Share of the limits at which it aims.
+
+        Returns:
+            None where no forces hold the posture, or no motion keeps ``still`` and the bounds.
+        """
+        if not np.isfinite(self.share):
+            return None
+        body, count, weight, gravity = self._body, len(self._forces), self._body.mass * GRAVITY, self._gravity
+        # Unknowns: motion, forces over the weight, share beyond the wanted one.
+        torques = np.column_stack([self._slopes(), -weight * self._columns])
+        rows = [
+            np.column_stack([still, np.zeros((len(still), count + 1))]),
+            np.column_stack([torques[:6] / weight, np.zeros(6)]),
+        ]
+        fixed = np.concatenate([np.zeros(len(still)), -gravity[:6] / weight])
+        upper = []
+        for limit in (body.torque_upper, body.torque_lower):  # torques over their limits, one side at a time
+            rows.append(np.column_stack([torques[6:] / limit[:, None], -np.ones(len(limit))]))
+            upper.append(wanted - gravity[6:] / limit)
+        rows.append(np.concatenate([np.zeros(body.nv), self._generators.normal, [0.0]])[None])
+        upper.append(np.array([_cap(self._stance, body.mass) / weight]))
+        weights = np.repeat([1.0, FORCE_WEIGHT, SHARE_WEIGHT], [body.nv, count, 1])
+        towards = np.concatenate([np.zeros(body.nv), -FORCE_WEIGHT * self._forces / weight, [SHARE_PRICE]])
+        low = np.concatenate([bounds[0], np.zeros(count + 1)])
+        high = np.concatenate([bounds[1], self._generators.upper / weight, [np.inf]])
+        most = np.concatenate(upper)
+        program = solve_qp(
+            np.diag(weights), towards, np.vstack(rows), np.append(fixed, np.full(len(most), -np.inf)),
+            np.append(fixed, most), (low, high), equalities=len(fixed),
+        )  # fmt: skip
+        return (program.x[: body.nv], wanted + float(program.x[-1])) if program.solved else None
+
+    def _slopes(self) -> FloatArray:
+        """(nv, nv) derivatives of the torques along motions that keep the contacts, under constant forces."""
+        model = self._body.pinocchio
+        forces = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
+        for number, contact in enumerate(self._stance):
+            mine = self._generators.contact == number
+            frame = model.frames[self._body.effector_frame(contact.effector)]
+            turn = pin.SE3(self._state.effector_placement(contact.effector)[0], np.zeros(3))
+            wrench = turn.actInv(pin.Force(self._forces[mine] @ self._wrenches[mine]))
+            forces[frame.parentJoint] += frame.placement.act(wrench)
+        return pin.computeStaticTorqueDerivatives(model, model.createData(), self._q, forces)
 
 
 def _cap(stance: Stance, mass: float) -> float:

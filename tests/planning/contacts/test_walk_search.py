@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from manikin.balance import StaticRegion
+from manikin.balance import StaticRegion, static_torque_share
 from manikin.body import Configuration, human
 from manikin.contact import ContactKind, Stance, sole, soles_overlap
+from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.contacts import (
     Endpoints,
@@ -183,6 +184,30 @@ def test_a_high_step_is_made_in_postures_that_the_joints_can_hold():
     found, _, _ = planned(high, (0.8, 0.0), body=woman)
     assert found.failure is None
     assert certify_plan(woman, high, found.plan).value("max_torque_share") <= 1.0
+
+
+@pytest.mark.parametrize("stride", [0.5, 0.6, 0.7])
+def test_a_posture_that_is_too_hard_becomes_easier_with_the_same_contacts(stride):
+    """A woman in a stride rests on the front foot; the first posture asks for up to 1.6 of her strength."""
+    woman, feet = human(1.63, 53.0, "female"), Scene()
+    held = {
+        foot: sole(foot, place, length=0.24, width=0.09, friction=0.7)
+        for foot, place in (("left_foot", (0.0, 0.09, 0.0)), ("right_foot", (stride, -0.09, 0.0)))
+    }
+    finder, carrying = PostureFinder(woman, feet), {"right_foot": held["right_foot"]}
+    posed, stance = (
+        finder.pose(held, carrying, woman.standing_posture(), restarts=True),
+        Stance([held["right_foot"]]),
+    )
+    assert static_torque_share(woman, posed.q, stance) > 1.0
+    eased = finder.eased(posed, held, carrying)
+    assert not eased.too_hard
+    assert static_torque_share(woman, eased.q, stance) <= 1.0
+    state = Configuration(woman, eased.q)
+    for foot, contact in held.items():
+        assert state.effector_placement(foot)[1] == pytest.approx(contact.position, abs=2e-4)
+    assert signed_distance(state.com[:2], StaticRegion.of(stance, woman.mass).polygon) > 0.0
+    assert finder.eased(eased, held, carrying).q is eased.q
 
 
 def test_a_step_that_no_leg_can_make_is_explained():

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.criteria import StaticRegion
+from manikin.balance.criteria import RestingTorques, StaticRegion
 from manikin.body import BodyModel, Configuration, with_root
 from manikin.contact import Contact, ContactKind, ContactModel, FrictionModel, Stance
 from manikin.kinematics import (
@@ -24,6 +24,13 @@ from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
 
 ROOT = 7  # numbers of a posture that are the pose of its root
+EASING_MOVES, EASING_TURN = (
+    8,
+    (0.3, 0.03),
+)  # most moves towards an easier posture; first and least turns [rad]
+EASY, EASY_ENOUGH = 0.95, 0.98  # shares of the strength at which they aim, and with which they end
+LIKE_BEFORE = Preferences(hinges={}, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
+"""What is wished for where a posture is near another one: that all its hinges stay."""
 LEARNT_MARGIN = 0.01  # angle that such postures keep to the surface of a learnt volume [rad]; our choice
 
 
@@ -67,8 +74,8 @@ class Posed:
 
     Attributes:
         q: (nq,) or None.
-        reason: In one line, where there is none.
-        too_hard: Whether the reason is the strength of the joints.
+        reason: In one line, where there is none, or where it is too hard.
+        too_hard: Whether the joints are too weak to rest in it.
     """
 
     q: FloatArray | None
@@ -152,6 +159,46 @@ class PostureFinder:
                 return Posed(result.q)
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
+
+    def eased(
+        self, posed: Posed, held: Contacts, carrying: Contacts,
+        placements: Mapping[str, Placement] | None = None,
+    ) -> Posed:  # fmt: skip
+        """A posture that the joints can hold at rest: the given one, or one near it that asks for less.
+
+        Each move keeps contacts and joint ranges, and is put back onto what else is required. Where no
+        posture is found, the one that asks for the least is told with the reason; the other arguments are
+        those of :meth:`pose`.
+        """
+        if posed.q is None:
+            return posed
+        body, stance, margin = self.body, Stance(list(carrying.values())), self.settings.range_margin
+        now, turn, best = RestingTorques(body, posed.q, stance), EASING_TURN[0], posed.q
+        for _ in range(EASING_MOVES if now.share > 1.0 else 0):
+            state, wide = Configuration(body, best), np.full(body.nv, turn)
+            low, high = -wide, wide.copy()
+            low[6:] = np.clip(body.lower + margin - best[ROOT:], low[6:], 0.0)
+            high[6:] = np.clip(body.upper - margin - best[ROOT:], 0.0, high[6:])
+            still = np.vstack([
+                state.effector_jacobian(name)[: 3 if contact.kind is ContactKind.POINT else 6]
+                for name, contact in held.items()
+            ])  # fmt: skip
+            move = now.easing(still, (low, high), EASY)
+            if move is None or now.share - move[1] < 0.003:
+                break
+            near = pin.integrate(body.pinocchio, best, move[0])
+            q = self.pose(held, carrying, near, near, placements=placements, preferences=LIKE_BEFORE).q
+            then = None if q is None else RestingTorques(body, q, stance)
+            if q is not None and then is not None and then.share < now.share - 0.1 * (now.share - move[1]):
+                now, best, turn = then, q, min(1.5 * turn, 0.5)
+            else:
+                turn *= 0.4
+            if now.share <= EASY_ENOUGH or turn < EASING_TURN[1]:
+                break
+        if now.share <= 1.0:
+            return Posed(best)
+        why = f"resting on {' and '.join(carrying)} asks for {now.share:.2f} of the strength"
+        return Posed(best, why, too_hard=True)
 
     def resting_place(self, carrying: Contacts, near: FloatArray, inset: float) -> FloatArray | None:
         """(2,) place nearest to another where the centre of mass can rest on contacts; None without any.

@@ -6,21 +6,17 @@ the other already down, and one that rests on the other, the first about to leav
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations, pairwise
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from manikin.balance.criteria import torque_share_gradient
-from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, ContactKind, Stance
-from manikin.kinematics import Placement
+from manikin.body import BodyModel
+from manikin.contact import Contact
 from manikin.kinematics.step_reach import StepReach
-from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
@@ -38,9 +34,6 @@ STRONG_TRIES = 16
 """Ways that are refused because a posture at rest asks for more than the strength; then later stages decide,
 as a motion may need less than its postures at rest, whose knees and trunk are not bent for least torque."""
 
-EASIER_MOVES = 8
-EASIER_TURN = 0.2  # moves towards a posture of less strength, and a joint's largest turn in each [rad]
-EASY = 0.95  # share of the strength at which they aim
 NEAR_TRIES = 12  # ways after which a pair without a posture closes all that are much like it
 HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]
 HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
@@ -342,50 +335,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
             posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone, placements=flat)
-        if posed.q is not None:
-            posed = self._easier(posed, held, carrying, flat)
+        posed = self.poser.eased(posed, held, carrying, flat)
+        if posed.too_hard:
+            posed = replace(posed, q=None) if self.replanned < STRONG_TRIES else Posed(posed.q)
         self._postures[key] = posed
         return posed
-
-    def _easier(
-        self, posed: Posed, held: Contacts, carrying: Contacts, flat: Mapping[str, Placement]
-    ) -> Posed:
-        """A posture that the joints can hold at rest: the given one, or one near it that asks for less.
-
-        Each move is the shortest that keeps contacts and joint ranges and takes the share of the strength to
-        :data:`EASY` along its gradient; it is put back onto what else is required.
-        """
-        assert posed.q is not None
-        body, stance, q = self.poser.body, Stance(list(carrying.values())), posed.q
-        margin = self.poser.settings.range_margin
-        lower, upper = body.lower + margin, body.upper - margin
-        share, slope = torque_share_gradient(body, q, stance)
-        size = 1.0
-        for _ in range(EASIER_MOVES):
-            if share <= 1.0 or slope is None:
-                break
-            state, widest = Configuration(body, q), np.full(body.nv, size * EASIER_TURN)
-            rows = np.vstack([
-                state.effector_jacobian(name)[: 3 if contact.kind is ContactKind.POINT else 6]
-                for name, contact in held.items()
-            ])  # fmt: skip
-            low, high = -widest, np.array(widest)
-            low[6:], high[6:] = np.clip(lower - q[7:], low[6:], 0.0), np.clip(upper - q[7:], 0.0, high[6:])
-            wanted, still = size * (share - EASY), np.zeros(len(rows))
-            move = solve_qp(
-                np.eye(body.nv) + 1e3 * np.outer(slope, slope), 1e3 * wanted * slope, rows, still, still,
-                (low, high), equalities=len(rows),
-            )  # fmt: skip
-            if not move.solved or slope @ move.x > -0.005:
-                break
-            near = pin.integrate(body.pinocchio, q, move.x)
-            other = self.poser.pose(held, carrying, near, near, placements=flat)
-            after = (math.inf, None) if other.q is None else torque_share_gradient(body, other.q, stance)
-            if other.q is not None and after[0] < share:
-                q, (share, slope), size = other.q, after, min(1.0, 1.5 * size)
-            else:
-                size *= 0.4
-        if share > 1.0 and self.replanned < STRONG_TRIES:
-            why = f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength"
-            return Posed(None, why, too_hard=True)
-        return Posed(q)
