@@ -94,7 +94,10 @@ def test_age_takes_strength_as_published():
 
 
 def test_men_are_as_much_stronger_than_women_as_published():
-    """1.5 to 2 times (Danneskiold-Samsoe 2009); wrists 1.56, shoulders 2; legs as in Anderson's groups."""
+    """1.5 to 2 times (Danneskiold-Samsoe 2009); wrists 1.56, shoulders 2; legs as in Anderson's groups.
+
+    Abductors of the hip have 1.29 and 1.13 N.m/kg (Sugimoto 2014).
+    """
     for name, entries in HUMAN_STRENGTH.items():
         ratio = np.divide(hinge_strength(name, *MAN, age=22.0), hinge_strength(name, *WOMAN, age=22.0))
         for entry, found in zip(entries, ratio, strict=True):
@@ -102,6 +105,8 @@ def test_men_are_as_much_stronger_than_women_as_published():
                 assert 1.1 < found < 1.8
             elif entry.women is Women.WRIST:
                 assert found == pytest.approx(1.0 / 0.641, rel=0.05)
+            elif entry.women is Women.ABDUCTION:
+                assert found == pytest.approx(1.29 * MAN[0] / (1.13 * WOMAN[0]))
             else:
                 assert 1.5 - 1e-9 <= found <= 2.0 + 1e-9
 

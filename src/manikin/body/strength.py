@@ -55,13 +55,15 @@ class Women(Enum):
 
     Torques: 1/1.75, the middle of [DanneskioldSamsoe2009]_ (men 1.5 to 2 times as strong); shoulder 0.5
     (Clin. Biomech. 1989, doi 10.1016/0268-0033(89)90046-6, and :data:`SHOULDER_STUDY`); forearm 1/1.7
-    (Axelsson et al. 2018); wrist 0.786 per kg (J. Funct. Morphol. Kinesiol. 10:377, 2025).
+    (Axelsson et al. 2018); wrist 0.786 per kg (J. Funct. Morphol. Kinesiol. 10:377, 2025); abduction of the
+    hip 1.13 and 1.29 per kg (Sugimoto et al. 2014).
     """
 
     GENERAL = MEAN_MEN_PER_WOMEN / 1.75
     SHOULDER = MEAN_MEN_PER_WOMEN * 0.5
     FOREARM = MEAN_MEN_PER_WOMEN / 1.7
     WRIST = 0.786
+    ABDUCTION = 1.13 / 1.29
 
 
 ANDERSON = "Anderson et al. 2007, Table 3"
@@ -169,7 +171,8 @@ HUMAN_STRENGTH: Mapping[str, tuple[DirectionStrength, DirectionStrength]] = Mapp
         LegStrength((0.113, 0.107, 0.101), (0.127, 0.091, 0.081)),
     ),
     "hip_abduction": (
-        MassStrength(1.08, HIP_STUDY, Grade.QUOTED), MassStrength(1.30 * 1.29, ABDUCTION, Grade.PAPER),
+        MassStrength(1.08, HIP_STUDY, Grade.QUOTED),
+        MassStrength(1.30 * 1.29, ABDUCTION, Grade.PAPER, Women.ABDUCTION),
     ),
     "hip_rotation": (
         MassStrength(0.66, HIP_STUDY, Grade.QUOTED), MassStrength(0.72, HIP_STUDY, Grade.QUOTED),
