@@ -28,7 +28,7 @@ EASING_MOVES, EASING_TURN = (
     8,
     (0.3, 0.03),
 )  # most moves towards an easier posture; first and least turns [rad]
-EASY, EASY_ENOUGH = 0.95, 0.98  # shares of the strength at which they aim, and with which they end
+EASY, EASY_ENOUGH = 0.9, 0.98  # shares of the strength at which they aim, and with which they end
 LIKE_BEFORE = Preferences(hinges={}, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 """What is wished for where a posture is near another one: that all its hinges stay."""
 LEARNT_MARGIN = 0.01  # angle that such postures keep to the surface of a learnt volume [rad]; our choice
