@@ -109,3 +109,43 @@ def test_turn_derivatives_agree_with_finite_differences():
             by_all = (exact.alpha_by_value, exact.alpha_by_rate, exact.alpha_by_second)[which]
             np.testing.assert_allclose(omega, by_value_rate[:, :, column], atol=1e-7)
             np.testing.assert_allclose(alpha, by_all[:, :, column], atol=1e-6)
+
+
+def at_rest(rng, start, end, points=12, degree=5):
+    """Spline between two postures at which velocity and acceleration are zero, and its duration."""
+    control = rng.normal(size=(points, 8))
+    control[:, 3:7] = np.array([0.1, -0.2, 0.3, 1.0]) + 0.1 * rng.normal(size=(points, 4))
+    control[:3], control[-3:] = start, end
+    inner = np.sort(rng.uniform(0.1, 1.5, points - degree - 1))
+    knots = np.concatenate([np.zeros(degree + 1), inner, np.full(degree + 1, 1.6)])
+    return ConfigurationSpline(knots, control, degree)
+
+
+def test_joined_splines_are_each_of_them_and_smooth_where_they_meet():
+    """A quaternion and its negative are the same attitude; the second one is turned round."""
+    rng = np.random.default_rng(5)
+    ends = rng.normal(size=(3, 8))
+    ends[:, 3:7] = np.array([0.1, -0.2, 0.3, 1.0])
+    opposite = ends.copy()
+    opposite[:, 3:7] *= -1.0
+    first, second = at_rest(rng, ends[0], ends[1]), at_rest(rng, opposite[1], opposite[2])
+    flipped = second.control_points.copy()
+    flipped[3:-3, 3:7] *= -1.0
+    second = ConfigurationSpline(second.knots, flipped, 5)
+    whole, t = ConfigurationSpline.joined([first, second]), np.linspace(0.0, 1.6, 41)
+    for found, wanted in zip(whole.evaluate(t), first.evaluate(t), strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-9)
+    later, own = whole.evaluate(1.6 + t), second.evaluate(t)
+    np.testing.assert_allclose(later.v, own.v, atol=1e-9)
+    np.testing.assert_allclose(later.a, own.a, atol=1e-8)
+    around = whole.evaluate(1.6 + np.array([-1e-7, 0.0, 1e-7]))
+    np.testing.assert_allclose(around.v, 0.0, atol=1e-9)
+    np.testing.assert_allclose(around.a, 0.0, atol=1e-3)  # the third derivative is of the order of 1e3
+
+
+def test_splines_that_do_not_meet_are_not_joined():
+    rng = np.random.default_rng(6)
+    ends = np.tile(np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3, 1.0, 0.0]), (2, 1))
+    ends[1, 7] = 0.1
+    with pytest.raises(SplineError, match=r"gap of 0\.1"):
+        ConfigurationSpline.joined([at_rest(rng, ends[0], ends[0]), at_rest(rng, ends[1], ends[1])])

@@ -6,6 +6,7 @@ Velocities and accelerations are exact derivatives, in Pinocchio's convention (p
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -51,6 +52,26 @@ class ConfigurationSpline:
             raise SplineError(f"{told}; valid: knots = control points + degree + 1")
         object.__setattr__(self, "knots", knots)
         object.__setattr__(self, "control_points", points)
+
+    @classmethod
+    def joined(cls, parts: "Sequence[ConfigurationSpline]") -> "ConfigurationSpline":
+        """Splines of one degree one after the other, each of which starts as the one before ends.
+
+        Raises:
+            SplineError: If an end and the start after it differ by more than 1e-9.
+        """
+        knots, points, degree = parts[0].knots, parts[0].control_points, parts[0].degree
+        for part in parts[1:]:
+            following = np.array(part.control_points)
+            if following[0, 3:7] @ points[-1, 3:7] < 0.0:
+                following[:, 3:7] *= -1.0
+            gap = float(np.abs(following[0] - points[-1]).max())
+            if gap > 1e-9 or part.degree != degree:
+                told = f"splines of degrees {degree} and {part.degree} meet with a gap of {gap:.2g}"
+                raise SplineError(f"{told}; valid: one degree, and each starts as the one before ends")
+            knots = np.concatenate([knots[:-1], knots[-1] - part.knots[0] + part.knots[degree + 1 :]])
+            points = np.concatenate([points, following[1:]])
+        return cls(knots, points, degree)
 
     def evaluate(self, time: ArrayLike) -> StateSamples:
         """Evaluate the motion at ``time`` (n,) [s], clamped to the spline's interval."""

@@ -8,7 +8,7 @@ import pytest
 from manikin.contact import Phase, Stance, StanceSequence, point
 from manikin.planning.com import CentroidalProblem, plan_com, timing_free
 from manikin.planning.com.feasibility import Failure
-from manikin.planning.com.timing_free import LONG
+from manikin.planning.com.timing_free import LEVEL, LONG, PART, _parted
 
 LIMBS = {
     "left_fist": (0.5, 0.15),
@@ -63,16 +63,33 @@ def test_a_crawl_keeps_its_margin_all_along(planned, problem):
     assert len(planned.key_instants) == len(problem.sequence) + 1
 
 
-def test_the_parts_meet_at_rest_where_a_posture_is_known(planned, problem):
-    trajectory, instants = planned.trajectory, planned.key_instants
-    resting = [
-        key for key in range(1, len(problem.sequence))
+def resting(found):
+    """Inner key instants at which the centre of mass stands still."""
+    trajectory, instants = found.trajectory, found.key_instants
+    return [
+        key for key in range(1, len(instants) - 1)
         if np.abs(trajectory.velocity(instants[key])).max() < 1e-6
         and np.abs(trajectory.acceleration(instants[key])).max() < 1e-4
     ]  # fmt: skip
-    assert len(resting) == len(problem.sequence) - 1
-    for key in resting:
-        np.testing.assert_allclose(trajectory.position(instants[key]), problem.rests[key], atol=1e-7)
+
+
+def test_the_parts_meet_at_rest_where_a_posture_is_known(planned, problem):
+    """Level parts are as long as they may be; between their ends the body goes on."""
+    keys = resting(planned)
+    assert keys == [*range(PART, len(problem.sequence), PART)]
+    for key in keys:
+        position = planned.trajectory.position(planned.key_instants[key])
+        np.testing.assert_allclose(position, problem.rests[key], atol=1e-7)
+
+
+def test_a_body_that_rises_comes_to_rest_at_each_change(problem):
+    """Limbs fold and stretch on the way: postures between the rests are not known."""
+    up = np.array([0.0, 0.0, 1.1 * LEVEL])
+    rests = [None if rest is None else rest + up * (key % 2) for key, rest in enumerate(problem.rests)]
+    steep = replace(problem, rests=tuple(rests))
+    keys = [*range(len(problem.sequence) + 1)]
+    assert _parted(problem, keys) == [*range(0, len(problem.sequence), PART), len(problem.sequence)]
+    assert _parted(steep, keys) == keys
 
 
 def test_a_short_motion_and_one_without_rests_are_planned_at_once():
@@ -83,21 +100,24 @@ def test_a_short_motion_and_one_without_rests_are_planned_at_once():
     assert np.linalg.norm(found.trajectory.velocity(found.key_instants[1:-1]), axis=1).min() > 1e-3
 
 
-def test_a_part_that_fails_names_its_phase_in_the_whole(problem, monkeypatch):
+def test_a_part_that_fails_is_divided_at_its_rests_and_names_its_phase_in_the_whole(problem, monkeypatch):
+    """The last of the parts into which it is divided fails as well, with either margin."""
     lengths = []
 
-    def second_fails(part):
+    def only_short_ones(part):
         lengths.append(len(part.sequence))
-        found = plan_com(part)
-        if len(lengths) == 1:
-            return found
-        return replace(found, failure=Failure("balance margin", "too small", 1, 0.25), trajectory=None)
+        if len(part.sequence) == 1 and len(lengths) < 4:
+            return plan_com(part)
+        found = replace(part, sequence=StanceSequence(part.sequence.phases[:1]), regions=())
+        return replace(
+            plan_com(found), failure=Failure("balance margin", "too small", 0, 0.25), trajectory=None
+        )
 
-    monkeypatch.setattr(timing_free, "plan_com", second_fails)
+    monkeypatch.setattr(timing_free, "plan_com", only_short_ones)
     failed = plan_com(problem)
     assert not failed.succeeded
     assert failed.trajectory is None
-    assert len(lengths) == 3  # the second one again with the margin that the problem requires
-    assert failed.failure.phase == lengths[0] + 1
-    assert failed.failure.time > 0.25 + problem.sequence[0].min_duration - 1e-9  # after the first part
+    assert lengths == [PART, 1, 1, 1, 1]
+    assert failed.failure.phase == 2
+    assert failed.failure.time > 0.25 + sum(problem.min_durations[:2]) - 1e-9  # after the parts before it
     assert "too small" in failed.failure.reason

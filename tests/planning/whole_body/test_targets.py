@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from manikin.body import human
-from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, point, sole
 from manikin.planning.whole_body.fit_objective import LEAST_ROLL, _effector_rows
 from manikin.planning.whole_body.fit_scales import FitScales
 from manikin.planning.whole_body.fit_targets import (
     FLIGHT_POSITION_WEIGHT,
     FLIGHT_ROTATION_WEIGHT,
     LEAVING_RAMP,
+    POINT_ROTATION_WEIGHT,
     POSITION_RAMP,
     ROTATION_RAMP,
     STRAIGHT,
@@ -168,3 +169,36 @@ def test_a_seat_rolls_forward_freely_and_never_back():
         FitScales().rotation * residual[:, 4], [-0.01 - LEAST_ROLL, -LEAST_ROLL, 0.0], atol=1e-12
     )
     np.testing.assert_allclose(FitScales().rotation * jacobian[:, 4, 4], [1.0, 1.0, 0.0], atol=1e-9)
+
+
+def test_what_touches_in_a_point_is_asked_for_no_more_than_a_hint_of_its_orientation():
+    """A knee that carries turns about its point; held as it lay, shank and spine would leave their ranges."""
+    held = {name: point(name, place, friction=0.6) for name, place in CREEPING.items()}
+    after = held | {"right_knee": point("right_knee", (0.4, -0.1, 0.0), friction=0.6)}
+    flying = {name: contact for name, contact in held.items() if name != "right_knee"}
+    stances = [Stance(list(stage.values()), 2000.0) for stage in (held, flying, after)]
+    schedule = ContactSchedule(StanceSequence([Phase(stance) for stance in stances]), [0.0, 0.5, 1.0, 1.5])
+    (swing,) = schedule.sequence.swings()
+    poses = [Pose(stage["right_knee"].position, np.eye(3)) for stage in (held, after)]
+    planned = PlannedSwing(swing, SwingCurve.lift(*poses, 0.5, 1.0), "smooth")
+    for target in effector_targets(schedule, [planned], np.linspace(0.0, 1.5, 16)).values():
+        assert target.rotation_weight.max() <= POINT_ROTATION_WEIGHT
+        assert (target.weight > 0.0).all()
+
+
+CREEPING = {
+    "left_fist": (0.6, 0.15, 0.0), "right_fist": (0.6, -0.15, 0.0),
+    "left_knee": (0.0, 0.1, 0.0), "right_knee": (0.0, -0.1, 0.0),
+}  # fmt: skip
+
+
+def test_targets_of_a_part_are_those_of_the_whole_then():
+    """Flights before and after the part's times place nothing."""
+    whole, part = np.linspace(0.0, END, 81), slice(61, 81)
+    swing = next(s for s in SCHEDULE.sequence.swings() if s.effector == "right_foot")
+    poses = [Pose(c.position, c.rotation_contact_to_world) for c in (RIGHT, ON_STEP)]
+    planned = PlannedSwing(swing, SwingCurve.lift(*poses, LIFT, LAND), "smooth")
+    all_of_it, rest = (effector_targets(SCHEDULE, [planned], time) for time in (whole, whole[part]))
+    for name, target in rest.items():
+        np.testing.assert_array_equal(target.position, all_of_it[name].position[part])
+        np.testing.assert_array_equal(target.weight, all_of_it[name].weight[part])

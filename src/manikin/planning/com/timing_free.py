@@ -282,17 +282,38 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
 LONG = 24
 """Phases of a motion on other contacts than feet from which on it is planned in parts."""
 
+PART = 8
+"""Most phases of a part, where there are rests between them."""
+
+LEVEL = 0.04
+"""Difference of the heights of rests up to which a body goes on from one to the other without coming to rest;
+where they differ more it folds and stretches its limbs [m]."""
+
 CALM = 0.6
 """Share of the margins of the rests of a part that its motion keeps."""
 
 
 def _resting_keys(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]) -> list[int]:
-    """Key instants that divide a long motion, at rests with the margin that is required; both ends too."""
+    """Key instants with rests that have the margin that is required, of a long motion; both ends too."""
     count, least = len(problem.sequence), problem.required_margin
     if count < LONG or not problem.rests or PENDULUM in guess_styles(problem):
         return []
     inner = [key for key in range(1, count) if _rest_margin(problem, polytopes, key) >= least]
     return [0, *inner, count] if inner else []
+
+
+def _parted(problem: CentroidalProblem, keys: Sequence[int]) -> list[int]:
+    """The fewest of the resting keys between which a body on points alone stays level, not far apart."""
+    rests = [problem.start_com, *problem.rests[1:], problem.goal_com]
+    heights = {key: float(rests[key][2]) for key in keys}
+    pointed = [all(one.kind is ContactKind.POINT for one in phase.stance) for phase in problem.sequence]
+    chosen = [keys[0]]
+    for key, following in itertools.pairwise(keys[1:]):
+        first = chosen[-1]
+        steep = max(abs(heights[one] - heights[first]) for one in (key, following)) > LEVEL
+        if steep or following - first > PART or not all(pointed[first:following]):
+            chosen.append(key)
+    return [*chosen, keys[-1]]
 
 
 def _rest_margin(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], key: int) -> float:
@@ -304,26 +325,30 @@ def _rest_margin(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]
 def _in_parts(
     problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], feasibility: Feasibility, keys: list[int]
 ) -> CentroidalResult:
-    """Plan a long motion in parts from rest to rest, and join them.
+    """Plan a long motion in parts from rest to rest, and join them; a part that fails is divided again.
 
     The programme grows faster than the motion, and one that lasts a minute does not end.
     """
-    began, whole, parts = time.perf_counter(), None, []
-    for first, last in itertools.pairwise(keys):
+    began, whole, parts, first = time.perf_counter(), None, list[CentroidalResult](), keys[0]
+    waiting = [*itertools.pairwise(_parted(problem, keys))]
+    while waiting and (not parts or parts[-1].failure is None):
+        first, last = waiting.pop(0)
         part = _part(problem, polytopes, first, last)
-        found = plan_com(part)
+        found, inside = plan_com(part), keys[keys.index(first) : keys.index(last) + 1]
+        if found.failure is not None and len(inside) > 2:
+            waiting = [*itertools.pairwise(inside), *waiting]
+            continue
         if found.failure is not None and part.required_margin > problem.required_margin:
             found = plan_com(replace(part, required_margin=problem.required_margin))
         parts.append(found)
-        if found.trajectory is None:
-            break
-        whole = found.trajectory if whole is None else whole.followed_by(found.trajectory)
+        if found.trajectory is not None:
+            whole = found.trajectory if whole is None else whole.followed_by(found.trajectory)
     failure, certificate = parts[-1].failure, None
     if failure is not None:
-        earlier, passed = keys[len(parts) - 1], 0.0 if whole is None else whole.duration
+        passed = 0.0 if whole is None else whole.duration
         failure = replace(
-            failure, reason=f"in the part from phase {earlier} on, counted from there: {failure.reason}",
-            phase=None if failure.phase is None else failure.phase + earlier,
+            failure, reason=f"in the part from phase {first} on, counted from there: {failure.reason}",
+            phase=None if failure.phase is None else failure.phase + first,
             time=None if failure.time is None else failure.time + passed,
         )  # fmt: skip
     elif whole is not None:

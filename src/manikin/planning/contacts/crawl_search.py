@@ -19,7 +19,7 @@ from manikin.contact import Contact, point
 from manikin.kinematics import Placement, Preferences
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Extension
-from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage, onto_normal
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage, onto_normal
 from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
@@ -50,7 +50,9 @@ INSET = 0.03  # distance of hands and knees to the edges of what they are on [m]
 LIFT = 0.05  # height of a limb in flight [m]
 LEVEL = {"knee": 0.3, "fist": 6.0}  # weights with which shanks are level and hands upright [1/rad^2]
 TILT = 0.19  # sine of the largest angle of a hand on its fist: its edge is not pressed into the ground
-TURNING = 1.2  # time in which a leg goes from its knee onto its foot or back [s]
+PACES = Paces(swing_duration=0.45, swing_speed=1.2, shift_duration=0.15)  # on all fours; our choice
+ON_FOURS_ROOM = (0.04, 0.04, 0.01)  # way of the centre of mass off a posture on all fours [m]; our choice
+TURNING = 1.6  # time in which a leg goes from its knee onto its foot or back [s]
 _ON_ALL_FOURS = {
     "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 80.0,
     "elbow_flexion": 10.0, "wrist_flexion": -65.0, "neck_flexion": -30.0,
@@ -278,9 +280,9 @@ class CrawlSearch:
             if via is None:
                 reason = f"{name} finds no way to {_text(contact.position)}"
                 continue
-            flight = self._settings.flight(contacts[name], contact)
-            flying = Stage.of(self._body, staying, lifted.q, flight, via=via)
-            return along, flying, Stage.of(self._body, landed, landing.q, self._settings.shift_duration)
+            flight = PACES.flight(contacts[name], contact)
+            flying = Stage.of(self._body, staying, lifted.q, flight, ON_FOURS_ROOM, via)
+            return along, flying, Stage.of(self._body, landed, landing.q, PACES.shift_duration, ON_FOURS_ROOM)
         return reason
 
     def _between(

@@ -333,7 +333,7 @@ def deepest_penetration(
         pairs = frozenset[tuple[str, str]]().union(*(ignored[row] for row in rows.tolist()))
         near = {obstacle for segment, obstacle in pairs if segment in ends}
         obstacles = {one for one in near if any((other.name, one) not in pairs for other in body.segments)}
-        if not obstacles:
+        if not obstacles or not len(rows):
             continue
         others = frozenset(
             (shape, other) for shape, other in proximity.pairs

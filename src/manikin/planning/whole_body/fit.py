@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from manikin.motion.configuration_spline import ConfigurationSpline
+from manikin.motion.configuration_spline import ConfigurationSpline, align_quaternions
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.fit_objective import FitLinearisation, MotionObjective
@@ -25,6 +25,10 @@ DEGREE = 5
 LEAST_DAMPING, FIRST_DAMPING, RESTORING_DAMPING, MOST_DAMPING = 1.0, 30.0, 100.0, 1.0e6
 """Levenberg damping of a control point: the smallest one, that with which a fit begins, the largest one of a
 step that only restores the contacts, and the largest one."""
+
+HELD, AT_REST = 1.0e15, 3
+"""Damping of control points that stay, and their number at an end at rest in a given posture: velocity and
+acceleration are zero there."""
 
 LENGTHS, REFUSED = (1.0, 0.5, 0.25), 4
 """Shares of a constrained step that are tried, until one makes the objective less, and constrained steps in a
@@ -50,6 +54,9 @@ class MotionFit:
         self._basis = objective.basis
         self._system = BlockBandedSystem(self._basis, objective.targets.reference.shape[1])
         self._damping = np.full(self._basis.size, FIRST_DAMPING)
+        first, last = (AT_REST * (posture is not None) for posture in objective.targets.ends)
+        self._held = np.zeros(self._basis.size, dtype=np.bool_)
+        self._held[:first], self._held[self._basis.size - last :] = True, True
         self._multiplier = np.zeros((len(objective.targets.time), objective.task_rows))
 
     def solve(self, start: ConfigurationSpline, final: MotionScales, *, further: bool = False) -> FitResult:
@@ -59,7 +66,7 @@ class MotionFit:
             final: Scales of the last stage.
             further: Go on from an earlier solution at its multipliers, with that stage alone.
         """
-        points, iterations = np.array(start.control_points), 0
+        points, iterations = self._with_ends(np.array(start.control_points)), 0
         for factor in final.stages[-1:] if further else final.stages:
             scales = final.loosened(factor)
             state = self._objective.linearise(points, scales, self._multiplier)
@@ -69,6 +76,18 @@ class MotionFit:
         points, restored = self._restore(points, state, scales)
         spline = ConfigurationSpline(self._knots, points, DEGREE)
         return FitResult(spline, iterations + constrained + restored)
+
+    def _with_ends(self, points: FloatArray) -> FloatArray:
+        """Control points (k, nq) with those of given ends in place."""
+        ends = slice(AT_REST), slice(-AT_REST, None)
+        for rows, posture in zip(ends, self._objective.targets.ends, strict=True):
+            if posture is not None:
+                points[rows] = align_quaternions(np.array([points[rows][0], posture]))[1]
+        return points
+
+    def _damped(self, most: float = np.inf) -> FloatArray:
+        """Damping of each control point, at most so large where it may move."""
+        return np.where(self._held, HELD, np.minimum(self._damping, most))
 
     def _constrain(
         self, points: FloatArray, current: FitLinearisation, scales: MotionScales
@@ -83,10 +102,10 @@ class MotionFit:
             taken += 1
             current.assemble(self._system)
             before = self._multiplier
-            step, after = self._system.factorised(self._damping).constrained(
+            step, after = self._system.factorised(self._damped()).constrained(
                 self._system.right, *self._constraints(current), before, scales.multiplier_rounds
             )
-            step = _within_reach(step)
+            step = self._within_reach(step)
             current.shift_tasks(before, after)
             for length in LENGTHS:
                 trial_points = points + length * step
@@ -114,9 +133,9 @@ class MotionFit:
             taken += 1
             current.assemble(self._system)
             # A step this small needs little damping, which would keep it from the constraints.
-            factor = self._system.factorised(np.minimum(self._damping, RESTORING_DAMPING))
+            factor = self._system.factorised(self._damped(RESTORING_DAMPING))
             step = factor.smallest(*self._constraints(current), scales.multiplier_rounds)
-            trial_points = points + _within_reach(step)
+            trial_points = points + self._within_reach(step)
             trial = self._objective.linearise(trial_points, scales, self._multiplier)
             if self._missed(trial) >= self._missed(current):
                 break
@@ -143,7 +162,7 @@ class MotionFit:
         while taken < scales.max_iterations:
             taken += 1
             current.assemble(self._system)
-            trial_points = points + _within_reach(self._system.solve(self._damping))
+            trial_points = points + self._within_reach(self._system.solve(self._damped()))
             trial = self._objective.linearise(trial_points, scales, self._multiplier)
             self._adapt_damping(current, trial)
             if trial.cost < current.cost:
@@ -153,6 +172,11 @@ class MotionFit:
                     break
         return points, current, taken
 
+    def _within_reach(self, step: FloatArray) -> FloatArray:
+        """The step, shortened to a radian: a longer one leaves the region where the model holds."""
+        step = np.where(self._held[:, None], 0.0, step)
+        return step * min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
+
     def _adapt_damping(self, before: FitLinearisation, after: FitLinearisation) -> None:
         old, new = (self._basis.gather(state.sample_cost) for state in (before, after))
         if after.cost < before.cost:
@@ -160,11 +184,6 @@ class MotionFit:
         else:
             factor = np.where(new > old, 8.0, 1.0)
         self._damping = np.clip(self._damping * factor, LEAST_DAMPING, MOST_DAMPING)
-
-
-def _within_reach(step: FloatArray) -> FloatArray:
-    """The step, shortened to a radian: a longer one leaves the region where the model holds."""
-    return step * min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
 
 
 def spline_through(configurations: FloatArray, basis: SampledBasis, knots: FloatArray) -> ConfigurationSpline:

@@ -137,6 +137,7 @@ class FitJob:
         gives_up: Whether a repair that hardly helps is the last one.
         by_count: Whether the attempt that breaks the fewest requirements is the better one, of two alike the
             later, and is gone on from; else the one that misses least.
+        span: Key instants from which and to which the splines last; the whole schedule when None.
         iterations: Gauss-Newton steps of all fits so far.
     """
 
@@ -147,14 +148,17 @@ class FitJob:
     patience: float = 0.0
     gives_up: bool = False
     by_count: bool = False
+    span: tuple[int, int] | None = None
     iterations: int = 0
 
     def knots(self, schedule: ContactSchedule, fine: int = 0) -> FloatArray:
         """Clamped knots [s] for contacts in time, those near the key instants doubled ``fine`` times."""
         sudden = touch_downs_at_speed(schedule) if self.sudden else ()
-        knots = phase_knots(schedule.instants, self.knot_spacing, sudden)
+        first, last = self.span or (0, len(schedule.sequence))
+        instants = schedule.instants[first : last + 1]
+        knots = phase_knots(instants, self.knot_spacing, sudden)
         for _ in range(fine):
-            knots = refined(knots, schedule.instants)
+            knots = refined(knots, instants)
         return knots
 
     def samples(self, knots: FloatArray) -> tuple[FloatArray, SampledBasis]:

@@ -123,7 +123,10 @@ class MotionObjective:
         self.exact_rows = exact & basis.starts[:, None]
         """(n, task_rows) whether a task is a constraint: contacts and centre of mass, at every knot.
 
-        A span adds one control point: more constrained samples ask for more than the spline can give."""
+        A span adds one control point: more constrained samples ask for more than the spline can give; nothing
+        is left to ask for in a posture that is given."""
+        for sample, posture in zip((0, -1), targets.ends, strict=True):
+            self.exact_rows[sample] &= posture is None
 
     def linearise(self, points: FloatArray, scales: MotionScales, shift: FloatArray) -> FitLinearisation:
         """Evaluate every term.

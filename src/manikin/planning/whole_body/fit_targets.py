@@ -14,7 +14,12 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.foot_roll import Rolls
 from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown, with_pairs
-from manikin.planning.whole_body.swing_planner import PlannedSwing, touch_pairs
+from manikin.planning.whole_body.swing_planner import (
+    PlannedSwing,
+    carries_elsewhere,
+    rolls_on_point,
+    touch_pairs,
+)
 from manikin.scene import Scene
 
 
@@ -75,6 +80,8 @@ class FitTargets:
             where any acceleration costs.
         loads: What is carried at each sample besides the body, or None for nothing.
         forces: Contact forces at which joint torques beyond the strength cost; None where no torque costs.
+        ends: (nq,) postures in which the body rests at the start and at the end; None where it only comes to
+            rest.
     """
 
     time: FloatArray
@@ -91,6 +98,7 @@ class FitTargets:
     reference_second: FloatArray | None = None
     loads: tuple[CarriedLoad | None, ...] | None = None
     forces: HeldForces | None = None
+    ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
 
 
 def effector_targets(
@@ -111,6 +119,8 @@ def effector_targets(
                 weight[rows] = np.where(settling[rows], ALMOST, 1.0)
                 if contact.kind is ContactKind.GRASP:
                     rotation_weight[rows] = GRASP_ROTATION_WEIGHT if contact.oriented else 0.0
+                elif rolls_on_point(contact):
+                    rotation_weight[rows] = POINT_ROTATION_WEIGHT
                 if np.any(settling):
                     share = settled_share(schedule, index, contact, time[rows])
                     target.along[rows] = settling_map(contact, share)
@@ -125,14 +135,18 @@ def effector_targets(
                     0.25 if end - start < LONG_FLIGHT else min(0.25, longest / (end - start))
                     for longest in (POSITION_RAMP, ROTATION_RAMP, LEAVING_RAMP)
                 )
-                weight[rows] = flight_weight(share, FLIGHT_POSITION_WEIGHT, place, place)
+                hold = item.swing.end or item.swing.start
+                on_point = hold is not None and rolls_on_point(hold)
+                middle = POINT_FLIGHT_WEIGHT if on_point else FLIGHT_POSITION_WEIGHT
+                weight[rows] = flight_weight(share, middle, place, place)
                 rotation_weight[rows] = flight_weight(share, FLIGHT_ROTATION_WEIGHT, leave, turn)
                 if item.method == "reach":
                     held = share if item.swing.start is None else 1.0 - share
                     weight[rows] = _reach_weight(held, place)
                     rotation_weight[rows] = GRASP_ROTATION_WEIGHT * held
-                hold = item.swing.end or item.swing.start
-                if hold is not None and hold.kind is ContactKind.GRASP and not hold.oriented:
+                if on_point:
+                    rotation_weight[rows] = POINT_ROTATION_WEIGHT * flight_weight(share, 0.25, leave, turn)
+                elif hold is not None and hold.kind is ContactKind.GRASP and not hold.oriented:
                     rotation_weight[rows] = 0.0
     return targets
 
@@ -141,6 +155,8 @@ def _place(item: PlannedSwing, time: FloatArray, target: EffectorTarget) -> None
     """Write the effector's placement during a flight, and while it rolls before and after it."""
     start, end = item.interval if item.roll is None else item.roll.instants[[0, 3]].tolist()
     rows = (time >= start) & (time < end)
+    if not rows.any():
+        return
     state = item.curve.evaluate(time[rows])
     placed = state.position, state.rotation
     if item.roll is not None:
@@ -224,12 +240,14 @@ LEAST_SETTLED = 0.01
 ALMOST = 1.0 - 1e-9
 """Weight of what matters fully but is not required exactly."""
 
-FLIGHT_POSITION_WEIGHT, FLIGHT_ROTATION_WEIGHT = 0.1, 0.05
+FLIGHT_POSITION_WEIGHT, FLIGHT_ROTATION_WEIGHT, POINT_FLIGHT_WEIGHT = 0.1, 0.05, 0.3
 """Importance of an effector's position in the middle of a flight, and of its orientation there: a hint, so
-that the ankle may follow the shank."""
+that the ankle may follow the shank; and of the position of what touches in a point, as a knee, for which no
+orientation keeps what is beside it off the ground."""
 
-GRASP_ROTATION_WEIGHT = 0.03
-"""Importance of a grasping hand's orientation: a hint, for a grasp holds a point."""
+GRASP_ROTATION_WEIGHT, POINT_ROTATION_WEIGHT = 0.03, 0.2
+"""Importance of a grasping hand's orientation: a hint, for a grasp holds a point; and of the orientation of a
+point contact, whose segment does not end in a point: what is upright lands and stays without rolling."""
 
 POSITION_RAMP, ROTATION_RAMP, LEAVING_RAMP, LONG_FLIGHT = 0.2, 0.12, 0.04, 1.0
 """Longest time near the ends of a flight in which the position matters more, before a landing in which the
@@ -251,6 +269,11 @@ def flight_weight(share: FloatArray, middle: float, leaving: float, landing: flo
     return np.where(blend > 0.0, inside, 1.0)
 
 
+NEAR_CONTACT = 0.35
+"""Time before its first contact in which an effector that was free may come close to it, and that before and
+after a contact of a limb that carries with another effector besides [s]."""
+
+
 def ignored_pairs(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> tuple[Ignored, ...]:
@@ -261,11 +284,17 @@ def ignored_pairs(
         for phase in sequence
     ]
     for swing in sequence.swings():
-        hanging, end = hangs(body, swing.effector), schedule.swing_interval(swing)[1]
-        if swing.end is not None and (swing.start is None or not hanging):
-            # Time before its first contact in which an effector that was free may come close to it [s].
-            early = 0.35 if hanging else SITTING_DOWN
+        hanging, (begin, end) = hangs(body, swing.effector), schedule.swing_interval(swing)
+        flies = swing.end is None or (hanging and swing.start is not None)
+        early = NEAR_CONTACT if hanging else SITTING_DOWN
+        if hanging and carries_elsewhere(body, schedule, swing):
+            flies = False
+            if swing.start is not None:
+                rows = (time >= begin) & (time < begin + NEAR_CONTACT)
+                landing.append((touch_pairs(body, scene, swing.start), rows))
+        if swing.end is not None and not flies:
             landing.append((touch_pairs(body, scene, swing.end), (time >= end - early) & (time < end)))
+        if not flies:
             continue
         for contact in filter(None, (swing.start, swing.end)):
             for index in range(swing.first_phase, swing.last_phase + 1):

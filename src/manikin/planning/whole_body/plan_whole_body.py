@@ -6,9 +6,10 @@ postures show the way; the whole body then follows contacts, swings and centre o
 
 import time as clock
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from itertools import product
+from itertools import pairwise, product
 from types import MappingProxyType
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from manikin.balance import WrenchPolytope, motion_margin, pseudo_wrench, wrench_polytopes
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
+from manikin.body.configuration import Configuration
 from manikin.body.limbs import end_segments, hanging_segment
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
@@ -53,7 +55,13 @@ from manikin.planning.whole_body.posture_style import (
 )
 from manikin.planning.whole_body.sliding_touchdown import Ignored, sliding_touchdown_at
 from manikin.planning.whole_body.swing import SwingLimits
-from manikin.planning.whole_body.swing_planner import FlightPlanner, PlannedSwing, leaning_pairs
+from manikin.planning.whole_body.swing_planner import (
+    FlightPlanner,
+    PlannedSwing,
+    carries_elsewhere,
+    leaning_pairs,
+    rolls_on_point,
+)
 from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import RequirementTable
 from manikin.scene import Proximity, Scene
@@ -162,9 +170,12 @@ def plan_whole_body(
         known = Guide(trajectory.schedule.instants, align_quaternions(np.array(key_postures)), ())
     elif waypoints is not None:
         led = waypoints.guide()
-    leaning = leaning_pairs(body, padded)
+    leaning, tell = leaning_pairs(body, padded), progress or no_progress
     planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), leaning, known, led)
-    return planner.run(began, progress or no_progress)
+    keys = [] if known is None else resting_keys(body, trajectory, known)
+    if len(keys) > 2:
+        return _in_parts(planner, keys, began, tell)
+    return planner.run(planner.swings(), began, tell)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,8 +207,8 @@ class _Goal:
     def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
         """Sample a fitted motion and certify it."""
         planner, schedule = self.planner, self.schedule
-        duration = float(schedule.instants[-1])
-        time = np.linspace(0.0, duration, max(2, round(duration / planner.settings.sampling) + 1))
+        begin, end = planner.instants[[0, -1]].tolist()
+        time = np.linspace(begin, end, max(2, round((end - begin) / planner.settings.sampling) + 1))
         motion, wrench = full_motion(planner.body, schedule, planner.polytopes, time, *spline.evaluate(time))
         ignored = ignored_pairs(planner.body, planner.scene, schedule, time)
         if planner.leaning:
@@ -239,6 +250,7 @@ class _Goal:
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             forces=None if self.forces is None else HeldForces.of(planner.body, schedule, self.forces, time),
+            ends=planner.ends,
         )  # fmt: skip
 
 
@@ -250,6 +262,8 @@ class _Planner:
         settings: WholeBodySettings, leaning: Ignored = frozenset(), known: Guide | None = None,
         waypoints: Guide | None = None,
     ) -> None:  # fmt: skip
+        self.ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
+        self.instants = trajectory.schedule.instants
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
         self.leaning, self.known, self.waypoints = leaning, known, waypoints
         self.proximity = Proximity(body, scene)
@@ -263,8 +277,24 @@ class _Planner:
         )  # fmt: skip
         self.guide = cache(self._guide)
 
-    def run(self, began: float, progress: Progress) -> WholeBodyResult:
-        swings = tuple(self.flights.plan(swing) for swing in self.flights.flights())
+    def part(self, first: int, last: int) -> "_Planner":
+        """The same job from one key instant to another, at rest in the known postures of those inside."""
+        assert self.known is not None  # only motions along known postures are divided
+        part, count = copy(self), len(self.trajectory.schedule.sequence)
+        inside = (key if 0 < key < count else None for key in (first, last))
+        start, end = (None if key is None else self.known.configurations[key] for key in inside)
+        part.ends, part.instants = (start, end), self.trajectory.schedule.instants[first : last + 1]
+        part.job, part.guide = replace(self.job, span=(first, last)), cache(part._guide)
+        return part
+
+    def swings(self) -> tuple[PlannedSwing, ...]:
+        """Every flight; known postures lead limbs of which another effector carries meanwhile."""
+        flights, schedule, led = self.flights.flights(), self.trajectory.schedule, self.known is not None
+        flown = (item for item in flights if not led or not carries_elsewhere(self.body, schedule, item))
+        return tuple(self.flights.plan(swing) for swing in flown)
+
+    def run(self, swings: tuple[PlannedSwing, ...], began: float, progress: Progress) -> WholeBodyResult:
+        """Fit a motion to the swings, in other manners or to other swings where it fails."""
         progress(0.2)
         manner, body = self.settings.manner, self.body
         arms = (_limb_of(body, name) for name in body.effectors if "hand" in name)
@@ -357,7 +387,7 @@ class _Planner:
     ) -> Guide:
         """The guide to the swings for a manner, a set of known postures and a way of search."""
         schedule = self.trajectory.schedule
-        time = split_spans(schedule.instants, self.settings.guide_spacing)
+        time = split_spans(self.instants, self.settings.guide_spacing)
         toes, reference = self.toes(swings, time), self._reference(time, manner, known)
         lay_toes_flat(toes, reference)
         com = self.trajectory.position(time)
@@ -390,6 +420,51 @@ class _Planner:
             wrench = self.trajectory.pseudo_wrench(time)
         stances = [phase.stance for phase in schedule.sequence]
         return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=self.polytopes).margin
+
+
+STILL, CLOSE_TO = (1.0e-3, 1.0e-2), 1.0e-3
+"""Speed [m/s] and acceleration [m/s^2] of a centre of mass at rest, and its distance from that of a posture
+in which the body rests there [m]."""
+
+
+def resting_keys(body: BodyModel, trajectory: CentroidalTrajectory, known: Guide) -> list[int]:
+    """Key instants at which the centre of mass of a crawl rests where a known posture has it; both ends too.
+
+    Empty where nothing carries on a knee, a fist or a tip, and where the trajectory does not bind to its end.
+    """
+    instants, phases = trajectory.schedule.instants, trajectory.schedule.sequence
+    crawls = any(rolls_on_point(contact) for phase in phases for contact in phase.stance)
+    if not crawls or trajectory.binding_until is not None:
+        return []
+    coms = np.array([Configuration(body, q).com for q in known.configurations])
+    limits = (
+        (trajectory.velocity(instants), STILL[0]), (trajectory.acceleration(instants), STILL[1]),
+        (trajectory.position(instants) - coms, CLOSE_TO),
+    )  # fmt: skip
+    still = np.all([np.linalg.norm(values, axis=1) < limit for values, limit in limits], axis=0)
+    still[[0, -1]] = True
+    return np.flatnonzero(still).tolist()
+
+
+def _in_parts(planner: _Planner, keys: Sequence[int], began: float, progress: Progress) -> WholeBodyResult:
+    """Plan a motion in parts from rest to rest, and join them.
+
+    A fit takes or leaves a step for the whole of its motion, and its repairs weigh all of it anew.
+    """
+    swings, parts, count = planner.swings(), list[WholeBodyResult](), len(keys) - 1
+    for number, (first, last) in enumerate(pairwise(keys)):
+        progress(0.2 + 0.8 * number / count)
+        parts.append(planner.part(first, last).run(swings, began, no_progress))
+        swings = parts[-1].swings
+    spline = ConfigurationSpline.joined([part.spline for part in parts])
+    guide = Guide.joined([part.guide for part in parts])
+    goal = _Goal(planner, swings, guide, planner.settings.manner, True)
+    motion, certificate = goal.measure(spline)
+    progress(1.0)
+    return WholeBodyResult(
+        motion, spline, certificate, swings, guide, goal.failure(certificate),
+        sum(part.iterations for part in parts), clock.perf_counter() - began,
+    )  # fmt: skip
 
 
 def _limb_of(body: BodyModel, effector: str) -> frozenset[str]:

@@ -18,10 +18,11 @@ from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.errors import InputError
 from manikin.kinematics import Placement, PostureProblem, Preferences, SolverSettings, generate_posture
 from manikin.motion.configuration_spline import align_quaternions
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, rotation_from_quaternion
 from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body.fit_targets import EffectorTarget, settled_share
 from manikin.planning.whole_body.sliding_touchdown import Ignored
+from manikin.planning.whole_body.swing_planner import rolls_on_point
 from manikin.scene import Proximity
 
 
@@ -46,6 +47,13 @@ class Guide:
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
         return rows
 
+    @classmethod
+    def joined(cls, parts: "Sequence[Guide]") -> "Guide":
+        """Guides one after the other."""
+        postures = align_quaternions(np.concatenate([part.configurations for part in parts]))
+        failures = tuple(failure for part in parts for failure in part.failures)
+        return cls(np.concatenate([part.time for part in parts]), postures, failures)
+
 
 def plan_guide(
     body: BodyModel, proximity: Proximity, schedule: ContactSchedule, time: FloatArray,
@@ -65,6 +73,8 @@ def plan_guide(
         exact: Joints that keep to the reference whatever the posture before.
         restarts: Whether a posture that is not found from the one before is sought from others as well.
     """
+    crawls = any(rolls_on_point(contact) for phase in schedule.sequence for contact in phase.stance)
+    creeping = replace(preferences, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
     q, exactly = reference[0], [7 + joint for joint in exact]
     found, failures, touched = list[FloatArray](), list[tuple[float, str]](), dict[str, FloatArray]()
     settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False, restarts=restarts)
@@ -75,9 +85,11 @@ def plan_guide(
         if k > 0:
             wanted[7:] = 0.5 * (reference[k][7:] + q[7:])
             wanted[exactly] = reference[k][exactly]
+        lies = crawls and rotation_from_quaternion(reference[k : k + 1, 3:7])[0, 2, 2] < LYING
+        distance, likes = (NEAR * clearance, creeping) if lies else (clearance, preferences)
         problem = PostureProblem(
-            body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
-            self_clearance=clearance, ignore=ignored[k], reference=wanted, preferences=preferences,
+            body, contacts, placements, com=com[k], proximity=proximity, clearance=distance,
+            self_clearance=distance, ignore=ignored[k], reference=wanted, preferences=likes,
         )  # fmt: skip
         result = generate_posture(problem, q, settings=settings)
         flying = [name for name in placements if effectors[name].weight[k] < 1.0]
@@ -91,6 +103,11 @@ def plan_guide(
         q = result.q
         found.append(q)
     return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))
+
+
+LYING, NEAR = 0.7, 0.5
+"""Cosine of the pelvis' tilt from which on a body creeps, without upright trunk, level head and hanging arms,
+and near to the ground: share of the wanted distance that its guide postures keep then; our choice."""
 
 
 def _requirements(

@@ -14,7 +14,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments, hangs
-from manikin.contact import Contact, ContactSchedule, Swing
+from manikin.contact import Contact, ContactKind, ContactSchedule, Swing
 from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -178,17 +178,9 @@ class FlightPlanner:
         found: list[Swing] = []
         for swing in self.schedule.sequence.swings():
             if hangs(self._body, swing.effector):
-                apart = swing.start and swing.end and self._carries_elsewhere(swing)
+                apart = swing.start and swing.end and carries_elsewhere(self._body, self.schedule, swing)
                 found += [replace(swing, end=None), replace(swing, start=None)] if apart else [swing]
         return tuple(found)
-
-    def _carries_elsewhere(self, swing: Swing) -> bool:
-        """Whether another effector of the same limb is in contact during a flight."""
-        body, phases = self._body, self.schedule.sequence.phases[swing.first_phase : swing.last_phase + 1]
-        model, others = body.pinocchio, {name for phase in phases for name in phase.stance.effectors}
-        own = model.frames[body.effector_frame(swing.effector)].parentJoint
-        joints = [model.frames[body.effector_frame(name)].parentJoint for name in others if hangs(body, name)]
-        return any(own in model.supports[joint] or joint in model.supports[own] for joint in joints)
 
     def plan(self, swing: Swing) -> PlannedSwing:
         """Find a smooth curve, or else search one."""
@@ -199,6 +191,8 @@ class FlightPlanner:
         if roll is None:
             ends, clearance = (Pose.of(swing.start), Pose.of(swing.end)), self._clearance(swing)
             limits, heights, pitch = self._limits, HEIGHTS, self._pitch(swing, start)
+            if rolls_on_point(swing.start):  # a knee or fist turns about its point as it goes
+                limits = replace(limits, clearance=2.0 * limits.clearance)
         else:
             # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it rises.
             limits = replace(
@@ -307,6 +301,20 @@ class FlightPlanner:
             ignore=frozenset().union(*(self._touching(item) for item in touching)),
             reference=self._reference(time),
         )  # fmt: skip
+
+
+def rolls_on_point(contact: Contact) -> bool:
+    """Whether a contact leaves its effector free to turn: a knee, a fist or a tip, but no flat palm."""
+    return contact.kind is ContactKind.POINT and not contact.effector.endswith("hand")
+
+
+def carries_elsewhere(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> bool:
+    """Whether another effector of the same limb is in contact during a flight."""
+    phases = schedule.sequence.phases[swing.first_phase : swing.last_phase + 1]
+    model, others = body.pinocchio, {name for phase in phases for name in phase.stance.effectors}
+    own = model.frames[body.effector_frame(swing.effector)].parentJoint
+    joints = [model.frames[body.effector_frame(name)].parentJoint for name in others if hangs(body, name)]
+    return any(own in model.supports[joint] or joint in model.supports[own] for joint in joints)
 
 
 def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, ...]:
