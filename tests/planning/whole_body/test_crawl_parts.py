@@ -1,0 +1,60 @@
+"""A crawl is fitted in parts, from rest to rest in known postures."""
+
+import numpy as np
+import pytest
+
+from manikin.body import human
+from manikin.body.configuration import Configuration
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, point, sole
+from manikin.numerics.spline import BSpline, clamped_knots
+from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.whole_body import WholeBodySettings
+from manikin.planning.whole_body.plan_whole_body import _Planner, resting_keys
+from manikin.planning.whole_body.posture_style import Guide
+from manikin.scene import Scene
+
+BODY = human()
+INSTANTS = np.array([0.0, 0.4, 0.8])
+
+
+@pytest.fixture(scope="module")
+def standing():
+    return np.array(BODY.standing_posture())
+
+
+def still(q, extra=()):
+    """The centre of mass of a posture, at rest over its feet for two phases."""
+    state, feet = Configuration(BODY, q), []
+    for name in ("left_foot", "right_foot"):
+        rotation, place = state.effector_placement(name)
+        feet.append(sole(name, place, length=0.24, width=0.08, friction=0.7, rotation=rotation))
+    phases = StanceSequence([Phase(Stance([*feet, *extra], 2000.0))] * 2)
+    spline = BSpline(5, clamped_knots(5, [0.0, 1.0]), np.tile(state.com, (6, 1)))
+    return CentroidalTrajectory(BODY.mass, spline, ContactSchedule(phases, INSTANTS))
+
+
+def test_a_part_ends_at_rest_in_the_posture_that_is_known(standing):
+    """Whatever the fit would rather do there: control points at a given end do not move."""
+    trajectory = still(standing)
+    known = standing.copy()
+    known[7 + BODY.joint_index("left_elbow_flexion")] += 0.2  # an arm that moves no contact
+    guide = Guide(INSTANTS, np.array([standing, known, standing]), ())
+    rng = np.random.default_rng(0)
+    part = _Planner(BODY, Scene([]), trajectory, rng, WholeBodySettings(), known=guide).part(0, 1)
+    spline = part.run((), 0.0, lambda _: None).spline
+    end = spline.evaluate(INSTANTS[1:2])
+    np.testing.assert_allclose(end.q[0], known, atol=1e-9)
+    np.testing.assert_allclose(end.v, 0.0, atol=1e-9)
+    np.testing.assert_allclose(end.a, 0.0, atol=1e-6)  # rounding over the squared spacing of the knots
+    assert spline.knots[-1] == INSTANTS[1]
+
+
+def test_a_crawl_may_be_cut_where_it_rests_and_a_walk_is_not(standing):
+    """A still body on its feet is fitted as a whole, one on a knee is cut where postures are known."""
+    knee = point("left_knee", (0.3, 0.1, 0.0), friction=0.7)
+    known = np.array([standing, standing, standing])
+    assert resting_keys(BODY, still(standing), Guide(INSTANTS, known, ())) == []
+    assert resting_keys(BODY, still(standing, [knee]), Guide(INSTANTS, known, ())) == [0, 1, 2]
+    away = known.copy()
+    away[1, 0] += 0.01  # the posture in the middle has its centre of mass elsewhere
+    assert resting_keys(BODY, still(standing, [knee]), Guide(INSTANTS, away, ())) == [0, 2]
