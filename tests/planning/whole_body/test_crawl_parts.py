@@ -9,7 +9,7 @@ from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, poin
 from manikin.numerics.spline import BSpline, clamped_knots
 from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body import WholeBodySettings
-from manikin.planning.whole_body.plan_whole_body import _Planner, resting_keys
+from manikin.planning.whole_body.plan_whole_body import _in_parts, _Planner, resting_keys
 from manikin.planning.whole_body.posture_style import Guide
 from manikin.scene import Scene
 
@@ -58,3 +58,17 @@ def test_a_crawl_may_be_cut_where_it_rests_and_a_walk_is_not(standing):
     away = known.copy()
     away[1, 0] += 0.01  # the posture in the middle has its centre of mass elsewhere
     assert resting_keys(BODY, still(standing, [knee]), Guide(INSTANTS, away, ())) == [0, 2]
+
+
+def test_joined_parts_are_one_motion_with_one_certificate(standing):
+    """Measured over the whole, the instant where the parts meet included."""
+    guide = Guide(INSTANTS, np.array([standing] * 3), ())
+    rng = np.random.default_rng(0)
+    planner = _Planner(BODY, Scene([]), still(standing), rng, WholeBodySettings(), known=guide)
+    shares = []
+    result = _in_parts(planner, [0, 1, 2], 0.0, shares.append)
+    assert result.succeeded, result.failure
+    assert result.motion.time[-1] == INSTANTS[-1]
+    assert result.guide.time[-1] == INSTANTS[-1]
+    np.testing.assert_allclose(result.spline.evaluate(INSTANTS[1:2]).q[0], standing, atol=1e-9)
+    assert shares[-1] == 1.0
