@@ -7,6 +7,7 @@ from manikin.body import Configuration, human
 from manikin.body.limbs import hinge_line
 from manikin.contact import SolePart, sole, sole_part
 from manikin.planning.contacts.posture_finder import PostureFinder
+from manikin.planning.contacts.walk_search import LANDING_INSETS
 from manikin.scene import Box, Obstacle, Scene
 
 
@@ -33,3 +34,19 @@ def test_the_body_rests_on_the_lower_foot_with_the_upper_one_on_its_toes(stature
     toes = np.array([hinge_line(body, "left_foot"), 0.0, 0.0])
     np.testing.assert_allclose(position + rotation @ toes, upper.position + toes, atol=1e-3)
     assert abs(state.com[0] - lower.position[0]) < edge
+
+
+def test_a_foot_comes_down_farther_where_the_body_rests_less_far_inside():
+    """0.74 m down beside the other one: not with 4.5 cm between the weight and the edge, but with 1.5 cm."""
+    body, height = human(1.75, 79.0, "male"), 0.74
+    size = {"length": body.sole_length, "width": body.sole_width, "friction": 0.7}
+    upper = sole("left_foot", (0.0, 0.0, height), **size)
+    lower = sole("right_foot", (0.0, -0.25, 0.0), **size)
+    block = Obstacle("block", Box((3.0, 1.0, height)), translation=(0.0, 0.39, 0.5 * height))
+    finder, start = PostureFinder(body, Scene([block], 0.0)), np.array(body.standing_posture())
+    start[1:3] += -0.1, 0.4 * height
+    held, found = {"left_foot": upper, "right_foot": lower}, dict[float, bool]()
+    for inset in (finder.settings.inset, LANDING_INSETS[-1]):
+        posed = finder.pose(held, {"left_foot": upper}, start, start[:7], inset=inset, restarts=True)
+        found[inset] = posed.q is not None
+    assert list(found.values()) == [False, True]

@@ -39,6 +39,9 @@ HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it,
 HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
 HAND_TRIES = 4  # ways that feet alone do not make after which hands may join at any step
 HOLDS = 6  # most places of hands that are tried at a step
+LANDING_INSETS = (0.03, 0.015)
+"""Distances of the centre of mass to the edge of where it may rest as a foot comes down a long way [m], tried
+where the usual one fails: that foot carries at once."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +139,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         steepest = min(math.radians(30.0), math.atan(0.8 * friction))
         self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
         self._contact = cache(self._made)
-        self._postures: dict[tuple[frozenset[Contact], frozenset[str], int], Posed] = {}
+        self._postures: dict[tuple[frozenset[Contact], frozenset[str], int, float | None], Posed] = {}
         self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
         ends = feet_of(start.contacts), feet_of(goal.contacts)
@@ -321,20 +324,28 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         lifted = self._posed({leaving.effector: leaving, **carrying}, carrying, before, q)
         if lifted.q is None:
             return None, replace(lifted, reason=f"{leaving.effector} cannot be lifted: {lifted.reason}")
-        landed = self._posed({**carrying, landing.effector: landing}, carrying, after, lifted.q)
+        held = {**carrying, landing.effector: landing}
+        landed = self._posed(held, carrying, after, lifted.q)
+        if float(standing.position[2] - landing.position[2]) > HIGHEST * self._scale:
+            for inset in LANDING_INSETS:
+                landed = self._posed(held, carrying, after, lifted.q, inset) if landed.q is None else landed
         return lifted.q, replace(landed, reason=f"{landing.effector} cannot be put down: {landed.reason}")
 
-    def _posed(self, held: Contacts, carrying: Contacts, place: _Stand, q: FloatArray) -> Posed:
-        """Posture that holds contacts and rests on some; looked for once with each trunk."""
-        key = frozenset(held.values()), frozenset(carrying), place.trunk
+    def _posed(
+        self, held: Contacts, carrying: Contacts, place: _Stand, q: FloatArray, inset: float | None = None
+    ) -> Posed:
+        """Posture that holds contacts and rests on some; looked for once with each trunk and inset."""
+        key = frozenset(held.values()), frozenset(carrying), place.trunk, inset
         if key in self._postures:
             return self._postures[key]
         guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
         flat = upright_points(held)
-        posed = self.poser.pose(held, carrying, q, guide, placements=flat)
+        posed = self.poser.pose(held, carrying, q, guide, inset=inset, placements=flat)
         if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
-            posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone, placements=flat)
+            posed = self.poser.pose(
+                held, carrying, start, guide, inset=inset, restarts=feet_alone, placements=flat
+            )
         posed = self.poser.eased(posed, held, carrying, flat)
         if posed.too_hard:
             posed = replace(posed, q=None) if self.replanned < STRONG_TRIES else Posed(posed.q)
