@@ -7,7 +7,7 @@ from manikin.errors import ScenarioError
 from manikin.pipeline import runner
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.scenarios import load_scenario
-from manikin.scenarios.planned import PLANNING, with_supports
+from manikin.scenarios.found_supports import PLANNING, with_supports
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from manikin.contact import ContactSchedule
 from manikin.errors import ScenarioError
 from manikin.pipeline.stages import ExecutionRequirements, Progress, Report, RunContext, RunResult
-from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_again
+from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_again, with_rests
 from manikin.pipeline.stages.context import StageFailure
 from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, execute_motion
 from manikin.pipeline.stages.recovery_stage import recover_from_push
@@ -97,6 +97,9 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
     planned = _refined if context.scenario.refines else _followed
     result, schedule = planned(with_contacts, report, requirements)
+    if (resting := with_rests(with_contacts, report)) is not None:
+        with_contacts = resting
+        result, schedule = planned(with_contacts, report, requirements)
     if (rolling := with_rolling_feet(with_contacts, report)) is not None:
         again = planned(rolling, report, requirements)
         result, schedule = (result, schedule) if report.prefer_earlier() else again

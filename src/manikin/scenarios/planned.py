@@ -1,4 +1,4 @@
-"""Scenarios made from values: planned contacts, footprints of a walk, one walk, one push."""
+"""Scenarios made from values: footprints of a walk, one walk, one push."""
 
 import math
 from collections.abc import Mapping
@@ -6,17 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
-from manikin.contact import Contact, ContactKind
+from manikin.contact import Contact
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray, yaw_about_normal
-from manikin.planning.contacts import ContactPlan
-from manikin.planning.contacts.transition import MARGIN as RISING_MARGIN
+from manikin.numerics.spatial import FloatArray
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.validation import validate
-from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.scenarios.world import flat_sequence
 from manikin.walking.footprints import FEET, Footprint, Footprints
 
@@ -35,9 +31,14 @@ STANDING = 0.3
 """Least duration of the first and the last support [s]."""
 MARGIN = 10.9
 """Margin about the CoM that the plan of a walk must keep, of a person of 1.75 m and 70 kg [N.m]."""
-_WEIGHTS = {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]}
+WEIGHTS: dict[str, Any] = {
+    "margin": 1.0,
+    "smoothness": 10.0,
+    "duration": 2.0,
+    "acceleration": [1.0, 1.0, 1.0],
+}
 WALKED_PLANNING: Mapping[str, Any] = {
-    "degree": 4, "samples": 4, "zero_end_accelerations": True, "weights": _WEIGHTS,
+    "degree": 4, "samples": 4, "zero_end_accelerations": True, "weights": WEIGHTS,
 }  # fmt: skip
 """Options of the planner: phases are short, so that few samples in each are enough."""
 _SAME_PLACE = 0.002
@@ -70,7 +71,7 @@ def walking_supports(footprints: Footprints, scenario: Scenario) -> Scenario:
         ],
         planning={
             **WALKED_PLANNING,
-            "min_margin": _margin(scenario),
+            "min_margin": walk_margin(scenario),
             "friction_model": scenario.file.planning.friction_model,
         },
         manner="walking",
@@ -103,7 +104,7 @@ def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
     for foot in FEET:
         landing = [phase for phase in walked if phase.get(foot) not in (None, "same")][-1]
         landing[foot] = phases[0][foot]
-    margin = min(scenario.file.planning.min_margin, _margin(scenario))
+    margin = min(scenario.file.planning.min_margin, walk_margin(scenario))
     return scenario.replaced(
         supports=_settings(scenario) | {"phases": [*walked, *phases[1:]]},
         task={**task, "start": {"com": start.tolist()}},
@@ -112,11 +113,11 @@ def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
     )
 
 
-def _margin(scenario: Scenario) -> float:
+def walk_margin(scenario: Scenario, margin: float = MARGIN) -> float:
     """The margin of a walk, for the body that the scenario's own margin is for [N.m]."""
     mass = scenario.file.reference_mass_kg or scenario.mass
     stature = scenario.file.reference_stature_m or scenario.file.body.stature_m
-    return MARGIN * mass / 70.0 * stature / STATURE
+    return margin * mass / 70.0 * stature / STATURE
 
 
 def _settings(scenario: Scenario) -> dict[str, Any]:
@@ -219,150 +220,3 @@ def push_task(
     }
     names = dict(where or {})
     return Scenario(validate(ScenarioFile, data, "push", names), "push", Path.cwd(), names)
-
-
-MAX_SUPPORT_DISTANCE = 1.08
-"""Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
-ABOVE = 0.01
-"""Height that the CoM of a rising body may be above that of its posture [m]; our choice."""
-LOWEST = 0.1
-"""Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
-LEAD = 0.2
-"""Time for which a CoM that leaves a seat at rest may go on at its velocity within its room there [s]: rising
-earlier it would ask a trunk that leans to be thrown back; our choice."""
-DIP = 0.001
-"""Depth that the CoM of a rising body may be below those of its postures [m]; our choice."""
-HIGHEST = 10.0
-"""Height above the lowest posture that no centre of mass reaches [m]."""
-PLANNING_SHARE = (0.8, 0.7)
-"""Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
-PLANNING: Mapping[str, Any] = {"degree": 5, "zero_end_accelerations": True, "weights": _WEIGHTS}
-"""Options of the planner of a body on its feet, where the file keeps the defaults; our choice.
-
-A body that sits down keeps the defaults.
-"""
-PLANNING_RISING: Mapping[str, Any] = {
-    "degree": 5, "min_margin": RISING_MARGIN, "weights": _WEIGHTS | {"margin": 0.2, "duration": 5.0},
-}  # fmt: skip
-"""Options of the planner of a body that leaves a seat, likewise: a seated trunk cannot follow any path."""
-SEATED_LONGER = 1.5
-"""Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
-
-
-def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
-    """Return the scenario with the supports of a contact plan, which can be kept and run again.
-
-    The centre of mass starts and ends where it is in the plan's first and last posture, and is near that of
-    each posture in between when its phase begins. Constraints that the file gives are kept.
-    """
-    friction = scenario.contacts.friction
-    # Rising legs are soon at full length: there is less room above such postures than below them.
-    rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
-    before: dict[str, Contact] = {}
-    phases: list[dict[str, Any]] = []
-    for number, stage in enumerate(plan.stages):
-        phase: dict[str, Any] = {
-            name: "same" if before.get(name) is contact else _entry(contact, friction)
-            for name, contact in stage.contacts.items()
-        }
-        phase["min_duration_s"] = stage.min_duration
-        if rises and "buttocks" in stage.contacts:
-            phase["max_duration_s"] = SEATED_LONGER * stage.min_duration
-        if number:
-            x, y, z = (float(value) for value in stage.com)
-            drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
-            phase["com_near"] = [x, y, z - drop]
-            phase["com_within_m"] = list(stage.com_room)
-            if "buttocks" in before and "buttocks" not in stage.contacts and stage.momentum is None:
-                phase["com_lead_s"] = LEAD
-        before = dict(stage.contacts)
-        phases.append(phase)
-    long, wide = _sole_size(scenario, plan)
-    supports = {
-        "friction": friction,
-        "sole": {"length_m": long, "width_m": wide},
-        "planning_sole": {"length_m": PLANNING_SHARE[0] * long, "width_m": PLANNING_SHARE[1] * wide},
-        "phases": phases,
-    }
-    # The centre of mass is planned up to where a seat is touched.
-    touch = next((stage for stage in plan.stages if "buttocks" in stage.contacts), None) if sits else None
-    task: dict[str, Any] = {
-        "start": {"com": [float(x) for x in plan.stages[0].com]},
-        "goal": {"com": [float(x) for x in (plan.goal_com if touch is None else touch.com)]},
-    }
-    if touch is not None:
-        speed = np.zeros(3) if touch.momentum is None else touch.momentum.velocity
-        task["goal"]["velocity_m_s"] = [float(x) for x in speed]
-    if scenario.file.task.act is not None:
-        task["act"] = scenario.file.task.act.model_dump(mode="json")
-    planning = scenario.file.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.file.planning == type(scenario.file.planning)() and not sits:
-        planning = PLANNING_RISING if rises else PLANNING
-    constraints = _constraints(scenario, plan)
-    return scenario.replaced(
-        supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning
-    )
-
-
-def _entry(contact: Contact, friction: float) -> dict[str, Any]:
-    position = [float(x) for x in contact.position]
-    if contact.kind is ContactKind.GRASP:
-        entry: dict[str, Any] = {"position": position, "max_force_N": contact.max_force}
-        if contact.oriented:
-            turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
-            entry["rpy_deg"] = turn.tolist()
-        return entry
-    turn = contact.rotation_contact_to_world
-    entry = {"position": position, "yaw_deg": math.degrees(yaw_about_normal(turn))}
-    if contact.kind is ContactKind.POINT:
-        entry["kind"] = "point"
-    if abs(contact.normal[2] - 1.0) > 1e-12:
-        entry["normal"] = [float(x) for x in contact.normal]
-    if contact.friction != friction:
-        entry["friction"] = contact.friction
-    if contact.rolls:
-        entry["edge_radius_m"] = contact.edge_radius
-    if contact.hangs_over:
-        entry["polygon"] = contact.points[:, :2].tolist()
-    return entry
-
-
-def _sole_size(scenario: Scenario, plan: ContactPlan) -> tuple[float, float]:
-    """Length and width of a whole sole: one of the plan, or the body's where all hang over edges [m]."""
-    feet = (c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
-    if (whole := next((contact for contact in feet if not contact.hangs_over), None)) is not None:
-        return whole.length, whole.width
-    body = build_body(scenario)
-    return float(body.sole_length or 0.0), float(body.sole_width or 0.0)
-
-
-def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, Any]]:
-    """The file's constraints, and those that a body on its feet keeps to."""
-    given = [item.model_dump(mode="json", exclude_none=True) for item in values.file.com_constraints]
-    keys = {key for item in given for key in item}
-    if "max_support_distance_m" not in keys:
-        given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
-    if values.file.task.act is not None and "height_band" not in keys:
-        given.append({"height_band": _below_postures(plan)})
-    elif "buttocks" in plan.stages[0].contacts and "height_band" not in keys:
-        # Who has left a seat does not go down again: the pelvis would meet it.
-        lowest = min(float(stage.com[2]) for stage in plan.stages) - DIP
-        given.append({"height_band": {"lower": f"{lowest:.4f}", "upper": f"{lowest + HIGHEST:.4f}"}})
-    return given
-
-
-def _below_postures(plan: ContactPlan) -> dict[str, str]:
-    """Band up to a line from start to end, just above the centres of mass of all postures.
-
-    Who goes down to an act and rises in between would have to lift the arms for it.
-    """
-    coms = np.array([*(stage.com for stage in plan.stages), plan.goal_com])
-    way = coms[-1, :2] - coms[0, :2]
-    along = way / max(float(way @ way), 1e-6)
-    drop = coms[-1, 2] - coms[0, 2]
-    shares = (coms[:, :2] - coms[0, :2]) @ along
-    level = float((coms[:, 2] - drop * shares).max()) + ABOVE
-    x, y = (float(value) for value in drop * along)
-    start = float(level - coms[0, 0] * x - coms[0, 1] * y)
-    line = f"{start:.4f} + {x:.4f}*x + {y:.4f}*y"
-    return {"lower": f"{float(coms[:, 2].min()) - LOWEST:.4f}", "upper": line.replace("+ -", "- ")}

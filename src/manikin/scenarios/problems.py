@@ -287,7 +287,10 @@ def _regions(
     if values.is_point_mass or values.max_support_distance is not None:
         return ()
     body = build_body(values)
-    reach, known = ComReach.of(body), [values.start_com, *_rests(values)[1:], values.goal_com]
+    reach, inner = ComReach.of(body), _rests(values)[1:]
+    if len(inner) + 1 != len(sequence):  # feet that roll have more phases, and no rests
+        inner = (None,) * (len(sequence) - 1)
+    known = [values.start_com, *inner, values.goal_com]
     found = [reach.region(phase.stance.contacts) for phase in sequence]
     tops = [region.top for region in found]
     for number, phase in enumerate(sequence):

@@ -22,7 +22,7 @@ from manikin.planning.contacts import ContactPlan, Endpoint, Endpoints, Extensio
 from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios import Scenario
-from manikin.scenarios.planned import with_supports
+from manikin.scenarios.found_supports import with_supports, without_rests
 from manikin.scenarios.sections.task_sections import StateSection
 from manikin.scenarios.world import CLIMBING, carried_to, contact_rules
 from manikin.scene import Scene
@@ -330,7 +330,23 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
         raise scenario.error(("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs")
     report.progress("contacts", 0.0)
     result = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
-    return _with_contacts(context, report, result)
+    planned = _with_contacts(context, report, result)
+    if planned is None or result.plan is None or scenario.contact_limbs is not None or scenario.refines:
+        return planned
+    walking = without_rests(scenario, result.plan)
+    if walking is None:
+        return planned
+    report.keep_scenario(walking)
+    return replace(planned.with_supports(walking), resting=planned)
+
+
+def with_rests(context: RunContext, report: Report) -> RunContext | None:
+    """The task with rests at all changes of contact, after a later stage failed without; None otherwise."""
+    if report.failure is None or context.resting is None:
+        return None
+    report.try_again()
+    report.keep_scenario(context.resting.scenario)
+    return context.resting
 
 
 def plan_contacts_again(context: RunContext, report: Report, phase: int) -> RunContext | None:

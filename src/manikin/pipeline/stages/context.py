@@ -130,6 +130,8 @@ class RunContext:
         settings: Options of the whole-body stage.
         problem: What the centre of mass is planned for; None as long as there are no supports.
         plan: The contacts that were found from start and goal, or None.
+        search_again: Searches on for other contacts without the change of a phase, which failed for a reason.
+        resting: The task with rests at all changes of contact, where this one passes some without; or None.
     """
 
     given: Scenario
@@ -142,6 +144,7 @@ class RunContext:
     problem: CentroidalProblem | KeyframeProblem | None = None
     plan: ContactPlan | None = None
     search_again: Callable[[int, str], ContactSearch] | None = None
+    resting: "RunContext | None" = None
 
     @classmethod
     def of(cls, scenario: Scenario, settings: WholeBodySettings | None = None) -> "RunContext":

@@ -12,6 +12,8 @@ from manikin.balance import motion_margin
 from manikin.balance.contact_forces import friction_use
 from manikin.contact import ContactSchedule, SolePart, StanceSequence
 from manikin.motion import Motion
+from manikin.motion.configuration_spline import align_quaternions
+from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.context import Report, RunContext, place, reason_in_world, trajectory_in_world
 from manikin.planning import com
 from manikin.planning.com import CentroidalResult, CentroidalTrajectory, KeyframeProblem, KeyframeResult
@@ -28,6 +30,7 @@ from manikin.planning.whole_body import (
 )
 from manikin.planning.whole_body.certificate import MotionCertificate
 from manikin.planning.whole_body.point_mass_motion import point_mass_forces, point_mass_motion
+from manikin.planning.whole_body.posture_style import Guide
 
 KEY_ROOM = 0.5
 """Share of the fit's distance from the ends of the joint ranges that key postures keep."""
@@ -101,7 +104,7 @@ def _eligible(
         return find_key_postures(
             context.body, context.scene, trajectory, manner=context.settings.manner,
             requirements=context.settings.requirements, range_margin=range_margin,
-            tolerance=tolerance, known=None if context.plan is None else context.plan.postures,
+            tolerance=tolerance, known=_planned_postures(context, trajectory.schedule),
             padded=() if context.plan is None else context.padded,
         )  # fmt: skip
 
@@ -181,7 +184,8 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
         result = com.plan_com_through_key_frames(problem)
     else:
         result = com.plan_com(problem)
-        if result.failure is not None and context.scenario.keeps_upright:  # the task may need a deeper bend
+        bends = context.scenario.keeps_upright and context.resting is None
+        if result.failure is not None and bends:  # the task may need a deeper bend
             result = com.plan_com(context.scenario.build_centroidal_problem(upright=False))
     report_centre_of_mass(report, result, centroidal_summary(result))
     if (failure := result.failure) is not None:
@@ -193,7 +197,8 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
 
 def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[str, Any]) -> None:
     """Take a plan into the report, with its trajectory and its ``centroidal`` block."""
-    on_flat_feet = next((failure for failure in report.refused if failure["phase"] is None), None)
+    refused = report.refused if report.summary["contacts"] is None else []
+    on_flat_feet = next((failure for failure in refused if failure["phase"] is None), None)
     report.finish("centroidal", block | {"on_flat_feet": on_flat_feet})
     if result.certificate is not None:
         report.require("centroidal", result.certificate.table(result.problem))
@@ -254,12 +259,33 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     result = plan_whole_body(
         context.body, context.scene, trajectory, rng=rng, settings=context.settings,
         padded=context.padded, waypoints=plan.postures,
-        key_postures=None if context.plan is None else context.plan.postures,
+        key_postures=_known_postures(context, plan),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     block = wholebody_summary(result) | {"seed_matters": rng.bit_generator.state != unused}
     report_whole_body(context, report, trajectory.schedule, result, block)
     return result
+
+
+def _known_postures(context: RunContext, plan: KeyedPlan) -> FloatArray | None:
+    """(phases + 1, nq) postures of the contact plan; those on the CoM of a body that passes them."""
+    if context.plan is None:
+        return None
+    if context.resting is None or plan.postures is None:
+        return context.plan.postures
+    return np.array([item.q for item in plan.postures.postures])
+
+
+def _planned_postures(context: RunContext, schedule: ContactSchedule) -> FloatArray | None:
+    """(phases + 1, nq) postures of the contact plan at the key instants of a schedule; None without a plan.
+
+    Feet that roll divide a phase in time; what is between two postures is on the line from one to the other.
+    """
+    if context.plan is None or len(context.plan.postures) >= len(schedule.instants):
+        return None if context.plan is None else context.plan.postures
+    postures, held = align_quaternions(context.plan.postures), [p.stance.effectors for p in schedule.sequence]
+    begins = [0, *(k for k in range(1, len(held)) if held[k] != held[k - 1]), len(held)]
+    return Guide(schedule.instants[begins], postures, ()).at(schedule.instants)
 
 
 def report_whole_body(

@@ -1,0 +1,260 @@
+"""Supports of a contact plan, as a scenario lists them: of a body that rests at every change, or walks.
+
+A body that rests is near its posture at every change of contact.  One that walks passes from foot to foot
+where the ground is mild: its centre of mass may be wherever its postures reach, and phases last as long as
+balance asks for, within bounds by people's step times.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.contact import Contact, ContactKind
+from manikin.numerics.spatial import yaw_about_normal
+from manikin.planning.contacts import ContactPlan, Stage
+from manikin.planning.contacts.transition import MARGIN as RISING_MARGIN
+from manikin.scenarios.planned import STANDING, STATURE, WEIGHTS, walk_margin
+from manikin.scenarios.scenario import Scenario
+from manikin.scenarios.values import ScenarioValues, build_body
+from manikin.walking.footprints import FEET
+
+MAX_SUPPORT_DISTANCE = 1.08
+"""Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
+ABOVE = 0.01
+"""Height that the CoM of a rising body may be above that of its posture [m]; our choice."""
+LOWEST = 0.1
+"""Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
+LEAD = 0.2
+"""Time for which a CoM that leaves a seat at rest may go on at its velocity within its room there [s]: rising
+earlier it would ask a trunk that leans to be thrown back; our choice."""
+DIP = 0.001
+"""Depth that the CoM of a rising body may be below those of its postures [m]; our choice."""
+HIGHEST = 10.0
+"""Height above the lowest posture that no centre of mass reaches [m]."""
+PLANNING_SHARE = (0.8, 0.7)
+"""Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
+PLANNING: Mapping[str, Any] = {"degree": 5, "zero_end_accelerations": True, "weights": WEIGHTS}
+"""Options of the planner of a body on its feet, where the file keeps the defaults; our choice.
+
+A body that sits down keeps the defaults.
+"""
+PLANNING_RISING: Mapping[str, Any] = {
+    "degree": 5, "min_margin": RISING_MARGIN, "weights": WEIGHTS | {"margin": 0.2, "duration": 5.0},
+}  # fmt: skip
+"""Options of the planner of a body that leaves a seat, likewise: a seated trunk cannot follow any path."""
+SEATED_LONGER = 1.5
+"""Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
+
+
+SWING, DOUBLE = 0.45, 0.15
+"""Least duration of a flight and of a support on both feet of a body that does not rest in between [s]: less
+than people's, whose steps at 0.5 m/s take 0.78 s, and at 1.2 m/s 0.51 s, 0.4 s of both in flight (Fukuchi et
+al., PeerJ 6:e4640, 2018)."""
+SWING_SPEED = 2.0
+"""Mean speed of a foot in a longer flight [m/s]; our choice."""
+CLIMBING_SPEED = 1.2
+"""Mean speed upwards or downwards in what a phase lasts longer for a rise [m/s]; our choice."""
+ROLLED = 0.3
+"""The same on both feet while one lands on its heel and the other leaves from its toes [s]."""
+LONGEST = 0.8
+"""Longest duration of a phase, or 1.5 times its least: a person's step at 0.5 m/s; without it the programme
+often diverges [s]."""
+FLAT_WAY = 0.05
+"""Largest difference in height of two feet on whose way both roll, of a body of 1.75 m [m]; our choice."""
+LEVEL = 0.97
+"""Least upward part of the normal of a sole on which a body steps without rest; our choice."""
+MILD = 0.21
+"""Largest difference in height of such soles, of a body of 1.75 m [m]: steps of stairs; our choice."""
+WALKING_MARGIN = 6.0
+"""Margin that the plan of such a body keeps on its smaller soles, of a person of 1.75 m and 70 kg [N.m]."""
+WALKING_SHARE = (0.8, 0.5)
+"""Size of the soles on which it balances: nearer to their edges an ankle's strength ends; our choice."""
+PLANNING_WALKING: Mapping[str, Any] = {
+    "degree": 4, "samples": 5, "zero_end_accelerations": True,
+    "weights": WEIGHTS | {"margin": 0.05, "duration": 10.0},
+}  # fmt: skip
+"""Options of the planner of such a body: margin beyond what is required is worth little time; our choice."""
+
+
+def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
+    """Return the scenario with the supports of a contact plan, which can be kept and run again.
+
+    The centre of mass starts and ends where it is in the plan's first and last posture, and is near that of
+    each posture in between when its phase begins. Constraints that the file gives are kept.
+    """
+    return _supported(scenario, plan, [False] * (len(plan.stages) + 1))
+
+
+def without_rests(scenario: Scenario, plan: ContactPlan) -> Scenario | None:
+    """The same for a body that passes from foot to foot without a rest where the ground is mild.
+
+    There the centre of mass may be wherever the body reaches, and phases last as long as balance asks for.
+    None where the body rests at every change, where anything but feet carries, and before an act.
+    """
+    carriers = {name for stage in plan.stages for name in stage.contacts}
+    if scenario.file.task.act is not None or not carriers <= set(FEET):
+        return None
+    inner = range(1, len(plan.stages))
+    passed = [_is_mild(plan.stages[key - 1 : key + 2], scenario) for key in inner]
+    return _supported(scenario, plan, [True, *passed, True]) if any(passed) else None
+
+
+def _is_mild(stages: Sequence[Stage], scenario: Scenario) -> bool:
+    """Whether a body steps from foot to foot at the change of the first two of some stages."""
+    highest = MILD * scenario.file.body.stature_m / STATURE
+    held = [tuple(stage.contacts.values()) for stage in stages]
+    return all(stage.momentum is None for stage in stages) and all(
+        contact.normal[2] > LEVEL and abs(contact.position[2] - stance[0].position[2]) <= highest
+        for stance in held for contact in stance
+    )  # fmt: skip
+
+
+def _is_level(plan: ContactPlan, scenario: Scenario) -> bool:
+    """Whether all steps are level enough for feet that roll."""
+    heights = [max(c.position[2] for c in stage.contacts.values()) for stage in plan.stages]
+    return float(np.abs(np.diff(heights)).max()) <= FLAT_WAY * scenario.file.body.stature_m / STATURE
+
+
+def _walking_time(plan: ContactPlan, number: int, *, rolls: bool) -> float:
+    """Least duration of a phase of a body that does not rest before or after it [s]."""
+    held, last = plan.stages[number].contacts, len(plan.stages) - 1
+    if len(held) > 1:
+        both = STANDING if number in (0, last) else ROLLED if rolls else DOUBLE
+        return both + float(np.ptp([contact.position[2] for contact in held.values()])) / CLIMBING_SPEED
+    before, after = plan.stages[number - 1].contacts, plan.stages[number + 1].contacts
+    ways = np.array([after[foot].position - before[foot].position for foot in set(before) & set(after)])
+    swing = max(SWING, float(np.linalg.norm(ways, axis=1).max()) / SWING_SPEED)
+    return swing + float(np.abs(ways[:, 2]).max()) / CLIMBING_SPEED
+
+
+def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) -> Scenario:
+    """The scenario with supports; at each key instant, of start and goal too, the body rests or passes."""
+    friction = scenario.contacts.friction
+    # Rising legs are soon at full length: there is less room above such postures than below them.
+    rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
+    rolls = all(passed) and _is_level(plan, scenario)
+    before: dict[str, Contact] = {}
+    phases: list[dict[str, Any]] = []
+    for number, stage in enumerate(plan.stages):
+        phase: dict[str, Any] = {
+            name: "same" if before.get(name) is contact else _entry(contact, friction)
+            for name, contact in stage.contacts.items()
+        }
+        walks = passed[number] and passed[number + 1]
+        phase["min_duration_s"] = stage.min_duration
+        if walks:
+            phase["min_duration_s"] = least = _walking_time(plan, number, rolls=rolls)
+            phase["max_duration_s"] = max(LONGEST, 1.5 * least)
+        if rises and "buttocks" in stage.contacts:
+            phase["max_duration_s"] = SEATED_LONGER * stage.min_duration
+        if number and not passed[number]:
+            x, y, z = (float(value) for value in stage.com)
+            drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
+            phase["com_near"] = [x, y, z - drop]
+            phase["com_within_m"] = list(stage.com_room)
+            if "buttocks" in before and "buttocks" not in stage.contacts and stage.momentum is None:
+                phase["com_lead_s"] = LEAD
+        before = dict(stage.contacts)
+        phases.append(phase)
+    long, wide = _sole_size(scenario, plan)
+    share = WALKING_SHARE if any(passed) else PLANNING_SHARE
+    supports: dict[str, Any] = {
+        "friction": friction,
+        "sole": {"length_m": long, "width_m": wide},
+        "planning_sole": {"length_m": share[0] * long, "width_m": share[1] * wide},
+        "phases": phases,
+    }
+    if rolls:
+        supports["foot"] = "rolling"
+    # The centre of mass is planned up to where a seat is touched.
+    touch = next((stage for stage in plan.stages if "buttocks" in stage.contacts), None) if sits else None
+    task: dict[str, Any] = {
+        "start": {"com": [float(x) for x in plan.stages[0].com]},
+        "goal": {"com": [float(x) for x in (plan.goal_com if touch is None else touch.com)]},
+    }
+    if touch is not None:
+        speed = np.zeros(3) if touch.momentum is None else touch.momentum.velocity
+        task["goal"]["velocity_m_s"] = [float(x) for x in speed]
+    if scenario.file.task.act is not None:
+        task["act"] = scenario.file.task.act.model_dump(mode="json")
+    planning = scenario.file.planning.model_dump(mode="json", exclude_none=True)
+    if scenario.file.planning == type(scenario.file.planning)() and not sits:
+        planning = PLANNING_RISING if rises else PLANNING
+        if any(passed):
+            planning = {**PLANNING_WALKING, "min_margin": walk_margin(scenario, WALKING_MARGIN)}
+    # Of a body that walks the region of its postures is known.
+    constraints = _given_constraints(scenario) if any(passed) else _constraints(scenario, plan)
+    return scenario.replaced(
+        supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning
+    )
+
+
+def _entry(contact: Contact, friction: float) -> dict[str, Any]:
+    position = [float(x) for x in contact.position]
+    if contact.kind is ContactKind.GRASP:
+        entry: dict[str, Any] = {"position": position, "max_force_N": contact.max_force}
+        if contact.oriented:
+            turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
+            entry["rpy_deg"] = turn.tolist()
+        return entry
+    turn = contact.rotation_contact_to_world
+    entry = {"position": position, "yaw_deg": math.degrees(yaw_about_normal(turn))}
+    if contact.kind is ContactKind.POINT:
+        entry["kind"] = "point"
+    if abs(contact.normal[2] - 1.0) > 1e-12:
+        entry["normal"] = [float(x) for x in contact.normal]
+    if contact.friction != friction:
+        entry["friction"] = contact.friction
+    if contact.rolls:
+        entry["edge_radius_m"] = contact.edge_radius
+    if contact.hangs_over:
+        entry["polygon"] = contact.points[:, :2].tolist()
+    return entry
+
+
+def _sole_size(scenario: Scenario, plan: ContactPlan) -> tuple[float, float]:
+    """Length and width of a whole sole: one of the plan, or the body's where all hang over edges [m]."""
+    feet = (c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
+    if (whole := next((contact for contact in feet if not contact.hangs_over), None)) is not None:
+        return whole.length, whole.width
+    body = build_body(scenario)
+    return float(body.sole_length or 0.0), float(body.sole_width or 0.0)
+
+
+def _given_constraints(values: ScenarioValues) -> list[dict[str, Any]]:
+    return [item.model_dump(mode="json", exclude_none=True) for item in values.file.com_constraints]
+
+
+def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, Any]]:
+    """The file's constraints, and those that a body on its feet keeps to."""
+    given = _given_constraints(values)
+    keys = {key for item in given for key in item}
+    if "max_support_distance_m" not in keys:
+        given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
+    if values.file.task.act is not None and "height_band" not in keys:
+        given.append({"height_band": _below_postures(plan)})
+    elif "buttocks" in plan.stages[0].contacts and "height_band" not in keys:
+        # Who has left a seat does not go down again: the pelvis would meet it.
+        lowest = min(float(stage.com[2]) for stage in plan.stages) - DIP
+        given.append({"height_band": {"lower": f"{lowest:.4f}", "upper": f"{lowest + HIGHEST:.4f}"}})
+    return given
+
+
+def _below_postures(plan: ContactPlan) -> dict[str, str]:
+    """Band up to a line from start to end, just above the centres of mass of all postures.
+
+    Who goes down to an act and rises in between would have to lift the arms for it.
+    """
+    coms = np.array([*(stage.com for stage in plan.stages), plan.goal_com])
+    way = coms[-1, :2] - coms[0, :2]
+    along = way / max(float(way @ way), 1e-6)
+    drop = coms[-1, 2] - coms[0, 2]
+    shares = (coms[:, :2] - coms[0, :2]) @ along
+    level = float((coms[:, 2] - drop * shares).max()) + ABOVE
+    x, y = (float(value) for value in drop * along)
+    start = float(level - coms[0, 0] * x - coms[0, 1] * y)
+    line = f"{start:.4f} + {x:.4f}*x + {y:.4f}*y"
+    return {"lower": f"{float(coms[:, 2].min()) - LOWEST:.4f}", "upper": line.replace("+ -", "- ")}

@@ -1,0 +1,70 @@
+"""Supports of found contacts: where the body rests, where it walks, and how long phases last."""
+
+import time
+
+import numpy as np
+import pytest
+
+from manikin.pipeline.stages import Report, RunContext
+from manikin.pipeline.stages.contact_stage import find_supports, with_rests
+from manikin.scenarios import found_supports, load_scenario
+from manikin.scenarios.found_supports import without_rests
+
+BLOCK = """
+- {name: block, box: [3.0, 2.0, HEIGHT], position: [1.8, 0.0, MIDDLE]}
+"""
+
+
+def way(tmp_path, height):
+    """Scenario of a way onto a block of a height [m], and its contacts."""
+    ends = "start: {at: [0.0, 0.0], heading_deg: 0.0}, goal: {at: [0.8, 0.0], heading_deg: 0.0}"
+    text = f"name: way\ntask: {{{ends}}}\n"
+    if height:
+        text += "scene:" + BLOCK.replace("HEIGHT", str(height)).replace("MIDDLE", str(0.5 * height))
+    file = tmp_path / "way.yaml"
+    file.write_text(text)
+    scenario = load_scenario(file)
+    context = RunContext.of(scenario)
+    found = find_supports(scenario, context.body, context.scene, np.random.default_rng(0))
+    assert found.failure is None
+    return context, found
+
+
+def test_a_body_walks_on_level_ground(tmp_path):
+    """It rests nowhere, its feet roll, and phases have both bounds; the goal is within its reach."""
+    context, found = way(tmp_path, 0.0)
+    walking = without_rests(context.scenario, found.plan)
+    supports = walking.file.supports
+    assert supports.foot == "rolling"
+    assert all(phase.com_near is None for phase in supports.phases)
+    assert any(phase.com_near is not None for phase in found.scenario.file.supports.phases)
+    for phase in supports.phases[1:-1]:
+        flies = len(phase.entries()) == 1
+        assert phase.min_duration_s >= (found_supports.SWING if flies else found_supports.ROLLED)
+        assert phase.max_duration_s >= 1.5 * phase.min_duration_s
+    problem = walking.build_centroidal_problem()
+    assert len(problem.sequence) > len(supports.phases)  # heels and toes have phases of their own
+    assert problem.regions[-1].violation(problem.goal_com) <= 0.0
+
+
+@pytest.mark.parametrize(("height", "rests"), [(0.12, False), (0.3, True)])
+def test_a_body_rests_where_it_climbs_high(tmp_path, height, rests):
+    """On a step of stairs it walks, on feet that land flat; on a higher one it is near its posture."""
+    context, found = way(tmp_path, height)
+    walking = without_rests(context.scenario, found.plan)
+    phases = found.scenario.file.supports.phases if walking is None else walking.file.supports.phases
+    assert any(phase.com_near is not None for phase in phases) == rests
+    assert walking is None or walking.file.supports.foot is None
+
+
+def test_the_body_rests_after_a_failure(tmp_path):
+    context, found = way(tmp_path, 0.0)
+    resting = context.with_supports(found.scenario)
+    walking = RunContext(**{**vars(context.with_supports(without_rests(context.scenario, found.plan))),
+                            "resting": resting})  # fmt: skip
+    report = Report(walking, None, None, time.perf_counter())
+    assert with_rests(walking, report) is None  # nothing has failed
+    report.fail("wholebody", "left_foot misses its position", 1.0, "phase 2")
+    assert with_rests(walking, report) is resting
+    assert report.failure is None
+    assert [item["stage"] for item in report.refused] == ["wholebody"]
