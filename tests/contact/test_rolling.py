@@ -39,6 +39,17 @@ def random_wrenches(count=500):
     return rng.normal(size=(count, 6)) * [60, 60, 300, 40, 40, 10] + [0, 0, 600, 0, 0, 0]
 
 
+@pytest.mark.parametrize(("way", "parts"), [(0.4, {SolePart.HEEL, SolePart.TOES}), (-0.3, {SolePart.TOES})])
+def test_a_foot_that_goes_back_lands_flat(way, parts):
+    """It leaves over its toes either way, as it heads."""
+    left, right = foot(), foot("right_foot", (0.0, -0.1, 0.0))
+    ahead = np.array([np.cos(0.3), np.sin(0.3), 0.0])
+    there = foot("right_foot", tuple(right.position + way * ahead))
+    phases = [Phase(Stance(contacts, 1500.0), 0.3) for contacts in ([left, right], [left], [left, there])]
+    held = [c.part for phase in roll_feet(StanceSequence(phases), HINGE) for c in phase.stance]
+    assert set(held) - {SolePart.FULL} == parts
+
+
 @pytest.mark.parametrize("part", [SolePart.HEEL, SolePart.TOES])
 def test_a_part_applies_what_its_points_apply(part):
     """The polytope of a part beside a full sole is that of frictional points at its corners."""

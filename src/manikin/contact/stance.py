@@ -6,7 +6,7 @@ rolling never costs margin against single support.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -272,19 +272,36 @@ STRETCH = 1.5
 """The phases on heel or toes last at most this many times their least time."""
 
 
+BACK = 0.02
+"""Way behind its last place from which on a foot lands flat [m]; our choice."""
+
+
 def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
     """Split every phase in which a foot lands or leaves beside another full contact.
 
     The parts' shares are taken from the split phase's least duration, which is never shortened. Soles are
-    full, and the hinge of the toes crosses their x axes at ``hinge`` [m].
+    full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back lands flat:
+    people step back onto their toes or their whole sole.
     """
-    parts = (_split(sequence, index, hinge) for index in range(len(sequence)))
+    flat = {(swing.last_phase + 1, swing.effector) for swing in sequence.swings() if _goes_back(swing)}
+    parts = (_split(sequence, index, hinge, flat) for index in range(len(sequence)))
     return StanceSequence([phase for split in parts for phase in split])
 
 
-def _split(sequence: StanceSequence, index: int, hinge: float) -> Iterator[Phase]:
+def _goes_back(swing: Swing) -> bool:
+    """Whether a foot lands more than :data:`BACK` behind where it left, as it heads then."""
+    if swing.start is None or swing.end is None:
+        return False
+    way = swing.end.position - swing.start.position
+    return float(way @ swing.end.rotation_contact_to_world[:, 0]) < -BACK
+
+
+def _split(
+    sequence: StanceSequence, index: int, hinge: float, flat: Collection[tuple[int, str]]
+) -> Iterator[Phase]:
     phase = sequence[index]
     landing = _changing(phase.stance, sequence[index - 1].stance) if index > 0 else ()
+    landing = tuple(name for name in landing if (index, name) not in flat)
     leaving = _changing(phase.stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
     taken = (ON_HEEL if landing else 0.0) + (ON_TOES if leaving else 0.0)
     if landing:
