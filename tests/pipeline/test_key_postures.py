@@ -40,7 +40,6 @@ com_constraints: {constraints}
 planning:
   degree: 5
   min_margin: 15
-  zero_end_accelerations: true
   weights: {{margin: 0.3, smoothness: 10, duration: 2, acceleration: [1, 1, 1]}}
 """
 """Nothing but the legs limits the height of the CoM: a point mass steps as far as it likes, level."""

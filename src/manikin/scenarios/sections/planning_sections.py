@@ -285,7 +285,7 @@ class PlanningSection(Section):
     friction_model: FrictionModelName = preset("outer", FRICTION_MODEL_TEXT)
     max_duration_s: Positive | None = optional("longest duration of the motion [s]")
     zero_end_accelerations: Annotated[bool, Field(strict=True)] = preset(
-        False, "whether the CoM starts and ends without acceleration"
+        True, "whether the CoM starts and ends without acceleration, as at rest"
     )
     weights: WeightsSection = preset(WeightsSection(), "of the objectives")
 
