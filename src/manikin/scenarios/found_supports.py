@@ -36,11 +36,10 @@ HIGHEST = 10.0
 """Height above the lowest posture that no centre of mass reaches [m]."""
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
-PLANNING: Mapping[str, Any] = {"degree": 5, "zero_end_accelerations": True, "weights": WEIGHTS}
-"""Options of the planner of a body on its feet, where the file keeps the defaults; our choice.
-
-A body that sits down keeps the defaults.
-"""
+PLANNING: Mapping[str, Any] = {"degree": 5, "weights": WEIGHTS}
+"""Options of the planner of a body on its feet, where the file keeps the defaults; our choice."""
+PLANNING_SITTING: Mapping[str, Any] = {"zero_end_accelerations": False}
+"""The same of a body that sits down: it is at the seat sooner if it may start with an acceleration."""
 PLANNING_RISING: Mapping[str, Any] = {
     "degree": 5, "min_margin": RISING_MARGIN, "weights": WEIGHTS | {"margin": 0.2, "duration": 5.0},
 }  # fmt: skip
@@ -73,8 +72,7 @@ WALKING_MARGIN = 6.0
 WALKING_SHARE = (0.8, 0.5)
 """Size of the soles on which it balances: nearer to their edges an ankle's strength ends; our choice."""
 PLANNING_WALKING: Mapping[str, Any] = {
-    "degree": 4, "samples": 5, "zero_end_accelerations": True,
-    "weights": WEIGHTS | {"margin": 0.05, "duration": 10.0},
+    "degree": 4, "samples": 5, "weights": WEIGHTS | {"margin": 0.05, "duration": 10.0},
 }  # fmt: skip
 """Options of the planner of such a body: margin beyond what is required is worth little time; our choice."""
 
@@ -181,8 +179,8 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
     if scenario.file.task.act is not None:
         task["act"] = scenario.file.task.act.model_dump(mode="json")
     planning = scenario.file.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.file.planning == type(scenario.file.planning)() and not sits:
-        planning = PLANNING_RISING if rises else PLANNING
+    if scenario.file.planning == type(scenario.file.planning)():
+        planning = PLANNING_SITTING if sits else PLANNING_RISING if rises else PLANNING
         if any(passed):
             planning = {**PLANNING_WALKING, "min_margin": walk_margin(scenario, WALKING_MARGIN)}
     # Of a body that walks the region of its postures is known.

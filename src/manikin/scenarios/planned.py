@@ -37,9 +37,7 @@ WEIGHTS: dict[str, Any] = {
     "duration": 2.0,
     "acceleration": [1.0, 1.0, 1.0],
 }
-WALKED_PLANNING: Mapping[str, Any] = {
-    "degree": 4, "samples": 4, "zero_end_accelerations": True, "weights": WEIGHTS,
-}  # fmt: skip
+WALKED_PLANNING: Mapping[str, Any] = {"degree": 4, "samples": 4, "weights": WEIGHTS}
 """Options of the planner: phases are short, so that few samples in each are enough."""
 _SAME_PLACE = 0.002
 

@@ -9,6 +9,7 @@ import pytest
 from manikin.body import human, with_further_contacts
 from manikin.contact import point
 from manikin.planning.contacts import PostureFinder, TrunkClearance, TrunkPosture, TrunkPostures
+from manikin.planning.contacts.trunk_postures import CEILINGS, SKIN
 from manikin.scene import Box, Cylinder, Obstacle, Scene
 from manikin.scene.collision import collision_parts, part_meter
 
@@ -49,6 +50,18 @@ def test_cheapest_posture_is_no_lower_than_it_must(postures: TrunkPostures, heig
     """Under a ceiling the body stoops, and no deeper than to the next posture below it."""
     chosen = postures[TrunkClearance(postures, passage(1.2, height)).cheapest(np.zeros((1, 4)))[0]]
     assert height - 0.17 < chosen.height < height
+
+
+@pytest.mark.parametrize(
+    ("stature", "mass", "sex"),
+    [(1.52, 56.2, "female"), (1.60, 60.0, "female"), (1.68, 71.7, "male"), (1.86, 72.6, "female")],
+)
+def test_everybody_bends_to_the_lowest_ceiling(stature: float, mass: float, sex: str) -> None:
+    """Bodies that a search from straight legs alone does not bend; each ceiling is kept by the skin."""
+    body = human(stature=stature, mass=mass, sex=sex)
+    heights = sorted(item.height / stature for item in TrunkPostures.of(body) if "bent" in item.name)
+    assert len(heights) == len(CEILINGS)
+    assert (np.array(heights) <= np.sort(CEILINGS) - SKIN / stature + 1e-3).all()
 
 
 def test_nothing_passes_where_nobody_would(postures: TrunkPostures) -> None:

@@ -15,7 +15,7 @@ Arms close and a turned trunk are our choice.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import coal
@@ -144,7 +144,7 @@ def _folded(body: BodyModel, q: FloatArray) -> Iterator[TrunkPosture]:
         height, com = share * body.stature, float(np.interp(share, *RECORDED_COM)) * body.stature
         found = _between(body, q, height=height, reference=q, com_height=com)
         if found is None:
-            found = _between(body, q, height=height, reference=q)
+            found = _between(body, q, height=height, reference=q, restarts=True)
         if found is None:
             return
         q, lost = found, 1.0 - share
@@ -154,7 +154,7 @@ def _folded(body: BodyModel, q: FloatArray) -> Iterator[TrunkPosture]:
 
 def _between(
     body: BodyModel, start: FloatArray, *, width: float | None = None, height: float | None = None,
-    reference: FloatArray | None = None, com_height: float | None = None,
+    reference: FloatArray | None = None, com_height: float | None = None, restarts: bool = False,
 ) -> FloatArray | None:  # fmt: skip
     """(nq,) posture on two feet between walls ``width`` apart or under a ceiling [m], or None."""
     solids = []
@@ -171,7 +171,7 @@ def _between(
         proximity=Proximity(body, Scene(solids)), reference=reference, range_margin=0.05,
         ignore=touching_pairs(body, [(contact.effector, FLOOR) for contact in feet]),
     )  # fmt: skip
-    result = generate_posture(problem, start, settings=_SETTINGS)
+    result = generate_posture(problem, start, settings=replace(_SETTINGS, restarts=restarts))
     return result.q if result.succeeded else None
 
 
