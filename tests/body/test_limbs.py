@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from manikin.body import (
     Configuration,
     Limb,
+    ShapeKind,
     are_mirrored,
     human,
     insect,
@@ -20,7 +21,7 @@ from manikin.body import (
     with_knees_and_elbows,
 )
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.body.limbs import is_further, limb_slots, parent_segment
+from manikin.body.limbs import is_further, limb_slots, parent_segment, with_round_tips
 from manikin.body.natural_range import NaturalRange
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
@@ -267,3 +268,35 @@ def test_other_misuse_is_refused():
         hull_of(arm, "thorax", np.random.default_rng(0).uniform(size=(50, 3)) * [1, 1, 0])
     with pytest.raises(BodyError, match="insect length"):
         insect(length=0.0)
+
+
+# An edge of the hand, 42 mm from its middle, comes down by the 5 mm before it at a tilt of 6.8 degrees.
+@pytest.mark.parametrize(("part", "tilt"), [("knee", 0.0), ("fist", 0.0), ("fist", 6.0)])
+def test_what_carries_at_a_point_touches_there_first(part, tilt):
+    """A segment with a ball at its tip, tilted either way, touches the ground with the ball alone."""
+    body, name = human(), f"left_{part}"
+    frame = body.effector(name)
+    segment = with_round_tips(body, [name]).segment(frame.segment)
+    ball, others = segment.shapes[-1], segment.shapes[:-1]
+    assert ball.distance_to(frame.translation) == pytest.approx(0.0, abs=1e-12)
+    for axis in (frame.rotation[:, 0], frame.rotation[:, 1]):
+        for angle in np.radians((tilt, -tilt)):
+            up = np.cos(angle) * frame.rotation[:, 2] + np.sin(angle) * axis
+            ground = up @ ball.translation - ball.size[0]
+            # A plane below a shape: its lowest point is that of its support function.
+            assert all(up @ shape.translation - support(shape, up) > ground for shape in others)
+
+
+def support(shape, up):
+    """How far a box or a capsule extends along a unit vector from its middle [m]."""
+    local = shape.rotation.T @ up
+    if shape.kind is ShapeKind.BOX:
+        return 0.5 * np.abs(local) @ shape.size
+    return shape.size[0] + 0.5 * abs(local[2]) * shape.size[1]
+
+
+def test_bodies_without_such_points_stay_as_they_are():
+    """Feet, flat hands and tips of insects touch with their own shapes."""
+    person, creature = human(), insect()
+    assert with_round_tips(person, ["left_foot", "left_hand"]) is person
+    assert with_round_tips(creature, creature.effectors) is creature

@@ -6,7 +6,7 @@ the joint. Their z axes, the normals of contacts, point through the joint, backw
 human sits on, the effector ``buttocks``, belongs to the root: no joint moves it, so its limb has none.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from manikin.body.configuration import Configuration
 from manikin.body.human import FRONT_OF_KNEE, SEAT_LENGTH, SEAT_WIDTH, SKIN
 from manikin.body.human_parts import ALONG_X
 from manikin.body.model import BodyModel, look_up
-from manikin.body.segments import Effector, Hinge, Limb, Segment, ShapeKind
+from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray
@@ -68,6 +68,31 @@ def ends_before_tip(body: BodyModel, effector: str) -> bool:
         place = body.segment(frame.segment).origin + frame.translation
         own += [shape.distance_to(place) for shape in body.segment(meeting).shapes]
     return bool(own) and min(own) > BEFORE_TIP
+
+
+TIP_RADIUS = 0.008
+"""Radius of the balls of :func:`with_round_tips`, as a share of the stature; our choice."""
+
+
+def with_round_tips(body: BodyModel, effectors: Iterable[str]) -> BodyModel:
+    """The human with a ball at each effector :data:`SKIN` or more before its own segment: knuckles, kneecaps.
+
+    Joints, masses and effectors are the same. A kneecap is fixed to the shank, whatever the thigh does;
+    without it, the round end of the thigh rolls on the ground by its whole turn, and an edge of the hand
+    touches beside the effector's point.
+    """
+    added: dict[str, Shape] = {}
+    for name in effectors if body.stature is not None else ():
+        frame, radius = body.effector(name), TIP_RADIUS * (body.stature or 0.0)
+        shapes = body.segment(frame.segment).shapes
+        if min((shape.distance_to(frame.translation) for shape in shapes), default=0.0) > SKIN - 1e-9:
+            middle = frame.translation + radius * frame.rotation[:, 2]
+            added[frame.segment] = Shape("tip", ShapeKind.SPHERE, (radius,), middle)
+    segments = (
+        replace(item, shapes=(*item.shapes, added[item.name])) if item.name in added else item
+        for item in body.segments
+    )
+    return replace(body, segments=tuple(segments)) if added else body
 
 
 def hinge_line(body: BodyModel, effector: str) -> float | None:

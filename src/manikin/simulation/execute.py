@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.body.limbs import end_segments
+from manikin.body.limbs import end_segments, with_round_tips
 from manikin.contact import ContactKind, ContactSchedule
 from manikin.control import Controller, ControlOutput, ControlSettings, ForceWish
 from manikin.control.supports import SupportInterval, support_intervals
@@ -130,7 +130,9 @@ class _Run:
             lying = tuple(sorted({segment for segment, _ in touching_pairs(body, [(effector, "")])}))
             for interval in support_intervals(schedule, effector, SWITCHING):
                 self.holds.append(_Hold(lying, interval, scene.touched_obstacles(interval.contact)))
-        self.world = World(compile_model(body, scene, physics), padded)
+        every = (contact for phase in schedule.sequence for contact in phase.stance)
+        points = sorted({contact.effector for contact in every if contact.kind is ContactKind.POINT})
+        self.world = World(compile_model(with_round_tips(body, points), scene, physics), padded)
         self.pushes = tuple(pushes)
         for push in pushes:
             self.world.apply_push(push)
