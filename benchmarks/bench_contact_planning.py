@@ -11,9 +11,10 @@ import pytest
 
 from manikin.body import human, insect, integrate, with_knees_and_elbows
 from manikin.contact import ContactKind
+from manikin.kinematics.efort import Task, usable_efort
+from manikin.kinematics.limb_samples import sample_limb, sample_limbs
 from manikin.numerics.spatial import rotation_from_rpy
-from manikin.planning.contacts import ContactGenerator, Efort, Task, sample_limb, sample_limbs
-from manikin.planning.contacts.efort import usable_efort
+from manikin.planning.contacts import ContactGenerator, Efort
 from manikin.planning.contacts.generator import UsableEfort
 from manikin.planning.contacts.single_contact import Role, ask_limb
 from manikin.scene import Box, Obstacle, Scene

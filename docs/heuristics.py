@@ -19,6 +19,8 @@ from manikin.body.limbs import parent_segment
 from manikin.contact import ContactKind
 from manikin.errors import InputError
 from manikin.kinematics import LimbKinematics
+from manikin.kinematics.efort import Task
+from manikin.kinematics.limb_samples import LimbSamples, sample_limbs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import (
     ClosestDistance,
@@ -27,12 +29,9 @@ from manikin.planning.contacts import (
     Efort,
     GeneratedContact,
     Heuristic,
-    LimbSamples,
     Manipulability,
     Random,
     StrongEfort,
-    Task,
-    sample_limbs,
 )
 from manikin.reports.figures import ChoicePanel, contact_choice_figure, save_figure
 from manikin.scene import Box, Obstacle, Scene

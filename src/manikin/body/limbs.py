@@ -115,6 +115,11 @@ def mirrored_name(name: str) -> str:
     return {"left": f"right_{part}", "right": f"left_{part}"}.get(side, name)
 
 
+def of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
+    """Angles by the full names of a body's hinges, of both sides where a name has none."""
+    return {name: value for name in body.joint_names for key, value in angles.items() if name.endswith(key)}
+
+
 def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
     """Hinges on the other side (nv - 6,) and factors (nv - 6,), 1 or -1, of the mirrored posture.
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manikin.body import human, insect, with_knees_and_elbows
-from manikin.planning.contacts import sample_limbs
+from manikin.kinematics.limb_samples import sample_limbs
 
 
 @pytest.fixture(scope="session")

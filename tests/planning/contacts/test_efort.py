@@ -15,17 +15,18 @@ from manikin.body import human, limb_named, with_further_contacts
 from manikin.body.limbs import moving_segments
 from manikin.errors import InputError
 from manikin.kinematics import LimbKinematics
-from manikin.planning.contacts import (
-    StrongEfort,
+from manikin.kinematics.efort import (
+    MOST_RATIO,
     Task,
     efort,
     force_ellipsoid,
     force_transmission_ratio,
     pulling_efort,
-    sample_limb,
+    usable_efort,
     velocity_ellipsoid,
 )
-from manikin.planning.contacts.efort import MOST_RATIO, usable_efort
+from manikin.kinematics.limb_samples import sample_limb
+from manikin.planning.contacts import StrongEfort
 
 SEEDS = st.integers(0, 10_000)
 SCRIPT = Path(__file__).parents[3] / "docs/heuristics.py"

@@ -13,6 +13,8 @@ from manikin.contact import ContactKind
 from manikin.errors import BodyError, ContactError
 from manikin.kinematics import Aligner, LimbKinematics
 from manikin.kinematics.alignment import DAMPING, LARGEST_STEP, LEVER, AlignmentStep
+from manikin.kinematics.efort import Task, efort, usable_efort
+from manikin.kinematics.limb_samples import sample_limb, sample_limbs
 from manikin.numerics.spatial import PlanarTransform, rotation_from_rpy
 from manikin.planning.contacts import (
     HEURISTICS,
@@ -26,14 +28,9 @@ from manikin.planning.contacts import (
     Random,
     Situation,
     SurfaceTable,
-    Task,
-    efort,
     find_candidates,
-    sample_limb,
-    sample_limbs,
 )
 from manikin.planning.contacts.contact_plan import footprint
-from manikin.planning.contacts.efort import usable_efort
 from manikin.planning.contacts.generator import NATURAL_SLACK, UsableEfort, _order
 from manikin.planning.contacts.limb_collisions import TOUCH, DeepSamples, yielding
 from manikin.planning.contacts.single_contact import ContactQuestion, find_contact

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from manikin.body import Configuration, NaturalRange, limb_named
 from manikin.contact import Stance, sole
+from manikin.kinematics.limb_samples import manipulability
 from manikin.planning.contacts import (
     BalanceScore,
     Candidates,
@@ -19,7 +20,6 @@ from manikin.planning.contacts import (
     Situation,
     WeightedSum,
     duration,
-    manipulability,
 )
 
 

@@ -9,6 +9,8 @@ from manikin.body import Configuration, human, limb_named, with_further_contacts
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import ContactKind
 from manikin.errors import ScenarioError
+from manikin.kinematics.efort import MOST_RATIO, Task, efort
+from manikin.kinematics.limb_samples import sample_limbs
 from manikin.motion.description import body_from, describe_body
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.planning.contacts import (
@@ -20,13 +22,9 @@ from manikin.planning.contacts import (
     Situation,
     StrongEfort,
     SurfaceTable,
-    Task,
-    efort,
     find_candidates,
-    sample_limbs,
 )
 from manikin.planning.contacts.contact_plan import footprint
-from manikin.planning.contacts.efort import MOST_RATIO
 from manikin.planning.guide import NO_MARGINS, Condition, ReachabilityChecker, abstraction_of
 from manikin.scenarios import load_scenario
 from manikin.scene import Box, Obstacle, Scene

@@ -6,7 +6,7 @@ import pytest
 from manikin.body import Configuration, NaturalRange, limb_named, limb_placement
 from manikin.body.limbs import limb_slots
 from manikin.errors import BodyError
-from manikin.planning.contacts import manipulability, mirrored, sample_limb, sample_limbs
+from manikin.kinematics.limb_samples import manipulability, mirrored_samples, sample_limb, sample_limbs
 
 
 @pytest.mark.parametrize("name", ["left_arm", "right_leg", "left_knee"])
@@ -64,7 +64,7 @@ def test_mirrored_samples_are_those_that_the_other_side_would_have(person, perso
 
 def test_samples_are_not_mirrored_onto_another_limb(person, person_samples):
     with pytest.raises(BodyError, match="no reflection of 'left_arm'; valid: right_arm"):
-        mirrored(person, person_samples["left_arm"], limb_named(person, "right_leg"))
+        mirrored_samples(person, person_samples["left_arm"], limb_named(person, "right_leg"))
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import pytest
 
 from manikin.body import human, with_further_contacts
 from manikin.contact import point
-from manikin.planning.contacts import PostureFinder, TrunkClearance, TrunkPosture, TrunkPostures
-from manikin.planning.contacts.trunk_postures import CEILINGS, SKIN
+from manikin.kinematics.trunk_postures import CEILINGS, SKIN, TrunkClearance, TrunkPosture, TrunkPostures
+from manikin.planning.contacts import PostureFinder
 from manikin.scene import Box, Cylinder, Obstacle, Scene
 from manikin.scene.collision import collision_parts, part_meter
 

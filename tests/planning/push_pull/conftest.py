@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manikin.body import human
-from manikin.planning.contacts import sample_limbs
+from manikin.kinematics.limb_samples import sample_limbs
 from manikin.planning.push_pull import Act, ActKind, BraceSettings, find_braced_posture
 from manikin.scene import Box, Obstacle, Scene
 

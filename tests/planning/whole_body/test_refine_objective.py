@@ -9,10 +9,9 @@ from scipy.optimize import lsq_linear, minimize
 from manikin.balance import wrench_polytope
 from manikin.balance.contact_forces import ContactGenerators, friction_share
 from manikin.contact import FRICTION_MODELS, ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
+from manikin.kinematics.efort import Task, efort
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.numerics.spatial import rotation_from_yaw, wrench_map
-from manikin.planning.contacts import Task
-from manikin.planning.contacts.efort import efort
 from manikin.planning.whole_body.fit_job import phase_knots, sample_times
 from manikin.planning.whole_body.fit_scales import RefineScales
 from manikin.planning.whole_body.refine_contacts import LimbDirections, efort_with_derivative

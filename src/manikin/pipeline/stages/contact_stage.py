@@ -13,6 +13,7 @@ import numpy as np
 from manikin.body import BodyModel, Limb, limb_named
 from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
+from manikin.kinematics.limb_samples import sample_limbs
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.contact_guides import ContactSearch, SearchTally, guide_root, stage_at
 from manikin.pipeline.stages.context import Report, RunContext
@@ -126,7 +127,7 @@ class _FootSearch(_ContactSearch):
         act = act_of(self._scenario)
         if act is None:
             return stage_at(self._places, self._scenario, "goal")
-        samples = contacts.sample_limbs(self._body, self._rng, natural=self._natural)
+        samples = sample_limbs(self._body, self._rng, natural=self._natural)
         friction, model = self._scenario.contacts.friction, self._scenario.contact_model.friction
         result = find_braced_posture(
             self._body, self._scene, samples, act, start.com[:2],
@@ -175,7 +176,7 @@ class _LimbSearch(_ContactSearch):
         style = None if body.stature is None else posture_style_of(scenario.file.manner)
         self._reference = np.array(body.standing_posture() if style is None else style.posture(body))
         self._poser = contacts.PostureFinder(body, scene, self._reference, self._asked().scaled(safe))
-        self._samples = samples = contacts.sample_limbs(body, np.random.default_rng(0), natural=self._natural)
+        self._samples = samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
         ends = [limb for limb in self._limbs if not is_further(body, limb)] or self._limbs
         self._reach = float(np.mean([samples[limb.name].hull[1] for limb in ends]))
 

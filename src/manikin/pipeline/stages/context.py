@@ -208,7 +208,7 @@ class StageFailure:
 
 
 @dataclass(frozen=True, eq=False)
-class _Attempt:
+class _Reported:
     """What a report says of an attempt: its failure, how far it came, its tables, blocks and files."""
 
     failure: StageFailure
@@ -250,7 +250,7 @@ class Report:
         self.refused: list[dict[str, Any]] = []
         self._tables: dict[str, RequirementTable] = {}
         self._files: dict[str, Callable[[RunDirectory], object]] = {}
-        self._before: _Attempt | None = None
+        self._before: _Reported | None = None
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
         if self._directory is not None:
@@ -281,7 +281,7 @@ class Report:
         """Begin again after a failure, which is kept among the refused with the phase it was traced to."""
         if self.failure is not None:
             blocks = {stage: self.summary[stage] for stage in PLANNED_STAGES}
-            self._before = _Attempt(self.failure, self.planned, self._tables, blocks, dict(self._files))
+            self._before = _Reported(self.failure, self.planned, self._tables, blocks, dict(self._files))
             self.refused.append({"phase": phase, **asdict(self.failure)})
         self.failure, self.planned, self.proved = None, False, False
         self._tables = {}

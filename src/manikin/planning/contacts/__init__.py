@@ -1,4 +1,4 @@
-"""Contacts found on their own: samples of limbs, EFORT, and the request for one contact."""
+"""Contacts found on their own: the searches for feet and limbs, and the request for one contact."""
 
 from manikin.planning.contacts.best_first import Extension, heading_of
 from manikin.planning.contacts.candidates import Candidates, Situation, SurfaceTable, find_candidates
@@ -10,14 +10,6 @@ from manikin.planning.contacts.contact_plan import (
     certify_plan,
 )
 from manikin.planning.contacts.crawl_search import CrawlSearch
-from manikin.planning.contacts.efort import (
-    Task,
-    efort,
-    force_ellipsoid,
-    force_transmission_ratio,
-    pulling_efort,
-    velocity_ellipsoid,
-)
 from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
 from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import (
@@ -44,20 +36,15 @@ from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import limb_holds
 from manikin.planning.contacts.limb_search import LimbHolds, LimbSearch, LimbSettings
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
 from manikin.planning.contacts.seat import leave_seat, take_seat
-from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPosture, TrunkPostures
 from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
 __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
     "ContactPlan", "ContactRules", "CrawlSearch", "Duration", "Efort", "Endpoint", "Endpoints",
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance",
-    "LimbCollisions", "LimbHolds", "LimbSamples", "LimbSearch", "LimbSettings", "Manipulability",
-    "PlanCertificate", "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage",
-    "StrongEfort", "SurfaceTable", "Task", "TrunkClearance", "TrunkPosture", "TrunkPostures",
-    "WalkSearch", "WalkSettings", "WeightedSum", "certify_plan", "duration", "efort", "find_candidates",
-    "force_ellipsoid", "force_transmission_ratio", "heading_of", "leave_seat", "limb_holds",
-    "manipulability", "mirrored", "pulling_efort", "sample_limb", "sample_limbs", "starts_on_limbs",
-    "take_seat", "velocity_ellipsoid",
+    "LimbCollisions", "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability", "PlanCertificate",
+    "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage", "StrongEfort",
+    "SurfaceTable", "WalkSearch", "WalkSettings", "WeightedSum", "certify_plan", "duration",
+    "find_candidates", "heading_of", "leave_seat", "limb_holds", "starts_on_limbs", "take_seat",
 ]  # fmt: skip

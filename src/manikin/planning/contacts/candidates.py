@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import Configuration, Limb, limb_placement
+from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Surface
 from manikin.scene.surface import walls_of
 

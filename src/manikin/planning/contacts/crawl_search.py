@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import of_both_sides
 from manikin.contact import Contact, point
 from manikin.kinematics import Placement, Preferences
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
@@ -26,7 +27,6 @@ from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.limb_search import within_strength
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.seat import of_both_sides
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
 from manikin.scene import Box, Obstacle, Scene
 

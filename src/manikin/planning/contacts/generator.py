@@ -15,6 +15,8 @@ from manikin.contact import Contact, ContactKind
 from manikin.errors import BodyError
 from manikin.kinematics import LimbKinematics
 from manikin.kinematics.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Aligner
+from manikin.kinematics.efort import Task, efort
+from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.candidates import (
     Candidates,
@@ -24,10 +26,8 @@ from manikin.planning.contacts.candidates import (
     find_candidates,
 )
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
-from manikin.planning.contacts.efort import Task, efort
 from manikin.planning.contacts.heuristics import Efort, Heuristic
 from manikin.planning.contacts.limb_collisions import DeepSamples, LimbCollisions
-from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene
 
 _GROWTH = 0.15  # how much longer each step down the order is than the one before
@@ -57,7 +57,7 @@ class UsableEfort:
     """EFORT that an answer has at least, whatever the heuristic prefers.
 
     Attributes:
-        least: See :func:`manikin.planning.contacts.efort.usable_efort` [N per N.m].
+        least: See :func:`manikin.kinematics.efort.usable_efort` [N per N.m].
         pulling: Whether the limb holds on and pulls at the surface (5.13).
     """
 
@@ -139,7 +139,7 @@ class ContactGenerator:
         self, body: BodyModel, scene: Scene, samples: Mapping[str, LimbSamples],
         settings: GeneratorSettings | None = None, rules: ContactRules | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a scene for samples by name of the limb (:func:`manikin.planning.contacts.sample_limbs`).
+        """Prepare a scene for samples by name of the limb, see :mod:`manikin.kinematics.limb_samples`.
 
         Raises:
             BodyError: If samples belong to no limb of the body.

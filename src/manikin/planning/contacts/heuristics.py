@@ -13,11 +13,11 @@ from manikin.body.natural_range import NaturalRange
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.errors import InputError
 from manikin.kinematics import LimbKinematics, ReachVolume
+from manikin.kinematics.efort import efort
+from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.candidates import Candidates, Situation
 from manikin.planning.contacts.contact_plan import ContactRules, make_contact, onto_normal
-from manikin.planning.contacts.efort import efort
-from manikin.planning.contacts.samples import LimbSamples
 
 
 def cached_score(

@@ -18,9 +18,9 @@ from manikin.body import BodyModel, Limb, Shape, ShapeKind
 from manikin.body.limbs import moving_segments
 from manikin.contact import ContactKind
 from manikin.kinematics import LimbKinematics
+from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.candidates import IntArray, Situation
-from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import Scene, segment_of
 from manikin.scene.collision import collision_parts, local_box
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import Contact, ContactKind
 from manikin.errors import BodyError
+from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw
 from manikin.planning.contacts.best_first import heading_of
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
 from manikin.planning.contacts.limb_search import LimbHolds
-from manikin.planning.contacts.samples import LimbSamples
 from manikin.scene import GraspLine, Scene, Surface
 
 

@@ -25,12 +25,12 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import limb_placement, limb_slots
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.kinematics import Placement
+from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
-from manikin.planning.contacts.samples import LimbSamples
 
 GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))  # on the estimate, states expanded with each; our choice
 GOAL_REACH = 1.5  # distance from the root at the goal within which limbs have to have places, by their reach

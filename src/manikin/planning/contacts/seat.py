@@ -16,6 +16,7 @@ from manikin.balance.criteria import static_torque_share
 from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import ANKLE_FROM_HEEL
 from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
+from manikin.body.limbs import of_both_sides
 from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
@@ -161,11 +162,6 @@ class Sitter:
 
 
 _SITTING = {"hip_flexion": 1.4, "knee_flexion": 1.6, "ankle_dorsiflexion": 0.1}
-
-
-def of_both_sides(body: BodyModel, angles: dict[str, float]) -> dict[str, float]:
-    """Angles by the full names of a body's hinges, of both sides where a name has none."""
-    return {name: value for name in body.joint_names for key, value in angles.items() if name.endswith(key)}
 
 
 LEANING = (0.25, 0.5, 0.75, 0.92)  # shares of the way of the centre of mass to the feet that have a posture

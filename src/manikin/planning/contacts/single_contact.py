@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike
 from manikin.body import BodyModel, Limb, limb_named
 from manikin.contact import ContactKind
 from manikin.errors import BodyError, InputError
+from manikin.kinematics.efort import Task, unit_direction, usable_efort
+from manikin.kinematics.limb_samples import sample_limb, sample_limbs
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts.contact_plan import ContactRules
-from manikin.planning.contacts.efort import Task, unit_direction, usable_efort
 from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact, UsableEfort
 from manikin.planning.contacts.heuristics import Heuristic, heuristic_named
-from manikin.planning.contacts.samples import sample_limb, sample_limbs
 from manikin.scene import Scene
 
 
@@ -79,7 +79,7 @@ class ContactAnswer:
         role: The role that was taken, never ``auto``.
         efort: EFORT of the posture found, with the sign of that role, usable or more [N per N.m]; None
             without one.
-        usable: See :func:`manikin.planning.contacts.efort.usable_efort` [N per N.m].
+        usable: See :func:`manikin.kinematics.efort.usable_efort` [N per N.m].
         prepare_wall_s: Wall time of the samples, the scene's preparation and a first request [s].
         wall_s: Wall time of the request, made again [s].
     """

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.contact import Contact
 from manikin.kinematics.step_reach import StepReach
+from manikin.kinematics.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
@@ -26,7 +27,6 @@ from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 from manikin.planning.contacts.seat import leave_seat
-from manikin.planning.contacts.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.scene import Scene
 
 COLUMN = (0.12, 0.5, 0.9)  # radius, lowest and highest end above the ground of what is free, at 1.75 m [m]

@@ -11,6 +11,8 @@ import pinocchio as pin
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, FrictionModel, grasp
 from manikin.kinematics import Preferences
+from manikin.kinematics.efort import Task
+from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts import (
     ContactGenerator,
@@ -18,11 +20,9 @@ from manikin.planning.contacts import (
     ContactRules,
     Efort,
     Heuristic,
-    LimbSamples,
     PostureFinder,
     PostureFinderSettings,
     Stage,
-    Task,
     WeightedSum,
 )
 from manikin.planning.contacts.limb_places import stature_of

@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
+from manikin.kinematics.efort import Task
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
 from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray, finite_number
-from manikin.planning.contacts.efort import Task
 from manikin.planning.whole_body.certificate import (
     MotionCertificate,
     RefineRequirements,

@@ -19,10 +19,10 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.body.limbs import limb_slots
 from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.kinematics.efort import Task
 from manikin.motion.configuration_spline import TurnDerivatives
 from manikin.motion.dynamics import MotionSamples
 from manikin.numerics.spatial import FloatArray, skew
-from manikin.planning.contacts.efort import Task
 from manikin.planning.whole_body.fit_targets import ALMOST, GRASP_ROTATION_WEIGHT, EffectorTarget
 from manikin.planning.whole_body.refine_input import KeyPath
 

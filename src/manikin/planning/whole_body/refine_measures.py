@@ -16,10 +16,10 @@ from manikin.balance import MotionMargin, motion_margin
 from manikin.body import BodyModel
 from manikin.body.limbs import end_segments
 from manikin.contact import ContactKind, ContactSchedule, Stance, StanceSequence
+from manikin.kinematics.efort import Task
 from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_map
-from manikin.planning.contacts.efort import Task
 from manikin.planning.whole_body.refine_contacts import (
     LEAST,
     contact_variables,

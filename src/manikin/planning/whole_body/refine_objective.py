@@ -20,11 +20,11 @@ from manikin.balance.motion_forces import load_shares
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.contact import ContactKind, ContactSchedule
+from manikin.kinematics.efort import Task
 from manikin.motion.configuration_spline import turn_derivatives
 from manikin.motion.dynamics import MomentumRate, MotionSamples
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.contacts.efort import Task
 from manikin.planning.whole_body.contact_variables import Variables
 from manikin.planning.whole_body.fit_objective import FitLinearisation, MotionObjective, to_raw
 from manikin.planning.whole_body.fit_scales import MotionScales, RefineScales

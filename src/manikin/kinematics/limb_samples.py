@@ -11,10 +11,9 @@ from manikin.body import BodyModel, Limb, are_mirrored
 from manikin.body.limbs import REFLECTION, limb_origin, limb_slots, parent_segment
 from manikin.body.natural_range import NaturalRange
 from manikin.errors import BodyError
-from manikin.kinematics import LimbKinematics, ReachVolume
-from manikin.kinematics.limb_kinematics import hull_of, rigid_reach
+from manikin.kinematics.efort import MOST_RATIO
+from manikin.kinematics.limb_kinematics import LimbKinematics, ReachVolume, hull_of, rigid_reach
 from manikin.numerics.spatial import FloatArray, finite_number
-from manikin.planning.contacts.efort import MOST_RATIO
 
 THRESHOLD = 0.05  # least manipulability, as a share of the largest seen; our choice, open in the thesis
 _FEWEST_KEPT = 0.02
@@ -200,7 +199,7 @@ def sample_limb(
     return LimbSamples(limb, segment, origin, *joined, threshold=float(least or 0.0), natural=natural)
 
 
-def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
+def mirrored_samples(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
     """Samples of the limb on the other side, by reflection in the sagittal plane (5.3.1).
 
     Equal angles give ``M p``, ``M R M`` and ``M J J^T M`` with ``M = diag(1, -1, 1)``.
@@ -230,7 +229,7 @@ def sample_limbs(
     for limb in body.limbs:
         twin = sampled.get(limb.mirror or "")
         if twin is not None and are_mirrored(body, twin.limb, limb):
-            sampled[limb.name] = mirrored(body, twin, limb)
+            sampled[limb.name] = mirrored_samples(body, twin, limb)
         else:
             sampled[limb.name] = sample_limb(body, limb, rng, count, threshold, natural=natural)
     return sampled

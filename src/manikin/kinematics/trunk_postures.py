@@ -24,12 +24,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
-from manikin.body.limbs import mirrored
+from manikin.body.limbs import mirrored, of_both_sides
 from manikin.errors import BodyError
-from manikin.kinematics import PostureProblem, SolverSettings, com_target, generate_posture, touching_pairs
 from manikin.kinematics.fold import level_feet
+from manikin.kinematics.posture_problem import PostureProblem, com_target, touching_pairs
+from manikin.kinematics.posture_search import SolverSettings, generate_posture
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw, turned_root
-from manikin.planning.contacts.seat import of_both_sides
 from manikin.scene import Box, Obstacle, Proximity, Scene
 from manikin.scene.collision import Meter, collision_parts, local_box, part_meter, shape_of
 from manikin.scene.covering import cover
