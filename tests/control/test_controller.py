@@ -7,10 +7,11 @@ from scipy import sparse
 
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control import Controller, ControlSettings, SupportMode, TaskWeights
-from manikin.control.controller import RAISED
+from manikin.control.controller import PRESSED, RAISED
 from manikin.control.edge_forces import contact_geometry, points_along
 from manikin.errors import InputError
 from manikin.numerics.qp import QPSolution, solve_sparse_qp
+from manikin.numerics.spatial import GRAVITY
 
 
 def disturbed(body, seed, position=2e-3, speed=2e-2):
@@ -262,3 +263,15 @@ def test_a_foot_carries_nothing_beyond_the_rung_below_its_middle(body):
     geometry = contact_geometry(body, rung, 0.01)
     assert [segment for segment, _ in geometry.patches] == ["left_foot"]
     assert np.abs(points_along(body, geometry)).max() <= 0.03 + 1e-9
+
+
+def test_no_point_of_a_human_on_points_is_let_go(body, on_three_points):
+    """Where a body that rolls to one side is to be stopped, the third point presses with its least force."""
+    schedule, plan = on_three_points
+    v = np.zeros(body.nv)
+    v[3] = 2.0
+    output = Controller(body, plan, schedule).step(0.1, body.standing_posture(), v)
+    weight = body.mass * GRAVITY
+    # The solver keeps inequalities to a millionth of the weight.
+    assert output.wrenches["left_fist"][2] == pytest.approx(PRESSED * weight, abs=1e-6 * weight)
+    assert min(wrench[2] for wrench in output.wrenches.values()) > (PRESSED - 1e-6) * weight

@@ -52,6 +52,7 @@ class LoadedContact:
     Attributes:
         basis: The force map.
         cap: Largest normal force now [N].
+        least: Smallest one [N].
         grasp_share: Share of a grasp's limits that it may use now, in [0, 1].
         wished: (3,) force that it should feel now [N], or None.
         wish_weight: Of the squared error of that force [1/N^2].
@@ -62,6 +63,7 @@ class LoadedContact:
     grasp_share: float = 1.0
     wished: FloatArray | None = None
     wish_weight: float = 0.0
+    least: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,15 +139,14 @@ def build_qp(
     joint_map = equation[6:].copy()
     joint_map[:, 6:nv] += np.diag(0.5 * period * damping)
     joint_offset = state.bias[6:] + damping * state.v[6:]
-    caps, cap_limits = _normal_force_rows(contacts, variables, size, sum_cap)
+    caps, cap_limits, least = _normal_force_rows(contacts, variables, size, sum_cap)
     rows = np.concatenate((equation[:6], joint_map, caps))
-    free = np.full(len(cap_limits), -np.inf)
-    rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, free))
+    rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, least))
     rows_upper = np.concatenate((-state.bias[:6], bounds.torque_upper - joint_offset, cap_limits))
     shares = [np.where(item.basis.normal > 0, 1.0, item.grasp_share) for item in contacts]
-    least = [basis.lower * share for basis, share in zip(bases, shares, strict=True)]
+    fewest = [basis.lower * share for basis, share in zip(bases, shares, strict=True)]
     most = [basis.upper * share for basis, share in zip(bases, shares, strict=True)]
-    lower = np.concatenate([np.full(6, -np.inf), bounds.acceleration_lower, *least])
+    lower = np.concatenate([np.full(6, -np.inf), bounds.acceleration_lower, *fewest])
     upper = np.concatenate([np.full(6, np.inf), bounds.acceleration_upper, *most])
     hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
     for loaded, part in zip(contacts, variables, strict=True):
@@ -193,15 +194,18 @@ def _cost(
 
 def _normal_force_rows(
     contacts: Sequence[LoadedContact], variables: Sequence[slice], size: int, sum_cap: float | None
-) -> tuple[FloatArray, FloatArray]:
-    rows, limits = [], []
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows of the normal forces of contacts and of their sum, with their largest and smallest values [N]."""
+    rows, limits, least = [], [], []
     for loaded, part in zip(contacts, variables, strict=True):
         if loaded.basis.normal.any():
             row = np.zeros(size)
             row[part] = loaded.basis.normal
             rows.append(row)
             limits.append(loaded.cap)
+            least.append(loaded.least if loaded.least > 0.0 else -np.inf)
     if sum_cap is not None and rows:
         rows.append(np.sum(rows, axis=0))
         limits.append(sum_cap)
-    return np.array(rows).reshape(-1, size), np.array(limits)
+        least.append(-np.inf)
+    return np.array(rows).reshape(-1, size), np.array(limits), np.array(least)

@@ -25,6 +25,10 @@ from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
 YIELDING = 0.2
 """Stiffness with which a hand that should feel a force is held at its place, relative to a stance's."""
 
+PRESSED = 0.02
+"""Least normal force of each contact of a human on knees and fists alone, where it carries fully, relative to
+the weight: of three points none can be spared, and one that is let go ends balance."""
+
 RAISED = 0.006
 """Points this far above the lowest one of a contact that settles may carry load, twice as far none [m]."""
 
@@ -164,6 +168,9 @@ class Controller:
         settings = self.settings
         on = [support for support in supports.values() if support.mode is SupportMode.STANCE]
         loaded = [self._wishing(self._loaded(s, s.contact, state), time) for s in on if s.contact is not None]
+        kinds = {one.basis.contact.kind for one in loaded}
+        if self.body.stature is not None and kinds == {ContactKind.POINT}:
+            loaded = [replace(one, least=self._least(supports, one)) for one in loaded]
         horizon, largest = settings.joint_limit_horizon, settings.max_joint_acceleration
         bounds = JointBounds.of(self.body, state, horizon, largest)
         return build_qp(
@@ -258,6 +265,12 @@ class Controller:
         if support.fades:
             upper = np.minimum(upper, state.mass * GRAVITY * self._point_shares(support, contact, edges))
         return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
+
+    def _least(self, supports: Mapping[str, SupportState], loaded: LoadedContact) -> float:
+        """Normal force that keeps a contact pressed which carries fully [N]."""
+        support = supports[loaded.basis.contact.effector]
+        carries = support.load_share >= 1.0 and support.unload_share >= 1.0
+        return min(PRESSED * self.body.mass * GRAVITY, loaded.cap) if carries else 0.0
 
     def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:
         """The contact with the force that it should feel at a time, where there is one."""

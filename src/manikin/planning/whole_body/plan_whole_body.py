@@ -58,7 +58,6 @@ from manikin.planning.whole_body.swing import SwingLimits
 from manikin.planning.whole_body.swing_planner import (
     FlightPlanner,
     PlannedSwing,
-    carries_elsewhere,
     leaning_pairs,
     rolls_on_point,
 )
@@ -288,10 +287,8 @@ class _Planner:
         return part
 
     def swings(self) -> tuple[PlannedSwing, ...]:
-        """Every flight; known postures lead limbs of which another effector carries meanwhile."""
-        flights, schedule, led = self.flights.flights(), self.trajectory.schedule, self.known is not None
-        flown = (item for item in flights if not led or not carries_elsewhere(self.body, schedule, item))
-        return tuple(self.flights.plan(swing) for swing in flown)
+        """Every flight."""
+        return tuple(self.flights.plan(swing) for swing in self.flights.flights())
 
     def run(self, swings: tuple[PlannedSwing, ...], began: float, progress: Progress) -> WholeBodyResult:
         """Fit a motion to the swings, in other manners or to other swings where it fails."""

@@ -220,9 +220,11 @@ class FlightPlanner:
             Pose.of(held) if held else Pose.in_posture(self._body, self._reference(time), swing.effector)
             for held, time in ((swing.start, start), (swing.end, end))
         )
+        # A limb that changes from one contact to another need not rise above both ends.
+        level = carries_elsewhere(self._body, self.schedule, swing)
         plan = plan_swing(
             first, last, start, end, self._clearance(swing), limits=self._limits, refine=0,
-            start_normal=contact.normal, end_normal=contact.normal,
+            start_normal=contact.normal, end_normal=contact.normal, heights=(0.0,) * level + HEIGHTS,
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "reach")
 
