@@ -26,8 +26,8 @@ YIELDING = 0.2
 """Stiffness with which a hand that should feel a force is held at its place, relative to a stance's."""
 
 PRESSED = 0.02
-"""Least normal force of each contact of a human on knees and fists alone, where it carries fully, relative to
-the weight: of three points none can be spared, and one that is let go ends balance."""
+"""Least normal force of each contact of a human on knees and fists alone, from its landing until it is about to
+leave, relative to the weight: of three points none can be spared, and one that is let go ends balance."""
 
 RAISED = 0.006
 """Points this far above the lowest one of a contact that settles may carry load, twice as far none [m]."""
@@ -267,9 +267,9 @@ class Controller:
         return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
 
     def _least(self, supports: Mapping[str, SupportState], loaded: LoadedContact) -> float:
-        """Normal force that keeps a contact pressed which carries fully [N]."""
+        """Normal force that keeps a contact pressed which has landed and is not about to leave [N]."""
         support = supports[loaded.basis.contact.effector]
-        carries = support.load_share >= 1.0 and support.unload_share >= 1.0
+        carries = support.planned and support.unload_share >= 1.0
         return min(PRESSED * self.body.mass * GRAVITY, loaded.cap) if carries else 0.0
 
     def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:
