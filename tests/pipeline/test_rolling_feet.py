@@ -117,6 +117,8 @@ def test_all_of_a_run_is_told_of_whichever_attempt_came_farther(flat, rolling, t
         (n, told) for n in reached
     ]
     assert summary["planned"] == (report.failure.stage == "execution")
+    kept = load_scenario(str(tmp_path / "run/scenario.yaml"))
+    assert kept.file.supports.foot == (None if told == 1 else "rolling")
 
 
 @pytest.mark.parametrize(("rolling", "told"), [("centroidal", 0), ("execution", 1)])

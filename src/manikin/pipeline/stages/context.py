@@ -253,8 +253,7 @@ class Report:
         self._before: _Reported | None = None
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
-        if self._directory is not None:
-            self._directory.write(SCENARIO, scenario.to_yaml())
+        self._write(SCENARIO, lambda directory: directory.write(SCENARIO, scenario.to_yaml()))
         stature = None if scenario.is_point_mass else context.body.stature
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
@@ -320,8 +319,8 @@ class Report:
 
     def keep_scenario(self, scenario: Scenario) -> None:
         """Keep a scenario of the task frame with the supports that were found, in the world."""
-        if self._directory is not None:
-            self._directory.write(SCENARIO, scenario.from_task_frame(self.transform).to_yaml())
+        text = scenario.from_task_frame(self.transform).to_yaml()
+        self._write(SCENARIO, lambda directory: directory.write(SCENARIO, text))
 
     def keep_contact_plan(self, plan: ContactPlan) -> None:
         """Keep a contact plan of the task frame as a contact-plan file, in the world."""

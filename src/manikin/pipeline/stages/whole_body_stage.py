@@ -171,7 +171,9 @@ def with_rolling_feet(context: RunContext, report: Report) -> RunContext | None:
     if not 0.0 < failure.time_s < (report.summary["centroidal"]["duration_s"] or 0.0):
         return None
     report.try_again()
-    return context.with_supports(context.scenario.with_overrides(["supports.foot=rolling"]))
+    rolling = context.with_supports(context.scenario.with_overrides(["supports.foot=rolling"]))
+    report.keep_scenario(rolling.scenario)
+    return rolling
 
 
 def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
