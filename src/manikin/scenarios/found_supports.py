@@ -57,7 +57,7 @@ SWING_SPEED = 2.0
 CLIMBING_SPEED = 1.2
 """Mean speed upwards or downwards in what a phase lasts longer for a rise [m/s]; our choice."""
 ROLLED = 0.3
-"""The same on both feet while one lands on its heel and the other leaves from its toes [s]."""
+"""Least duration of a support on both feet, one landing on its heel, the other leaving from its toes [s]."""
 LONGEST = 0.8
 """Longest duration of a phase, or 1.5 times its least: a person's step at 0.5 m/s; without it the programme
 often diverges [s]."""
