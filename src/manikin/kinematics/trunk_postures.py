@@ -14,7 +14,7 @@ expended while walking in stooping postures", Brit. J. Industr. Med. 12, 1955); 
 Arms close and a turned trunk are our choice.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -90,32 +90,47 @@ class TrunkPosture:
         return cls(name, frozen_array(q, "trunk posture"), cost, top, shapes, *placed)
 
 
-class TrunkPostures(tuple[TrunkPosture, ...]):
-    """The postures of one body, the cheapest first."""
+class TrunkPostures:
+    """The postures of one body, the cheapest first: upright, and further ones, found when they are asked for.
 
-    @classmethod
-    def of(cls, body: BodyModel) -> "TrunkPostures":
-        """Find the postures of a person; kept by the body's identity.
+    Most places are free upright, and the further ones take longer to find than many a way.
+    """
+
+    def __init__(self, body: BodyModel) -> None:
+        self._body = body
+        self.upright = TrunkPosture.of("upright", body, body.standing_posture(), 1.0)
+
+    @staticmethod
+    @lru_cache(maxsize=64)
+    def of(body: BodyModel) -> "TrunkPostures":
+        """The postures of a person; kept by the body's identity.
 
         Raises:
             BodyError: If the body has no stature or no soles.
         """
-        return _postures_of(body)
+        if body.stature is None or body.sole_length is None:
+            raise BodyError(f"body {body.name!r} has no stature or soles; valid: a human body")
+        return TrunkPostures(body)
+
+    @cached_property
+    def _all(self) -> tuple[TrunkPosture, ...]:
+        narrow = list(_narrow(self._body))
+        folded = _folded(self._body, narrow[0].q if narrow else self.upright.q)
+        return self.upright, *sorted([*narrow, *folded], key=lambda item: item.cost)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __iter__(self) -> Iterator[TrunkPosture]:
+        return iter(self._all)
+
+    def __getitem__(self, row: int) -> TrunkPosture:
+        return self._all[row] if row else self.upright
 
     @property
     def costs(self) -> FloatArray:
         """(m,) cost of each posture."""
         return np.array([item.cost for item in self])
-
-
-@lru_cache(maxsize=64)
-def _postures_of(body: BodyModel) -> TrunkPostures:
-    if body.stature is None or body.sole_length is None:
-        raise BodyError(f"body {body.name!r} has no stature or soles; valid: a human body")
-    items = [TrunkPosture.of("upright", body, body.standing_posture(), 1.0)]
-    items += _narrow(body)
-    items += _folded(body, items[-1].q if len(items) == 1 else items[1].q)
-    return TrunkPostures(sorted(items, key=lambda item: item.cost))
 
 
 def _narrow(body: BodyModel) -> Iterator[TrunkPosture]:
@@ -220,9 +235,6 @@ _TOGETHER = 32  # places that are tested at once: keeps temporary arrays in the 
 class TrunkClearance:
     """Which trunk postures are free of a scene at places; use one instance per thread.
 
-    A quick test of balls around the shapes against the boxes around the obstacles' parts decides most pairs;
-    Coal measures the rest exactly.  Answers are kept by place.
-
     Attributes:
         postures: The postures, in the order of the answers.
         margin: Distance that they keep to the scene [m].
@@ -230,47 +242,27 @@ class TrunkClearance:
 
     def __init__(self, postures: TrunkPostures, scene: Scene, margin: float = 0.015) -> None:
         self.postures, self.margin = postures, margin
-        self._parts = parts = tuple(part for item in scene for part in collision_parts(item))
-        self._placed = [coal.Transform3s(part.rotation, part.translation) for part in parts]
-        self._axes = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
-        origins = np.array([part.rotation.T @ part.translation for part in parts]).reshape(-1, 3)
-        self._low = np.array([part.low for part in parts]).reshape(-1, 3) + origins
-        self._high = np.array([part.high for part in parts]).reshape(-1, 3) + origins
-        fills = [isinstance(part.geometry, (coal.Box, coal.Halfspace)) for part in parts]
-        self._solid = np.array(fills, dtype=bool)  # which are all of the box around them
-        shapes = [(row, n) for row, item in enumerate(postures) for n in range(len(item.shapes))]
-        self._shapes = np.array(shapes, dtype=np.int64)
-        self._meters: dict[tuple[int, int], Meter] = {}
-        centres, outer, inner = zip(*(_balls(postures[p], n) for p, n in shapes), strict=True)
-        self._centres = np.array(centres)  # (shapes, balls, 3)
-        self._outer, self._inner = np.array(outer), np.array(inner)  # (shapes,) [m]
-        self._middles = self._centres.mean(axis=1)
-        apart = np.linalg.norm(self._centres - self._middles[:, None], axis=2).max(axis=1)
-        self._around = apart + self._outer
-        out = float((np.linalg.norm(self._middles[:, :2], axis=1) + self._around).max()) + margin
-        top = float((self._middles[:, 2] + self._around).max()) + margin
-        bottom = float((self._middles[:, 2] - self._around).min()) - margin
-        self._middle = np.array([0.0, 0.0, 0.5 * (top + bottom)])
-        self._reach = np.array([out, out, 0.5 * (top - bottom)])
-        self._known: dict[bytes, NDArray[np.bool_]] = {}
+        self._scene, self._upright = scene, _Clearance((postures.upright,), scene, margin)
+
+    @cached_property
+    def _any(self) -> "_Clearance":
+        return _Clearance(tuple(self.postures), self._scene, self.margin)
 
     def free(self, places: FloatArray) -> NDArray[np.bool_]:
         """(k, m) whether each posture is free at each of (k, 4) places.
 
         They are x, y and height of the ground between the feet [m], and the heading of the feet [rad].
         """
-        rows = np.ascontiguousarray(places, dtype=np.float64).reshape(-1, 4)
-        keys = [row.tobytes() for row in rows]
-        new = [number for number, key in enumerate(keys) if key not in self._known]
-        if new:
-            for number, answer in zip(new, self._free(rows[new]), strict=True):
-                self._known[keys[number]] = answer
-        return np.array([self._known[key] for key in keys]).reshape(-1, len(self.postures))
+        return self._any.free(places)
 
     def cheapest(self, places: FloatArray) -> NDArray[np.int64]:
         """(k,) index of the cheapest free posture at each place, -1 where there is none."""
-        free = self.free(places)
-        return np.where(free.any(axis=1), np.argmax(free, axis=1), -1)
+        upright = self._upright.free(places)[:, 0]
+        numbers, rest = np.zeros(len(upright), dtype=np.int64), np.flatnonzero(~upright)
+        if len(rest):
+            free = self.free(places[rest])
+            numbers[rest] = np.where(free.any(axis=1), np.argmax(free, axis=1), -1)
+        return numbers
 
     def along(self, places: FloatArray) -> NDArray[np.int64] | None:
         """(k,) postures at places (k, 4) one after the other that cost least together; None where none pass.
@@ -279,6 +271,8 @@ class TrunkClearance:
         neighbours, a change a share of the way that the body's parts move in it.  A change is made at one of
         its two places, where both postures and all of a height in between have to be free.
         """
+        if self._upright.free(places).all():
+            return np.zeros(len(places), dtype=np.int64)
         free, costs = self.free(places), self.postures.costs - 1.0
         ways = np.maximum(np.linalg.norm(np.diff(places[:, :3], axis=0), axis=1), STANDING)
         share = np.append(ways, STANDING) + np.insert(ways, 0, STANDING)
@@ -315,6 +309,50 @@ class TrunkClearance:
         """(m, m) mean way of the parts of the body from one posture to another [m]."""
         middles = np.array([item.translations for item in self.postures])
         return np.linalg.norm(middles[:, None] - middles[None, :], axis=3).mean(axis=2)
+
+
+class _Clearance:
+    """Which of some postures are free of a scene at places.
+
+    A quick test of balls around the shapes against the boxes around the obstacles' parts decides most pairs;
+    Coal measures the rest exactly.  Answers are kept by place.
+    """
+
+    def __init__(self, postures: Sequence[TrunkPosture], scene: Scene, margin: float) -> None:
+        self.postures, self.margin = postures, margin
+        self._parts = parts = tuple(part for item in scene for part in collision_parts(item))
+        self._placed = [coal.Transform3s(part.rotation, part.translation) for part in parts]
+        self._axes = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
+        origins = np.array([part.rotation.T @ part.translation for part in parts]).reshape(-1, 3)
+        self._low = np.array([part.low for part in parts]).reshape(-1, 3) + origins
+        self._high = np.array([part.high for part in parts]).reshape(-1, 3) + origins
+        fills = [isinstance(part.geometry, (coal.Box, coal.Halfspace)) for part in parts]
+        self._solid = np.array(fills, dtype=bool)  # which are all of the box around them
+        shapes = [(row, n) for row, item in enumerate(postures) for n in range(len(item.shapes))]
+        self._shapes = np.array(shapes, dtype=np.int64)
+        self._meters: dict[tuple[int, int], Meter] = {}
+        centres, outer, inner = zip(*(_balls(postures[p], n) for p, n in shapes), strict=True)
+        self._centres = np.array(centres)  # (shapes, balls, 3)
+        self._outer, self._inner = np.array(outer), np.array(inner)  # (shapes,) [m]
+        self._middles = self._centres.mean(axis=1)
+        apart = np.linalg.norm(self._centres - self._middles[:, None], axis=2).max(axis=1)
+        self._around = apart + self._outer
+        out = float((np.linalg.norm(self._middles[:, :2], axis=1) + self._around).max()) + margin
+        top = float((self._middles[:, 2] + self._around).max()) + margin
+        bottom = float((self._middles[:, 2] - self._around).min()) - margin
+        self._middle = np.array([0.0, 0.0, 0.5 * (top + bottom)])
+        self._reach = np.array([out, out, 0.5 * (top - bottom)])
+        self._known: dict[bytes, NDArray[np.bool_]] = {}
+
+    def free(self, places: FloatArray) -> NDArray[np.bool_]:
+        """(k, m) whether each posture is free at each of (k, 4) places."""
+        rows = np.ascontiguousarray(places, dtype=np.float64).reshape(-1, 4)
+        keys = [row.tobytes() for row in rows]
+        new = [number for number, key in enumerate(keys) if key not in self._known]
+        if new:
+            for number, answer in zip(new, self._free(rows[new]), strict=True):
+                self._known[keys[number]] = answer
+        return np.array([self._known[key] for key in keys]).reshape(-1, len(self.postures))
 
     def _free(self, places: FloatArray) -> NDArray[np.bool_]:
         free, near = np.ones((len(places), len(self.postures)), dtype=bool), self._near(places)

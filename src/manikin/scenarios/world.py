@@ -34,7 +34,7 @@ from manikin.numerics.spatial import (
     rotation_from_rpy,
     turned_root,
 )
-from manikin.planning.contacts import ContactRules, Endpoints, Habit
+from manikin.planning.contacts import ContactRules, Endpoints, Habit, PostureFinder, PostureFinderSettings
 from manikin.planning.whole_body.posture_style import READY, posture_style_of
 from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
 from manikin.scenarios.sections.task_sections import ObstacleSection
@@ -235,8 +235,8 @@ def start_posture(
         if name == CLIMBING:
             level = values.start_level if start.height_m is None else start.height_m
             return carried_to(posture_style_of(CLIMBING).posture(body), spot, yaw, level)
-        friction, model = friction_of(values), values.contact_model.friction
-        endpoints = Endpoints(body, scene, friction, friction_model=model)
+        settings = PostureFinderSettings(friction_model=values.contact_model.friction)
+        endpoints = Endpoints(PostureFinder(body, scene, settings=settings), friction_of(values))
         result = endpoints.find(spot, yaw, Habit(name), start.height_m)
         if result.stage is None:
             raise ScenarioError(f"{values.source}: {result.failure}; valid: another place or posture")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.collision import Measured, collision_parts, pair_meter, part_meter
+from manikin.scene.collision import Measured, Meter, collision_parts, pair_meter, part_meter
 from manikin.scene.distance_bounds import KnownDistances, PairBounds, PlacedShapes, PlacementReader
 from manikin.scene.scene import Scene
 
@@ -155,16 +155,11 @@ class Proximity(BodyPairs):
         first, second = np.array(outer + inner, dtype=np.int64).reshape(-1, 2).T
         self._bounds = PairBounds(self._shapes, parts, first, second)
         self._first, self._second = first.tolist(), second.tolist()
-        geometries, both = (
-            [item.geometry for item in objects],
-            list(zip(self._first, self._second, strict=True)),
-        )
-        self._meters = [
-            pair_meter(geometries[a], geometries[b]) if b < self._count
-            else part_meter(geometries[a], parts[b - self._count])
-            for a, b in both
-        ]  # fmt: skip
+        self._geometries, self._parts = [item.geometry for item in objects], parts
+        # Made when a pair is first measured: most pairs never come near.
+        self._meters: list[Meter | None] = [None] * len(self._first)
         names = [item.name for item in objects] + [part.obstacle for part in parts]
+        both = zip(self._first, self._second, strict=True)
         self.pairs: tuple[Pair, ...] = tuple((names[a], names[b]) for a, b in both)
         moves = moves_by_shape(self._model, self._shapes, len(parts))
         self._sensitivity = moves[second] - moves[first]
@@ -344,8 +339,19 @@ class Proximity(BodyPairs):
                     # The shape's own transform: making new ones takes longer than many a distance.
                     transforms[key] = self._moving[key]
                     transforms[key].setTransform(rotations[key], translations[key])
-            measured.append(self._meters[index](transforms[shape], transforms[other], within))
+            meter = self._meters[index] or self._meter(index)
+            measured.append(meter(transforms[shape], transforms[other], within))
         return measured
+
+    def _meter(self, index: int) -> Meter:
+        """Measuring function of a pair, made for the first time."""
+        first, other = self._geometries[self._first[index]], self._second[index]
+        inner = other < self._count
+        meter = self._meters[index] = (
+            pair_meter(first, self._geometries[other]) if inner
+            else part_meter(first, self._parts[other - self._count])
+        )  # fmt: skip
+        return meter
 
 
 def _split(placements: FloatArray) -> tuple[FloatArray, FloatArray]:

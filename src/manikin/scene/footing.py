@@ -93,8 +93,12 @@ class FootingTable:
         self.surfaces = tuple(surfaces)
         self.footprint = np.asarray(footprint, dtype=np.float64)[:, :2]
         rings = [one for face in surfaces for one in ((face.polygon, 1.0), *((r, -1.0) for r in face.holes))]
-        self._start = np.concatenate([ring for ring, _ in rings]) if rings else np.zeros((0, 3))
-        self._end = np.concatenate([np.roll(ring, -1, axis=0) for ring, _ in rings]) if rings else self._start
+        # Rings along two axes in the plane of their surface.
+        self._axes = np.array([item.rotation[:, :2] for item in surfaces]).reshape(-1, 3, 2)
+        owner = np.repeat(np.arange(len(surfaces)), [1 + len(item.holes) for item in surfaces])
+        flat = [ring @ self._axes[number] for (ring, _), number in zip(rings, owner, strict=True)]
+        self._start = np.concatenate([np.zeros((0, 2)), *flat])
+        self._end = np.concatenate([np.zeros((0, 2)), *(np.roll(ring, -1, axis=0) for ring in flat)])
         self._edges_of_ring = _Ranges([len(ring) for ring, _ in rings])
         self._rings_of_surface = _Ranges([1 + len(item.holes) for item in surfaces])
         self._sign = np.array([sign for _, sign in rings])  # of the area inside a ring: holes are taken away
@@ -131,7 +135,10 @@ class FootingTable:
         away = np.linalg.norm(positions[rows] - self._middle[rings], axis=1)
         known = away < self._reach[rings] + sole.radius
         rows, rings = rows[known], rings[known]
-        pair, start, end = self._edges(rings, positions[rows], rotations[rows])
+        pair, edges = self._edges_of_ring.expand(rings)
+        axes = self._axes[on]
+        origin = np.einsum("nij,ni->nj", axes, positions)[rows[pair]]
+        start, end = self._start[edges] - origin, self._end[edges] - origin
         near = _any(pair, _distance(start, end) < sole.radius, len(rows))
         # A ring that no edge of comes near a sole has all of it inside or nothing, as its middle.
         around = _crossings(pair, start, end, len(rows)) % 2 == 1
@@ -143,7 +150,9 @@ class FootingTable:
         whole = around & ~near
         base = np.bincount(rows, self._sign[rings] * whole, count)
         mine = near[pair]
-        of, start, end = rows[pair[mine]], start[mine], end[mine]
+        of = rows[pair[mine]]
+        turn = (axes.transpose(0, 2, 1) @ rotations[..., :2])[of]
+        start, end = (np.einsum("pi,pij->pj", ends[mine], turn) for ends in (start, end))
         clipped = sole.clip(start, end)
         area = sole.area * base + np.bincount(of, sole.fan(start, end, clipped), count)
         share[hanging] = np.clip(area[hanging] / sole.area, 0.0, 1.0)
@@ -241,16 +250,6 @@ class FootingTable:
         rotations = np.stack([forward, cross(normals, forward), normals], axis=2)
         return Places(rows, numbers, np.column_stack([xy[rows], height]), rotations)
 
-    def _edges(
-        self, rings: IntArray, positions: FloatArray, rotations: FloatArray
-    ) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Pair, start (p, 2) and end (p, 2) of every edge of the ring of each pair in the sole's frame."""
-        pair, edges = self._edges_of_ring.expand(rings)
-        axes = np.ascontiguousarray(rotations[:, :, :2])[pair]
-        origin = positions[pair]
-        flat = [np.einsum("pi,pij->pj", ends[edges] - origin, axes) for ends in (self._start, self._end)]
-        return pair, flat[0], flat[1]
-
     def _spanning(
         self, of: IntArray, clipped: _Clipped, own: NDArray[np.bool_], hanging: IntArray
     ) -> tuple[IntArray, FloatArray]:
@@ -311,13 +310,13 @@ class _Sole:
     def clip(self, start: FloatArray, end: FloatArray) -> _Clipped:
         """Cut edges (p, 2) to what of them is inside (Cyrus and Beck)."""
         edge = end - start
-        rise = edge @ self._walls.T
-        room = self._offsets - start @ self._walls.T
+        rise = self._walls @ edge.T
+        room = self._offsets[:, None] - self._walls @ start.T
         level = np.abs(rise) < 1e-300
         share = room / np.where(level, 1.0, rise)
-        enters = np.where(~level & (rise < 0.0), share, 0.0).max(axis=1).clip(0.0)
-        leaves = np.where(~level & (rise > 0.0), share, 1.0).min(axis=1).clip(max=1.0)
-        inside = (enters < leaves) & ~(level & (room < 0.0)).any(axis=1)
+        enters = np.where(~level & (rise < 0.0), share, 0.0).max(axis=0).clip(0.0)
+        leaves = np.where(~level & (rise > 0.0), share, 1.0).min(axis=0).clip(max=1.0)
+        inside = (enters < leaves) & ~(level & (room < 0.0)).any(axis=0)
         return inside, start + enters[:, None] * edge, start + leaves[:, None] * edge
 
     def fan(self, start: FloatArray, end: FloatArray, clipped: _Clipped) -> FloatArray:

@@ -36,7 +36,8 @@ def tunnel(height, length=0.2, side=0.45, yaw=0.0):
 
 
 def searched(scene, away, yaw=0.0):
-    ends, finder = Endpoints(BODY, scene, 0.7), PostureFinder(BODY, scene)
+    finder = PostureFinder(BODY, scene)
+    ends = Endpoints(finder, 0.7)
     heading = rotation_from_yaw(yaw)[:2, 0]
     start, goal = (ends.find(far * heading, yaw, Habit.STANDING).stage for far in (0.0, away))
     return CrawlSearch(finder, ends, start, goal, 0.7, lambda a, b: WalkSearch(finder, a, b).run()).run()

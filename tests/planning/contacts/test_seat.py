@@ -82,7 +82,7 @@ def test_a_seat_that_cannot_be_left_at_rest_is_left_in_motion():
     """Feet so far in front that no lean brings the weight over them: speed does, and only then."""
     body = human(1.75, 75.0, "male")
     scene = Scene([Obstacle("seat", Box((0.4, 0.5, 0.45)), translation=(0.0, 0.0, 0.225))])
-    start = Endpoints(body, scene, 0.7).find(np.zeros(2), 0.0, Habit.SEATED).stage
+    start = Endpoints(PostureFinder(body, scene), 0.7).find(np.zeros(2), 0.0, Habit.SEATED).stage
     poser = PostureFinder(body, scene)
     farther = np.array([0.09, 0.0, 0.0])
     moved = {
@@ -133,7 +133,7 @@ def test_hands_push_until_the_weight_is_over_the_feet():
     ]
     scene = Scene([seat, *arms])
     poser = PostureFinder(body, scene)
-    sat = Endpoints(body, scene, 0.7).find(np.zeros(2), 0.0, Habit.SEATED).stage
+    sat = Endpoints(PostureFinder(body, scene), 0.7).find(np.zeros(2), 0.0, Habit.SEATED).stage
     held = {**sat.contacts, **hand_supports(scene, sat.contacts["buttocks"], 1.75, 0.7, 0.9)}
     posed = poser.pose(held, held, sat.q, place=sat.com[:2], restarts=True)
     leaving = leave_seat(poser, type(sat).of(body, held, posed.q, 0.35), frozenset(FEET.effectors))

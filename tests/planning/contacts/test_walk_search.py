@@ -37,7 +37,7 @@ STEPS = Scene(
 
 
 def planned(scene, at, heading=0.0, body=BODY, **options):
-    ends = Endpoints(body, scene, 0.7)
+    ends = Endpoints(PostureFinder(body, scene), 0.7)
     start = ends.find(np.zeros(2), 0.0, Habit.STANDING).stage
     goal = ends.find(np.asarray(at), heading, Habit.STANDING).stage
     assert start is not None
@@ -256,7 +256,7 @@ def test_holds_are_in_reach_and_on_what_a_hand_can_hold_or_lean_on():
 
 def test_a_step_that_a_later_stage_refused_is_not_taken_again():
     """Nor one much like it: 8 cm; the start, of no step, cannot be refused."""
-    ends = Endpoints(BODY, STEPS, 0.7)
+    ends = Endpoints(PostureFinder(BODY, STEPS), 0.7)
     start, goal = (ends.find(np.array([x, 0.0]), 0.0, Habit.STANDING).stage for x in (0.0, 1.5))
     search = WalkSearch(PostureFinder(BODY, STEPS), start, goal)
     first = search.run().plan
@@ -321,7 +321,7 @@ def test_a_body_stands_beside_and_across_coplanar_boxes(seam):
             Obstacle(name, Box((2.0, high - low, 0.2)), translation=(seam, 0.5 * (low + high), 0.1))
             for name, (low, high) in sides.items()
         ])  # fmt: skip
-    stage = Endpoints(BODY, scene, 0.7).find(np.zeros(2), 0.0, Habit.STANDING).stage
+    stage = Endpoints(PostureFinder(BODY, scene), 0.7).find(np.zeros(2), 0.0, Habit.STANDING).stage
     assert stage is not None
     contact = stage.contacts["left_foot"]
     assert set(scene.touched_obstacles(contact)) == (
@@ -335,7 +335,7 @@ def test_a_body_stands_beside_and_across_coplanar_boxes(seam):
 @pytest.mark.parametrize("seat", [0.36, 0.42, 0.48])
 def test_a_seated_start_touches_seat_and_floor(seat):
     scene = Scene([Obstacle("seat", Box((0.4, 0.5, seat)), translation=(-0.08, 0.0, seat / 2))])
-    ends = Endpoints(BODY, scene, 0.7)
+    ends = Endpoints(PostureFinder(BODY, scene), 0.7)
     stage = ends.find(np.zeros(2), 0.0, Habit.SEATED).stage
     assert set(stage.contacts) == {"buttocks", "left_foot", "right_foot"}
     assert stage.contacts["buttocks"].position[2] == pytest.approx(seat)
@@ -348,11 +348,11 @@ def test_a_seated_start_touches_seat_and_floor(seat):
 
 
 def test_ends_that_do_not_exist_say_why():
-    ends = Endpoints(BODY, Scene(floor_height=None), 0.7)
+    ends = Endpoints(PostureFinder(BODY, Scene(floor_height=None)), 0.7)
     assert "no surface with room" in ends.find(np.zeros(2), 0.0, Habit.STANDING).failure
     low = Scene([Obstacle("lid", Box((3.0, 3.0, 0.2)), translation=(0.0, 0.0, 0.5))])
-    on_top = Endpoints(BODY, low, 0.7).find(np.zeros(2), 0.0, Habit.STANDING).stage
+    on_top = Endpoints(PostureFinder(BODY, low), 0.7).find(np.zeros(2), 0.0, Habit.STANDING).stage
     assert on_top.contacts["left_foot"].position[2] == pytest.approx(0.6)
-    below = Endpoints(BODY, low, 0.7).find(np.zeros(2), 0.0, Habit.STANDING, 0.0)
+    below = Endpoints(PostureFinder(BODY, low), 0.7).find(np.zeros(2), 0.0, Habit.STANDING, 0.0)
     assert below.stage is None
     assert "no posture standing at" in below.failure

@@ -6,6 +6,7 @@ and a climber go on all their limbs, led round what is in their straight way by 
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from itertools import islice
 
 import numpy as np
@@ -62,12 +63,8 @@ class _ContactSearch:
         model = self._scenario.contact_model.friction
         return contacts.PostureFinderSettings(natural=self._natural, friction_model=model)
 
-    def _endpoints(self, reference: FloatArray | None = None) -> Endpoints:
-        return Endpoints(
-            self._body, self._scene, self._scenario.contacts.friction, reference,
-            natural=self._natural, friction_model=self._scenario.contact_model.friction,
-            rolls=not self._scenario.refines,
-        )  # fmt: skip
+    def _endpoints(self, poser: contacts.PostureFinder) -> Endpoints:
+        return Endpoints(poser, self._scenario.contacts.friction, rolls=not self._scenario.refines)
 
 
 class _FootSearch(_ContactSearch):
@@ -76,7 +73,8 @@ class _FootSearch(_ContactSearch):
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
         super().__init__(scenario, body, scene, rng)
         self._reference = posture_style_of(scenario.file.manner).posture(body)
-        self._places = self._endpoints(self._reference)
+        self._poser = contacts.PostureFinder(body, scene, self._reference, self._asked())
+        self._places = self._endpoints(self._poser)
         self._brace: Brace | None = None
         self._seat: Stage | None = None
 
@@ -102,14 +100,14 @@ class _FootSearch(_ContactSearch):
     def _crawl(self, walk: WalkSearch, start: Stage, goal: Stage) -> Extension:
         """The way on hands and knees below what is too low to walk under."""
         return contacts.CrawlSearch(
-            walk.poser, self._places, start, goal, self._scenario.contacts.friction,
+            self._poser, self._places, start, goal, self._scenario.contacts.friction,
             lambda first, last: self._searched(first, last).run(), walk.settings,
         ).run()  # fmt: skip
 
     def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
         whole = plan
         if self._seat is not None:
-            whole = contacts.take_seat(self._poser(), plan, self._seat)
+            whole = contacts.take_seat(self._poser, plan, self._seat)
         elif self._brace is not None:
             whole = with_hands(self._body, plan, self._brace)
         return whole if isinstance(whole, str) else (whole, with_supports(self._scenario, whole))
@@ -117,10 +115,7 @@ class _FootSearch(_ContactSearch):
     def _searched(self, start: Stage, goal: Stage) -> WalkSearch:
         options = self._scenario.contacts
         settings = contacts.WalkSettings(stride=options.stride_m, grasp_force=options.grasp_force_N)
-        return WalkSearch(self._poser(), start, goal, options.friction, settings)
-
-    def _poser(self) -> contacts.PostureFinder:
-        return contacts.PostureFinder(self._body, self._scene, self._reference, self._asked())
+        return WalkSearch(self._poser, start, goal, options.friction, settings)
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""
@@ -243,7 +238,7 @@ class _LimbSearch(_ContactSearch):
         """Postures at the start, the best first, or the reason why there is none."""
         state = self._scenario.file.task.start
         if self._body.stature is not None and not self._hangs:
-            result = stage_at(self._endpoints(), self._scenario, "start")
+            result = stage_at(self._standing_places, self._scenario, "start")
             yield Endpoint(None, result) if isinstance(result, str) else Endpoint(result)
             return
         q = self._standing(state)
@@ -255,9 +250,14 @@ class _LimbSearch(_ContactSearch):
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""
         if self._body.stature is not None and not self._climbs:
-            result = stage_at(self._endpoints(), self._scenario, "goal")
+            result = stage_at(self._standing_places, self._scenario, "goal")
             return result if isinstance(result, str) else result.q[:7]
         return self._standing(self._scenario.file.task.goal)[:7]
+
+    @cached_property
+    def _standing_places(self) -> Endpoints:
+        """Starts and goals on feet, in postures like standing."""
+        return self._endpoints(contacts.PostureFinder(self._body, self._scene, settings=self._asked()))
 
     def _standing(self, state: StateSection) -> FloatArray:
         """(nq,) reference posture at a place, as high as if it stood there."""

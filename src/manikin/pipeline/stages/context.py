@@ -8,6 +8,7 @@ import re
 import time as clock
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +129,6 @@ class RunContext:
         scenario: With the supports that were found, where a file can list them.
         scene_in_world: The scene that was given.
         settings: Options of the whole-body stage.
-        problem: What the centre of mass is planned for; None as long as there are no supports.
         plan: The contacts that were found from start and goal, or None.
         search_again: Searches on for other contacts without the change of a phase, which failed for a reason.
         resting: The task with rests at all changes of contact, where this one passes some without; or None.
@@ -141,7 +141,6 @@ class RunContext:
     scene: Scene
     scene_in_world: Scene
     settings: WholeBodySettings
-    problem: CentroidalProblem | KeyframeProblem | None = None
     plan: ContactPlan | None = None
     search_again: Callable[[int, str], ContactSearch] | None = None
     resting: "RunContext | None" = None
@@ -158,29 +157,39 @@ class RunContext:
         if scenario.file.supports is not None:
             scenario.check_contacts(scene)
         transform, task = scenario.transform_task_to_world, scenario.in_task_frame()
-        bare = cls(scenario, transform, task, body, task.build_scene(), scene, settings)
-        return bare if task.file.supports is None else bare._posed(task)
+        context = cls(scenario, transform, task, body, task.build_scene(), scene, settings)
+        _ = context.problem  # now, so that a file with a fault is refused before anything is computed
+        return context
 
     def with_supports(self, scenario: Scenario) -> "RunContext":
-        """The same for a scenario of the task frame with supports, whose problem is posed.
+        """The same for a scenario of the task frame with supports.
 
         Raises:
-            ScenarioError: If the supports do not fit the scene, or a value is out of range.
+            ScenarioError: If the supports do not fit the scene.
         """
         scenario.check_contacts(self.scene)
-        return self._posed(scenario)
+        return replace(self, scenario=scenario)
+
+    @cached_property
+    def problem(self) -> CentroidalProblem | KeyframeProblem | None:
+        """What the centre of mass is planned for; None as long as there are no supports.
+
+        It is posed when it is first asked for: of supports with and without rests mostly one is planned.
+
+        Raises:
+            ScenarioError: If a value of the supports is out of range.
+        """
+        if self.scenario.file.supports is None:
+            return None
+        try:
+            return self.scenario.build_keyframe_problem() or self.scenario.build_centroidal_problem()
+        except ScenarioError as error:
+            raise ScenarioError(reason_in_world(str(error), self.transform_task_to_world)) from None
 
     @property
     def padded(self) -> tuple[str, ...]:
         """Names of the obstacles that any part of the body may lean on."""
         return self.scenario.padded
-
-    def _posed(self, scenario: Scenario) -> "RunContext":
-        try:
-            problem = scenario.build_keyframe_problem() or scenario.build_centroidal_problem()
-        except ScenarioError as error:
-            raise ScenarioError(reason_in_world(str(error), self.transform_task_to_world)) from None
-        return replace(self, scenario=scenario, problem=problem)
 
     def passage(self, schedule: ContactSchedule, motion: Motion) -> Passage:
         """Lowest height of the body, and least distance of its head from the scene."""

@@ -11,16 +11,16 @@ from itertools import islice
 
 import numpy as np
 
-from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, FrictionModel
+from manikin.body import Configuration
+from manikin.contact import Contact
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.limb_search import LimbHolds, within_strength
-from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
+from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.seat import Sitter, Sitting, hand_supports, leave_seat
-from manikin.scene import Scene, Surface
+from manikin.scene import Surface
 
 SEAT_HEIGHTS = (0.12, 0.40)  # lowest and greatest height of a seat above the feet [statures]; our choice
 FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)  # places of a floor before the middle of the buttocks [statures]
@@ -47,25 +47,17 @@ class Endpoint:
 class Endpoints:
     """Finds starts and goals of a body on its feet or a seat in one scene."""
 
-    def __init__(
-        self, body: BodyModel, scene: Scene, friction: float, reference: FloatArray | None = None, *,
-        natural: bool = False, friction_model: FrictionModel = "outer", rolls: bool = False,
-    ) -> None:  # fmt: skip
-        """Prepare a scene.
+    def __init__(self, poser: PostureFinder, friction: float, *, rolls: bool = False) -> None:
+        """Prepare the scene of a finder of postures, of a body with soles.
 
         Args:
-            body: A body with soles.
             friction: Coulomb coefficient of the soles.
-            reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
-            natural: Whether hips and shoulders keep to their learnt ranges.
-            friction_model: Friction model of the stances.
             rolls: Whether a seated pelvis may roll forward on the front of the buttocks.
         """
-        self._body, self._scene, self._friction, self._rolls = body, scene, friction, rolls
-        self._stature = stature_of(body)
-        settings = PostureFinderSettings(natural=natural, friction_model=friction_model)
-        self._poser = PostureFinder(body, scene, reference, settings)
-        self._footholds = Footholds(body, scene)
+        self._poser, self._friction, self._rolls = poser, friction, rolls
+        self._body, self._scene = poser.body, poser.scene
+        self._stature = stature_of(poser.body)
+        self._footholds = Footholds(self._body, self._scene)
 
     def find(self, at: FloatArray, heading: float, habit: Habit, height: float | None = None) -> Endpoint:
         """Posture at a place; the lowest surface on which one exists, where no height is given.

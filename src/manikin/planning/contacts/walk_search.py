@@ -87,12 +87,11 @@ class BodyRoom:
     def __init__(self, body: BodyModel, scene: Scene) -> None:
         self._postures = TrunkPostures.of(body)
         self._clearance = TrunkClearance(self._postures, scene)
-        self._costs = self._postures.costs - 1.0
 
     def cost(self, place: _Stand) -> float:
         """Cost of a step in the cheapest posture that is free, beyond upright [s]; infinite without one."""
         number = int(self._clearance.cheapest(place.between[None])[0])
-        return STEP * float(self._costs[number]) if number >= 0 else math.inf
+        return STEP * (self._postures[number].cost - 1.0) if number >= 0 else math.inf
 
     def postures(self, places: Sequence[_Stand]) -> NDArray[np.int64]:
         """(k,) postures to take one after the other at places.
