@@ -8,6 +8,7 @@ import pytest
 
 from manikin.body import human, with_further_contacts
 from manikin.contact import point
+from manikin.kinematics import trunk_postures
 from manikin.kinematics.trunk_postures import CEILINGS, SKIN, TrunkClearance, TrunkPosture, TrunkPostures
 from manikin.planning.contacts import PostureFinder
 from manikin.scene import Box, Cylinder, Obstacle, Scene
@@ -99,6 +100,22 @@ def test_quick_test_agrees_with_measured_distances(postures: TrunkPostures) -> N
             assert answer == (nearest >= checker.margin)
     alone = TrunkClearance(postures, scene)
     assert np.array_equal(np.vstack([alone.free(row) for row in places]), free)
+
+
+def test_a_body_that_passes_upright_needs_no_other_posture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a wall and on open ground no further posture is looked for, and the answers are upright."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise AssertionError("a posture is looked for")
+
+    monkeypatch.setattr(trunk_postures, "generate_posture", refused)
+    wall = Obstacle("wall", Box((4.0, 0.2, 3.0)), translation=(0.0, 0.9, 1.5))
+    clearance = TrunkClearance(TrunkPostures.of(human(stature=1.71)), Scene([wall]))
+    places = np.array([[x, 0.0, 0.0, 0.1 * x] for x in np.arange(-1.0, 1.0, 0.2)])
+    assert (clearance.cheapest(places) == 0).all()
+    way = clearance.along(places)
+    assert way is not None
+    assert (way == 0).all()
 
 
 def test_body_bends_before_a_bar_and_not_below_it(postures: TrunkPostures) -> None:
