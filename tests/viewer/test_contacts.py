@@ -11,10 +11,12 @@ from manikin.body import Configuration, human, point_mass
 from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE
 from manikin.errors import BodyError
-from manikin.planning.contacts.single_contact import LiveContacts, Role
+from manikin.planning.contacts.single_contact import Role
 from manikin.scene import Box, Obstacle, Scene
 
 pytest.importorskip("viser")
+
+from manikin.viewer.drive import LiveContacts  # only where viser is
 
 
 @pytest.fixture(scope="module")

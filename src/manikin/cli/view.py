@@ -23,10 +23,10 @@ def view(
 ) -> None:
     """Show a motion in the browser, or the contacts of a body moved by hand; on this computer only."""
     if contacts:
-        from manikin.planning.contacts.single_contact import LiveContacts
         from manikin.scenarios import load_scenario
         from manikin.scenarios.world import contact_rules, start_posture
         from manikin.viewer import serve_contacts
+        from manikin.viewer.drive import LiveContacts
 
         job = load_scenario(source)
         body, scene = job.build_body(), job.build_scene()

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from manikin.motion.file import MotionFile
-    from manikin.planning.contacts.single_contact import LiveContacts
     from manikin.scene import Scene
     from manikin.viewer.canvas import Page
+    from manikin.viewer.drive import LiveContacts
     from manikin.walking import WalkController
 
 

@@ -10,12 +10,15 @@ from manikin.balance.margin import stability_margins
 from manikin.balance.wrench import pseudo_wrench, wrench_polytope
 from manikin.body import Configuration, human
 from manikin.contact import Stance, sole
+from manikin.numerics.spatial import IDENTITY
 from manikin.pipeline.stages.contact_stage import find_supports
-from manikin.planning.contacts import Endpoints, Habit, PostureFinder, certify_plan, leave_seat
+from manikin.pipeline.stages.context import plan_in_world
+from manikin.planning.contacts import Endpoints, Habit, PostureFinder, leave_seat
 from manikin.planning.contacts.seat import hand_supports
 from manikin.planning.contacts.transition import momentum_to_rest
 from manikin.scenarios import load_scenario
 from manikin.scene import Box, Obstacle, Scene
+from manikin.verification import check_contact_plan
 
 FEET = Stance([
     sole("left_foot", (0.0, 0.09, 0.0), length=0.26, width=0.10, friction=0.7),
@@ -41,8 +44,8 @@ def planned(scenario):
     body, scene = scenario.build_body(), scenario.build_scene()
     found = find_supports(scenario, body, scene, np.random.default_rng(0))
     assert found.failure is None
-    certificate = certify_plan(body, scene, found.plan)
-    assert certificate.held, certificate.first_broken
+    check = check_contact_plan(scenario, plan_in_world(found.plan, IDENTITY))
+    assert check.verdict == "certified"
     return found
 
 

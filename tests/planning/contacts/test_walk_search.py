@@ -20,7 +20,6 @@ from manikin.planning.contacts import (
     PostureFinder,
     WalkSearch,
     WalkSettings,
-    certify_plan,
 )
 from manikin.planning.contacts.handholds import Handholds
 from manikin.scene import Box, Capsule, Cylinder, Obstacle, Scene
@@ -177,13 +176,13 @@ def test_ways_that_people_take_are_found_with_as_many_steps(way):
     assert landed <= most
 
 
-def test_a_high_step_is_made_in_postures_that_the_joints_can_hold():
+def test_a_high_step_is_made_in_postures_that_the_joints_can_hold(checked):
     """Upright, a woman on one foot before a step of 0.4 m needs more than the strength of hip and knee."""
     woman = human(1.66, 70.7, "female")
     high = Scene([Obstacle("high", Box((1.2, 2.0, 0.4)), translation=(1.1, 0.0, 0.2))])
     found, _, _ = planned(high, (0.8, 0.0), body=woman)
     assert found.failure is None
-    assert certify_plan(woman, high, found.plan).value("max_torque_share") <= 1.0
+    assert checked(woman, high, found.plan).requirements.value("max_torque_share") <= 1.0
 
 
 @pytest.mark.parametrize("stride", [0.5, 0.6, 0.7])
@@ -218,7 +217,7 @@ def test_a_step_that_no_leg_can_make_is_explained():
     assert found.searches <= 62
 
 
-def test_a_hand_joins_where_feet_alone_do_not_make_a_step():
+def test_a_hand_joins_where_feet_alone_do_not_make_a_step(checked):
     """Up a block of 0.65 m beside a rail: each change is of one contact, and rest is within the strength."""
     scene = Scene([
         Obstacle("block", Box((0.9, 1.0, 0.65)), translation=(0.9, 0.0, 0.325)),
@@ -230,10 +229,10 @@ def test_a_hand_joins_where_feet_alone_do_not_make_a_step():
     assert hands
     for contact in hands:
         assert scene.touched_obstacles(contact) in (("rail",), ("block",))
-    certificate = certify_plan(BODY, scene, found.plan)
-    assert certificate.changes == 1
-    assert certificate.value("max_contact_error_m") < 3e-4
-    assert certificate.value("min_room_m") > 0.0
+    check = checked(BODY, scene, found.plan)
+    assert check.verdict == "certified"
+    assert check.requirements.value("max_contact_error_m") < 3e-4
+    assert check.room > 0.0
     assert set(found.plan.stages[-1].contacts) == {"left_foot", "right_foot"}
 
 

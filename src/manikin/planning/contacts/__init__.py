@@ -2,13 +2,7 @@
 
 from manikin.planning.contacts.best_first import Extension, heading_of
 from manikin.planning.contacts.candidates import Candidates, Situation, SurfaceTable, find_candidates
-from manikin.planning.contacts.contact_plan import (
-    ContactPlan,
-    ContactRules,
-    PlanCertificate,
-    Stage,
-    certify_plan,
-)
+from manikin.planning.contacts.contact_plan import ContactPlan, ContactRules, Stage
 from manikin.planning.contacts.crawl_search import CrawlSearch
 from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
 from manikin.planning.contacts.footholds import Footholds
@@ -43,8 +37,8 @@ __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
     "ContactPlan", "ContactRules", "CrawlSearch", "Duration", "Efort", "Endpoint", "Endpoints",
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance",
-    "LimbCollisions", "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability", "PlanCertificate",
+    "LimbCollisions", "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability",
     "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage", "StrongEfort",
-    "SurfaceTable", "WalkSearch", "WalkSettings", "WeightedSum", "certify_plan", "duration",
+    "SurfaceTable", "WalkSearch", "WalkSettings", "WeightedSum", "duration",
     "find_candidates", "heading_of", "leave_seat", "limb_holds", "starts_on_limbs", "take_seat",
 ]  # fmt: skip

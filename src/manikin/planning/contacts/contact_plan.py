@@ -1,19 +1,13 @@
-"""A sequence of contacts with a posture for every change, as the contact planner finds it; its certificate.
-
-The certificate measures every posture afresh, balance by other means than the search's.
-"""
+"""A sequence of contacts with a posture for every change, as the searches find it."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
-from manikin.balance.criteria import static_room, static_torque_share
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import (
     Contact,
@@ -28,11 +22,8 @@ from manikin.contact import (
     sole,
 )
 from manikin.errors import ContactError
-from manikin.kinematics import pairs_beside, touching_pairs
 from manikin.numerics.spatial import FloatArray, frozen_array, skew
 from manikin.planning.contacts.transition import Momentum
-from manikin.runtime.requirement import Requirement, RequirementTable, Sense
-from manikin.scene import Proximity, Scene
 
 Contacts = Mapping[str, Contact]
 """Contacts by their effectors."""
@@ -264,107 +255,3 @@ def _least_time(stage: Stage, q: FloatArray, com: FloatArray, paces: Paces) -> f
     way = float(np.linalg.norm(com - stage.com))
     accelerating = math.sqrt(10.0 / math.sqrt(3.0) * way / paces.com_acceleration)
     return max(turn / paces.hinge_pace, way / COM_PACE, accelerating)
-
-
-_QUANTITIES: tuple[tuple[str, str, str, Sense, float], ...] = (
-    ("max_contact_error_m", "distance of an effector from its contact", "m", "<=", 1.0e-3),
-    ("max_sole_turn_rad", "angle of a sole from its contact", "rad", "<=", 5.0e-3),
-    ("min_clearance_m", "clearance", "m", ">=", 0.0),
-    ("max_range_violation_rad", "joint range violation", "rad", "<=", 1.0e-9),
-    ("min_room_m", "room of the centre of mass", "m", ">=", 0.0),
-    ("max_torque_share", "share of a torque limit at rest", "", "<=", 1.0),
-)
-"""Key, name, unit, sense and limit of what is measured of a plan."""
-
-
-@dataclass(frozen=True)
-class PlanCertificate(RequirementTable):
-    """Worst values of the postures of a plan beside their limits; ``where`` names the posture.
-
-    ``min_room_m`` is the least room of the centre of mass on the contacts that stay, see
-    :func:`~manikin.balance.static_room`; ``max_torque_share`` is that of holding the postures at rest;
-    ``min_clearance_m`` is of what does not touch.  A posture that cannot rest is measured in its motion, and
-    the point to which its velocity would carry the centre of mass must have room as well.
-
-    Attributes:
-        postures: Number of postures: at every change, in the middle of flights, at the goal.
-        changes: Largest number of contacts made and broken at one change.
-    """
-
-    postures: int
-    changes: int
-
-
-class _Held(NamedTuple):
-    """A posture, what it holds, what carries it; its motion if it could not rest, and what it holds then."""
-
-    q: FloatArray
-    held: tuple[Contact, ...]
-    carrying: tuple[Contact, ...]
-    momentum: Momentum | None = None
-    after: tuple[Contact, ...] = ()
-
-
-def certify_plan(
-    body: BodyModel, scene: Scene, plan: ContactPlan, model: ContactModel | None = None
-) -> PlanCertificate:
-    """Measure every posture of a plan; the contact model is that with the body's default cap when omitted."""
-    model = model or ContactModel.of_body(body.mass)
-    postures, proximity = _postures(plan), Proximity(body, scene)
-    measured, pairs = zip(*(_measured(body, scene, proximity, item, model) for item in postures), strict=True)
-    rows = []
-    for (key, name, unit, sense, limit), values in zip(_QUANTITIES, zip(*measured, strict=True), strict=True):
-        worst = int(np.argmax(values) if sense == "<=" else np.argmin(values))
-        where = f"posture {worst}{pairs[worst] if key == 'min_clearance_m' else ''}"
-        rows.append(Requirement(key, name, unit, values[worst], sense, limit, where=where))
-    return PlanCertificate(tuple(rows), len(postures), _changes(plan))
-
-
-def _measured(
-    body: BodyModel, scene: Scene, proximity: Proximity, item: "_Held", model: ContactModel
-) -> tuple[tuple[float, ...], str]:
-    """Value of each quantity in one posture, and the nearest pair in words."""
-    state, angles = Configuration(body, item.q), item.q[7:]
-    error = turn = 0.0
-    for contact in item.held:
-        rotation, position = state.effector_placement(contact.effector)
-        moved = float(np.linalg.norm(position - contact.position))
-        if contact.rolls:
-            moved, turned = contact.rolled_away(rotation, position)
-            turn = max(turn, turned)
-        elif contact.kind is ContactKind.SOLE:
-            turn = max(turn, float(np.linalg.norm(pin.log3(rotation.T @ contact.rotation_contact_to_world))))
-        error = max(error, moved)
-    touched = [(contact.effector, name) for contact in item.held for name in scene.touched_obstacles(contact)]
-    near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched) - pairs_beside(body, touched))
-    pair = f", {' and '.join(near.pairs[int(np.argmin(near.distance))])}" if len(near.distance) else ""
-    beyond = np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)
-    stance, moving = Stance(item.carrying, model=model), item.momentum
-    acceleration = None if moving is None else moving.acceleration
-    room = static_room(stance, body.mass, state.com, acceleration=acceleration)
-    if moving is not None:
-        after = Stance(item.after, model=model)
-        room = min(room, static_room(after, body.mass, moving.extrapolated(state.com, stance)))
-    clearance = float(near.distance.min(initial=np.inf))
-    share = static_torque_share(body, item.q, stance, acceleration)
-    return (error, turn, clearance, float(beyond), float(room), share), pair
-
-
-def _postures(plan: ContactPlan) -> list[_Held]:
-    """At a change the contacts of both sides are held, and those that are in both carry."""
-    own = tuple(plan.stages[0].contacts.values())
-    found = [_Held(plan.stages[0].q, own, own)]
-    for before, after in pairwise(plan.stages):
-        own = tuple(after.contacts.values())
-        both = tuple(c for name, c in after.contacts.items() if before.contacts.get(name) is c)
-        every = tuple({id(c): c for c in (*before.contacts.values(), *own)}.values())
-        found.append(_Held(after.q, every, both, after.momentum, own))
-        if after.via is not None:
-            found.append(_Held(after.via, own, own))
-    return [*found, _Held(plan.goal, own, own)]
-
-
-def _changes(plan: ContactPlan) -> int:
-    pairs = ((before.contacts, after.contacts) for before, after in pairwise(plan.stages))
-    changed = ([a.get(name) is not b.get(name) for name in {*a, *b}] for a, b in pairs)
-    return max(map(sum, changed), default=0)

@@ -1,7 +1,6 @@
-"""Contacts for one task: of one limb, for ``manikin contact``, and of all limbs of a body moved by hand."""
+"""Contact of one limb for one task, as ``manikin contact`` asks for it."""
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -14,8 +13,8 @@ from manikin.body import BodyModel, Limb, limb_named
 from manikin.contact import ContactKind
 from manikin.errors import BodyError, InputError
 from manikin.kinematics.efort import Task, unit_direction, usable_efort
-from manikin.kinematics.limb_samples import sample_limb, sample_limbs
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.kinematics.limb_samples import sample_limb
+from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import ContactRules
 from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact, UsableEfort
 from manikin.planning.contacts.heuristics import Heuristic, heuristic_named
@@ -164,92 +163,3 @@ def ask_limb(
     causes = [f"{what}, {item.message}" for what, item in zip(does, answers, strict=False)]
     message = result.message if len({item.message for item in answers}) == 1 else "; ".join(causes)
     return roles[farthest], replace(answers[farthest], message=message), None
-
-
-@dataclass(frozen=True, eq=False)
-class LiveAnswer:
-    """Answers of all limbs.
-
-    Attributes:
-        q: (nq,) the body with each limb that found a contact in it.
-        answers: The limbs' answers by their names, in the order in which they were asked.
-        efforts: EFORT of each posture found [N per N.m].
-        wall_s: Wall time of all requests [s].
-    """
-
-    q: FloatArray
-    answers: dict[str, GeneratedContact]
-    efforts: dict[str, float]
-    wall_s: float
-
-
-class LiveContacts:
-    """The pose of a body, a task, and the contacts that follow from both.
-
-    Attributes:
-        q: (nq,) the body as it was put, before any limb is moved.
-        azimuth_deg: Direction of the task about the vertical, from world x [deg].
-        elevation_deg: Direction of the task above the horizon [deg].
-        limbs: Names of the limbs that are asked.
-        role: What the limbs do with their contacts.
-        pulling: Whether they hold on and pull.
-    """
-
-    def __init__(
-        self, body: BodyModel, scene: Scene, q: ArrayLike, *, samples: int = 10_000, seed: int = 0,
-        rules: ContactRules | None = None,
-    ) -> None:  # fmt: skip
-        """Begin at a configuration (nq,), with a number of samples of each limb drawn from a seed.
-
-        Raises:
-            BodyError: If the body has no limbs.
-        """
-        check_limbs(body)
-        self.body, self.scene = body, scene
-        self.q = np.array(q, dtype=np.float64)
-        self.azimuth_deg, self.elevation_deg = 0.0, 90.0
-        self.limbs: tuple[str, ...] = tuple(limb.name for limb in body.limbs)
-        self.heuristic = "efort"
-        self.role = Role.AUTO
-        self.pulling = False
-        self._generator = ContactGenerator(
-            body, scene, sample_limbs(body, np.random.default_rng(seed), samples), rules=rules
-        )
-
-    def move(self, position: ArrayLike, quaternion: ArrayLike) -> None:
-        """Put the root at a position (3,) [m] with a quaternion xyzw (4,), normalised here."""
-        turn = frozen_array(quaternion, "quaternion", (4,))
-        self.q[:3] = frozen_array(position, "position [m]", (3,))
-        self.q[3:7] = turn / np.linalg.norm(turn)
-
-    def aim(self, azimuth_deg: float, elevation_deg: float) -> None:
-        """Turn the task: azimuth about the vertical from world x, elevation above the horizon [deg]."""
-        self.azimuth_deg, self.elevation_deg = float(azimuth_deg), float(elevation_deg)
-
-    @property
-    def direction(self) -> FloatArray:
-        """(3,) unit direction of the task in the world."""
-        azimuth, elevation = np.deg2rad([self.azimuth_deg, self.elevation_deg])
-        level = np.cos(elevation)
-        return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
-
-    def ask(self, limbs: Sequence[str]) -> None:
-        """Choose the limbs that are asked, in the body's own order."""
-        self.limbs = tuple(limb.name for limb in self.body.limbs if limb.name in limbs)
-
-    def answer(self) -> LiveAnswer:
-        """Ask one limb after the other; each sees the postures of those before it."""
-        started = time.perf_counter()
-        heuristic = heuristic_named(self.heuristic, pulling=self.pulling)
-        kind = ContactKind.GRASP if self.pulling else None
-        q, answers, efforts = np.array(self.q), {}, {}
-        for name in self.limbs:
-            limb = limb_named(self.body, name)
-            usable = UsableEfort(usable_efort(self.body, limb), self.pulling)
-            _, answers[name], value = ask_limb(
-                self._generator, q, limb, self.direction, self.role, heuristic, kind, usable
-            )
-            efforts |= {} if value is None else {name: value}
-            reached = answers[name].q
-            q = q if reached is None else np.array(reached)
-        return LiveAnswer(q, answers, efforts, time.perf_counter() - started)
