@@ -25,7 +25,6 @@ from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.limb_places import stature_of
-from manikin.planning.contacts.limb_search import within_strength
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
 from manikin.scene import Box, Obstacle, Scene
@@ -370,7 +369,9 @@ class CrawlSearch:
                 up = state.effector_placement(name)[0][:, 2]
                 if name.endswith("fist") and np.linalg.norm(np.cross(up, contact.normal)) > TILT:
                     return Posed(None, f"{name} is not upright")
-        return within_strength(self._body, posed, carrying, EASE)
+            why = self._poser.strained(posed.q, carrying, EASE)
+            return Posed(None, why) if why else posed
+        return posed
 
 
 def _middles(contacts: Contacts) -> tuple[FloatArray, FloatArray]:

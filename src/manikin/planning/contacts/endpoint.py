@@ -17,7 +17,7 @@ from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
-from manikin.planning.contacts.limb_search import LimbHolds, within_strength
+from manikin.planning.contacts.limb_search import LimbHolds
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.seat import Sitter, Sitting, hand_supports, leave_seat
 from manikin.scene import Surface
@@ -189,7 +189,7 @@ def starts_on_limbs(
         for item in holds:
             if item.effector in contacts:
                 near = item.stretched(near, q[:7], contacts[item.effector], state)
-        posed = within_strength(poser.body, poser.pose(contacts, contacts, near, q[:7]), contacts)
+        posed = poser.eased(poser.pose(contacts, contacts, near, q[:7]), contacts, contacts).at_rest
         reason = reason or posed.reason
         if posed.q is not None:
             any_start = True

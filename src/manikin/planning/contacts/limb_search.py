@@ -20,10 +20,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import cKDTree
 
-from manikin.balance.criteria import static_torque_share
-from manikin.body import BodyModel, Configuration
+from manikin.body import Configuration
 from manikin.body.limbs import limb_placement, limb_slots
-from manikin.contact import Contact, ContactKind, Stance
+from manikin.contact import Contact, ContactKind
 from manikin.kinematics import Placement
 from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.polytope import convex_polygon, signed_distance
@@ -159,16 +158,6 @@ class _Guess(NamedTuple):
     root: FloatArray
     q: FloatArray
     near: FloatArray | None
-
-
-def within_strength(body: BodyModel, posed: Posed, carrying: Contacts, most: float = 1.0) -> Posed:
-    """The posture, or that resting on some contacts in it asks for more than a share of the strength."""
-    if posed.q is None:
-        return posed
-    share = static_torque_share(body, posed.q, Stance(list(carrying.values())))
-    if share <= most:
-        return posed
-    return Posed(None, f"resting on {' and '.join(carrying)} asks for {share:.2f} of the strength")
 
 
 class LimbSearch(PosedSearch[State, tuple[State, State]]):
@@ -515,7 +504,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             self._moves += [(before, after)] * (len(stages) - len(self._moves))
         contacts = stages[-1].contacts
         end = self.poser.pose(contacts, contacts, stages[-1].q, self.goal)
-        end = within_strength(body, end, contacts)
+        end = self.poser.eased(end, contacts, contacts).at_rest
         if end.q is None or np.linalg.norm(end.q[:3] - self.goal[:3]) > self.settings.goal_distance:
             self._ahead[way[-1]] = 1e-3
             self.reasons[f"at the goal: {end.reason or 'the root stays away from it'}"] += 1
@@ -587,7 +576,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 posed = self.poser.pose(held, carrying, start, guide, place=place, placements=placements)
                 if posed.q is not None:
                     break
-            self._postures[key] = within_strength(self.poser.body, posed, carrying)
+            self._postures[key] = self.poser.eased(posed, held, carrying, placements).at_rest
         return self._postures[key]
 
     def _over_feet(self, carrying: Contacts, near: FloatArray) -> FloatArray:

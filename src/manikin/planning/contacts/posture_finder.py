@@ -1,5 +1,6 @@
 """Balanced, free postures on given contacts."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -7,7 +8,7 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance.criteria import RestingTorques, StaticRegion
+from manikin.balance.criteria import RestingTorques, StaticRegion, static_torque_share
 from manikin.body import BodyModel, Configuration, with_root
 from manikin.contact import Contact, ContactKind, ContactModel, FrictionModel, Stance
 from manikin.kinematics import (
@@ -81,6 +82,11 @@ class Posed:
     q: FloatArray | None
     reason: str = ""
     too_hard: bool = False
+
+    @property
+    def at_rest(self) -> "Posed":
+        """The posture, or the reason why it is none, where the joints are too weak for it."""
+        return Posed(None, self.reason, too_hard=True) if self.too_hard else self
 
 
 def upright_points(held: Contacts) -> dict[str, Placement]:
@@ -172,7 +178,7 @@ class PostureFinder:
         """
         if posed.q is None:
             return posed
-        body, stance, margin = self.body, Stance(list(carrying.values())), self.settings.range_margin
+        body, stance, margin = self.body, self._stance(carrying), self.settings.range_margin
         now, turn, best = RestingTorques(body, posed.q, stance), EASING_TURN[0], posed.q
         for _ in range(EASING_MOVES if now.share > 1.0 else 0):
             state, wide = Configuration(body, best), np.full(body.nv, turn)
@@ -195,10 +201,20 @@ class PostureFinder:
                 turn *= 0.4
             if now.share <= EASY_ENOUGH or turn < EASING_TURN[1]:
                 break
-        if now.share <= 1.0:
-            return Posed(best)
-        why = f"resting on {' and '.join(carrying)} asks for {now.share:.2f} of the strength"
-        return Posed(best, why, too_hard=True)
+        return Posed(best, _strained(carrying, now.share, 1.0), too_hard=now.share > 1.0)
+
+    def strained(
+        self, q: FloatArray, carrying: Contacts, most: float, acceleration: FloatArray | None = None
+    ) -> str:
+        """Message that a posture (nq,) asks for more than a share of the strength; empty where it does not.
+
+        The body rests in it on contacts, or has an acceleration (3,) there [m/s^2].
+        """
+        share = static_torque_share(self.body, q, self._stance(carrying), acceleration)
+        return _strained(carrying, share, most)
+
+    def _stance(self, carrying: Contacts) -> Stance:
+        return Stance(tuple(carrying.values()), model=self.model)
 
     def resting_place(self, carrying: Contacts, near: FloatArray, inset: float) -> FloatArray | None:
         """(2,) place nearest to another where the centre of mass can rest on contacts; None without any.
@@ -207,8 +223,7 @@ class PostureFinder:
         """
         key = frozenset(carrying.values())
         if key not in self._regions:
-            stance = Stance(tuple(carrying.values()), model=self.model)
-            self._regions[key] = StaticRegion.of(stance, self.body.mass)
+            self._regions[key] = StaticRegion.of(self._stance(carrying), self.body.mass)
         return self._regions[key].nearest(near, inset)
 
     def led(self, guide: FloatArray) -> dict[str, Placement]:
@@ -226,3 +241,10 @@ class PostureFinder:
             for obstacle in self._touched(item)
         }  # fmt: skip
         return touching_pairs(self.body, touched), pairs_beside(self.body, touched) | wrists
+
+
+def _strained(carrying: Contacts, share: float, most: float) -> str:
+    names = " and ".join(carrying)
+    if not math.isfinite(share):
+        return f"{names} cannot carry the body"
+    return f"resting on {names} asks for {share:.2f} of the strength" if share > most else ""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manikin.balance.criteria import static_torque_share
 from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import ANKLE_FROM_HEEL
 from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
@@ -258,7 +257,8 @@ def _lean(poser: PostureFinder, q: FloatArray, held: Contacts, rest: FloatArray,
             behind = float(np.linalg.norm(com[:2] - rest[:2]))
             where = f"{behind:.3f} m behind the middle of the feet"
             return f"a lean leaves the centre of mass {where}, from where no speed carries it over them"
-    return _too_weak(poser, q, held, momentum) or (q, momentum)
+    acceleration = None if momentum is None else momentum.acceleration
+    return poser.strained(q, held, STRENGTH_SHARE, acceleration) or (q, momentum)
 
 
 def _pushed_up(
@@ -277,25 +277,11 @@ def _pushed_up(
         if off.q is None:
             failure = failure or off.reason
             continue
-        weak = _too_weak(poser, off.q, pushing) or _too_weak(poser, free.q, held)
-        if weak is None:
+        weak = [poser.strained(q, on, STRENGTH_SHARE) for q, on in ((off.q, pushing), (free.q, held))]
+        if not any(weak):
             return _rising(poser, start, [(pushing, off.q, None), (held, free.q, None)], risen)
-        failure = weak
+        failure = weak[0] or weak[1]
     return Leaving((start,), failure)
-
-
-def _too_weak(
-    poser: PostureFinder, q: FloatArray, carrying: Contacts, momentum: Momentum | None = None
-) -> str | None:
-    """Message that the joints are too weak for a posture; None where they are not."""
-    acceleration = None if momentum is None else momentum.acceleration
-    stance = Stance(list(carrying.values()), model=poser.model)
-    share = static_torque_share(poser.body, q, stance, acceleration)
-    if share <= STRENGTH_SHARE:
-        return None
-    if not np.isfinite(share):
-        return f"{', '.join(carrying)} cannot carry the body off the seat"
-    return f"rising on {', '.join(carrying)} needs {share:.2f} times the strength of the joints"
 
 
 def _rising(

@@ -347,6 +347,6 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             )
         posed = self.poser.eased(posed, held, carrying, flat)
         if posed.too_hard:
-            posed = replace(posed, q=None) if self.replanned < STRONG_TRIES else Posed(posed.q)
+            posed = posed.at_rest if self.replanned < STRONG_TRIES else Posed(posed.q)
         self._postures[key] = posed
         return posed
