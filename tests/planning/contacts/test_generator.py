@@ -7,13 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human, insect, integrate, limb_named
-from manikin.body.limbs import limb_slots
+from manikin.body.limbs import limb_placement, limb_slots
 from manikin.body.natural_range import NaturalRange
 from manikin.contact import ContactKind
 from manikin.errors import BodyError, ContactError
 from manikin.kinematics import Aligner, LimbKinematics
 from manikin.kinematics.alignment import DAMPING, LARGEST_STEP, LEVER, AlignmentStep
 from manikin.kinematics.efort import Task, efort, usable_efort
+from manikin.kinematics.limb_collisions import TOUCH, DeepSamples, LimbCollisions, yielding
 from manikin.kinematics.limb_samples import sample_limb, sample_limbs
 from manikin.numerics.spatial import PlanarTransform, rotation_from_rpy
 from manikin.planning.contacts import (
@@ -24,7 +25,6 @@ from manikin.planning.contacts import (
     Efort,
     GeneratorSettings,
     Hindrance,
-    LimbCollisions,
     Random,
     Situation,
     SurfaceTable,
@@ -32,7 +32,6 @@ from manikin.planning.contacts import (
 )
 from manikin.planning.contacts.contact_plan import footprint
 from manikin.planning.contacts.generator import NATURAL_SLACK, UsableEfort, _order
-from manikin.planning.contacts.limb_collisions import TOUCH, DeepSamples, yielding
 from manikin.planning.contacts.single_contact import ContactQuestion, find_contact
 from manikin.scenarios import load_scenario
 from manikin.scenarios.world import contact_rules, start_posture
@@ -578,7 +577,7 @@ def test_what_a_limb_cannot_reach_is_left_out_and_nothing_else(person):
     for _ in range(15):
         move = np.concatenate([rng.uniform(-0.6, 0.6, 3), rng.uniform(-1, 1, 3), np.zeros(person.nv - 6)])
         q = integrate(person, person.standing_posture(), move)
-        pruned.begin(Situation.of(Configuration(person, q), limb, np.array([0.0, 0.0, 1.0])))
+        pruned.begin(q, limb_placement(Configuration(person, q), limb)[1])
         for angles in chain.random_angles(rng, 20):
             q[chain.slots] = angles
             found = plain.first(q)
@@ -636,9 +635,9 @@ def test_a_sample_is_deep_where_a_ball_along_its_limb_is(person, person_samples)
     collisions = LimbCollisions(person, samples.limb, scene)
     deep = DeepSamples(person, LimbKinematics(person, samples.limb), samples, collisions)
     situation = Situation.of(Configuration(person, q), samples.limb, np.array([0.0, 0.0, 1.0]))
-    collisions.begin(situation)
+    collisions.begin(situation.state.q, situation.origin)
     rows = np.arange(150)
-    found = deep.pairs(deep.around(situation), rows, depth)
+    found = deep.pairs(deep.around(situation.rotation, situation.origin), rows, depth)
     others = {collisions.names[pair][1] for pair in found[found >= 0].tolist()}
     assert others >= {"seat", "ball", "post"}
     assert any("/" in name for name in others)

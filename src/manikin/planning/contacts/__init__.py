@@ -26,7 +26,6 @@ from manikin.planning.contacts.heuristics import (
     WeightedSum,
     duration,
 )
-from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import limb_holds
 from manikin.planning.contacts.limb_search import LimbHolds, LimbSearch, LimbSettings
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
@@ -37,7 +36,7 @@ __all__ = [
     "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
     "ContactPlan", "ContactRules", "CrawlSearch", "Duration", "Efort", "Endpoint", "Endpoints",
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance",
-    "LimbCollisions", "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability",
+    "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability",
     "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage", "StrongEfort",
     "SurfaceTable", "WalkSearch", "WalkSettings", "WeightedSum", "duration",
     "find_candidates", "heading_of", "leave_seat", "limb_holds", "starts_on_limbs", "take_seat",

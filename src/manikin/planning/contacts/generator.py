@@ -16,6 +16,7 @@ from manikin.errors import BodyError
 from manikin.kinematics import LimbKinematics
 from manikin.kinematics.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Aligner
 from manikin.kinematics.efort import Task, efort
+from manikin.kinematics.limb_collisions import DeepSamples, LimbCollisions
 from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.candidates import (
@@ -27,7 +28,6 @@ from manikin.planning.contacts.candidates import (
 )
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
 from manikin.planning.contacts.heuristics import Efort, Heuristic
-from manikin.planning.contacts.limb_collisions import DeepSamples, LimbCollisions
 from manikin.scene import Scene
 
 _GROWTH = 0.15  # how much longer each step down the order is than the one before
@@ -293,7 +293,7 @@ class ContactGenerator:
                 continue
             q[tools.chain.slots] = aligned.angles
             if not begun:
-                tools.collisions.begin(situation)
+                tools.collisions.begin(situation.state.q, situation.origin)
                 begun = True
             surface = int(candidates.surfaces[row])
             hit = tools.collisions.first(q, self._table.surfaces[surface].obstacles)
@@ -331,7 +331,7 @@ class ContactGenerator:
             rows = order[start : start + size]
             start += size
             if sum(count for hit, count in faults.items() if hit[0] in tools.deep.shapes) >= _FEW // 2:
-                around = around or tools.deep.around(situation)
+                around = around or tools.deep.around(situation.rotation, situation.origin)
                 deep = tools.deep.pairs(around, candidates.samples[rows], self.settings.tolerance)
                 faults.update(tools.collisions.names[pair] for pair in deep[deep >= 0].tolist())
                 rows, size = rows[deep < 0], _BLOCK

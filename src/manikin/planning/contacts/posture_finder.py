@@ -247,4 +247,4 @@ def _strained(carrying: Contacts, share: float, most: float) -> str:
     names = " and ".join(carrying)
     if not math.isfinite(share):
         return f"{names} cannot carry the body"
-    return f"resting on {names} asks for {share:.2f} of the strength" if share > most else ""
+    return f"carrying the body on {names} takes {share:.2f} of the strength" if share > most else ""

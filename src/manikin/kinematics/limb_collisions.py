@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel, Limb, Shape, ShapeKind
 from manikin.body.limbs import moving_segments
 from manikin.contact import ContactKind
-from manikin.kinematics import LimbKinematics
+from manikin.kinematics.limb_kinematics import LimbKinematics
 from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.contacts.candidates import IntArray, Situation
 from manikin.scene import Scene, segment_of
 from manikin.scene.collision import collision_parts, local_box
+from manikin.scene.mesh import IntArray
 
 _SURE = 1e-6  # depth beyond that from which on two ways to measure it agree [m]
 TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]
@@ -43,7 +43,7 @@ class LimbCollisions:
         shapes: All geometries, those of the body first.
         pairs: (p, 2) numbers of the limb's shape and of the other one of each pair.
         names: What the shapes of each pair are called: that of the body, and the obstacle or other shape.
-        active: (p,) which pairs may touch in the situation that was begun.
+        active: (p,) which pairs may touch where the body was begun.
         soft: Segments that give way in what the limb touches.
     """
 
@@ -110,15 +110,16 @@ class LimbCollisions:
         deep = np.flatnonzero(self._solid & (depth > TOUCH + _SURE))
         return (name, self._held[int(deep[0])]) if len(deep) else None
 
-    def begin(self, situation: Situation) -> None:
-        """Leave out what the limb cannot reach wherever its joints are, until the body is elsewhere."""
-        if np.array_equal(situation.state.q, self._begun):
+    def begin(self, q: FloatArray, origin: FloatArray) -> None:
+        """Leave out what the limb cannot reach wherever its joints are, until the body is elsewhere.
+
+        The body is at (nq,) with the origin of the limb's frame at (3,) [m].
+        """
+        if np.array_equal(q, self._begun):
             return
-        self._begun = np.array(situation.state.q)
-        pin.updateGeometryPlacements(
-            self._model, self._data, self._shapes, self._placed, np.asarray(situation.state.q)
-        )
-        near = self._near(situation.origin)
+        self._begun = np.array(q)
+        pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._placed, np.asarray(q))
+        near = self._near(origin)
         for number in np.flatnonzero(near & ~self.active).tolist():
             self._placed.activateCollisionPair(number)
         for number in np.flatnonzero(self.active & ~near).tolist():
@@ -127,7 +128,7 @@ class LimbCollisions:
         self._tested = [(self.names[number], self._results[number]) for number in np.flatnonzero(near)]
 
     def placements(self, numbers: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-        """Axes (n, 3, 3) and origins (n, 3) of some shapes in the world, as the situation began [m]."""
+        """Axes (n, 3, 3) and origins (n, 3) of some shapes in the world, as the body began [m]."""
         frames = [self._frames[number] for number in numbers.tolist()]
         turns = np.array([item.rotation for item in frames]).reshape(-1, 3, 3)
         return turns, np.array([item.translation for item in frames]).reshape(-1, 3)
@@ -136,7 +137,7 @@ class LimbCollisions:
         """Shape of the body, and obstacle or other shape, of the first pair that collides, or None.
 
         Args:
-            q: (nq,) configuration; all but the limb as in the situation that was begun, if one was.
+            q: (nq,) configuration; all but the limb as where it was begun, if it was.
             touched: Names of the obstacles on which the limb has its contact.
         """
         if touched != self._touched:
@@ -247,13 +248,16 @@ class DeepSamples:
             self._pair[row, own] = pair
             self._reach[row, own] = solid[second[pair]][1] + radii[own]
 
-    def around(self, situation: Situation) -> "Surroundings":
-        """What the balls may be in, in the limb's frame; the collision test was begun with the situation."""
+    def around(self, rotation: FloatArray, origin: FloatArray) -> "Surroundings":
+        """What the balls may be in, in the limb's frame, with which the collision test was begun.
+
+        The frame has a rotation (3, 3) to the world and an origin (3,) there [m].
+        """
         active = np.append(self._collisions.active, False)[self._pair]
         near = np.flatnonzero(active.any(axis=1))
         turns, places = self._collisions.placements(self._others[near])
-        turns = turns.transpose(0, 2, 1) @ situation.rotation
-        places = (turns @ ((places - situation.origin) @ situation.rotation)[:, :, None])[:, :, 0]
+        turns = turns.transpose(0, 2, 1) @ rotation
+        places = (turns @ ((places - origin) @ rotation)[:, :, None])[:, :, 0]
         reach = np.where(active[near], self._reach[near], -np.inf)
         return Surroundings(turns, places, self._half[near], reach, self._pair[near])
 
