@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import count
 from typing import Generic, TypeVar
 
@@ -106,6 +106,19 @@ class Extension:
     searches: int
     backtracks: int
     failure: str | None = None
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Moves that were refused, by (n, 3) places of each [m], which others are like up to a distance [m]."""
+
+    within: float
+    places: list[FloatArray] = field(default_factory=list)
+
+    def alike(self, places: FloatArray) -> int:
+        """How many refused moves one is like that has places (n, 3) [m]."""
+        away = np.linalg.norm(np.reshape(self.places, (-1, *places.shape)) - places, axis=2)
+        return int((away < self.within).all(axis=1).sum())
 
 
 class PosedSearch(ABC, Generic[Node, Move]):

@@ -7,7 +7,7 @@ import heapq
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from itertools import islice
+from itertools import product
 
 import numpy as np
 
@@ -184,7 +184,7 @@ def starts_on_limbs(
         yield Endpoint(None, "no limb has a contact")
         return
     reason, any_start, state = "", False, Configuration(poser.body, q)
-    for contacts in islice(best_first(offered), TRIES):
+    for contacts in best_first(offered, TRIES):
         near = q
         for item in holds:
             if item.effector in contacts:
@@ -198,17 +198,8 @@ def starts_on_limbs(
         yield Endpoint(None, reason)
 
 
-def best_first(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[dict[str, Contact]]:
-    """One contact for each limb, the least loss of score in all first."""
-    items = list(offered.values())
-    known = {(0,) * len(items)}
-    open_ = [(0.0, choice) for choice in known]
-    while open_:
-        _, choice = heapq.heappop(open_)
-        yield {item[k][1].effector: item[k][1] for item, k in zip(items, choice, strict=True)}
-        for limb, k in enumerate(choice):
-            after = (*choice[:limb], k + 1, *choice[limb + 1 :])
-            if k + 1 < len(items[limb]) and after not in known:
-                known.add(after)
-                cost = sum(item[number][0] for item, number in zip(items, after, strict=True))
-                heapq.heappush(open_, (cost, after))
+def best_first(offered: Mapping[str, list[tuple[float, Contact]]], most: int) -> list[dict[str, Contact]]:
+    """One contact for each limb in ``most`` ways, the least loss of score in all first."""
+    choices = product(*offered.values())
+    best = heapq.nsmallest(most, choices, key=lambda choice: sum(loss for loss, _ in choice))
+    return [{contact.effector: contact for _, contact in choice} for choice in best]

@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 
 from manikin.kinematics.step_reach import StepReach
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
-from manikin.planning.contacts.best_first import Graph
+from manikin.planning.contacts.best_first import Graph, Refused
 from manikin.planning.contacts.footholds import Feet, Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import column_is_free
@@ -97,7 +97,7 @@ class FootstepSearch:
         self._pairs: dict[tuple[int, int], float] = {}
         self._next: dict[tuple[int, int], list[tuple[_Node, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
-        self._refused: list[tuple[FloatArray, FloatArray]] = []
+        self._refused = Refused(ALIKE)
         self._too_hard: list[FloatArray] = []
         self._offsets = _offsets(scale)
         heights = HIGHEST * scale, highest * scale
@@ -114,7 +114,10 @@ class FootstepSearch:
 
     def refuse(self, stand: int, step: int) -> None:
         """Close all steps that are much like one, with which a later stage failed."""
-        self._refused.append((self.holds[stand].position, self.holds[step].position))
+        self._refused.places.append(self._at(stand, step))
+
+    def _at(self, stand: int, step: int) -> FloatArray:
+        return np.array([self.holds[stand].position, self.holds[step].position])
 
     def refuse_everywhere(self, stand: int, step: int) -> None:
         """Close all steps like one for which the joints are too weak, and longer ones, wherever they are."""
@@ -188,10 +191,7 @@ class FootstepSearch:
     def _is_refused(self, stand: int, step: int) -> bool:
         if self._too_hard and self._harder(self._shape(stand, step)):
             return True
-        first, last = self.holds[stand].position, self.holds[step].position
-        return any(
-            np.linalg.norm(first - a) < ALIKE and np.linalg.norm(last - b) < ALIKE for a, b in self._refused
-        )
+        return self._refused.alike(self._at(stand, step)) > 0
 
     def _steps(self, node: _Node) -> list[tuple[_Node, float]]:
         """The other foot on footholds to which it may go, with the cost of the step alone."""

@@ -27,8 +27,9 @@ from manikin.kinematics import Placement
 from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
-from manikin.planning.contacts.best_first import Graph, PosedSearch, heading_of
+from manikin.planning.contacts.best_first import Graph, PosedSearch, Refused, heading_of
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
+from manikin.planning.contacts.heuristics import duration
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
 
 GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))  # on the estimate, states expanded with each; our choice
@@ -43,6 +44,7 @@ WIDE = 0.12  # distance to the edges of where it rests at which a trunk is at ea
 NARROW = 3.0  # cost of a move over contacts on one line, without room between their edges, in moves
 OVERREACH = 30.0  # cost of a limb that is beyond its reach then by as much as that, in moves; our choice
 PROVEN = 0.8  # discount on a move that has a posture: such ways are gone on with [moves]; our choice
+AHEAD = np.linspace(0.0, 2.0, 7)[1:, None]  # places ahead at which a contact may be kept [strides]
 LOOSE = 1.0  # cost of a limb without a contact, in moves; our choice
 HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
 """Turn of a hand whose fingers hook round an edge, from one that lies flat on it."""
@@ -62,6 +64,7 @@ class LimbSettings(Paces):
         stride: Way of a limb that costs least [m].
         around: Distance from where a limb should be up to which places are tried [strides].
         beyond: How far limbs are beyond their reach from a stiff trunk at most, by that reach.
+        brief: Cost of a contact that can be kept on nothing of the way ahead ([Tonneau2015]_ 7.4), in moves.
         comfort: Cost of a limb that is as far from where it should be as it reaches, in moves.
         sway: Distance of the root from the polygon of the contacts that stay at most, by that reach.
         searches: Most postures that are looked for.
@@ -79,6 +82,7 @@ class LimbSettings(Paces):
     stride: float = 0.4
     around: float = 0.45
     beyond: float = 0.0
+    brief: float = 1.0
     comfort: float = 2.0
     sway: float = 0.12
     searches: int = 900
@@ -202,7 +206,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._later: dict[State, list[tuple[State, float]]] = {}
         self._ahead: dict[State, float] = {}
         self._stuck: set[tuple[State, int]] = set()
-        self._dearer: dict[int, FloatArray] = {}  # (n, 2, 3) places of a limb and the root, by limb
+        self._dearer = [Refused(0.12 * size) for _ in holds]  # by places of the limb and the root
         # Place and rotation of the root, and the place a stride on.
         self._trunks: dict[State, tuple[FloatArray, FloatArray, FloatArray]] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
@@ -351,7 +355,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             ways = np.linalg.norm(self._places[k][places] - here, axis=1)
             far = (places != state[k]) & (ways > 0.15 * stride)
             states += [(*state[:k], row, *state[k + 1 :]) for row in places[far].tolist()]
-            steps += (1.0 + 0.5 * (ways[far] / (2.0 * stride)) ** 2).tolist()
+            cost = 1.0 + 0.5 * (ways[far] / (2.0 * stride)) ** 2
+            if self.settings.brief > 0.0:
+                kept = self._duration(k, self._places[k][places[far]], root + AHEAD * away, turn)
+                cost += self.settings.brief * (1.0 - kept)
+            steps += cost.tolist()
         costs = self._frame_costs(states) if states else np.zeros(0)
         moves = [
             (after, step + cost)
@@ -368,6 +376,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._next[state] = [item for item in moves if item[0] in fills] or moves
         return self._next[state]
 
+    def _duration(self, k: int, places: FloatArray, roots: FloatArray, turn: FloatArray) -> FloatArray:
+        """(n,) share of the roots (w, 3) on the way ahead up to which limb k reaches places (n, 3) [m]."""
+        local = (places[:, None] - roots) @ turn
+        return duration(self.holds[k].room(local.reshape(-1, 3)).reshape(local.shape[:2]) >= 0.0)
+
     def _tested(self, before: State, after: State) -> float:
         """What a move costs beyond its way; infinite where it is closed, blocked or without balance."""
         k = self._moved(before, after)
@@ -377,12 +390,11 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         proven = self._postures.get((after, k, True))
         if proven is not None and proven.q is not None and math.isfinite(cost):
             cost = -PROVEN
-        dearer = self._dearer.get(k)
-        if dearer is None or math.isinf(cost):
-            return cost
-        place = np.concatenate([self._places[k][after[k]], self._trunks[after][0]]).reshape(2, 3)
-        away = np.linalg.norm(dearer - place, axis=2)
-        return cost + 2.0 * int((away < 0.12 * self.size).all(axis=1).sum())
+        return cost if math.isinf(cost) else cost + 2.0 * self._dearer[k].alike(self._closing(k, after))
+
+    def _closing(self, k: int, after: State) -> FloatArray:
+        """(2, 3) places of limb k and the root, by which moves are alike [m]."""
+        return np.array([self._places[k][after[k]], self._trunks[after][0]])
 
     def _overreached(self, before: State, after: State, k: int) -> float:
         """What a move of limb k costs whose limbs come to the ends of their reach; infinite without room."""
@@ -451,8 +463,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         k = self._moved(before, after)
         left = [item for item in self._next.get(before, []) if item[0] != after]
         self._next[before] = left or self._later.pop(before, [])
-        place = np.array([[self._at(after)[k], self._trunks[after][0]]])
-        self._dearer[k] = np.vstack([self._dearer.get(k, np.zeros((0, 2, 3))), place])
+        self._dearer[k].places.append(self._closing(k, after))
 
     # --- whole postures -------------------------------------------------------------------------
 

@@ -10,7 +10,6 @@ more wrenches are admissible than without it: the test of the contacts that stay
 
 from dataclasses import dataclass, replace
 from itertools import product
-from math import comb
 
 import numpy as np
 from scipy.optimize import linprog
@@ -21,6 +20,7 @@ from manikin.balance.margin import wrench_levers
 from manikin.contact import Stance
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
+from manikin.numerics.spline import bernstein_matrix
 
 FORWARD_SPEEDS = (0.0, 0.15, 0.3, 0.45, 0.6)  # level, at the start, up to that of people who rise [m/s]
 UPWARD_SPEEDS = (0.0, 0.15, 0.3)  # upward speeds at the start that are tried [m/s]
@@ -96,7 +96,9 @@ def _way(
     points = np.array([com, com + velocity * duration / _DEGREE, np.zeros(3), rest, rest, rest])
     points[[0, 1, 3, 4, 5]] -= origin
     share = np.linspace(0.0, 1.0, SAMPLES + 1)
-    place, bend = _bernstein(share, _DEGREE), _second(share) / duration**2
+    place = bernstein_matrix(_DEGREE, share)
+    inner = np.pad(bernstein_matrix(_DEGREE - 2, share), ((0, 0), (2, 2)))
+    bend = _DEGREE * (_DEGREE - 1) / duration**2 * np.diff(inner, n=2, axis=1)
     gravity = np.array([0.0, 0.0, -GRAVITY])
     rows, bounds = [], []
     for number, (at, turn) in enumerate(zip(place, bend, strict=True)):
@@ -120,18 +122,3 @@ def _way(
     points[2] = solution.x[:3]
     start = frozen_array(bend[0] @ points, "acceleration", (3,))
     return Momentum(frozen_array(velocity, "velocity", (3,)), start, duration, float(solution.x[3]))
-
-
-def _bernstein(share: FloatArray, degree: int) -> FloatArray:
-    """(n, degree + 1) Bernstein polynomials at shares of the way."""
-    k = np.arange(degree + 1)
-    binomial = np.array([float(comb(degree, number)) for number in k.tolist()])
-    return binomial * share[:, None] ** k * (1.0 - share[:, None]) ** (degree - k)
-
-
-def _second(share: FloatArray) -> FloatArray:
-    """(n, 6) second derivatives of those of degree 5 by the share."""
-    second, lower = np.zeros((len(share), _DEGREE + 1)), _bernstein(share, _DEGREE - 2)
-    for first, weight in ((0, 1.0), (1, -2.0), (2, 1.0)):
-        second[:, first : first + 4] += 20.0 * weight * lower
-    return second
