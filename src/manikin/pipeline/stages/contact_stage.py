@@ -220,7 +220,9 @@ class _LimbSearch(_ContactSearch):
         """Lengths by the size of the body, times by how fast a body of that size moves."""
         plain, pace, safe = contacts.LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
         if self._body.stature is not None:
-            plain = replace(plain, turns=False, around=1.5, beyond=0.1, brief=0.0, comfort=10.0, sway=0.3)
+            plain = replace(
+                plain, turns=False, around=1.5, beyond=0.1, brief=0.0, effort=0.0, comfort=10.0, sway=0.3
+            )  # fmt: skip
         if self._on_rungs:
             plain = replace(
                 plain, retreats=RETREATS, greeds=RUNG_GREED, hinge_pace=HOLDING_PACE,

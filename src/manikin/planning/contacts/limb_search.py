@@ -24,6 +24,7 @@ from manikin.body import Configuration
 from manikin.body.limbs import limb_placement, limb_slots
 from manikin.contact import Contact, ContactKind
 from manikin.kinematics import Placement
+from manikin.kinematics.efort import efort
 from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
@@ -44,6 +45,7 @@ WIDE = 0.12  # distance to the edges of where it rests at which a trunk is at ea
 NARROW = 3.0  # cost of a move over contacts on one line, without room between their edges, in moves
 OVERREACH = 30.0  # cost of a limb that is beyond its reach then by as much as that, in moves; our choice
 PROVEN = 0.8  # discount on a move that has a posture: such ways are gone on with [moves]; our choice
+HARDEST = 3.0  # largest factor on the cost of effort; our choice
 AHEAD = np.linspace(0.0, 2.0, 7)[1:, None]  # places ahead at which a contact may be kept [strides]
 LOOSE = 1.0  # cost of a limb without a contact, in moves; our choice
 HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
@@ -65,6 +67,7 @@ class LimbSettings(Paces):
         around: Distance from where a limb should be up to which places are tried [strides].
         beyond: How far limbs are beyond their reach from a stiff trunk at most, by that reach.
         brief: Cost of a contact that can be kept on nothing of the way ahead ([Tonneau2015]_ 7.4), in moves.
+        effort: Cost of a limb whose EFORT upwards is the median of its samples, in moves; inverse to EFORT.
         comfort: Cost of a limb that is as far from where it should be as it reaches, in moves.
         sway: Distance of the root from the polygon of the contacts that stay at most, by that reach.
         searches: Most postures that are looked for.
@@ -83,6 +86,7 @@ class LimbSettings(Paces):
     around: float = 0.45
     beyond: float = 0.0
     brief: float = 1.0
+    effort: float = 0.3
     comfort: float = 2.0
     sway: float = 0.12
     searches: int = 900
@@ -149,6 +153,18 @@ class LimbHolds:
             if apart.min(initial=np.inf) >= APART * size and self.is_free(row):
                 near.append(row)
         return [(float(away[row]), replace(self.contact(row), oriented=False)) for row in near]
+
+    @cached_property
+    def _efforts(self) -> tuple[cKDTree, FloatArray]:
+        """Places of the samples, and the median EFORT of a limb that carries over that of each."""
+        up = np.repeat(self.root_to_segment[0][2:], len(self.samples.positions), axis=0)
+        alpha = efort(self.samples.products, up[0], up)
+        return cKDTree(self.samples.positions), np.minimum(np.median(alpha) / alpha, HARDEST)
+
+    def effort(self, places: FloatArray) -> FloatArray:
+        """(k,) how hard it is to carry at places (k, 3) seen from the root, 1 in the middle of all."""
+        (turn, at), (tree, efforts) = self.root_to_segment, self._efforts
+        return efforts[tree.query((places - at) @ turn)[1]]
 
     def room(self, places: FloatArray) -> FloatArray:
         """(k,) distance of places (k, 3) seen from the root to the end of the reach [m]; negative outside."""
@@ -300,6 +316,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         for k, item in enumerate(self.holds):
             beyond = np.where(held[:, k], -item.room(local[:, k]) / self.size, 0.0)
             cost += np.where(beyond > self.settings.beyond, np.inf, 4.0 * np.maximum(beyond, 0.0))
+            if self.settings.effort > 0.0:
+                cost += self.settings.effort * held[:, k] * item.effort(local[:, k])
         away, (off_way, onward) = np.linalg.norm(roots - self.goal[:3], axis=1), self._ahead_of(roots)
         off_heading = np.abs(np.mod(yaw - self._yaws[1] + math.pi, 2.0 * math.pi) - math.pi)
         n, stride = len(self.holds), self.settings.stride
