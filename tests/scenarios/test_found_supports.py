@@ -1,12 +1,15 @@
 """Supports of found contacts: where the body rests, where it walks, and how long phases last."""
 
+import itertools
 import time
 
 import numpy as np
 import pytest
 
+from manikin.contact import SolePart
 from manikin.pipeline.stages import Report, RunContext
 from manikin.pipeline.stages.contact_stage import find_supports, with_rests
+from manikin.planning.com import plan_com
 from manikin.scenarios import found_supports, load_scenario
 from manikin.scenarios.found_supports import without_rests
 
@@ -15,10 +18,10 @@ BLOCK = """
 """
 
 
-def way(tmp_path, height):
-    """Scenario of a way onto a block of a height [m], and its contacts."""
-    ends = "start: {at: [0.0, 0.0], heading_deg: 0.0}, goal: {at: [0.8, 0.0], heading_deg: 0.0}"
-    text = f"name: way\ntask: {{{ends}}}\n"
+def way(tmp_path, height, *, goal=0.8, scene=""):
+    """Scenario of a way to a place [m], onto a block of a height [m] or with a scene, and its contacts."""
+    ends = f"start: {{at: [0.0, 0.0], heading_deg: 0.0}}, goal: {{at: [{goal}, 0.0], heading_deg: 0.0}}"
+    text = f"name: way\ntask: {{{ends}}}\n" + (f"scene: {scene}" if scene else "")
     if height:
         text += "scene:" + BLOCK.replace("HEIGHT", str(height)).replace("MIDDLE", str(0.5 * height))
     file = tmp_path / "way.yaml"
@@ -49,12 +52,44 @@ def test_a_body_walks_on_level_ground(tmp_path):
 
 @pytest.mark.parametrize(("height", "rests"), [(0.12, False), (0.3, True)])
 def test_a_body_rests_where_it_climbs_high(tmp_path, height, rests):
-    """On a step of stairs it walks, on feet that land flat; on a higher one it is near its posture."""
+    """On a step of stairs it walks, on feet that land flat there; on a higher one it is near its posture."""
     context, found = way(tmp_path, height)
     walking = without_rests(context.scenario, found.plan)
     phases = found.scenario.file.supports.phases if walking is None else walking.file.supports.phases
     assert any(phase.com_near is not None for phase in phases) == rests
-    assert walking is None or walking.file.supports.foot is None
+    if not rests:
+        sequence = walking.build_centroidal_problem().sequence
+        parts = {contact.part for phase in sequence for contact in phase.stance if contact.position[2] > 0.05}
+        assert SolePart.TOES in parts  # the foot below leaves from its toes before the other has flown
+        rising = [phase.stance for phase in sequence if np.ptp([c.position[2] for c in phase.stance]) > 0.05]
+        landed = [contact.part for stance in rising for contact in stance if contact.position[2] > 0.05]
+        assert rising
+        assert set(landed) == {SolePart.FULL}
+
+
+BAR = """
+- {name: bar, box: [0.08, 2.0, 0.1], position: [0.9, 0.0, 1.45]}
+"""
+
+
+def test_a_body_that_bends_below_a_bar_walks(tmp_path):
+    """Each phase has a plane above the postures at both its ends, in place of a bound by the bar's shape."""
+    context, found = way(tmp_path, 0.0, goal=2.0, scene=BAR)
+    walking, plan = without_rests(context.scenario, found.plan), found.plan
+    supports, problem = walking.file.supports, walking.build_centroidal_problem()
+    assert supports.foot is None
+    assert problem.geometric == ()
+    coms = [*(stage.com for stage in plan.stages), plan.goal_com]
+    for phase, region, ends in zip(supports.phases, problem.regions, itertools.pairwise(coms), strict=True):
+        normal = np.array(phase.com_below.normal) / np.linalg.norm(phase.com_below.normal)
+        rooms = (phase.com_below.position - np.array(ends)) @ normal
+        assert 0.0 <= rooms.min() < 0.031  # the postures are below it, and the higher one is just below
+        higher = ends[int(rooms.argmin())]
+        assert region.violation(higher) <= 1e-9
+        assert region.violation(higher + np.array([0.0, 0.0, 0.1])) > 0.03
+    result = plan_com(problem, guesses=1)
+    assert result.failure is None
+    assert result.iterations < 150
 
 
 def test_the_body_rests_after_a_failure(tmp_path):

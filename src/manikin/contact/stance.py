@@ -272,28 +272,28 @@ STRETCH = 1.5
 """The phases on heel or toes last at most this many times their least time."""
 
 
-BACK = 0.02
-"""Way behind its last place from which on a foot lands flat [m]; our choice."""
+BACK, STEP = 0.02, 0.05
+"""Way behind, and above or below, its last place from which on a foot lands flat [m]; our choice."""
 
 
 def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
     """Split every phase in which a foot lands or leaves beside another full contact.
 
     The parts' shares are taken from the split phase's least duration, which is never shortened. Soles are
-    full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back lands flat:
-    people step back onto their toes or their whole sole.
+    full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back, or onto a
+    step, lands flat: people land on their whole sole or its front there.
     """
-    flat = {(swing.last_phase + 1, swing.effector) for swing in sequence.swings() if _goes_back(swing)}
+    flat = {(swing.last_phase + 1, swing.effector) for swing in sequence.swings() if _lands_flat(swing)}
     parts = (_split(sequence, index, hinge, flat) for index in range(len(sequence)))
     return StanceSequence([phase for split in parts for phase in split])
 
 
-def _goes_back(swing: Swing) -> bool:
-    """Whether a foot lands more than :data:`BACK` behind where it left, as it heads then."""
+def _lands_flat(swing: Swing) -> bool:
+    """Whether a foot lands behind where it left, as it heads then, or higher or lower."""
     if swing.start is None or swing.end is None:
         return False
-    way = swing.end.position - swing.start.position
-    return float(way @ swing.end.rotation_contact_to_world[:, 0]) < -BACK
+    way = (swing.end.position - swing.start.position) @ swing.end.rotation_contact_to_world
+    return float(way[0]) < -BACK or abs(float(way[2])) > STEP
 
 
 def _split(

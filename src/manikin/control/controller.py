@@ -249,8 +249,7 @@ class Controller:
         return weight
 
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
-        frame = state.frames[contact.effector]
-        geometry = edge_forces.on_bar(contact, self.geometry(contact), self.body, frame)
+        geometry = self.geometry(contact)
         basis = edge_forces.contact_force_basis(
             contact, geometry, state, sliding=support.settling,
             friction_share=self.settings.supports.friction_share, friction_model=self._friction_model,

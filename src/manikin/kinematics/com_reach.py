@@ -69,6 +69,12 @@ class ComRegion:
         below = self.normals[:, 2] < -1.0 + 1e-9
         return replace(self, offsets=np.where(below, np.minimum(self.offsets, -height), self.offsets))
 
+    def below(self, point: ArrayLike, normal: ArrayLike) -> "ComRegion":
+        """The part of the region behind a plane through a point (3,) [m]."""
+        out = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
+        faces, ends = np.vstack([self.normals, out]), np.append(self.offsets, out @ np.asarray(point))
+        return replace(self, normals=faces, offsets=ends)
+
     def violation(self, points: ArrayLike) -> FloatArray:
         """(...) largest distance of (..., 3) points beyond a face [m]; negative is room."""
         places = np.asarray(points, dtype=np.float64)

@@ -17,8 +17,10 @@ from manikin.numerics.spatial import yaw_about_normal
 from manikin.planning.contacts import ContactPlan, Stage
 from manikin.planning.contacts.transition import MARGIN as RISING_MARGIN
 from manikin.scenarios.planned import STANDING, STATURE, WEIGHTS, walk_margin
+from manikin.scenarios.problems import overhead_constraints
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.values import ScenarioValues, build_body
+from manikin.scenarios.world import build_scene
 from manikin.walking.footprints import FEET
 
 MAX_SUPPORT_DISTANCE = 1.08
@@ -61,9 +63,9 @@ ROLLED = 0.3
 LONGEST = 0.8
 """Longest duration of a phase, or 1.5 times its least: a person's step at 0.5 m/s; without it the programme
 often diverges [s]."""
-FLAT_WAY = 0.05
-"""Largest difference in height of two feet on whose way both roll, of a body of 1.75 m [m]; our choice."""
-LEVEL = 0.97
+SLOPED = 0.1
+"""Way of the centre of mass from which on a plane above it is inclined [m]; our choice."""
+LEVEL = 0.94
 """Least upward part of the normal of a sole on which a body steps without rest; our choice."""
 MILD = 0.21
 """Largest difference in height of such soles, of a body of 1.75 m [m]: steps of stairs; our choice."""
@@ -110,10 +112,21 @@ def _is_mild(stages: Sequence[Stage], scenario: Scenario) -> bool:
     )  # fmt: skip
 
 
-def _is_level(plan: ContactPlan, scenario: Scenario) -> bool:
-    """Whether all steps are level enough for feet that roll."""
-    heights = [max(c.position[2] for c in stage.contacts.values()) for stage in plan.stages]
-    return float(np.abs(np.diff(heights)).max()) <= FLAT_WAY * scenario.file.body.stature_m / STATURE
+def _passes_below(plan: ContactPlan, scenario: Scenario) -> bool:
+    """Whether something hangs so low over the way that a body bends below it."""
+    stances, ends = plan.schedule(scenario.contact_model).sequence, (plan.stages[0].com, plan.goal_com)
+    return bool(overhead_constraints(build_body(scenario), build_scene(scenario), stances, ends, None))
+
+
+def _ceiling(plan: ContactPlan, number: int) -> dict[str, Any]:
+    """Plane above the centres of mass of the two postures between which a phase is."""
+    here = plan.stages[number].com
+    there = plan.goal_com if number + 1 == len(plan.stages) else plan.stages[number + 1].com
+    (x, y, rise), room = (float(value) for value in there - here), plan.stages[number].com_room[2]
+    way, top = math.hypot(x, y), np.array(here)
+    slope = rise / way**2 if way > SLOPED else 0.0
+    top[2] += room + (0.0 if way > SLOPED else max(0.0, rise))
+    return {"position": top.tolist(), "normal": [-slope * x, -slope * y, 1.0]}
 
 
 def _walking_time(plan: ContactPlan, number: int, *, rolls: bool) -> float:
@@ -133,7 +146,8 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
     friction = scenario.contacts.friction
     # Rising legs are soon at full length: there is less room above such postures than below them.
     rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
-    rolls = all(passed) and _is_level(plan, scenario)
+    below = any(passed) and _passes_below(plan, scenario)
+    rolls = all(passed) and not below
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -148,6 +162,8 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
             phase["max_duration_s"] = max(LONGEST, 1.5 * least)
         if rises and "buttocks" in stage.contacts:
             phase["max_duration_s"] = SEATED_LONGER * stage.min_duration
+        if below:
+            phase["com_below"] = _ceiling(plan, number)
         if number and not passed[number]:
             x, y, z = (float(value) for value in stage.com)
             drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0

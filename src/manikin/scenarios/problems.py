@@ -215,7 +215,8 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
     given: dict[str, Any] = {"degree": options.degree, "samples": options.samples}
     sequence = _standing(values, planning=True)
     upright = upright and values.keeps_upright
-    geometric = _height_constraints(values, automatic=upright)
+    ceilings = [phase.com_below for phase in values.explicit_supports().phases[:seat]]
+    geometric = _height_constraints(values, automatic=upright and not any(ceilings))
     with values.refusing(("planning",)):
         return CentroidalProblem(
             values.moved_mass, sequence, values.start_com, values.goal_com,
@@ -276,7 +277,7 @@ def _rests(values: ScenarioValues) -> tuple[FloatArray | None, ...]:
 def _regions(
     values: ScenarioValues, sequence: StanceSequence, ceilings: Sequence[GeometricConstraint] | None
 ) -> tuple[ComRegion | None, ...]:
-    """Where the body's postures have the CoM in each phase, with the places that the file gives.
+    """Where the body's postures have the CoM in each phase, with the places and below the planes of the file.
 
     With ``ceilings`` they are cut :data:`BEND` below the least height that a phase, those beside it and the
     ceilings over it allow.
@@ -284,8 +285,12 @@ def _regions(
     At those, and on stances on which sampling finds no posture, the full search for key postures judges.
     A largest distance from the supports that the file gives takes the place of all regions.
     """
+    planes = [phase.com_below for phase in values.explicit_supports().phases[: values.seated_from]]
+    planes = planes if any(planes) else [None] * len(sequence)  # feet that roll have more phases, and none
+    free = ComRegion.everywhere()
     if values.is_point_mass or values.max_support_distance is not None:
-        return ()
+        bounded = tuple(plane and free.below(plane.position, plane.normal) for plane in planes)
+        return bounded if any(planes) else ()
     body = build_body(values)
     reach, inner = ComReach.of(body), _rests(values)[1:]
     if len(inner) + 1 != len(sequence):  # feet that roll have more phases, and no rests
@@ -298,13 +303,19 @@ def _regions(
         for ceiling in ceilings or ():
             if not ceiling.impassable:
                 tops[number] = min(tops[number], -float(ceiling.violation(middle)))
+        if (plane := planes[number]) is not None:
+            down = (middle - plane.position) @ plane.normal / plane.normal[2]
+            tops[number] = min(tops[number], float(middle[2] - down))
     bend = BEND * float(Configuration(body, body.standing_posture()).com[2])
     regions: list[ComRegion | None] = []
     for number, region in enumerate(found):
         if ceilings is not None:
             region = region.above(min(tops[max(0, number - 1) : number + 2]) - bend)
         places = [place for place in known[number : number + 2] if place is not None]
-        regions.append(None if region.empty else region.including(places))
+        within = free if region.empty else region.including(places)
+        if (plane := planes[number]) is not None:
+            within = within.below(plane.position, plane.normal)
+        regions.append(within if len(within.offsets) else None)
     return tuple(regions)
 
 

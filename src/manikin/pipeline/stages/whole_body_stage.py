@@ -185,7 +185,8 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
     if isinstance(problem, KeyframeProblem):
         result = com.plan_com_through_key_frames(problem)
     else:
-        result = com.plan_com(problem)
+        # Where the body may rest instead, what one guess does not find is not worth the time.
+        result = com.plan_com(problem, guesses=None if context.resting is None else 1)
         bends = context.scenario.keeps_upright and context.resting is None
         if result.failure is not None and bends:  # the task may need a deeper bend
             result = com.plan_com(context.scenario.build_centroidal_problem(upright=False))

@@ -127,9 +127,10 @@ class MarginTargets:
         names = {"support distance", "reach", *(constraint.name for constraint in problem.geometric)}
         measured = names & {item.requirement for item in certificate.items}
         position = max((certificate[name].value for name in measured), default=0.0)
+        missing = certificate["balance margin"].value
         return replace(
             self,
-            margin=self.margin + 1.2 * max(certificate["balance margin"].value, 0.0),
+            margin=self.margin + (1.6 * missing + 1e-3 if missing > 0.0 else 0.0),
             position=self.position + (1.2 * position + 1e-5 if position > TOLERANCE else 0.0),
         )
 

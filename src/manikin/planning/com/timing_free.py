@@ -248,12 +248,15 @@ class CentroidalResult(Displayed):
         return measure(self.problem, trajectory, self.polytopes)
 
 
-def plan_com(problem: CentroidalProblem) -> CentroidalResult:
+def plan_com(problem: CentroidalProblem, *, guesses: int | None = None) -> CentroidalResult:
     """Find control points, key instants and margin of a CoM trajectory ([Qiu2012]_ 5.20-5.28).
 
     Every solution is measured every millisecond against all facets and all bounds. Where a requirement is
     broken between the samples it is asked for with more distance, and solved again. A result that does not
     meet its own certificate is a failure that says which requirement could not be met.
+
+    Args:
+        guesses: Number of guesses to start from at most; all where None.
     """
     began = time.perf_counter()
     polytopes = polytopes_of(problem)
@@ -263,7 +266,7 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     if failure is None and (keys := _resting_keys(problem, polytopes)):
         return _in_parts(problem, polytopes, feasibility, keys)
     if failure is None:
-        for style in guess_styles(problem):
+        for style in guess_styles(problem)[:guesses]:
             attempts.extend(_rounds(problem, polytopes, style))
             if attempts[-1].certificate.within():
                 break

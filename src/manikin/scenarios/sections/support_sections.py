@@ -128,6 +128,18 @@ ContactEntry = Annotated[
 _MASSLESS = "contact of that foot of a point mass, or 'same'"
 
 
+class CeilingSection(Section):
+    """A plane that the centre of mass stays below."""
+
+    position: Annotated[Vector3, FrameMoves.POINT] = required("of a point of the plane [m]")
+    normal: Annotated[Vector3, FrameMoves.DIRECTION] = required("upward normal of the plane")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        refuse_if(self.normal[2] <= 0.0, "normal", f"is {list(self.normal)}; valid: one that points upwards")
+        return self
+
+
 class PhaseSection(Section):
     """The contacts of one phase and how long it may last; an effector left out is in the air."""
 
@@ -156,6 +168,10 @@ class PhaseSection(Section):
     )
     com_lead_s: NonNegative = preset(
         0.0, "time after which it would still be as near if it went on at the velocity that it has then [s]"
+    )
+    com_below: CeilingSection | None = optional(
+        "plane below which the centre of mass stays in this phase; where one is given, overhead obstacles "
+        "bound it by nothing else"
     )
 
     @model_validator(mode="after")
@@ -214,11 +230,12 @@ class SupportsSection(Section):
             ours, limit = getattr(self, f"planning_{real}"), getattr(self, real)
             if ours is not None and limit is not None and ours > limit:
                 raise refuse(f"planning_{real}", f"is {ours:g}; valid: at most {real} = {limit:g}")
-        near = [phase.com_near is not None for phase in self.phases]
         problem = "is given; valid: task.start.com says where the motion begins"
-        refuse_if(near[0], "phases[0].com_near", problem)
-        problem = "is rolling beside a phase with com_near; valid: flat, or no com_near"
-        refuse_if(self.foot == "rolling" and any(near), "foot", problem)
+        refuse_if(self.phases[0].com_near is not None, "phases[0].com_near", problem)
+        for key in ("com_near", "com_below"):
+            bound = any(getattr(phase, key) is not None for phase in self.phases)
+            problem = f"is rolling beside a phase with {key}; valid: flat, or no {key}"
+            refuse_if(self.foot == "rolling" and bound, "foot", problem)
         problem = "is 'same' but the phase before has no such contact; valid: a contact with a position"
         for number, phase in enumerate(self.phases):
             before = self.phases[number - 1].entries() if number else {}
