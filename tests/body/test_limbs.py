@@ -173,10 +173,10 @@ def test_limbs_that_are_no_mirror_images_are_told_apart():
 
 
 def test_kneeling_on_a_knee_and_leaning_on_an_elbow_touch_from_below():
-    """Shank level behind the knee, forearm level before the elbow: both normals point up."""
+    """Shank 6 degrees up to the foot, forearm level before the elbow: both normals point up."""
     body = BODIES["human"]
     bent = np.pi / 2
-    q = body.posture({"left_knee_flexion": bent, "left_elbow_flexion": bent})
+    q = body.posture({"left_knee_flexion": bent + np.radians(6.0), "left_elbow_flexion": bent})
     state = Configuration(body, q)
     for name in ("left_knee", "left_elbow"):
         turn, place = state.effector_placement(name)
@@ -270,8 +270,8 @@ def test_other_misuse_is_refused():
         insect(length=0.0)
 
 
-# An edge of the hand, 42 mm from its middle, comes down by the 5 mm before it at a tilt of 6.8 degrees.
-@pytest.mark.parametrize(("part", "tilt"), [("knee", 0.0), ("fist", 0.0), ("fist", 6.0)])
+# The tips of the fingers, 189 mm from the wrist, come down by the 26 mm before the palm at 8 degrees.
+@pytest.mark.parametrize(("part", "tilt"), [("knee", 0.0), ("wrist", 0.0), ("wrist", 6.0)])
 def test_what_carries_at_a_point_touches_there_first(part, tilt):
     """A segment with a ball at its tip, tilted either way, touches the ground with the ball alone."""
     body, name = human(), f"left_{part}"

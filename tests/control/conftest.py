@@ -68,8 +68,8 @@ def on_points():
 
 @pytest.fixture(scope="session")
 def on_three_points(body):
-    """Schedule and motion of a body that stands still on points: of its feet, and of a fist beside it."""
-    q, names = body.standing_posture(), (*FEET, "left_fist")
+    """Schedule and motion of a body that stands still on points: of its feet, and of a wrist beside it."""
+    q, names = body.standing_posture(), (*FEET, "left_wrist")
     state = Configuration(body, q)
     points = [point(name, state.effector_placement(name)[1], friction=0.7) for name in names]
     schedule = ContactSchedule(StanceSequence([Phase(Stance(points))]), [0.0, 1.0])

@@ -273,5 +273,5 @@ def test_no_point_of_a_human_on_points_is_let_go(body, on_three_points):
     output = Controller(body, plan, schedule).step(0.1, body.standing_posture(), v)
     weight = body.mass * GRAVITY
     # The solver keeps inequalities to a millionth of the weight.
-    assert output.wrenches["left_fist"][2] == pytest.approx(PRESSED * weight, abs=1e-6 * weight)
+    assert output.wrenches["left_wrist"][2] == pytest.approx(PRESSED * weight, abs=1e-6 * weight)
     assert min(wrench[2] for wrench in output.wrenches.values()) > (PRESSED - 1e-6) * weight

@@ -34,7 +34,7 @@ from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
 from manikin.body.strength import AGE_RANGE, DEFAULT_AGE, HANDS, carrying, hinge_strength
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, finite_number, skew
+from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy, skew
 
 _SOFT_PAIRS = frozenset(frozenset(pair) for pair in (
     # One short link apart: the shapes overlap in ordinary postures.
@@ -61,8 +61,11 @@ SEAT_WIDTH = 0.14
 FRONT_OF_KNEE = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 """Rotation from the knee's effector to the lower leg."""
 
+KNEELING = FRONT_OF_KNEE @ rotation_from_rpy(0.0, -np.deg2rad(6.0), 0.0)
+"""The same of one who kneels, the shank a little up to the foot, which is clear of the ground; our choice."""
+
 SKIN = 0.005
-"""Distance of the effectors of knees and fists to the shapes behind them, which need not be level [m]."""
+"""Distance of the effectors of knees and wrists to the shapes behind them, which need not be level [m]."""
 
 _STANDING_DEG = MappingProxyType(
     {"hip_flexion": 2.0, "knee_flexion": 10.0, "ankle_dorsiflexion": 8.0, "elbow_flexion": 15.0}
@@ -89,11 +92,11 @@ def human(
 
     Effectors: ``left_foot``, ``right_foot`` (sole centre, x to the toes, z up), ``left_hand``, ``right_hand``
     (palm centre, x along the fingers, z out of the back of the hand: parallel to the world when the palm lies
-    on a table, fingers forward), ``left_fist``, ``right_fist`` (end of the hand, z to the wrist),
-    ``left_knee``, ``right_knee`` (before the thigh's round end, z through the joint, backwards), ``head``
-    (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on a seat, axes as the
-    pelvis). Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``; knees, elbows and the pelvis too
-    with :func:`manikin.body.limbs.with_further_contacts`.
+    on a table, fingers forward), ``left_wrist``, ``right_wrist`` (heel of the hand, before the forearm's
+    round end, axes as the palm), ``left_knee``, ``right_knee`` (before the thigh's round end, z through the
+    joint, backwards), ``head`` (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what
+    presses on a seat, axes as the pelvis). Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``;
+    knees, elbows and the pelvis too with :func:`manikin.body.limbs.with_further_contacts`.
 
     Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all other
     breadths and girths are our choice. They scale with stature and (within 12 %) with the square root of the
@@ -192,6 +195,7 @@ class _HumanBuilder:
         self.stature, self.girth = size.stature, size.girth
         self._seat_x = -0.017 * self.stature  # the buttocks' middle, behind the hip joints
         self._hand_thickness = 0.016 * self.stature
+        self._arm_radius = 0.025 * self.stature * self.girth
         self._thigh_radius, self._shank_radius = (k * self.stature * self.girth for k in (0.038, 0.029))
         # Height of the shoulder joints above the thorax' origin.
         self._shoulder_in_thorax = (
@@ -214,13 +218,14 @@ class _HumanBuilder:
         for side, sign in _SIDES:
             sole = np.array([(0.5 - ANKLE_FROM_HEEL) * size.sole_length, 0.0, -size.ankle_height])
             palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
-            fist = np.array([0.0, 0.0, -size.length("hand") - SKIN])
-            knee = np.array([self._thigh_radius + SKIN, 0.0, 0.0])
+            turn = palm_rotation(sign)
+            wrist = -(0.8 * self._arm_radius + SKIN) * turn[:, 2]
+            knee = -(self._thigh_radius + SKIN) * KNEELING[:, 2]
             effectors += [
                 Effector(f"{side}_foot", f"{side}_foot", sole),
-                Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)),
-                Effector(f"{side}_fist", f"{side}_hand", fist),
-                Effector(f"{side}_knee", f"{side}_leg", knee, FRONT_OF_KNEE),
+                Effector(f"{side}_hand", f"{side}_hand", palm, turn),
+                Effector(f"{side}_wrist", f"{side}_hand", wrist, turn),
+                Effector(f"{side}_knee", f"{side}_leg", knee, KNEELING),
             ]
         return effectors
 
@@ -289,9 +294,8 @@ class _HumanBuilder:
         size, stature = self.size, self.stature
         shoulder = (0.0, 0.5 * sign * size.shoulder_distance, self._shoulder_in_thorax)
         upper, lower, hand = (size.length(row) for row in ("upper_arm", "forearm", "hand"))
-        radius = 0.025 * stature * self.girth
-        upper_shape = upright_capsule("arm", radius, 0.0, -upper)
-        lower_shape = upright_capsule("arm", 0.8 * radius, 0.0, -lower)
+        upper_shape = upright_capsule("arm", self._arm_radius, 0.0, -upper)
+        lower_shape = upright_capsule("arm", 0.8 * self._arm_radius, 0.0, -lower)
         extents = (0.048 * stature, self._hand_thickness, hand)
         palm = Shape("palm", ShapeKind.BOX, extents, (0.0, 0.0, -0.5 * hand))
         elbow, wrist = (0.0, 0.0, -upper), (0.0, 0.0, -lower)

@@ -26,7 +26,7 @@ YIELDING = 0.2
 """Stiffness with which a hand that should feel a force is held at its place, relative to a stance's."""
 
 PRESSED = 0.02
-"""Least normal force of each contact of a human on knees and fists alone, from its landing until it is about
+"""Least normal force of each contact of a human on knees and wrists alone, from its landing until it is about
 to leave, relative to the weight: of three points none can be spared, and one that is let go ends balance."""
 
 RAISED = 0.006

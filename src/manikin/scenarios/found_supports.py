@@ -40,6 +40,8 @@ PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
 PLANNING: Mapping[str, Any] = {"degree": 5, "weights": WEIGHTS}
 """Options of the planner of a body on its feet, where the file keeps the defaults; our choice."""
+PLANNING_CRAWLING: Mapping[str, Any] = {"degree": 5, "weights": WEIGHTS | {"duration": 20.0}}
+"""The same of a body that goes on hands and knees, as fast as its contacts let it; our choice."""
 PLANNING_SITTING: Mapping[str, Any] = {"zero_end_accelerations": False}
 """The same of a body that sits down: it is at the seat sooner if it may start with an acceleration."""
 PLANNING_RISING: Mapping[str, Any] = {
@@ -196,7 +198,9 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
         task["act"] = scenario.file.task.act.model_dump(mode="json")
     planning = scenario.file.planning.model_dump(mode="json", exclude_none=True)
     if scenario.file.planning == type(scenario.file.planning)():
-        planning = PLANNING_SITTING if sits else PLANNING_RISING if rises else PLANNING
+        crawls = any(c.kind is ContactKind.POINT for stage in plan.stages for c in stage.contacts.values())
+        planning = PLANNING_CRAWLING if crawls else PLANNING
+        planning = PLANNING_SITTING if sits else PLANNING_RISING if rises else planning
         if any(passed):
             planning = {**PLANNING_WALKING, "min_margin": walk_margin(scenario, WALKING_MARGIN)}
     # Of a body that walks the region of its postures is known.

@@ -11,8 +11,8 @@ from manikin.planning.com.feasibility import Failure
 from manikin.planning.com.timing_free import LEVEL, LONG, PART, _parted
 
 LIMBS = {
-    "left_fist": (0.5, 0.15),
-    "right_fist": (0.5, -0.15),
+    "left_wrist": (0.5, 0.15),
+    "right_wrist": (0.5, -0.15),
     "left_knee": (0.0, 0.1),
     "right_knee": (0.0, -0.1),
 }

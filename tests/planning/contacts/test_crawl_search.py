@@ -3,14 +3,24 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
-from manikin.body import human
+from manikin.balance.criteria import RestingTorques
+from manikin.body import Configuration, human
+from manikin.contact import Stance, point
 from manikin.numerics.spatial import rotation_from_yaw
-from manikin.planning.contacts import CrawlSearch, Endpoints, Habit, PostureFinder, WalkSearch
+from manikin.planning.contacts import (
+    CrawlSearch,
+    Endpoints,
+    Habit,
+    PostureFinder,
+    PostureFinderSettings,
+    WalkSearch,
+)
+from manikin.planning.contacts.crawl_postures import CRAWLERS, on_all_fours
 from manikin.scene import Box, Obstacle, Scene
 
 BODY = human(1.75, 75.0, "male")
-CRAWLERS = {"left_fist", "right_fist", "left_knee", "right_knee"}
 
 
 def tunnel(height, length=0.2, side=0.45, yaw=0.0):
@@ -41,10 +51,32 @@ def test_a_tunnel_is_crawled_through_whatever_its_heading(checked):
     found = searched(scene, 1.9, 0.6)
     assert found.failure is None
     held = [set(stage.contacts) for stage in found.plan.stages]
-    assert CRAWLERS in held
+    assert set(CRAWLERS) in held
     assert held[0] == held[-1] == {"left_foot", "right_foot"}
     assert all(len(a ^ b) == 1 for a, b in pairwise(held))
     assert checked(BODY, scene, found.plan).verdict == "certified"
+    # The weight passes from three limbs to other three with little swaying, and nobody gets up on stiff legs.
+    across = rotation_from_yaw(0.6)[:2, 1]
+    crawled = [stage for stage in found.plan.stages if stage.contacts.keys() <= set(CRAWLERS)]
+    assert max(abs(float(across @ stage.com[:2])) for stage in crawled) < 0.04
+    knees = [7 + BODY.joint_index(f"{side}_knee_flexion") for side in ("left", "right")]
+    squatting = [stage for stage, names in zip(found.plan.stages, held, strict=True) if len(names) == 3]
+    bent = [stage.q[knees].min() for stage in squatting if {"left_foot", "right_foot"} <= set(stage.contacts)]
+    assert len(bent) == 2
+    assert min(bent) > np.radians(45.0)
+
+
+@pytest.mark.parametrize(
+    "body", [BODY, human(1.55, 50.0, "female"), human(1.9, 100.0, "male")], ids=["mean", "small", "tall"]
+)
+def test_hands_under_nearly_straight_arms_carry_with_little_strength(body):
+    """On the ends of upright hands, 0.19 m higher, elbows would have to bend aside under the load."""
+    q = on_all_fours(body, PostureFinderSettings()).q
+    state = Configuration(body, q)
+    held = [point(name, state.effector_placement(name)[1], friction=0.7) for name in CRAWLERS]
+    assert np.abs([contact.position[2] for contact in held]).max() < 1e-3
+    assert RestingTorques(body, q, Stance(held)).share < 0.3
+    assert q[7 + body.joint_index("left_elbow_flexion")] < np.radians(70.0)
 
 
 def test_a_tunnel_that_is_too_low_is_told_at_once():

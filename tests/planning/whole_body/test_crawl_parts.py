@@ -33,20 +33,37 @@ def still(q, extra=()):
     return CentroidalTrajectory(BODY.mass, spline, ContactSchedule(phases, INSTANTS))
 
 
-def test_a_part_ends_at_rest_in_the_posture_that_is_known(standing):
-    """Whatever the fit would rather do there: control points at a given end do not move."""
+def test_a_part_begins_in_a_given_posture_and_comes_to_rest_where_it_likes(standing):
+    """It does not snap into the posture that is known there; the one that follows begins where it ended."""
     trajectory = still(standing)
-    known = standing.copy()
-    known[7 + BODY.joint_index("left_elbow_flexion")] += 0.2  # an arm that moves no contact
+    given, known = standing.copy(), standing.copy()
+    given[7 + BODY.joint_index("left_elbow_flexion")] += 0.2  # an arm that moves no contact
+    known[7 + BODY.joint_index("left_elbow_flexion")] += 0.6
     guide = Guide(INSTANTS, np.array([standing, known, standing]), ())
     rng = np.random.default_rng(0)
-    part = _Planner(BODY, Scene([]), trajectory, rng, WholeBodySettings(), known=guide).part(0, 1)
-    spline = part.run((), 0.0, lambda _: None).spline
-    end = spline.evaluate(INSTANTS[1:2])
-    np.testing.assert_allclose(end.q[0], known, atol=1e-9)
-    np.testing.assert_allclose(end.v, 0.0, atol=1e-9)
-    np.testing.assert_allclose(end.a, 0.0, atol=1e-6)  # rounding over the squared spacing of the knots
+    planner = _Planner(BODY, Scene([]), trajectory, rng, WholeBodySettings(), known=guide)
+    spline = planner.part(0, 1, given).run((), 0.0, lambda _: None).spline
+    begin, end = (spline.evaluate(INSTANTS[k : k + 1]) for k in (0, 1))
+    np.testing.assert_allclose(begin.q[0], given, atol=1e-9)
+    for rate in (begin.v, begin.a):
+        np.testing.assert_allclose(rate, 0.0, atol=1e-6)  # rounding over the squared spacing of the knots
+    assert np.abs(end.v).max() < 2e-3
+    assert np.abs(end.a).max() < 0.05
+    assert np.abs(end.q[0] - known).max() > 1e-3
     assert spline.knots[-1] == INSTANTS[1]
+
+
+def test_a_guide_at_rest_at_some_instants_has_no_speed_there_and_does_not_overshoot(standing):
+    bent = standing.copy()
+    bent[7:] += 0.3
+    guide = Guide(INSTANTS, np.array([standing, bent, standing + 1.5 * (bent - standing)]), ())
+    smooth, time = guide.resting(INSTANTS[[0, 2]]), np.linspace(0.0, INSTANTS[-1], 801)
+    rows = smooth.at(time)[:, 7:] - standing[7:]
+    np.testing.assert_allclose(smooth.at(INSTANTS), guide.at(INSTANTS), atol=1e-12)
+    speed = np.gradient(rows, time, axis=0)
+    assert np.abs(speed[[0, -1]]).max() < 0.01
+    assert speed[400].min() > 0.3  # it passes the middle one
+    assert np.diff(rows, axis=0).min() > -1e-12
 
 
 def test_a_crawl_may_be_cut_where_it_rests_and_a_walk_is_not(standing):
@@ -70,5 +87,8 @@ def test_joined_parts_are_one_motion_with_one_certificate(standing):
     assert result.succeeded, result.failure
     assert result.motion.time[-1] == INSTANTS[-1]
     assert result.guide.time[-1] == INSTANTS[-1]
-    np.testing.assert_allclose(result.spline.evaluate(INSTANTS[1:2]).q[0], standing, atol=1e-9)
+    meeting = result.spline.evaluate(INSTANTS[1] + np.array([-1e-6, 0.0]))
+    np.testing.assert_allclose(meeting.q[0], meeting.q[1], atol=1e-6)
+    assert np.abs(meeting.v).max() < 2e-3
+    assert np.abs(meeting.a).max() < 0.05
     assert shares[-1] == 1.0

@@ -88,3 +88,5 @@ def test_a_foot_whose_knee_carries_meanwhile_is_put_away_and_reached_with(side, 
         for swing in planner.flights() if swing.effector == f"{side}_foot"
     ]  # fmt: skip
     assert found == ([(0.0, None), (None, 0.3)] if apart else [(0.0, 0.3)])
+    # Straight up from the knee there is no way for a thigh that stands on it.
+    assert not any(swing.effector.endswith("knee") for swing in planner.flights())

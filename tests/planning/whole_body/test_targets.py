@@ -186,8 +186,28 @@ def test_what_touches_in_a_point_is_asked_for_no_more_than_a_hint_of_its_orienta
         assert (target.weight > 0.0).all()
 
 
+def test_a_foot_lands_before_its_knee_from_above_and_a_hand_that_left_stays_off():
+    """Only 0.1 s around a change within a limb, and 0.35 s after the last contact, may go into the ground."""
+    wrist, knee = (point(name, CREEPING[name], friction=0.6) for name in ("left_wrist", "right_knee"))
+    stances = [
+        Stance(held, 2000.0)
+        for held in ([LEFT, wrist, knee], [LEFT, wrist], [LEFT, wrist, RIGHT], [LEFT, RIGHT])
+    ]
+    schedule = ContactSchedule(
+        StanceSequence([Phase(stance) for stance in stances]), [0.0, 1.0, 2.0, 3.0, 5.0]
+    )
+    times = {"foot": (1.85, 1.95), "leg": (1.05, 1.15), "hand": (3.3, 3.4)}
+    for part, (first, second) in times.items():
+        side = "left" if part == "hand" else "right"
+        touching = ignored_pairs(BODY, Scene([]), schedule, np.array([first, second]))
+        assert [(f"{side}_{part}", "floor") in pairs for pairs in touching] == [
+            part != "foot",
+            part == "foot",
+        ]
+
+
 CREEPING = {
-    "left_fist": (0.6, 0.15, 0.0), "right_fist": (0.6, -0.15, 0.0),
+    "left_wrist": (0.6, 0.15, 0.0), "right_wrist": (0.6, -0.15, 0.0),
     "left_knee": (0.0, 0.1, 0.0), "right_knee": (0.0, -0.1, 0.0),
 }  # fmt: skip
 

@@ -262,7 +262,7 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     result = plan_whole_body(
         context.body, context.scene, trajectory, rng=rng, settings=context.settings,
         padded=context.padded, waypoints=plan.postures,
-        key_postures=_known_postures(context, plan),
+        known=_known_postures(context, plan, trajectory.schedule.instants),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     block = wholebody_summary(result) | {"seed_matters": rng.bit_generator.state != unused}
@@ -270,13 +270,15 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     return result
 
 
-def _known_postures(context: RunContext, plan: KeyedPlan) -> FloatArray | None:
-    """(phases + 1, nq) postures of the contact plan; those on the CoM of a body that passes them."""
+def _known_postures(context: RunContext, plan: KeyedPlan, instants: FloatArray) -> Guide | None:
+    """Postures of the contact plan at (n,) key instants [s]; those on the CoM of a body that passes them."""
     if context.plan is None:
         return None
     if context.resting is None or plan.postures is None:
-        return context.plan.postures
-    return np.array([item.q for item in plan.postures.postures])
+        times, postures = context.plan.keys(instants)
+    else:
+        times, postures = instants, np.array([item.q for item in plan.postures.postures])
+    return Guide(times, align_quaternions(postures), ())
 
 
 def _planned_postures(context: RunContext, schedule: ContactSchedule) -> FloatArray | None:

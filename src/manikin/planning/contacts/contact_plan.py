@@ -109,8 +109,7 @@ def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
 
 
 COM_ROOM = (0.06, 0.06, 0.03)  # way of the centre of mass off its posture when a phase begins [m]; our choice
-HINGE_PACE = 1.3  # mean speed of the hinge that turns most between two postures [rad/s]; our choice
-COM_PACE = 0.4  # mean speed of the centre of mass between two postures [m/s]; our choice
+HINGE_PACE, COM_PACE = 1.3, 0.4  # see Paces; our choice
 
 
 @dataclass(frozen=True)
@@ -122,6 +121,7 @@ class Paces:
         swing_speed: Its mean speed on longer ways [m/s].
         shift_duration: Shortest time between two flights [s].
         hinge_pace: Mean speed of the hinge that turns most [rad/s].
+        com_pace: Mean speed of the centre of mass between two postures [m/s].
         com_acceleration: Largest acceleration of the centre of mass from rest to rest [m/s^2].
     """
 
@@ -129,6 +129,7 @@ class Paces:
     swing_speed: float = 0.7
     shift_duration: float = 0.35
     hinge_pace: float = HINGE_PACE
+    com_pace: float = COM_PACE
     com_acceleration: float = math.inf
 
     def flight(self, before: Contact, after: Contact) -> float:
@@ -254,4 +255,4 @@ def _least_time(stage: Stage, q: FloatArray, com: FloatArray, paces: Paces) -> f
     turn = float(np.abs(np.diff([*between[:, 7:], q[7:]], axis=0)).max(axis=1, initial=0.0).sum())
     way = float(np.linalg.norm(com - stage.com))
     accelerating = math.sqrt(10.0 / math.sqrt(3.0) * way / paces.com_acceleration)
-    return max(turn / paces.hinge_pace, way / COM_PACE, accelerating)
+    return max(turn / paces.hinge_pace, way / paces.com_pace, accelerating)

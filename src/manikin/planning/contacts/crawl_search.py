@@ -7,38 +7,30 @@ same backwards, as every posture at rest is at rest backwards as well.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import of_both_sides
 from manikin.contact import Contact, point
-from manikin.kinematics import Placement, Preferences
-from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import Extension
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage, onto_normal
+from manikin.planning.contacts.crawl_postures import APART, CRAWLERS, CrawlPostures, fingers_out
 from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.limb_places import stature_of
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
+from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
-from manikin.scene import Box, Obstacle, Scene
 
-ORDER = ("right_knee", "right_fist", "left_knee", "left_fist")  # order in which limbs go
+HANDS = ("left_wrist", "right_wrist")
 CRAWLING = (0.2, 0.05, 0.45)  # radius, lowest and highest end of what is free to crawl, at 1.75 m [m]
-APART = {"knee": 0.10, "fist": 0.17}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
-WHEELBASE = {"knee": -0.65, "fist": 0.65}  # place of limbs along the way, of a body of 1.75 m, twice [m]
-RESTING = (0.35, 0.2, 0.5)  # shares of the way from knees to fists at which the body rests: arms are weaker
-EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
-ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
 # Tried in turn, at 1.75 m [m]: strides with distances of hands before knees; to kneel down and get up,
 # those distances with those of knees before the feet; shares of a limb's step with ways outwards.
-GAITS = ((0.42, 0.60), (0.42, 0.70), (0.28, 0.52), (0.28, 0.70))
+GAITS = ((0.42, 0.50), (0.42, 0.60), (0.28, 0.50), (0.28, 0.60))
 KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
 NEARBY = ((1.0, 0.0), (0.6, 0.0), (1.0, -0.05), (1.0, 0.05), (0.6, -0.05))
 BEFORE, BEHIND = 0.85, 0.45  # ways from the feet to what is low when a body kneels, gets up, at 1.75 m [m]
@@ -46,34 +38,11 @@ NEAR_END = 0.8  # way to the start or goal up to which the body kneels or gets u
 TURNED = math.radians(25.0)  # angle up to which it does so with feet as they are
 STEEPEST = math.radians(30.0)  # largest slope of a surface for hands and knees
 INSET = 0.03  # distance of hands and knees to the edges of what they are on [m]
-LIFT = 0.05  # height of a limb in flight [m]
-LEVEL = {"knee": 0.3, "fist": 6.0}  # weights with which shanks are level and hands upright [1/rad^2]
-TILT = 0.19  # sine of the largest angle of a hand on its fist: its edge is not pressed into the ground
-PACES = Paces(swing_duration=0.45, swing_speed=1.2, shift_duration=0.15)  # on all fours; our choice
-ON_FOURS_ROOM = (0.04, 0.04, 0.01)  # way of the centre of mass off a posture on all fours [m]; our choice
-TURNING = 1.6  # time in which a leg goes from its knee onto its foot or back [s]
-_ON_ALL_FOURS = {
-    "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 80.0,
-    "elbow_flexion": 10.0, "wrist_flexion": -65.0, "neck_flexion": -30.0,
-}  # fmt: skip
-_PITCH = math.radians(80.0)
-_PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
-
-
-def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
-    """Posture on fists and knees on a level floor, the middle between them at the origin."""
-    angles = {name: math.radians(value) for name, value in _ON_ALL_FOURS.items()}
-    q = body.posture(of_both_sides(body, angles))
-    q[3:7] = quaternions(np.array(0.0), np.array(_PITCH), np.array(0.0))
-    q[2] = -Configuration(body, q).effector_placement(ORDER[0])[1][2]
-    size, held = stature_of(body) / 1.75, dict[str, Contact]()
-    for name in ORDER:
-        side, _, part = name.partition("_")
-        place = size * np.array([0.5 * WHEELBASE[part], (1.0 if side == "left" else -1.0) * APART[part], 0.0])
-        held[name] = point(name, place, friction=1.0, rotation=np.eye(3))
-    ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * ROOM + 0.5))
-    finder = PostureFinder(body, Scene([ceiling]), q, settings)
-    return finder.pose(held, held, q, place=np.zeros(2), placements=_level(held), preferences=_PREFERENCES)
+LIFT, STEP = 0.05, 0.1  # heights of a limb in flight, and of a foot between its knee's place and its own [m]
+# On all fours; our choice.
+PACES = Paces(swing_duration=0.5, swing_speed=1.2, shift_duration=0.2, hinge_pace=2.5, com_pace=0.5)
+ON_FOURS_ROOM = (0.02, 0.02, 0.01)  # way of the centre of mass off a posture on all fours [m]; our choice
+TURNING = 1.4  # time in which a leg goes from its knee onto its foot or back [s]
 
 
 class _Way(NamedTuple):
@@ -107,10 +76,7 @@ class CrawlSearch:
             walk: Plans a walk between two stages on feet.
         """
         self._body, self._scene = poser.body, poser.scene
-        crawling = on_all_fours(poser.body, poser.settings)
-        self._fault = f"no posture on all fours: {crawling.reason}" if crawling.q is None else ""
-        self._reference = poser.body.standing_posture() if crawling.q is None else crawling.q
-        self._poser = PostureFinder(self._body, self._scene, self._reference, poser.settings)
+        self._postures = CrawlPostures(self._body, self._scene, poser.settings)
         self._endpoints, self._walk = endpoints, walk
         self._start, self._goal, self._friction = start, goal, friction
         self._settings = settings or WalkSettings()
@@ -119,9 +85,9 @@ class CrawlSearch:
 
     def run(self) -> Extension:
         """The plan, or why there is none."""
-        found = self._fault or self._planned()
+        found = self._postures.fault or self._planned()
         plan, failure = (None, found) if isinstance(found, str) else (found, None)
-        return Extension(plan, self._poser.searches, 0, failure)
+        return Extension(plan, self._postures.searches, 0, failure)
 
     def _planned(self) -> ContactPlan | str:
         ends = feet_of(self._start.contacts), feet_of(self._goal.contacts)
@@ -182,7 +148,7 @@ class CrawlSearch:
             if walk is None:
                 return "no walk leads on from where the body would get up"
             stages, goal = [*stages, *walk.stages[1:]], walk.goal
-        return ContactPlan.of(self._body, stages, goal, self._settings)
+        return ContactPlan.of(self._body, stages, goal, PACES)
 
     # --- kneeling down and getting up -------------------------------------------------------------
 
@@ -204,12 +170,12 @@ class CrawlSearch:
     def _got_up(self, held: dict[str, Contact], feet: Contacts, lead: str) -> list[Stage] | str:
         """From four contacts onto two feet, the leading one first."""
         other = "left" if lead == "right" else "right"
-        posed, stages = self._posed(held, held, self._guide(held), guided=True), list[Stage]()
+        posed, stages = self._postures.pose(held, held, self._postures.over(held)), list[Stage]()
         if posed.q is not None:
             stages = [Stage.of(self._body, held, posed.q, self._settings.shift_duration)]
         changes = [
             (f"{lead}_knee", None), (None, f"{lead}_foot"), (f"{other}_knee", None), (None, f"{other}_foot"),
-            ("left_fist", None), ("right_fist", None),
+            *((hand, None) for hand in HANDS),
         ]  # fmt: skip
         contacts = dict(held)
         for leaving, landing in changes:
@@ -218,12 +184,23 @@ class CrawlSearch:
                 after[landing] = feet[landing]
             both = {**contacts, **after}
             staying = {name: contact for name, contact in after.items() if name in contacts}
-            if posed.q is not None:
-                posed = self._posed(both, staying, posed.q)
-            if posed.q is None:
+            before = posed.q
+            if before is not None:
+                # Hands leave one after the other, the first of them staying near.
+                near = {name: held[name] for name in HANDS if name not in both}
+                guide = self._postures.squatting(feet) if all(foot in both for foot in FEET) else None
+                posed = self._postures.pose(both, staying, before, guide, near)
+            if before is None or posed.q is None:
                 return f"{leaving or landing} cannot {'be put down' if landing else 'leave'}: {posed.reason}"
+            if landing is not None:
+                start = Configuration(self._body, before).effector_placement(landing)[1]
+                middle = 0.5 * (start + feet[landing].position) + STEP * feet[landing].normal
+                via = self._postures.between(contacts, landing, middle, (before, posed.q))
+                if via is None:
+                    return f"{landing} finds no way to {_text(feet[landing].position)}"
+                stages[-1] = Stage.of(self._body, contacts, before, TURNING, via=via)
             contacts = after
-            time = TURNING if len(after) == 3 and landing is None else self._settings.reach_duration
+            time = PACES.shift_duration if leaving == HANDS[0] else self._settings.reach_duration
             stages.append(Stage.of(self._body, contacts, posed.q, time))
         return stages
 
@@ -236,11 +213,11 @@ class CrawlSearch:
         stride, base = (self._size * value for value in gait)
         stages, goal = down.stages[:1], up.stages[0].contacts
         total, contacts, q = up.along - down.along, dict(stages[0].contacts), stages[0].q
-        begin = {"knee": down.along, "fist": down.along + base}
-        end = {"knee": up.along, "fist": up.along + up.base}
-        reached = {name: down.along + down.base * name.endswith("fist") for name in ORDER}
+        begin = {"knee": down.along, "wrist": down.along + base}
+        end = {"knee": up.along, "wrist": up.along + up.base}
+        reached = {name: down.along + down.base * name.endswith("wrist") for name in CRAWLERS}
         for number in range(4 * (2 + math.ceil(total / (0.5 * stride)))):
-            name = ORDER[number % 4]
+            name = CRAWLERS[number % 4]
             part = name.partition("_")[2]
             ahead = begin[part] + 0.25 * (number + 1) * stride
             target = goal[name] if ahead >= end[part] else None
@@ -251,7 +228,7 @@ class CrawlSearch:
                 reached[name], *made = step
                 stages += made
                 q, contacts = made[-1].q, dict(made[-1].contacts)
-            if all(contacts[each] is goal[each] for each in ORDER):
+            if all(contacts[each] is goal[each] for each in CRAWLERS):
                 return stages
         return "does not arrive on hands and knees"
 
@@ -261,7 +238,7 @@ class CrawlSearch:
     ) -> tuple[float, Stage, Stage] | str:  # fmt: skip
         """New place and stages of a limb that goes to a contact, where the way has it, or near there."""
         staying = {other: contact for other, contact in contacts.items() if other != name}
-        lifted = self._posed(contacts, staying, q, guided=True)
+        lifted = self._postures.pose(contacts, staying, q)
         if lifted.q is None:
             return f"{name} cannot leave {_text(contacts[name].position)}: {lifted.reason}"
         reason = f"there is nothing to put {name} on beyond {_text(contacts[name].position)}"
@@ -271,11 +248,12 @@ class CrawlSearch:
             if contact is None:
                 continue
             landed = {**staying, name: contact}
-            landing = self._posed(landed, staying, lifted.q, guided=True)
+            landing = self._postures.pose(landed, staying, lifted.q)
             if landing.q is None:
                 reason = f"{name} cannot be put down at {_text(contact.position)}: {landing.reason}"
                 continue
-            via = self._between(staying, name, (contacts[name], contact), (lifted.q, landing.q))
+            middle = 0.5 * (contacts[name].position + contact.position) + LIFT * contact.normal
+            via = self._postures.between(staying, name, middle, (lifted.q, landing.q))
             if via is None:
                 reason = f"{name} finds no way to {_text(contact.position)}"
                 continue
@@ -284,23 +262,13 @@ class CrawlSearch:
             return along, flying, Stage.of(self._body, landed, landing.q, PACES.shift_duration, ON_FOURS_ROOM)
         return reason
 
-    def _between(
-        self, staying: Contacts, name: str, ends: tuple[Contact, Contact],
-        postures: tuple[FloatArray, FloatArray],
-    ) -> FloatArray | None:  # fmt: skip
-        """(nq,) posture in the middle of a flight, the limb off the line between its contacts."""
-        middle = 0.5 * (ends[0].position + ends[1].position) + LIFT * ends[1].normal
-        start = 0.5 * (postures[0] + postures[1])
-        start[3:7] = postures[1][3:7]
-        return self._posed(staying, staying, start, {name: Placement(middle, None, None, 0.5 / LIFT**2)}).q
-
-    # --- contacts and postures --------------------------------------------------------------------
+    # --- contacts -----------------------------------------------------------------------------------
 
     def _contacts(self, way: _Way, ends: tuple[float, float]) -> dict[str, Contact] | str:
         """Knees and hands at two places along the way."""
         found: dict[str, Contact] = {}
-        for name in ORDER:
-            contact = self._contact(way, name, ends[name.endswith("fist")])
+        for name in CRAWLERS:
+            contact = self._contact(way, name, ends[name.endswith("wrist")])
             if contact is None:
                 return f"there is nothing for {name} at {_text(way.at(ends[0])[0])}"
             found[name] = contact
@@ -320,75 +288,9 @@ class CrawlSearch:
             spot = np.array([wanted[0], wanted[1], height])
             around = spot + INSET * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
             if abs(height - wanted[2]) < least and surface.outside(around).max() <= 0.0:
-                least, frame = abs(height - wanted[2]), onto_normal(turn, surface.normal)
+                least, frame = abs(height - wanted[2]), onto_normal(turn @ fingers_out(name), surface.normal)
                 best = point(name, spot, friction=self._friction, rotation=frame)
         return best
-
-    def _guide(self, contacts: Contacts) -> FloatArray:
-        """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
-        knees, hands = _middles(contacts)
-        ahead, q = hands - knees, np.array(self._reference)
-        yaw = math.atan2(ahead[1], ahead[0])
-        pitch = -math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
-        turn = rotations(np.array(yaw), np.array(pitch), np.array(0.0))
-        root = pin.XYZQUATToSE3(q[:7])
-        q[:7] = pin.SE3ToXYZQUAT(pin.SE3(turn, 0.5 * (knees + hands)) * root)
-        return q
-
-    def _posed(
-        self, held: Contacts, carrying: Contacts, start: FloatArray,
-        wishes: Mapping[str, Placement] | None = None, *, guided: bool = False,
-    ) -> Posed:  # fmt: skip
-        """A posture that the strength can hold, palms flat and shanks level as far as they can be.
-
-        A guided one is like that on all fours, its weight between the knees and the fists.
-        """
-        first: Posed | None = None
-        for share in RESTING if guided else (None,):
-            place = None
-            if share is not None:
-                knees, fists = (middle[:2] for middle in _middles(held))
-                near = knees + share * (fists - knees)
-                place = self._poser.resting_place(carrying, near, self._poser.settings.inset)
-            posed = self._poser.pose(
-                held, carrying, start, self._guide(held) if guided else None, place=place,
-                placements={**_level(held), **(wishes or {})}, preferences=_PREFERENCES,
-                restarts=not guided and not wishes,
-            )  # fmt: skip
-            posed = self._held_easily(posed, held, carrying)
-            if posed.q is not None:
-                return posed
-            first = first or posed
-        return first or Posed(None)
-
-    def _held_easily(self, posed: Posed, held: Contacts, carrying: Contacts) -> Posed:
-        """The posture, or that a hand is not upright in it, or that it asks for too much of the strength."""
-        if posed.q is not None:
-            state = Configuration(self._body, posed.q)
-            for name, contact in held.items():
-                up = state.effector_placement(name)[0][:, 2]
-                if name.endswith("fist") and np.linalg.norm(np.cross(up, contact.normal)) > TILT:
-                    return Posed(None, f"{name} is not upright")
-            why = self._poser.strained(posed.q, carrying, EASE)
-            return Posed(None, why) if why else posed
-        return posed
-
-
-def _middles(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
-    """(3,) middles of the knees and of the fists [m]."""
-    knees, fists = (
-        np.mean([contact.position for name, contact in contacts.items() if name.endswith(part)], axis=0)
-        for part in ("knee", "fist")
-    )
-    return knees, fists
-
-
-def _level(held: Contacts) -> dict[str, Placement]:
-    """Wishes for shanks that are level and hands that are upright."""
-    return {
-        name: Placement(None, contact.rotation_contact_to_world, LEVEL[name.partition("_")[2]])
-        for name, contact in held.items() if name in ORDER
-    }  # fmt: skip
 
 
 class _Rise(NamedTuple):
@@ -407,7 +309,7 @@ def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:
     """Kneeling down: the stages of getting up in the other order of time."""
     begins = [*(stage.q for stage in rise.stages[1:]), rise.q]
     stages = zip(reversed(rise.stages), reversed(begins), strict=True)
-    return [Stage.of(body, stage.contacts, q, stage.min_duration) for stage, q in stages]
+    return [Stage.of(body, stage.contacts, q, stage.min_duration, via=stage.via) for stage, q in stages]
 
 
 def _text(place: FloatArray) -> str:

@@ -244,6 +244,8 @@ class MotionObjective:
             second = second - self.targets.reference_second
         weight = np.full_like(second, 1.0 / scales.acceleration)
         weight[:, :7] = 1.0 / scales.pelvis_acceleration
+        if self.targets.settles:
+            weight[-1] = 0.1 / scales.rest  # 0.01 m/s^2, rad/s^2 cost as much as a speed of 1 mm/s
         out.add_diagonal(2, weight, weight * second)
 
     def _add_dynamics(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:

@@ -82,6 +82,7 @@ class FitTargets:
         forces: Contact forces at which joint torques beyond the strength cost; None where no torque costs.
         ends: (nq,) postures in which the body rests at the start and at the end; None where it only comes to
             rest.
+        settles: Whether it comes to rest at the end without acceleration: another part goes on from there.
     """
 
     time: FloatArray
@@ -99,6 +100,7 @@ class FitTargets:
     loads: tuple[CarriedLoad | None, ...] | None = None
     forces: HeldForces | None = None
     ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
+    settles: bool = False
 
 
 def effector_targets(
@@ -269,9 +271,9 @@ def flight_weight(share: FloatArray, middle: float, leaving: float, landing: flo
     return np.where(blend > 0.0, inside, 1.0)
 
 
-NEAR_CONTACT = 0.35
+NEAR_CONTACT, NEAR_CHANGE = 0.35, 0.1
 """Time before its first contact in which an effector that was free may come close to it, and that before and
-after a contact of a limb that carries with another effector besides [s]."""
+after a contact of a limb that carries with another effector besides, which comes straight down [s]."""
 
 
 def ignored_pairs(
@@ -285,13 +287,13 @@ def ignored_pairs(
     ]
     for swing in sequence.swings():
         hanging, (begin, end) = hangs(body, swing.effector), schedule.swing_interval(swing)
-        flies = swing.end is None or (hanging and swing.start is not None)
+        flies = (swing.end is None and not hanging) or (hanging and None not in (swing.start, swing.end))
         early = NEAR_CONTACT if hanging else SITTING_DOWN
         if hanging and carries_elsewhere(body, schedule, swing):
-            flies = False
-            if swing.start is not None:
-                rows = (time >= begin) & (time < begin + NEAR_CONTACT)
-                landing.append((touch_pairs(body, scene, swing.start), rows))
+            flies, early = False, NEAR_CHANGE
+        if hanging and swing.start is not None and not flies:
+            rows = (time >= begin) & (time < begin + early)
+            landing.append((touch_pairs(body, scene, swing.start), rows))
         if swing.end is not None and not flies:
             landing.append((touch_pairs(body, scene, swing.end), (time >= end - early) & (time < end)))
         if not flies:

@@ -21,7 +21,7 @@ from manikin.body.configuration import Configuration
 from manikin.body.limbs import end_segments, hanging_segment
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
-from manikin.motion.configuration_spline import ConfigurationSpline, align_quaternions
+from manikin.motion.configuration_spline import ConfigurationSpline
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -140,7 +140,7 @@ class WholeBodyResult(Displayed):
 def plan_whole_body(
     body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, *, rng: np.random.Generator,
     settings: WholeBodySettings | None = None, padded: Sequence[str] = (),
-    key_postures: FloatArray | None = None, waypoints: KeyPostures | None = None,
+    known: Guide | None = None, waypoints: KeyPostures | None = None,
     progress: Progress | None = None,
 ) -> WholeBodyResult:  # fmt: skip
     """Find a whole-body motion that keeps contacts, centre of mass and distances.
@@ -151,8 +151,8 @@ def plan_whole_body(
         rng: Source of all randomness (the Bi-RRT).
         padded: Obstacles that any part of the body may lean on: it is kept off them where that is
             possible, but the certificate does not ask for it.
-        key_postures: (phases + 1, nq) postures known for the key instants, which the motion stays near;
-            the manner's when omitted.
+        known: Postures at the key instants, and perhaps in between, which the motion stays near; the
+            manner's when omitted.
         waypoints: Postures of the plan's key instants, which lead the motion where one that is led by
             the manner is caught on the wrong side of an obstacle.
         progress: Called now and then with the share done.
@@ -164,14 +164,12 @@ def plan_whole_body(
         the result is called a failure.
     """
     began = clock.perf_counter()
-    known = led = None
-    if key_postures is not None:
-        known = Guide(trajectory.schedule.instants, align_quaternions(np.array(key_postures)), ())
-    elif waypoints is not None:
-        led = waypoints.guide()
+    led = waypoints.guide() if known is None and waypoints is not None else None
     leaning, tell = leaning_pairs(body, padded), progress or no_progress
-    planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), leaning, known, led)
     keys = [] if known is None else resting_keys(body, trajectory, known)
+    if known is not None and len(keys) > 2:
+        known = known.resting(trajectory.schedule.instants[keys])
+    planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), leaning, known, led)
     if len(keys) > 2:
         return _in_parts(planner, keys, began, tell)
     return planner.run(planner.swings(), began, tell)
@@ -249,7 +247,7 @@ class _Goal:
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             forces=None if self.forces is None else HeldForces.of(planner.body, schedule, self.forces, time),
-            ends=planner.ends,
+            ends=planner.ends, settles=planner.settles,
         )  # fmt: skip
 
 
@@ -262,6 +260,7 @@ class _Planner:
         waypoints: Guide | None = None,
     ) -> None:  # fmt: skip
         self.ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
+        self.settles = False
         self.instants = trajectory.schedule.instants
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
         self.leaning, self.known, self.waypoints = leaning, known, waypoints
@@ -276,13 +275,11 @@ class _Planner:
         )  # fmt: skip
         self.guide = cache(self._guide)
 
-    def part(self, first: int, last: int) -> "_Planner":
-        """The same job from one key instant to another, at rest in the known postures of those inside."""
-        assert self.known is not None  # only motions along known postures are divided
-        part, count = copy(self), len(self.trajectory.schedule.sequence)
-        inside = (key if 0 < key < count else None for key in (first, last))
-        start, end = (None if key is None else self.known.configurations[key] for key in inside)
-        part.ends, part.instants = (start, end), self.trajectory.schedule.instants[first : last + 1]
+    def part(self, first: int, last: int, start: FloatArray | None) -> "_Planner":
+        """The same job from one key instant to another, at rest at both; it begins in a posture (nq,)."""
+        part = copy(self)
+        part.ends, part.settles = (start, None), last < len(self.instants) - 1
+        part.instants = self.instants[first : last + 1]
         part.job, part.guide = replace(self.job, span=(first, last)), cache(part._guide)
         return part
 
@@ -387,12 +384,14 @@ class _Planner:
         time = split_spans(self.instants, self.settings.guide_spacing)
         toes, reference = self.toes(swings, time), self._reference(time, manner, known)
         lay_toes_flat(toes, reference)
+        # A guide that lags behind postures at rest at their ends would have to catch up there.
+        exact = tuple(toes) if known is None or known.rates is None else range(self.body.nq - 7)
         com = self.trajectory.position(time)
         com[~self.trajectory.binds(time)] = np.nan  # The body is safe without one.
         return plan_guide(
             self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time), com,
             ignored_pairs(self.body, self.scene, schedule, time), reference,
-            self.settings.fit.safe_distance, manner.preferences, tuple(toes), restarts,
+            self.settings.fit.safe_distance, manner.preferences, exact, restarts,
         )  # fmt: skip
 
     def toes(self, swings: tuple[PlannedSwing, ...], time: FloatArray) -> dict[int, FloatArray]:
@@ -427,13 +426,13 @@ in which the body rests there [m]."""
 def resting_keys(body: BodyModel, trajectory: CentroidalTrajectory, known: Guide) -> list[int]:
     """Key instants at which the centre of mass of a crawl rests where a known posture has it; both ends too.
 
-    Empty where nothing carries on a knee, a fist or a tip, and where the trajectory does not bind to its end.
+    Empty where nothing carries on a knee, a wrist or a tip, and where it does not bind to its end.
     """
     instants, phases = trajectory.schedule.instants, trajectory.schedule.sequence
     crawls = any(rolls_on_point(contact) for phase in phases for contact in phase.stance)
     if not crawls or trajectory.binding_until is not None:
         return []
-    coms = np.array([Configuration(body, q).com for q in known.configurations])
+    coms = np.array([Configuration(body, q).com for q in known.at(instants)])
     limits = (
         (trajectory.velocity(instants), STILL[0]), (trajectory.acceleration(instants), STILL[1]),
         (trajectory.position(instants) - coms, CLOSE_TO),
@@ -451,7 +450,8 @@ def _in_parts(planner: _Planner, keys: Sequence[int], began: float, progress: Pr
     swings, parts, count = planner.swings(), list[WholeBodyResult](), len(keys) - 1
     for number, (first, last) in enumerate(pairwise(keys)):
         progress(0.2 + 0.8 * number / count)
-        parts.append(planner.part(first, last).run(swings, began, no_progress))
+        start = parts[-1].spline.control_points[-1] if parts else None
+        parts.append(planner.part(first, last, start).run(swings, began, no_progress))
         swings = parts[-1].swings
     spline = ConfigurationSpline.joined([part.spline for part in parts])
     guide = Guide.joined([part.guide for part in parts])

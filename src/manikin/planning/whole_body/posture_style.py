@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
@@ -35,17 +36,33 @@ class Guide:
         configurations: (k, nq), quaternions in one half-space.
         failures: Time [s] and reason of the postures that could not be found exactly; their best attempts are
             used.
+        rates: (k, nq) derivatives, between which it is smooth in time; None where it is linear.
     """
 
     time: FloatArray
     configurations: FloatArray
     failures: tuple[tuple[float, str], ...]
+    rates: FloatArray | None = None
 
     def at(self, time: FloatArray) -> FloatArray:
-        """(n, nq) linear interpolation; quaternions are normalised."""
-        rows = np.stack([np.interp(time, self.time, column) for column in self.configurations.T], axis=1)
+        """(n, nq) interpolation; quaternions are normalised."""
+        if self.rates is None:
+            rows = np.stack([np.interp(time, self.time, column) for column in self.configurations.T], axis=1)
+        else:
+            rows = CubicHermiteSpline(self.time, self.configurations, self.rates)(
+                np.clip(time, self.time[0], self.time[-1])
+            )
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
         return rows
+
+    def resting(self, instants: FloatArray) -> "Guide":
+        """The same, smooth and without overshoot (PCHIP), at rest at some of its times [s].
+
+        On a line in time a body would stop dead at each rest.
+        """
+        rates = PchipInterpolator(self.time, self.configurations).derivative()(self.time)
+        rates[np.isin(self.time, instants)] = 0.0
+        return replace(self, rates=rates)
 
     @classmethod
     def joined(cls, parts: "Sequence[Guide]") -> "Guide":

@@ -173,13 +173,23 @@ class FlightPlanner:
     def flights(self) -> tuple[Swing, ...]:
         """Every flight from a contact or to one; the trunk is not flown.
 
-        A foot whose knee carries in between is put away and reached with, on its own each.
+        A foot whose knee carries in between is put away and reached with, on its own each. Its knee has no
+        curve: under a thigh that stands on it there is no way straight up.
         """
         found: list[Swing] = []
         for swing in self.schedule.sequence.swings():
-            if hangs(self._body, swing.effector):
-                apart = swing.start and swing.end and carries_elsewhere(self._body, self.schedule, swing)
-                found += [replace(swing, end=None), replace(swing, start=None)] if apart else [swing]
+            if not hangs(self._body, swing.effector):
+                continue
+            if not carries_elsewhere(self._body, self.schedule, swing):
+                found.append(swing)
+                continue
+            ends = replace(swing, end=None), replace(swing, start=None)
+            contacts = (swing.start, swing.end)
+            found += [
+                part
+                for part, contact in zip(ends, contacts, strict=True)
+                if contact is not None and not rolls_on_point(contact)
+            ]
         return tuple(found)
 
     def plan(self, swing: Swing) -> PlannedSwing:
@@ -191,7 +201,7 @@ class FlightPlanner:
         if roll is None:
             ends, clearance = (Pose.of(swing.start), Pose.of(swing.end)), self._clearance(swing)
             limits, heights, pitch = self._limits, HEIGHTS, self._pitch(swing, start)
-            if rolls_on_point(swing.start):  # a knee or fist turns about its point as it goes
+            if rolls_on_point(swing.start):  # a knee or wrist turns about its point as it goes
                 limits = replace(limits, clearance=2.0 * limits.clearance)
         else:
             # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it rises.
@@ -210,21 +220,26 @@ class FlightPlanner:
     def _reach(self, swing: Swing) -> PlannedSwing:
         """Curve between a contact, where alone it must be kept, and the effector in the preferred posture."""
         start, end = self.schedule.swing_interval(swing)
+        near, longest, changes = swing, REACHING_TIME, carries_elsewhere(self._body, self.schedule, swing)
+        if changes:
+            # A limb that changes from one contact to another need not rise above both ends. It is put away in
+            # one half of the phase in which it flies and reached with in the other, past what stands then.
+            phase = swing.last_phase if swing.start is None else swing.first_phase
+            near = replace(swing, first_phase=phase, last_phase=phase)
+            longest = min(longest, 0.5 * float(np.diff(self.schedule.instants[phase : phase + 2])[0]))
         if swing.start is None:
-            start = max(start, end - REACHING_TIME)
+            start = max(start, end - longest)
         else:
-            end = min(end, start + REACHING_TIME)
+            end = min(end, start + longest)
         contact = swing.end or swing.start
         assert contact is not None
         first, last = (
             Pose.of(held) if held else Pose.in_posture(self._body, self._reference(time), swing.effector)
             for held, time in ((swing.start, start), (swing.end, end))
         )
-        # A limb that changes from one contact to another need not rise above both ends.
-        level = carries_elsewhere(self._body, self.schedule, swing)
         plan = plan_swing(
-            first, last, start, end, self._clearance(swing), limits=self._limits, refine=0,
-            start_normal=contact.normal, end_normal=contact.normal, heights=(0.0,) * level + HEIGHTS,
+            first, last, start, end, self._clearance(near), limits=self._limits, refine=0,
+            start_normal=contact.normal, end_normal=contact.normal, heights=(0.0,) * changes + HEIGHTS,
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "reach")
 
@@ -306,7 +321,7 @@ class FlightPlanner:
 
 
 def rolls_on_point(contact: Contact) -> bool:
-    """Whether a contact leaves its effector free to turn: a knee, a fist or a tip, but no flat palm."""
+    """Whether a contact leaves its effector free to turn: a knee, a wrist or a tip, but no flat palm."""
     return contact.kind is ContactKind.POINT and not contact.effector.endswith("hand")
 
 

@@ -45,7 +45,7 @@ class ContactSection(Section):
     """One contact; what it leaves out comes from the section around it."""
 
     kind: Literal["sole", "point", "grasp"] | None = optional(
-        "default: sole for a foot, grasp for a hand, point for a fist or a knee"
+        "default: sole for a foot, grasp for a hand, point for a wrist or a knee"
     )
     position: Annotated[Vector3, FrameMoves.POINT] = required(
         "of the contact (centre of a sole) in the world [m]"
@@ -90,7 +90,7 @@ class ContactSection(Section):
 
     def kind_for(self, effector: str) -> str:
         """Kind of the contact when ``effector`` makes it."""
-        usual = {"hand": "grasp", "fist": "point", "knee": "point"}
+        usual = {"hand": "grasp", "wrist": "point", "knee": "point"}
         return self.kind or usual.get(effector.rpartition("_")[2], "sole")
 
     def check_for(self, effector: str, path: str = "") -> None:
@@ -105,7 +105,7 @@ class ContactSection(Section):
 
 
 EFFECTORS = (
-    "left_foot", "right_foot", "left_hand", "right_hand", "left_fist", "right_fist", "left_knee",
+    "left_foot", "right_foot", "left_hand", "right_hand", "left_wrist", "right_wrist", "left_knee",
     "right_knee", "buttocks",
 )  # fmt: skip
 """Effectors of a human that a phase may put in contact, in the order of the contact tables."""
@@ -147,8 +147,8 @@ class PhaseSection(Section):
     right_foot: ContactEntry | None = optional("contact of the right foot, or 'same'")
     left_hand: ContactEntry | None = optional("contact of the left hand, or 'same'")
     right_hand: ContactEntry | None = optional("contact of the right hand, or 'same'")
-    left_fist: ContactEntry | None = optional("contact of the end of the left hand, or 'same'")
-    right_fist: ContactEntry | None = optional("contact of the end of the right hand, or 'same'")
+    left_wrist: ContactEntry | None = optional("contact of the heel of the left hand, or 'same'")
+    right_wrist: ContactEntry | None = optional("contact of the heel of the right hand, or 'same'")
     left_knee: ContactEntry | None = optional("contact of the left knee, or 'same'")
     right_knee: ContactEntry | None = optional("contact of the right knee, or 'same'")
     left_front_foot: ContactEntry | None = optional(_MASSLESS)

@@ -1,0 +1,187 @@
+"""Postures of a body that crawls on hands and knees, kneels down and gets up.
+
+What carries a hand is its heel, under the wrist: arms are nearly straight on it, so that elbows ask for a
+quarter of their strength at rest.  Wrists bend back by 70 degrees at most, so elbows are behind them.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import of_both_sides
+from manikin.contact import Contact, point
+from manikin.kinematics import Placement, Preferences
+from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
+from manikin.planning.contacts.contact_plan import Contacts
+from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
+from manikin.scene import Box, Obstacle, Scene
+
+CRAWLERS = ("right_knee", "right_wrist", "left_knee", "left_wrist")  # in the order in which they go
+APART = {"knee": 0.08, "wrist": 0.20}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
+WHEELBASE = {"knee": -0.55, "wrist": 0.55}  # place of limbs along the way, of a body of 1.75 m, twice [m]
+# Shares of the way from knees to wrists at which the body rests, and its distance there to the edges of where
+# it may rest, at 1.75 m [m]: a shift of the weight from three limbs to other three is twice that at least.
+RESTING, RESTING_INSET = (0.36, 0.42, 0.3), 0.02
+EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
+ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
+OUTWARDS = math.radians(30.0)  # angle of the fingers from the way
+# Distance from a place that is wished for that costs half a unit, and that of a hand from what it left [m].
+MISSED, OFF = 0.05, 0.03
+LEVEL = {"knee": 1.0, "wrist": 6.0}  # weights with which shanks and hands are level [1/rad^2]
+TILT = 0.5  # sine of the largest angle of a hand: neither its edge nor the forearm is pressed into the ground
+_ON_ALL_FOURS = {
+    "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 66.0,
+    "elbow_flexion": 48.0, "forearm_pronation": 65.0, "wrist_flexion": -62.0, "neck_flexion": -30.0,
+}  # fmt: skip
+_SQUATTING = {
+    "hip_flexion": 126.0, "knee_flexion": 96.0, "ankle_dorsiflexion": 28.0, "lumbar_flexion": 20.0,
+    "shoulder_flexion": 70.0, "elbow_flexion": 20.0,
+}  # fmt: skip
+_CRAWLING_PITCH, _SQUATTING_PITCH = math.radians(84.0), math.radians(58.0)
+_PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
+
+
+def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
+    """Posture on hands and knees on a level floor, the middle between them at the origin."""
+    q = _bent(body, _ON_ALL_FOURS, 0.0, _CRAWLING_PITCH)
+    q[2] = -Configuration(body, q).effector_placement(CRAWLERS[0])[1][2]
+    size, held = stature_of(body) / 1.75, dict[str, Contact]()
+    for name in CRAWLERS:
+        side, _, part = name.partition("_")
+        place = size * np.array([0.5 * WHEELBASE[part], (1.0 if side == "left" else -1.0) * APART[part], 0.0])
+        held[name] = point(name, place, friction=1.0, rotation=fingers_out(name))
+    ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * ROOM + 0.5))
+    finder = PostureFinder(body, Scene([ceiling]), q, settings)
+    return finder.pose(held, held, q, place=np.zeros(2), placements=_level(held), preferences=_PREFERENCES)
+
+
+class CrawlPostures:
+    """Finds postures of a body on all fours, and on the way there from its feet; see :class:`PostureFinder`.
+
+    Attributes:
+        fault: Why the body has no posture on all fours; empty where it has one.
+    """
+
+    def __init__(self, body: BodyModel, scene: Scene, settings: PostureFinderSettings) -> None:
+        crawling = on_all_fours(body, settings)
+        self.fault = f"no posture on all fours: {crawling.reason}" if crawling.q is None else ""
+        self._body = body
+        self._reference = body.standing_posture() if crawling.q is None else crawling.q
+        self._finder = PostureFinder(body, scene, self._reference, settings)
+        self._inset = RESTING_INSET * stature_of(body) / 1.75
+
+    @property
+    def searches(self) -> int:
+        """Postures looked for so far."""
+        return self._finder.searches
+
+    def pose(
+        self, held: Contacts, carrying: Contacts, start: FloatArray, guide: FloatArray | None = None,
+        near: Contacts | None = None,
+    ) -> Posed:  # fmt: skip
+        """A posture that the strength can hold, hands flat and shanks level as far as they can be.
+
+        One on hands and knees alone is like :func:`on_all_fours`, its weight between them; another one is
+        like a guide (nq,), limbs just off what they left ``near``. The other arguments are those of
+        :meth:`PostureFinder.pose`.
+        """
+        first, crawls, wishes = None, held.keys() <= set(CRAWLERS), _level(held)
+        for name, contact in (near or {}).items():
+            wishes[name] = _wished(contact.position + OFF * contact.normal)
+        for share in RESTING if crawls else (0.0,):
+            place = None
+            if crawls:
+                knees, wrists = (middle[:2] for middle in _middles(held))
+                place = self._finder.resting_place(carrying, knees + share * (wrists - knees), self._inset)
+            posed = self._finder.pose(
+                held, carrying, start, self.over(held) if crawls else guide, place=place,
+                placements=wishes, preferences=_PREFERENCES, restarts=not crawls,
+            )  # fmt: skip
+            posed = self._held_easily(posed, held, carrying)
+            if posed.q is not None:
+                return posed
+            first = first or posed
+        return first or Posed(None)
+
+    def between(
+        self, staying: Contacts, name: str, middle: FloatArray, postures: tuple[FloatArray, FloatArray]
+    ) -> FloatArray | None:
+        """(nq,) posture half way between two, a limb near a place (3,) off the ground [m]."""
+        start = 0.5 * (postures[0] + postures[1])
+        start[3:7] = postures[1][3:7]
+        wishes = _level(staying) | {name: _wished(middle)}
+        return self._finder.pose(
+            staying, staying, start, start, placements=wishes, preferences=_PREFERENCES
+        ).q
+
+    def over(self, contacts: Contacts) -> FloatArray:
+        """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
+        knees, hands = _middles(contacts)
+        ahead, q = hands - knees, np.array(self._reference)
+        yaw = math.atan2(ahead[1], ahead[0])
+        pitch = -math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
+        turn = rotations(np.array(yaw), np.array(pitch), np.array(0.0))
+        root = pin.XYZQUATToSE3(q[:7])
+        q[:7] = pin.SE3ToXYZQUAT(pin.SE3(turn, 0.5 * (knees + hands)) * root)
+        return q
+
+    def squatting(self, feet: Contacts) -> FloatArray:
+        """(nq,) posture that squats on two feet: a person's way up, and no legs at full length."""
+        ahead = np.mean([foot.rotation_contact_to_world[:2, 0] for foot in feet.values()], axis=0)
+        q = _bent(self._body, _SQUATTING, math.atan2(ahead[1], ahead[0]), _SQUATTING_PITCH)
+        state = Configuration(self._body, q)
+        away = [foot.position - state.effector_placement(name)[1] for name, foot in feet.items()]
+        q[:3] += np.mean(away, axis=0)
+        return q
+
+    def _held_easily(self, posed: Posed, held: Contacts, carrying: Contacts) -> Posed:
+        """The posture, or that a hand is not level in it, or that it asks for too much of the strength."""
+        if posed.q is not None:
+            state = Configuration(self._body, posed.q)
+            for name, contact in held.items():
+                up = state.effector_placement(name)[0][:, 2]
+                if name.endswith("wrist") and np.linalg.norm(np.cross(up, contact.normal)) > TILT:
+                    return Posed(None, f"{name} is not level")
+            why = self._finder.strained(posed.q, carrying, EASE)
+            return Posed(None, why) if why else posed
+        return posed
+
+
+def fingers_out(name: str) -> FloatArray:
+    """(3, 3) turn of a limb's frame from that of the way: fingers point outwards."""
+    side, _, part = name.partition("_")
+    return rotation_from_yaw((OUTWARDS if side == "left" else -OUTWARDS) * (part == "wrist"))
+
+
+def _bent(body: BodyModel, degrees: Mapping[str, float], yaw: float, pitch: float) -> FloatArray:
+    """(nq,) posture of angles on both sides [deg], the root turned and pitched [rad]."""
+    angles = {name: math.radians(value) for name, value in degrees.items()}
+    q = np.array(body.posture(of_both_sides(body, angles)))
+    q[3:7] = quaternions(np.array(yaw), np.array(pitch), np.array(0.0))
+    return q
+
+
+def _middles(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
+    """(3,) middles of the knees and of the wrists [m]."""
+    knees, wrists = (
+        np.mean([contact.position for name, contact in contacts.items() if name.endswith(part)], axis=0)
+        for part in ("knee", "wrist")
+    )
+    return knees, wrists
+
+
+def _wished(place: FloatArray) -> Placement:
+    """Wish for a limb at a place (3,) [m], turned as it likes."""
+    return Placement(place, None, None, 0.5 / MISSED**2)
+
+
+def _level(held: Contacts) -> dict[str, Placement]:
+    """Wishes for shanks and hands that are level."""
+    return {
+        name: Placement(None, contact.rotation_contact_to_world, LEVEL[name.partition("_")[2]])
+        for name, contact in held.items() if name in CRAWLERS
+    }  # fmt: skip
