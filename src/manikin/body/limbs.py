@@ -75,7 +75,7 @@ TIP_RADIUS = 0.008
 
 
 def with_round_tips(body: BodyModel, effectors: Iterable[str]) -> BodyModel:
-    """The human with a ball at each effector :data:`SKIN` or more before its segment: heels, kneecaps.
+    """The human with a ball at each effector :data:`SKIN` or more before its segment: heel of hand, kneecap.
 
     Joints, masses and effectors are the same. A kneecap is fixed to the shank, whatever the thigh does;
     without it, the round end of the thigh rolls on the ground by its whole turn, and an edge of the hand
