@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
+from manikin.body import Configuration
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control import Controller, ControlSettings, SupportMode, TaskWeights
 from manikin.control.controller import PRESSED, RAISED
@@ -254,6 +255,30 @@ def test_a_foot_on_a_rod_carries_at_a_line_of_its_own_segment(body, middle):
     geometry = contact_geometry(body, rung, 0.01)
     assert [segment for segment, _ in geometry.patches] == ["left_foot"]
     assert points_along(body, geometry) == pytest.approx([middle, middle])
+
+
+@pytest.mark.parametrize("pitch", [-0.2, 0.1])
+def test_a_foot_that_tilts_on_a_rod_carries_where_it_has_rolled_to(body, contacts, still, pitch):
+    """On a rod of 16 mm, 1.6 mm from where the sole lay flat at 0.1 rad: the force acts there."""
+    _, right = contacts
+    radius, half = 0.016, np.sqrt(0.0015 * (0.032 - 0.0015))
+    edge = [[x, y] for x, y in ((half, 0.05), (-half, 0.05), (-half, -0.05), (half, -0.05))]
+    q = body.standing_posture()
+    q[7 + body.joint_index("left_ankle_dorsiflexion")] += pitch
+    turn, origin = Configuration(body, q).effector_placement("left_foot")
+    # Rolled to its tilt, the sole touches the rod's side, as far along the sole as around the rod.
+    touching = origin + turn @ [-radius * pitch, 0.0, 0.0]
+    top = touching - radius * turn[:, 2] + [0.0, 0.0, radius]
+    rung = sole("left_foot", top, length=0.26, width=0.1, friction=0.7, polygon=edge)
+    schedule = ContactSchedule(StanceSequence([Phase(Stance([rung, right]))]), [0.0, 1.0])
+    output, _ = solve(Controller(body, still, schedule), q, np.zeros(body.nv), 0.5)
+    (basis,) = (item.basis for item in output.problem.contacts if item.basis.contact is rung)
+    force, moment = basis.wrench[:3], basis.wrench[3:]
+    # About the line itself there is no moment along it.
+    about = moment - np.cross(touching - origin, force.T).T
+    assert np.abs(about[1]).max() < 1e-9
+    planned = moment - np.cross(top - origin, force.T).T
+    assert np.abs(planned[1]).max() > 0.5 * radius * abs(pitch)
 
 
 def test_a_foot_carries_nothing_beyond_the_rung_below_its_middle(body):

@@ -249,7 +249,8 @@ class Controller:
         return weight
 
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
-        geometry = self.geometry(contact)
+        frame = state.frames[contact.effector]
+        geometry = edge_forces.on_bar(contact, self.geometry(contact), self.body, frame)
         basis = edge_forces.contact_force_basis(
             contact, geometry, state, sliding=support.settling,
             friction_share=self.settings.supports.friction_share, friction_model=self._friction_model,

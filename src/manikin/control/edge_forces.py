@@ -9,9 +9,13 @@ from manikin.balance.friction import edges_in_world
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment, hinge_line
 from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
-from manikin.control.dynamics import DynamicsState
+from manikin.control.dynamics import DynamicsState, FrameState
 from manikin.numerics.polytope import chord, inset_polygon
 from manikin.numerics.spatial import FloatArray, cross, skew
+from manikin.scene.surface import bar_radius
+
+MOST_ROLLED = 0.03
+"""Farthest way of a sole on a round bar that counts [m]: beyond that it has slipped; our choice."""
 
 ROUND = 0.02
 """Length of what of a sole touches up to which it carries at a line: that of a rod is 14 mm [m]."""
@@ -73,6 +77,24 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
     if toes is not None and len(tips):
         patches.append((toes.name, on_segment(tips) - toes.origin))
     return ContactGeometry(contact.effector, tuple(patches))
+
+
+def on_bar(
+    contact: Contact, geometry: ContactGeometry, body: BodyModel, frame: FrameState
+) -> ContactGeometry:
+    """The points of a sole on a round bar, on which it rolls, at the current placement of the effector.
+
+    At a tilt ``t`` it touches a bar of radius ``r`` at ``r t`` from where it lay flat. With points that stay
+    where they are, a load ``F`` turns it on by ``r F t``, which is more than an ankle is held with.
+    """
+    if contact.kind is not ContactKind.SOLE or contact.part is not SolePart.FULL or contact.length > ROUND:
+        return geometry
+    line = contact.position + contact.rotation_contact_to_world @ contact.centre
+    axis = line - bar_radius(contact.length) * contact.normal
+    rolled = float(frame.rotation[:, 0] @ (axis - frame.position) - contact.centre[0])
+    away = np.clip(rolled, -MOST_ROLLED, MOST_ROLLED) * body.effector(contact.effector).rotation[:, 0]
+    patches = tuple((segment, points + away) for segment, points in geometry.patches)
+    return ContactGeometry(geometry.effector, patches)
 
 
 def _parts(polygon: FloatArray, line: float) -> tuple[FloatArray, FloatArray]:

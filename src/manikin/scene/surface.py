@@ -356,12 +356,17 @@ def bar_tops(obstacles: Sequence[Obstacle]) -> tuple[Surface, ...]:
             continue
         up = np.array([0.0, 0.0, 1.0]) - axis[2] * axis
         up /= np.linalg.norm(up)
-        half = float(np.sqrt(SOLE_YIELD * (2.0 * shape.radius - SOLE_YIELD)))
+        half = float(np.sqrt(SOLE_YIELD * (2.0 * shape.radius - SOLE_YIELD)))  # as bar_radius has it
         along, across = 0.5 * shape.length * axis, half * np.cross(up, axis)
         ring = item.translation + shape.radius * up + _corners(along, across)
         polygon = frozen_array(ring, "polygon", (4, 3))
         found.append(Surface((item.name,), polygon, frozen_array(up, "normal", (3,))))
     return tuple(found)
+
+
+def bar_radius(width: float) -> float:
+    """Radius of the round bar whose strip on top has a width [m], see :func:`bar_tops`."""
+    return (0.25 * width**2 + SOLE_YIELD**2) / (2.0 * SOLE_YIELD)
 
 
 def palm_places(lines: Sequence[GraspLine], numbers: NDArray[np.int64], points: FloatArray) -> FloatArray:
