@@ -9,6 +9,7 @@ import pytest
 import trimesh
 import yaml
 
+from manikin.body import Configuration
 from manikin.contact import ContactKind, ContactModel
 from manikin.errors import ScenarioError
 from manikin.numerics.spatial import IDENTITY
@@ -16,6 +17,8 @@ from manikin.pipeline import runner
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.pipeline.stages.context import plan_in_world
 from manikin.scenarios import load_scenario
+from manikin.scenarios.families import FAMILIES, draw_scene
+from manikin.scene import Proximity, segment_of
 from manikin.verification import check_contact_plan
 
 DOG = Path(__file__).parents[1] / "body" / "data" / "dog.urdf"
@@ -173,3 +176,36 @@ def test_contacts_of_any_limbs_need_the_refinement():
     scenario = load_scenario("climb-wall", overrides=["wholebody.method=follow"])
     with pytest.raises(ScenarioError, match=r"wholebody\.method is follow; valid: refine"):
         runner.run(scenario)
+
+
+def test_a_person_on_a_ladder_stays_upright(tmp_path):
+    """Down from the fourth rung: trunk and pelvis are never tilted by more than 35 degrees."""
+    scenario = draw_scene(FAMILIES["ladders"], 1300, tmp_path)
+    body, scene = scenario.build_body(), scenario.build_scene()
+    plan = find_supports(scenario, body, scene, np.random.default_rng(0)).plan
+    assert plan is not None
+    for stage in plan.stages:
+        state = Configuration(body, stage.q)
+        upright = [state.segment_placement(name)[0][2, 2] for name in ("pelvis", "thorax")]
+        assert min(upright) > np.cos(np.deg2rad(35.0))
+
+
+def test_a_free_hand_comes_to_its_rung_from_outside(tmp_path):
+    """From the ground: half way to its first hold a hand is outside all that it could hold on to."""
+    scenario = draw_scene(FAMILIES["ladders"], 1304, tmp_path)
+    body, scene = scenario.build_body(), scenario.build_scene()
+    plan = find_supports(scenario, body, scene, np.random.default_rng(0)).plan
+    assert plan is not None
+    proximity, reached = Proximity(body, scene), 0
+    for before, after in pairwise(plan.stages):
+        for name in set(after.contacts) - set(before.contacts):
+            hand, is_free = body.effector(name).segment, "hand" in name and before.via is not None
+            held = [hand_ for hand_ in before.contacts if body.effector(hand_).segment == hand]
+            if not is_free or held:
+                continue
+            near = proximity.evaluate(before.via, 0.05)
+            pairs = zip(near.distance, near.pairs, strict=True)
+            mine = [distance for distance, (shape, _) in pairs if segment_of(shape) == hand]
+            assert min(mine, default=1.0) > 0.0
+            reached += 1
+    assert reached >= 2

@@ -20,7 +20,7 @@ from manikin.planning.whole_body.certificate import certify_refined
 from manikin.planning.whole_body.refine_contacts import contact_variables
 from manikin.planning.whole_body.refine_input import KeyPath, stretched_around, stretched_for_speed
 from manikin.planning.whole_body.refine_measures import RefineObstacles, balance_of, differences, rooms_of
-from manikin.scene import Proximity, Scene
+from manikin.scene import Box, Obstacle, Proximity, Scene
 
 FEET = [
     sole(f"{side}_foot", (0.0, y, 0.0), length=0.28, width=0.12, friction=0.7)
@@ -69,6 +69,43 @@ def test_a_refined_motion_is_smoother_than_a_spline_through_its_input(name, requ
     """The jumps of the input's velocity at its keys do not decide the comparison."""
     _, result = request.getfixturevalue(name)
     assert result.after.squared_accelerations < result.smoothed.squared_accelerations / 2.0
+
+
+@pytest.fixture(scope="module")
+def knee_bends():
+    """Keys with the pelvis 8 cm lower in the middle, and 4 cm at the end of the first and the third phase."""
+    body, keys = human(), []
+    for height in (0.92, 0.88, 0.84, 0.88, 0.92):
+        problem = PostureProblem(body, tuple(FEET), com=np.array([0.0, 0.0, height]))
+        found = generate_posture(problem, keys[-1] if keys else None)
+        assert found.succeeded, found.failure
+        keys.append(found.q)
+    instants = np.array([0.0, 0.8, 1.6, 2.4, 3.2])
+    schedule = ContactSchedule(StanceSequence([Phase(Stance(FEET, 1500.0))] * 4), instants)
+    return body, instants, np.array(keys), schedule
+
+
+def test_a_motion_with_rests_is_at_rest_there_in_its_key(knee_bends):
+    """Without velocity and acceleration, in the posture that was given, all requirements kept throughout."""
+    body, time, q, schedule = knee_bends
+    result = refine_motion(body, Scene(), time, q, schedule, rests=[2])
+    assert result.failure is None, result.failure
+    found = result.spline.evaluate(result.schedule.instants)
+    np.testing.assert_allclose(found.q[2], KeyPath(time, q).q[2], atol=1e-9)
+    np.testing.assert_allclose(found.v[2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.a[2], 0.0, atol=1e-6)
+    assert np.abs(found.v[[1, 3]]).max() > 0.05  # and goes on elsewhere
+    assert result.motion.time[-1] == pytest.approx(result.schedule.instants[-1])
+
+
+def test_a_motion_with_rests_ends_with_the_part_that_fails(knee_bends):
+    """A post in the pelvis: nothing after the first rest is fitted."""
+    body, time, q, schedule = knee_bends
+    post = Obstacle("post", Box((0.1, 0.1, 0.2)), translation=tuple(q[0, :3]))
+    result = refine_motion(body, Scene([post]), time, q, schedule, rests=[2])
+    assert result.failure is not None
+    assert len(result.schedule.sequence) == 2
+    assert result.failure.time <= result.motion.time[-1] == result.schedule.instants[-1]
 
 
 @pytest.mark.parametrize("name", ["crouching", "climbing"])

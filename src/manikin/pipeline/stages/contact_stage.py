@@ -11,7 +11,7 @@ from itertools import islice
 
 import numpy as np
 
-from manikin.body import BodyModel, Limb, limb_named
+from manikin.body import BodyModel, Configuration, Limb, limb_named
 from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
 from manikin.kinematics.limb_samples import sample_limbs
@@ -22,7 +22,7 @@ from manikin.pipeline.stages.execution_stage import act_of
 from manikin.planning import contacts, guide
 from manikin.planning.contacts import ContactPlan, Endpoint, Endpoints, Extension, Stage, WalkSearch
 from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
-from manikin.planning.whole_body.posture_style import posture_style_of
+from manikin.planning.whole_body.posture_style import LADDER, posture_style_of
 from manikin.scenarios import Scenario
 from manikin.scenarios.found_supports import with_supports, without_rests
 from manikin.scenarios.sections.task_sections import StateSection
@@ -154,6 +154,8 @@ HOLDING_PACE, HOLDING_ACCELERATION = 1.0, 1.0
 """Mean speed of hinges [rad/s] and largest acceleration of the CoM [m/s^2] on rungs; our choice."""
 RUNG_GREED = ((6.0, 1500),)
 """Factor on the estimate on rungs, where every limb is away from its best place: less finds nothing."""
+RUNG_STRIDES = 2.2
+"""Longest way of a limb on rungs, in strides: past one rung and not past two; our choice."""
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
@@ -168,12 +170,21 @@ class _LimbSearch(_ContactSearch):
         self._kinds = {limb.name: _kind(body, limb) for limb in self._limbs}
         self._size = float(body.standing_posture()[2]) / STANDING_HEIGHT
         safe = max(self._size, SMALLEST)
-        style = None if body.stature is None else posture_style_of(scenario.file.manner)
-        self._reference = np.array(body.standing_posture() if style is None else style.posture(body))
+        self._reference = np.array(body.standing_posture() if body.stature is None else self._upright())
         self._poser = contacts.PostureFinder(body, scene, self._reference, self._asked().scaled(safe))
         self._samples = samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
         ends = [limb for limb in self._limbs if not is_further(body, limb)] or self._limbs
         self._reach = float(np.mean([samples[limb.name].hull[1] for limb in ends]))
+
+    def _upright(self) -> FloatArray:
+        """(nq,) posture of a person who stands, on rungs with bent legs, soles on the ground."""
+        body = self._body
+        if not self._on_rungs:
+            return posture_style_of(self._scenario.file.manner).posture(body)
+        q = LADDER.posture(body)
+        state, feet = Configuration(body, q), [x.effector for x in self._limbs if x.kind is ContactKind.SOLE]
+        q[2] -= min((float(state.effector_placement(foot)[1][2]) for foot in feet), default=0.0)
+        return q
 
     def run(self) -> ContactSearch:
         goal = self._goal()
@@ -225,7 +236,7 @@ class _LimbSearch(_ContactSearch):
             )  # fmt: skip
         if self._on_rungs:
             plain = replace(
-                plain, retreats=RETREATS, greeds=RUNG_GREED, hinge_pace=HOLDING_PACE,
+                plain, retreats=RETREATS, farthest=RUNG_STRIDES, greeds=RUNG_GREED, hinge_pace=HOLDING_PACE,
                 com_acceleration=HOLDING_ACCELERATION,
             )  # fmt: skip
         return replace(

@@ -1,8 +1,9 @@
 """Refinement stage: a motion of all joints through postures at the changes of contact."""
 
+from itertools import pairwise
 from typing import Any
 
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactKind, ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.whole_body_stage import certificate_summary, report_whole_body
@@ -28,13 +29,23 @@ def refine_contacts(
     path = with_mid_flights(body, scene, schedule, KeyPath(time / options.pace, q), padded)
     kept = {"contact_variables": options.contact_variables, "speed_share": options.speed_share}
     result = refine_motion(
-        body, scene, path.time, path.q, schedule, padded=padded,
+        body, scene, path.time, path.q, schedule, padded=padded, rests=_rests(context, schedule),
         settings=RefineSettings(scales=RefineScales.of(body), **kept),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     block = refined_summary(result) | {"seed_matters": context.plan is not None}
     report_whole_body(context, report, result.schedule, result, block)
     return result
+
+
+def _rests(context: RunContext, schedule: ContactSchedule) -> list[int]:
+    """Key instants at which who climbs on whole soles rests, as another limb has come to its contact."""
+    stances = [phase.stance for phase in schedule.sequence]
+    holds = any(item.kind is ContactKind.GRASP for stance in stances for item in stance)
+    if context.plan is None or not holds or context.scenario.contacts.forefoot_m is not None:
+        return []
+    held = [set(stance.effectors) for stance in stances]
+    return [k for k, (before, after) in enumerate(pairwise(held), 1) if after > before]
 
 
 def refined_summary(result: RefineResult) -> dict[str, Any]:

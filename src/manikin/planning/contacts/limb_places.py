@@ -45,6 +45,10 @@ RUNG_SIDE = 0.025  # distance of a sole to the ends of its rung, where the stile
 RUNG_APART = 0.025  # distance on the sole between two places of a rung below it [m]; our choice
 PALM_ROOM = 0.01  # distance of a palm's middle from the bar that its fingers close round [m]
 STEEP_BAR = 0.85  # rise of a bar over its length from which on a hand takes it from the side; our choice
+LARGE = 4.0  # half the width of a large surface, in steps of its grid; our choice
+SHANK_UP, SHANK_ROOM = 0.35, 0.1
+"""Height above the middle of a sole on the ground at which nothing may be nearer than the second, by the
+reach: toes below the first rung of a ladder keep a shank from getting past it; our choice."""
 RUNG_SPACING = 0.045  # distance of neighbouring places of a foot along a rung [m]; our choice
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
@@ -68,7 +72,9 @@ def limb_holds(
         item for item in scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
         if (item.polygon.min(axis=0) <= high).all() and (item.polygon.max(axis=0) >= low).all()
     ]  # fmt: skip
-    grid, heading = _Grid(scene, surfaces, (low, high), SPACING * size), heading_of(ends[1])
+    heading = heading_of(ends[1])
+    goal = ends[1, :3], rotation_from_yaw(heading)
+    grid = _Grid(scene, surfaces, (low, high), SPACING * size, goal)
     known: dict[tuple[object, ...], list[_Place]] = {}
     found: list[LimbHolds] = []
     for limb in limbs:
@@ -83,11 +89,11 @@ def limb_holds(
             frames = [rotation_from_yaw(heading + turn) for turn in outward]
             stiff = rules.stiff if sole and rules.patch is None else None
             known[key] = grid.places(points, frames, kind, stiff)
-        places = known[key]
+        places, free = known[key], sole and rules.patch is None
         positions = np.array([place.position for place in places]).reshape(-1, 3)
         found.append(LimbHolds(
             positions, partial(_contact_at, body, limb, kind, rules, places),
-            partial(_has_room, scene, size, places), item, (there.rotation, there.translation), wanted,
+            partial(_has_room, scene, size, places, free), item, (there.rotation, there.translation), wanted,
         ))  # fmt: skip
     return found
 
@@ -119,19 +125,25 @@ def _contact_at(
     return replace(made, points=frozen_array(place.points, "what of a sole is on a rung [m]", (4, 3)))
 
 
-def _has_room(scene: Scene, size: float, places: Sequence[_Place], row: int) -> bool:
-    """Whether a ball just above a place is free."""
-    above = places[row].position + 0.06 * size * places[row].rotation[:, 2]
-    return scene.nearest(above)[1] > 0.035 * size
+def _has_room(scene: Scene, size: float, places: Sequence[_Place], free: bool, row: int) -> bool:
+    """Whether a ball just above a place is free, and, of a whole sole, one where its shank goes up again."""
+    place = places[row]
+    above = place.position + 0.06 * size * place.rotation[:, 2]
+    if scene.nearest(above)[1] <= 0.035 * size:
+        return False
+    shank = place.position + SHANK_UP * size * place.rotation[:, 2]
+    return not free or place.points is not None or scene.nearest(shank)[1] > SHANK_ROOM * size
 
 
 class _Grid:
-    """Grid of places on surfaces in a box (low, high), its spacing [m]."""
+    """Grid of places on surfaces in a box (low, high), its spacing [m], and place and heading of the goal."""
 
     def __init__(
-        self, scene: Scene, surfaces: Sequence[Surface], box: tuple[FloatArray, FloatArray], spacing: float
-    ) -> None:
+        self, scene: Scene, surfaces: Sequence[Surface], box: tuple[FloatArray, FloatArray], spacing: float,
+        goal: tuple[FloatArray, FloatArray],
+    ) -> None:  # fmt: skip
         self._scene, self._surfaces, self._box, self._spacing = scene, surfaces, box, spacing
+        self._goal = goal
 
     def places(
         self, points: FloatArray, turns: Sequence[FloatArray], kind: ContactKind, stiff: float | None
@@ -148,7 +160,7 @@ class _Grid:
             whole = [
                 _Place(place, upright)
                 for upright in (onto_normal(turn, surface.normal) for turn in turns)
-                for place in self._on(surface, points @ upright.T, spacing)
+                for place in self._on(surface, points @ upright.T, spacing, beside=stiff is not None)
             ]
             found += whole or ([] if stiff is None else self._across(surface, points, turns[0], stiff))
         for top in self._scene.bar_tops if stiff is not None else ():
@@ -217,12 +229,19 @@ class _Grid:
                 if self._scene.nearest(edge + BEYOND * out)[1] > 0.5 * BEYOND:
                     yield from (_Place(edge - inset * out, turn) for inset in FINGERS)
 
-    def _on(self, surface: Surface, points: FloatArray, spacing: float) -> FloatArray:
-        """(m, 3) places on one surface of what touches with points (c, 3) about it, in the world's axes."""
+    def _on(self, surface: Surface, points: FloatArray, spacing: float, *, beside: bool) -> FloatArray:
+        """(m, 3) places on one surface of what touches with points (c, 3) about it, in the world's axes.
+
+        Feet that stand ``beside`` rungs, on what is large, have places on either side of the way to the goal:
+        there is little room between the stiles of a ladder.
+        """
         low, high = self._box
         corners = np.clip(surface.polygon, low - 1.0, high + 1.0)
         middle, axes = 0.5 * (corners.min(axis=0) + corners.max(axis=0)), surface.rotation[:, :2]
         half = np.abs((corners - middle) @ axes).max(axis=0)
+        if beside and half.min() > LARGE * spacing:
+            axes = onto_normal(self._goal[1], surface.normal)[:, :2]
+            middle, half = self._goal[0] + 0.5 * spacing * axes[:, 1], 2.0 * half
         # At least two steps each way on what is small.
         gaps = np.minimum(spacing, 0.5 * half)
         steps = [np.arange(-np.ceil(side / gap), np.ceil(side / gap) + 1) * gap

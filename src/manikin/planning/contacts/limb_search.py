@@ -69,6 +69,7 @@ class LimbSettings(Paces):
         brief: Cost of a contact that can be kept on nothing of the way ahead ([Tonneau2015]_ 7.4), in moves.
         effort: Cost of a limb whose EFORT upwards is the median of its samples, in moves; inverse to EFORT.
         comfort: Cost of a limb that is as far from where it should be as it reaches, in moves.
+        farthest: Longest way of a limb from a contact to the next [strides].
         sway: Distance of the root from the polygon of the contacts that stay at most, by that reach.
         searches: Most postures that are looked for.
         lift: How far a limb in flight keeps from the line between its contacts [m].
@@ -88,6 +89,7 @@ class LimbSettings(Paces):
     brief: float = 1.0
     effort: float = 0.3
     comfort: float = 2.0
+    farthest: float = math.inf
     sway: float = 0.12
     searches: int = 900
     lift: float = 0.08
@@ -371,7 +373,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 rows |= set(tree.query(wanted + onward, k=min(3, tree.n))[1].ravel().tolist())
             places = np.array(sorted(rows)) + 1
             ways = np.linalg.norm(self._places[k][places] - here, axis=1)
-            far = (places != state[k]) & (ways > 0.15 * stride)
+            longest = self.settings.farthest * stride if self._held(k, state[k]) else math.inf
+            far = (places != state[k]) & (ways > 0.15 * stride) & (ways <= longest)
             states += [(*state[:k], row, *state[k + 1 :]) for row in places[far].tolist()]
             cost = 1.0 + 0.5 * (ways[far] / (2.0 * stride)) ** 2
             if self.settings.brief > 0.0:
@@ -520,12 +523,14 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 if landing.q is None:
                     return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
                 q = landing.q
+                via = None
+                if old is not None or self.settings.retreats:
+                    via = self._between(staying, lifted.q, q, (old or new, new), (before, after))
                 if old is None:
                     # The limb is free already: it reaches its contact while the phase before lasts.
                     longest = max(stages[-1].min_duration, self.settings.swing_duration)
-                    stages[-1] = replace(stages[-1], min_duration=longest)
+                    stages[-1] = replace(stages[-1], min_duration=longest, via=via)
                 else:
-                    via = self._between(staying, lifted.q, q, (old, new), (before, after))
                     if via is None:
                         return self._refused(before, after, f"{name} finds no way around")
                     stages.append(Stage.of(body, staying, lifted.q, self.settings.flight(old, new), via=via))
@@ -569,7 +574,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self, staying: Contacts, lifting: FloatArray, landing: FloatArray,
         ends: tuple[Contact, Contact], move: tuple[State, State],
     ) -> FloatArray | None:  # fmt: skip
-        """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
+        """Posture in the middle of a flight, the limb off the line between its contacts, or None.
+
+        On rungs what reaches for its first contact, at both ends then, comes there from outside.
+        """
         (before, after), lift = ends, self.settings.lift
         middle = 0.5 * (before.position + after.position)
         start = 0.5 * (lifting + landing)

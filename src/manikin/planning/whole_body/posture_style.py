@@ -251,6 +251,16 @@ CLIMBING = PostureStyle(
 )  # fmt: skip
 """Raised arms and bent, spread legs of a person on a wall."""
 
+LADDER = PostureStyle(
+    "ladder",
+    _degrees(
+        shoulder_flexion=40.0, shoulder_abduction=10.0, elbow_flexion=75.0, hip_flexion=12.0,
+        knee_flexion=20.0, ankle_dorsiflexion=8.0,
+    ),
+    READY.scales,
+)  # fmt: skip
+"""Hands before the chest and slightly bent legs of a person on a ladder."""
+
 HANGING = PostureStyle(
     "hanging", _degrees(shoulder_flexion=5.0, shoulder_abduction=12.0, elbow_flexion=25.0), CLOSE.scales,
     preferences=CLOSE.preferences,

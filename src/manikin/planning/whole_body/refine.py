@@ -9,6 +9,7 @@ import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactSchedule, StanceSequence
 from manikin.kinematics.efort import Task
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
@@ -63,6 +64,9 @@ from manikin.scene import Proximity, Scene
 
 REPAIRS = 5
 """Most fits that follow a failed one with other weights, knots or timing."""
+
+CAUGHT = 0.02
+"""Penetration from which on a part counts as caught [m]."""
 
 _SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})
 """Broken requirements that a slower motion may keep."""
@@ -152,16 +156,31 @@ class RefineResult(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class _RefineGoal:
-    """Keys and contacts at one timing.
+    """Keys and contacts at one timing, or a part of them.
 
     Attributes:
         forces: Motion whose contact forces are held where its torques are beyond the strength.
+        span: Key instants from which and to which the part lasts.
+        ends: Postures in which the body rests there; None where it only comes to rest.
     """
 
     job: "Refinement"
     path: KeyPath
     schedule: ContactSchedule
+    span: tuple[int, int]
+    ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
     forces: Motion | None = None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the part is all of it."""
+        return self.span == (0, len(self.schedule.sequence))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """When the part begins and ends [s]."""
+        begin, end = self.schedule.instants[list(self.span)].tolist()
+        return begin, end
 
     def objective(self, time: FloatArray, basis: SampledBasis, scales: MotionScales) -> MotionObjective:
         """Residuals at times (n,) [s]."""
@@ -170,6 +189,7 @@ class _RefineGoal:
         targets = refine_targets(
             job.body, job.scene, self.path, self.schedule, time, scales, job.task, job.padded, job.variables
         )
+        targets = replace(targets, ends=self.ends)
         if self.forces is not None:
             targets = replace(targets, forces=HeldForces.of(job.body, self.schedule, self.forces, time))
         wanted = job.rooms(self.schedule.sequence, job.settings.friction_share)
@@ -178,7 +198,7 @@ class _RefineGoal:
     def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
         """Sample a motion and certify it."""
         job, schedule, rooms = self.job, self.schedule, self.job.rooms(self.schedule.sequence)
-        time = sample_uniformly(schedule, job.settings.sampling)
+        time = sample_uniformly(*self.interval, job.settings.sampling)
         polytopes = [room.polytope for room in rooms]
         motion, wrench = full_motion(job.body, schedule, polytopes, time, *spline.evaluate(time))
         balance, violation = balance_of(schedule, rooms, time, wrench, motion.com)
@@ -191,7 +211,7 @@ class _RefineGoal:
     def samples(self, spline: ConfigurationSpline | None = None) -> VariableSamples:
         """Samples of a motion, or of the keys at rest, for the choice of the contacts."""
         body, names = self.job.body, self.schedule.sequence.effectors
-        time = sample_uniformly(self.schedule, 0.03)
+        time = sample_uniformly(*self.interval, 0.03)
         if spline is not None:
             return VariableSamples.of(body, names, time, spline.evaluate(time))
         still, path = np.zeros((len(time), body.nv)), self.path
@@ -229,32 +249,67 @@ class Refinement:
             settings.friction_share,
         )  # fmt: skip
 
-    def run(self, path: KeyPath, schedule: ContactSchedule, began: float, progress: Progress) -> RefineResult:
-        """Fit, repair and measure; the wall time counts from a reading of the clock [s]."""
-        goal = _RefineGoal(self, path, schedule)
+    def run(
+        self, path: KeyPath, schedule: ContactSchedule, rests: Sequence[int], began: float, progress: Progress
+    ) -> RefineResult:
+        """Fit, repair and measure; the wall time counts from a reading of the clock [s].
+
+        A motion that rests at key instants is fitted part by part, and ends with the first part that fails.
+        """
+        count, known = len(schedule.sequence), path.at(schedule.instants)
         self.variables = tuple(dict.fromkeys(phase.stance.effectors, 1.0) for phase in schedule.sequence)
+        goal = _RefineGoal(self, path, schedule, (0, count))
         if self.settings.retime:
             share = self.settings.scales.velocity_share
-            goal = _RefineGoal(self, *stretched_for_speed(self.body, path, schedule, share))
-        if self.settings.contact_variables:
+            goal = _RefineGoal(self, *stretched_for_speed(self.body, path, schedule, share), goal.span)
+        parts = list[FitAttempt[_RefineGoal]]()
+        for first, last in pairwise([0, *rests, count]):
+            ends = known[first] if first > 0 else None, known[last] if last < count else None
+            self._job = replace(self._job, span=(first, last))
+            done = partial(self._done, progress, schedule, (first, last))
+            parts.append(self._fitted(replace(goal, span=(first, last), ends=ends, forces=None), done))
+            goal = parts[-1].goal
+            if parts[-1].broken:
+                break
+        progress(1.0)
+        return self._result(parts, path.duration, schedule, began)
+
+    @staticmethod
+    def _done(progress: Progress, schedule: ContactSchedule, span: tuple[int, int], share: float) -> None:
+        """Tell the share of the whole that is done with a share of a part."""
+        start, *ends = schedule.instants[[0, *span, -1]].tolist()
+        progress((ends[0] - start + share * (ends[1] - ends[0])) / (ends[2] - start))
+
+    def _fitted(self, goal: _RefineGoal, progress: Progress) -> FitAttempt[_RefineGoal]:
+        """The best motion of a part that was found."""
+        if self._chooses(goal):
             goal = self._chosen(goal, goal.samples())
         first = self._job.attempt(goal, self.settings.scales)
         best = self._job.repair(first, partial(self._remedy, progress), REPAIRS)
         if self.settings.speed_share is not None and not best.broken:
             best = self._hurried(best, self.settings.speed_share)
-        progress(1.0)
-        return self._result(best, path.duration, schedule, began)
+        return best
+
+    def _chooses(self, goal: _RefineGoal) -> bool:
+        """Whether contacts may be let go: the postures at the ends of a part have them all."""
+        return self.settings.contact_variables and goal.is_whole
 
     def _remedy(
         self, progress: Progress, number: int, last: FitAttempt[_RefineGoal]
-    ) -> FitAttempt[_RefineGoal]:
-        """The next fit after one that breaks requirements: other contacts, weights, timing or knots."""
+    ) -> FitAttempt[_RefineGoal] | None:
+        """The next fit after one that breaks requirements: other contacts, weights, timing or knots.
+
+        None for a part that is caught a second time: in the postures at its ends it will stay so.
+        """
         progress((number + 1) / (REPAIRS + 1))
         goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
-        if self.settings.contact_variables:
+        if self._chooses(goal):
             chosen = self._chosen(goal, goal.samples(last.result.spline), goal.samples())
             if chosen is not goal:
                 return job.attempt(chosen, last.scales, last.fine)
+        caught = last.certificate.value("max_penetration_m") > CAUGHT
+        if caught and number > 0 and not last.goal.is_whole:
+            return None
         if last.is_caught:
             return job.restart(replace(last, goal=goal), last.fine)
         scales = job.updated(last.scales, broken)
@@ -274,13 +329,15 @@ class Refinement:
 
     def _hurried(self, best: FitAttempt[_RefineGoal], share: float) -> FitAttempt[_RefineGoal]:
         """Shorten phases round by round; what breaks a requirement is taken back where it does."""
-        settled = frozenset[int]()
+        first, last = best.goal.span
+        settled = frozenset(range(len(best.goal.schedule.sequence))) - frozenset(range(first, last))
         for _ in range(ROUNDS):
             goal = best.goal
             factors = shortening(self.body, best.motion, goal.schedule, share, settled)
             if np.all(factors == 1.0):
                 break
-            shorter = _RefineGoal(self, *stretched(goal.path, goal.schedule, factors))
+            path, schedule = stretched(goal.path, goal.schedule, factors)
+            shorter = replace(goal, path=path, schedule=schedule)
             near = _retimed(best.result.spline, goal.schedule, shorter.schedule)
             trial = self._job.attempt(shorter, best.scales, best.fine, near)
             if trial.broken:
@@ -305,22 +362,29 @@ class Refinement:
             worst = last.certificate[name].time_s or 0.0
             when = float(np.interp(worst, last.goal.schedule.instants, schedule.instants))
             # Factor by which a phase gets longer in which balance or speed is missed again.
-            path, schedule = stretched_around(path, schedule, when, 1.3)
-        return _RefineGoal(self, path, schedule)
+            path, schedule = stretched_around(path, schedule, when, 1.3, last.goal.span)
+        return replace(last.goal, path=path, schedule=schedule, forces=None)
 
     def _result(
-        self, found: FitAttempt[_RefineGoal], duration: float, given: ContactSchedule, began: float
+        self, parts: Sequence[FitAttempt[_RefineGoal]], duration: float, given: ContactSchedule, began: float
     ) -> RefineResult:
         """Measures of the input, of a spline through it and of the motion, and the verdict.
 
         Args:
+            parts: One after the other.
             duration: Of the input [s].
             given: Contacts of the input.
         """
-        schedule, path, spline = found.goal.schedule, found.goal.path, found.result.spline
-        time = sample_uniformly(schedule, STEP)
+        whole, last = parts[-1].goal, parts[-1].goal.span[1]
+        given, schedule = _until(given, last), _until(whole.schedule, last)
+        motion, certificate = parts[-1].motion, parts[-1].certificate
+        spline, path = parts[-1].result.spline, whole.path
+        if len(parts) > 1:
+            spline = ConfigurationSpline.joined([part.result.spline for part in parts])
+            motion, certificate = _RefineGoal(self, path, schedule, (0, last)).measure(spline)
+        time = sample_uniformly(float(schedule.instants[0]), float(schedule.instants[-1]), STEP)
         obstacles = RefineObstacles(self.body, self.scene, schedule, time, self.padded)
-        knots = self._job.knots(schedule)
+        knots = replace(self._job, span=None).knots(schedule)
         fitted, basis = self._job.samples(knots)
         smoothed = spline_through(path.at(fitted), basis, knots)
         before, start, after = (
@@ -338,8 +402,9 @@ class Refinement:
             "min_contact_slack", "least slack of the contacts' limits", "N, N.m", slack, ">=", 0.0, when,
             tolerance=1e-6,
         )  # fmt: skip
-        table = RequirementTable((*found.certificate.required, room))
-        broken, failure = table.first_broken, None
+        table = RequirementTable((*certificate.required, room))
+        # What a part broke that ends before its limb is there, that alone.
+        broken, failure = parts[-1].certificate.first_broken or table.first_broken, None
         if broken is not None:
             failure = WholeBodyFailure.at(schedule, broken.time_s or 0.0, broken.reason)
         released = tuple(
@@ -348,16 +413,23 @@ class Refinement:
             for name in one.stance.effectors if name not in kept.stance
         )  # fmt: skip
         return RefineResult(
-            found.motion, spline, schedule, before, start, after, found.certificate, table, slack, failure,
-            self.variables, released, path.duration / duration, self._job.iterations,
+            motion, spline, schedule, before, start, after, certificate, table, slack, failure,
+            self.variables[:last], released, path.duration / duration, self._job.iterations,
             clock.perf_counter() - began,
         )  # fmt: skip
+
+
+def _until(schedule: ContactSchedule, last: int) -> ContactSchedule:
+    """The first phases of a schedule, up to a key instant."""
+    if last == len(schedule.sequence):
+        return schedule
+    return ContactSchedule(StanceSequence(schedule.sequence.phases[:last]), schedule.instants[: last + 1])
 
 
 def _retimed(
     spline: ConfigurationSpline, before: ContactSchedule, after: ContactSchedule
 ) -> ConfigurationSpline:
-    """A spline in the time of another schedule."""
+    """A spline, or a part of one, in the time of another schedule."""
     knots = np.interp(spline.knots, before.instants, after.instants)
     return ConfigurationSpline(knots, spline.control_points, DEGREE)
 
@@ -365,7 +437,7 @@ def _retimed(
 def refine_motion(
     body: BodyModel, scene: Scene, time: ArrayLike, q: ArrayLike, schedule: ContactSchedule, *,
     settings: RefineSettings | None = None, task: Task | None = None, padded: Sequence[str] = (),
-    progress: Progress | None = None,
+    rests: Sequence[int] = (), progress: Progress | None = None,
 ) -> RefineResult:  # fmt: skip
     """Turn key configurations and their contacts into a smooth motion in balance and without collision.
 
@@ -375,11 +447,13 @@ def refine_motion(
         schedule: Which effector holds which contact when, over the same interval; full soles only.
         task: Direction of EFORT; the pelvis' displacement in each phase when omitted (7.9).
         padded: Obstacles that any part of the body may lean on.
+        rests: Key instants inside at which the body rests in its key configuration, all contacts held.
         progress: Called now and then with the share done.
 
     Returns:
         The motion with its certificate and the measures of every term before and after.  Where a
         requirement breaks, its weight grows, the spline gets more knots, or the phase lasts longer.
+        A motion with rests that fails ends at the rest after that.
 
     Raises:
         InputError: If keys, contacts and body do not fit each other.
@@ -390,5 +464,5 @@ def refine_motion(
     check_input(body, path, schedule)
     settings = settings or RefineSettings(scales=RefineScales.of(body))
     return Refinement(body, scene, settings, task, tuple(padded)).run(
-        path, schedule, began, progress or no_progress
+        path, schedule, rests, began, progress or no_progress
     )

@@ -72,6 +72,12 @@ class KeyPath:
         out[:, 3:7] = Slerp(self.time, Rotation.from_quat(self.q[:, 3:7]))(t).as_quat()
         return align_quaternions(out)
 
+    def through(self, time: float, q: FloatArray) -> "KeyPath":
+        """The path with one more configuration (nq,) at a time [s], which replaces keys within 10 ms."""
+        kept = np.abs(self.time - time) > 0.01
+        at = int(np.searchsorted(self.time[kept], time))
+        return KeyPath(np.insert(self.time[kept], at, time), np.insert(self.q[kept], at, q, axis=0))
+
 
 def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> None:
     """Refuse keys, contacts and bodies that do not fit each other.
@@ -133,11 +139,16 @@ def stretched_for_speed(
 
 
 def stretched_around(
-    path: KeyPath, schedule: ContactSchedule, time: float, factor: float
+    path: KeyPath, schedule: ContactSchedule, time: float, factor: float, span: tuple[int, int] | None = None
 ) -> tuple[KeyPath, ContactSchedule]:
-    """Slow down the phase at a time [s] by a factor, and half as much the ones beside it."""
-    worst = int(schedule.phase_at(time))
-    away = np.abs(np.arange(len(schedule.sequence)) - worst)
+    """Slow down the phase at a time [s] by a factor, and half as much the ones beside it.
+
+    Phases outside a span from one key instant to another stay as they are.
+    """
+    numbers = np.arange(len(schedule.sequence))
+    first, last = span or (0, len(numbers))
+    worst = min(int(schedule.phase_at(time)), last - 1)
+    away = np.where((numbers < first) | (numbers >= last), len(numbers) + 1, np.abs(numbers - worst))
     return stretched(path, schedule, np.select([away == 0, away == 1], [factor, 0.5 * (1.0 + factor)], 1.0))
 
 

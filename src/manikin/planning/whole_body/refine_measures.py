@@ -37,6 +37,10 @@ GRASPED = -0.05
 """Distance at which a hand that holds on to something begins to be pushed off it [m]."""
 
 
+REACHING = 0.35
+"""Longest time before and after a grasp in which a hand may be at what it holds [s]; executed it is 0.4 s."""
+
+
 class RefineObstacles:
     """Pairs that may be near each other, at samples of a motion.
 
@@ -72,12 +76,13 @@ class RefineObstacles:
             rows = (time >= start) & (time < end)
             for contact, gone in ((swing.start, time - start), (swing.end, end - time)):
                 if contact is not None:
+                    grasped = contact.kind is ContactKind.GRASP
                     # Share of a flight in which the wanted clearance to what was left, or is to be reached,
-                    # rises or falls.
-                    share = np.clip(gone / (0.3 * (end - start)), 0.0, 1.0)
+                    # rises or falls; of a hand that was free for long it is the end.
+                    ramp = min(0.3 * (end - start), REACHING if grasped else np.inf)
+                    share = np.clip(gone / ramp, 0.0, 1.0)
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
                     self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
-                    grasped = contact.kind is ContactKind.GRASP
                     self._sides.append((touch_pairs(body, scene, contact), away, grasped))
 
     def touching(self) -> tuple[Ignored, ...]:
@@ -157,9 +162,8 @@ class RefineMeasures:
         return asdict(self)
 
 
-def sample_uniformly(schedule: ContactSchedule, step: float) -> FloatArray:
-    """Times from the first to the last instant, both included, at most ``step`` apart [s]."""
-    start, end = float(schedule.instants[0]), float(schedule.instants[-1])
+def sample_uniformly(start: float, end: float, step: float) -> FloatArray:
+    """Times from a start to an end, both included, at most ``step`` apart [s]."""
     return np.linspace(start, end, max(2, int(np.ceil((end - start) / step - 1e-9))) + 1)
 
 

@@ -144,6 +144,8 @@ class RefineObjective(MotionObjective):
         self._stances = list[tuple[NDArray[np.intp], RefinedForces, MarginCost, Callable[[float], float]]]()
         for phase, room, (start, end) in zip(schedule.sequence, rooms, _relied_on(schedule), strict=True):
             rows = np.flatnonzero((time >= start) & (time <= end))
+            if not len(rows):  # of a part of the motion
+                continue
             wanted = cache(partial(room.wanted, com=com[rows].mean(axis=0)))
             self._stances.append((rows, RefinedForces(phase.stance, self._names), room, wanted))
         # The end of the names of knee joints.

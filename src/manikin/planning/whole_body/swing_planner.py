@@ -14,7 +14,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments, hangs
-from manikin.contact import Contact, ContactKind, ContactSchedule, Swing
+from manikin.contact import Contact, ContactKind, ContactSchedule, Stance, Swing
 from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -28,8 +28,12 @@ from manikin.planning.whole_body.swing_path import EffectorClearance, Pose
 from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing
 from manikin.scene import Proximity, Scene
 
-SHARES = (0.25, 0.5, 0.75)
-"""Shares of a flight at which a posture is looked for; our choice."""
+SHARES, BETWEEN = (0.25, 0.5, 0.75), (0.125, 0.375, 0.625, 0.875)
+"""Shares of a flight at which a posture is looked for, and those at which one is where the way between two of
+them is not clear; our choice."""
+
+KEPT = (0.75, 0.25)
+"""Shares of the wanted distance that they keep from everything that is not touched, tried in turn."""
 
 ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
@@ -47,44 +51,58 @@ def with_mid_flights(
     Returns:
         The path with the postures that were found; a flight for which there is none stays as it is.
     """
-    proximity, distance = Proximity(body, scene), RefineScales.of(body).safe_distance
+    proximity = Proximity(body, scene)
     # Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion.
-    limits = SwingLimits(clearance=distance, time_step=0.02)
-    keys = dict(zip(path.time.tolist(), path.q, strict=True))
+    limits = SwingLimits(clearance=RefineScales.of(body).safe_distance, time_step=0.02)
     for swing in schedule.sequence.swings():
-        curve = _curve(body, scene, schedule, path, swing, limits)
-        if curve is None:
+        flight = _clear_flight(body, scene, schedule, path, swing, limits)
+        if flight is None:
             continue
-        touched = leaning_pairs(body, padded).union(
-            *(touch_pairs(body, scene, item) for item in standing_during(schedule, swing))
+        curve, is_clear = flight
+        standing, ends = standing_during(schedule, swing), filter(None, (swing.start, swing.end))
+        touched, beside = (
+            leaning_pairs(body, padded).union(*(touch_pairs(body, scene, item) for item in contacts))
+            for contacts in (standing, (*standing, *ends))
         )
-        for share in SHARES:
+        for share in (*SHARES, *BETWEEN):
             time = curve.start_time + share * curve.duration
-            pose, guess = curve.at(time), path.at(np.array([time]))[0]
-            com = Configuration(body, guess).com
-            problem = PostureProblem(
-                body, tuple(schedule.stance_at(time)),
-                {swing.effector: Placement(pose.position, pose.rotation, 0.3)},
-                # The effector's attitude and a centre of mass between those at both ends are wished, not
-                # required.
-                com=np.array([com[0], com[1], np.nan]), com_weight=30.0,
-                # Share of the wanted distance that the posture keeps from everything that is not touched.
-                proximity=proximity, clearance=0.75 * distance, ignore=touched, reference=guess,
-            )  # fmt: skip
-            # A flight without such a posture needs no reason, and a guess no exact contacts.
-            found = generate_posture(problem, guess, settings=SolverSettings(tolerance=1e-3, explain=False))
-            if found.succeeded:
-                # A given posture this near to a new one is replaced by it [s].
-                keys = {other: q for other, q in keys.items() if abs(other - time) > 0.01}
-                keys[time] = found.q
-    times = sorted(keys)
-    return KeyPath(times, np.array([keys[time] for time in times]))
+            guess = path.at(np.array([time]))[0]
+            passes = share in BETWEEN and is_clear(time, Pose.in_posture(body, guess, swing.effector))
+            if passes and proximity.minimum_over(guess[None], (beside,)).distance > 0.0:
+                continue
+            stance, effector = schedule.stance_at(time), swing.effector
+            q = _posture_on(body, proximity, curve.at(time), effector, stance, guess, touched)
+            path = path if q is None else path.through(time, q)
+    return path
 
 
-def _curve(
+def _posture_on(
+    body: BodyModel, proximity: Proximity, pose: Pose, effector: str, stance: Stance, guess: FloatArray,
+    touched: frozenset[tuple[str, str]],
+) -> FloatArray | None:  # fmt: skip
+    """(nq,) posture with an effector in flight near a pose on its curve, or None."""
+    com, distance = Configuration(body, guess).com, RefineScales.of(body).safe_distance
+    for kept in KEPT:
+        problem = PostureProblem(
+            body, tuple(stance), {effector: Placement(pose.position, pose.rotation, 0.3)},
+            # The effector's attitude and a centre of mass between those at both ends are wished.
+            com=np.array([com[0], com[1], np.nan]), com_weight=30.0,
+            proximity=proximity, clearance=kept * distance, ignore=touched, reference=guess,
+        )  # fmt: skip
+        # A flight without such a posture needs no reason, and a guess no exact contacts.
+        found = generate_posture(problem, guess, settings=SolverSettings(tolerance=1e-3, explain=False))
+        if found.succeeded:
+            return found.q
+    return None
+
+
+def _clear_flight(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, swing: Swing, limits: SwingLimits
-) -> SwingCurve | None:
-    """A curve of the effector that keeps off everything; None where there is none, or none is needed."""
+) -> tuple[SwingCurve, ClearFlight] | None:
+    """A curve of the effector that keeps off everything, and the test of a path; None where none is needed.
+
+    None too where there is no such curve.
+    """
     if swing.start is None or swing.end is None or not hangs(body, swing.effector):
         return None
     interval = schedule.swing_interval(swing)
@@ -108,17 +126,18 @@ def _curve(
         end_normal=swing.end.normal,
     )  # fmt: skip
     if plan.succeeded:
-        return plan.curve
+        return plan.curve, is_clear
 
     def check(extra: float) -> Feasible:
-        is_clear = ClearFlight(clearance, ends, interval, limits, extra)
-        return lambda pose, time, _: is_clear(time, pose) or None
+        room = ClearFlight(clearance, ends, interval, limits, extra)
+        return lambda pose, time, _: room(time, pose) or None
 
     # The Bi-RRT asks for a clear effector only; its draws are always the same, and its flights slower.
     rng, slower = np.random.default_rng(0), replace(limits, speed=2.0, angular_speed=5.0)
-    return search_swing(
+    found = search_swing(
         *ends, *interval, check(0.0), rng, roomy=check(ROOM), limits=slower, iterations=600
-    ).curve
+    )  # fmt: skip
+    return None if found.curve is None else (found.curve, is_clear)
 
 
 REACHING_TIME = 0.7
