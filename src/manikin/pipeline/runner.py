@@ -22,7 +22,7 @@ from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_a
 from manikin.pipeline.stages.context import StageFailure
 from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, execute_motion
 from manikin.pipeline.stages.recovery_stage import recover_from_push
-from manikin.pipeline.stages.refinement_stage import refine_contacts
+from manikin.pipeline.stages.refinement_stage import from_rest_to_rest, is_hard, refine_contacts
 from manikin.pipeline.stages.walking_stage import walk_on_footprints, walk_to_goal
 from manikin.pipeline.stages.whole_body_stage import (
     follow_centre_of_mass,
@@ -95,13 +95,12 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     if context.scenario.is_point_mass and not context.scenario.refines:  # its centre of mass is all there is
         centroidal = plan_centre_of_mass(with_contacts, report)
         return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
-    planned = _refined if context.scenario.refines else _followed
-    result, schedule = planned(with_contacts, report, requirements)
+    result, schedule = _planned(with_contacts, report, requirements)
     if (resting := with_rests(with_contacts, report)) is not None:
         with_contacts = resting
-        result, schedule = planned(with_contacts, report, requirements)
+        result, schedule = _planned(with_contacts, report, requirements)
     if (rolling := with_rolling_feet(with_contacts, report)) is not None:
-        again = planned(rolling, report, requirements)
+        again = _planned(rolling, report, requirements)
         result, schedule = (result, schedule) if report.prefer_earlier() else again
     for _ in range(1, context.scenario.contacts.attempts):
         phase = failed_phase(report.failure, schedule)
@@ -109,8 +108,28 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         if other is None:
             break
         with_contacts = other
-        result, schedule = planned(with_contacts, report, requirements)
+        result, schedule = _planned(with_contacts, report, requirements)
     return result()
+
+
+def _planned(
+    context: RunContext, report: Report, requirements: ExecutionRequirements
+) -> tuple[Callable[[], RunResult], ContactSchedule | None]:
+    """Refined where that is asked for, from rest to rest where a step is hard; else as :func:`_followed`.
+
+    Where a body that rests at every change of contact fails so, it is refined from rest to rest, too.
+    """
+    resting = from_rest_to_rest(context)
+    if context.scenario.refines:
+        return _refined(resting or context, report, requirements)
+    if resting is not None and is_hard(context):
+        return _refined(resting, report, requirements)
+    found = _followed(context, report, requirements)
+    if report.failure is None or resting is None or context.resting is not None:
+        return found
+    report.try_again()
+    again = _refined(resting, report, requirements)
+    return found if report.prefer_earlier() else again
 
 
 def _followed(

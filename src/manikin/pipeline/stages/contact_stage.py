@@ -19,6 +19,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.contact_guides import ContactSearch, SearchTally, guide_root, stage_at
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.execution_stage import act_of
+from manikin.pipeline.stages.refinement_stage import HOLDING_ACCELERATION, HOLDING_PACE
 from manikin.planning import contacts, guide
 from manikin.planning.contacts import ContactPlan, Endpoint, Endpoints, Extension, Stage, WalkSearch
 from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
@@ -73,7 +74,8 @@ class _FootSearch(_ContactSearch):
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
         super().__init__(scenario, body, scene, rng)
         self._reference = posture_style_of(scenario.file.manner).posture(body)
-        self._poser = contacts.PostureFinder(body, scene, self._reference, self._asked())
+        asked = replace(self._asked(), forearms_beside=False)
+        self._poser = contacts.PostureFinder(body, scene, self._reference, asked)
         self._places = self._endpoints(self._poser)
         self._brace: Brace | None = None
         self._seat: Stage | None = None
@@ -150,8 +152,6 @@ LEAN = 0.35
 """Largest lean of the root in any direction [rad]; our choice."""
 RETREATS = (0.25, 0.45)
 """Distances from a climber's best place before its holds at which it is tried as well, by the reach."""
-HOLDING_PACE, HOLDING_ACCELERATION = 1.0, 1.0
-"""Mean speed of hinges [rad/s] and largest acceleration of the CoM [m/s^2] on rungs; our choice."""
 RUNG_GREED = ((6.0, 1500),)
 """Factor on the estimate on rungs, where every limb is away from its best place: less finds nothing."""
 RUNG_STRIDES = 2.2

@@ -1,15 +1,20 @@
 """Refinement stage: a motion of all joints through postures at the changes of contact."""
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from manikin.contact import ContactKind, ContactSchedule
+from manikin.contact import ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.whole_body_stage import certificate_summary, report_whole_body
+from manikin.planning.contacts import ContactPlan
+from manikin.planning.contacts.contact_plan import Paces
+from manikin.planning.contacts.footsteps import HIGHEST
 from manikin.planning.whole_body import RefineResult, RefineScales, RefineSettings, refine_motion
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.swing_planner import with_mid_flights
+from manikin.scenarios.planned import STATURE
 
 
 def refine_contacts(
@@ -38,13 +43,38 @@ def refine_contacts(
     return result
 
 
+HOLDING_PACE, HOLDING_ACCELERATION = 1.0, 1.0
+"""Mean speed of hinges [rad/s] and largest acceleration of the CoM [m/s^2] of who holds on; our choice."""
+
+
+def from_rest_to_rest(context: RunContext) -> RunContext | None:
+    """The task of a person on whole soles and hands with time to rest at every change of them, or None."""
+    plan, scenario = context.plan, context.scenario
+    if plan is None or context.body.stature is None or scenario.contacts.forefoot_m is not None:
+        return None
+    names = set[str]().union(*(stage.contacts for stage in plan.stages))
+    moving = any(stage.momentum is not None for stage in plan.stages)
+    if moving or scenario.file.task.act is not None or not all("foot" in x or "hand" in x for x in names):
+        return None
+    paces = Paces(hinge_pace=HOLDING_PACE, com_acceleration=HOLDING_ACCELERATION)
+    return replace(context, plan=ContactPlan.of(context.body, plan.stages, plan.goal, paces))
+
+
+def is_hard(context: RunContext) -> bool:
+    """Whether hands carry on the way, or a step is higher than feet alone are to make."""
+    stages = () if context.plan is None else context.plan.stages
+    if any("hand" in name for stage in stages for name in stage.contacts):
+        return True
+    heights = [[float(contact.position[2]) for contact in stage.contacts.values()] for stage in stages]
+    rises = [max(a + b) - min(a + b) for a, b in pairwise(heights)]
+    return max(rises, default=0.0) > HIGHEST * (context.body.stature or 0.0) / STATURE
+
+
 def _rests(context: RunContext, schedule: ContactSchedule) -> list[int]:
-    """Key instants at which who climbs on whole soles rests, as another limb has come to its contact."""
-    stances = [phase.stance for phase in schedule.sequence]
-    holds = any(item.kind is ContactKind.GRASP for stance in stances for item in stance)
-    if context.plan is None or not holds or context.scenario.contacts.forefoot_m is not None:
+    """Key instants at which such a person rests, as another limb has come to its contact."""
+    if from_rest_to_rest(context) is None:
         return []
-    held = [set(stance.effectors) for stance in stances]
+    held = [set(phase.stance.effectors) for phase in schedule.sequence]
     return [k for k, (before, after) in enumerate(pairwise(held), 1) if after > before]
 
 

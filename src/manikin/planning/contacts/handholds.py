@@ -14,7 +14,7 @@ from manikin.body import BodyModel
 from manikin.contact import Contact, grasp, point
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import heading_of
-from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.contacts.limb_places import PALM_ROOM, stature_of
 from manikin.scene import Scene
 
 HANDS = ("left_hand", "right_hand")
@@ -83,7 +83,7 @@ class Handholds:
                 # From above, or from the body's side where the bar is upright.
                 out = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.9 else root - middle
                 out = out - (out @ along) * along
-                place = middle + bar.radius * out / max(float(np.linalg.norm(out)), 1e-9)
+                place = middle + (bar.radius + PALM_ROOM) * out / max(float(np.linalg.norm(out)), 1e-9)
                 found.append(grasp(hand, place, max_force=self._force))
         for surface in self._level:
             height = (wanted - surface.polygon[0]) @ surface.normal / surface.normal[2]

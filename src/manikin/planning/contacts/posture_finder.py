@@ -49,6 +49,7 @@ class PostureFinderSettings:
         tolerance: Largest residual of a contact [m, rad].
         iterations: Iterations of each search.
         friction_model: Friction model of the stances on which the body has to be able to rest.
+        forearms_beside: Whether forearms may be as near as touching to what their hands hold.
     """
 
     clearance: float = 0.014
@@ -60,6 +61,7 @@ class PostureFinderSettings:
     tolerance: float = 2e-4
     iterations: int = 40
     friction_model: FrictionModel = "outer"
+    forearms_beside: bool = True
 
     def scaled(self, factor: float) -> "PostureFinderSettings":
         """Settings for a body of another size: lengths times a factor."""
@@ -237,7 +239,7 @@ class PostureFinder:
         touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched(item)]
         wrists = {
             (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)
-            for name, item in held.items() if item.kind is ContactKind.GRASP
+            for name, item in held.items() if item.kind is ContactKind.GRASP and self.settings.forearms_beside
             for obstacle in self._touched(item)
         }  # fmt: skip
         return touching_pairs(self.body, touched), pairs_beside(self.body, touched) | wrists
