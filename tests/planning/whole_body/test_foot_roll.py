@@ -1,11 +1,19 @@
 """A rolling foot turns about its toes' hinge and its heel's edge, which stay where they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from manikin.body import human
 from manikin.contact import ContactSchedule, SolePart, roll_feet
-from manikin.planning.whole_body.foot_roll import HEEL_STRIKE_PITCH, PUSH_OFF_PITCH, foot_roll
+from manikin.contact.stance import ON_TOES
+from manikin.planning.whole_body.foot_roll import (
+    HEEL_STRIKE_PITCH,
+    HIGHEST_PITCH,
+    PUSH_OFF_PITCH,
+    foot_roll,
+)
 from manikin.planning.whole_body.swing_curve import SwingCurve
 
 from .conftest import step_sequence
@@ -73,3 +81,16 @@ def test_the_motion_has_no_jump_in_speed(rolled):
     for local in (roll.heel, np.array([0.14, 0.0, 0.0])):
         acceleration = np.diff(placed(roll, curve, time, local), 2, axis=0) / (time[1] - time[0]) ** 2
         assert np.abs(np.diff(acceleration, axis=0)).max() < 0.1 * np.abs(acceleration).max()
+
+
+@pytest.mark.parametrize("flight", [0.4, 0.6, 1.1, 2.0])
+def test_toes_keep_their_range_in_long_flights(rolled, flight):
+    """The foot tilts on after lift-off, but no further for flying longer: toes extend to 70 degrees."""
+    up, off = 0.0, ON_TOES
+    instants = np.array([up, off, off + flight, off + flight])
+    steep = replace(rolled[0], instants=instants, push_off=HIGHEST_PITCH)
+    times = np.linspace(up, off + flight, 400)
+    body = human(1.75, 79.0, "male")
+    limit = body.pinocchio.upperPositionLimit[7 + body.joint_index("left_toe_extension")]
+    assert HIGHEST_PITCH < steep.toe_extension(times).max() < limit
+    assert steep.pitch(times).max() < np.pi / 2.0

@@ -27,6 +27,9 @@ HIGHEST_PITCH, HIGH_STEP = float(np.deg2rad(48.0)), 0.22
 """Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature: with the
 heel down no leg bends far enough for the body to be over the lower foot."""
 
+LONG_FLIGHT = 0.45
+"""Duration of a flight from which on a foot tilts more slowly at lift-off [s]."""
+
 PIVOT_SHIFT = (0.2, 0.85)
 """Shares of the flight between which the point that the curve describes moves from hinge to heel: while
 the heel is up the toes are the lowest, while the toes are up the heel is."""
@@ -98,10 +101,12 @@ class FootRoll:
 
     @property
     def _at_lift_off(self) -> list[float]:
-        up, off, _, _ = self.instants
+        up, off, land, _ = self.instants
         angle = self.push_off if off > up else 0.0
-        # The pitch rate at lift-off is 1.2 times the mean since the heel rose.
-        return [angle, 1.2 * angle / max(off - up, 1e-9), 0.0]
+        # The pitch rate at lift-off is 1.2 times the mean since the heel rose, and less in a long flight: the
+        # pitch goes on to rise by as much as it does in a shorter one.
+        rate = 1.2 * min(1.0, LONG_FLIGHT / (land - off)) * angle / max(off - up, 1e-9)
+        return [angle, rate, 0.0]
 
     @cached_property
     def _toe_return(self) -> BPoly:
