@@ -39,6 +39,9 @@ def test_a_body_walks_on_level_ground(tmp_path):
     walking = without_rests(context.scenario, found.plan)
     supports = walking.file.supports
     assert supports.foot == "rolling"
+    assert walking.file.manner == "walking"  # with arms that swing, as people's do
+    assert context.with_supports(walking).settings.manner.name == "walking"
+    assert found.scenario.file.manner == "ready"
     assert all(phase.com_near is None for phase in supports.phases)
     assert any(phase.com_near is not None for phase in found.scenario.file.supports.phases)
     for phase in supports.phases[1:-1]:

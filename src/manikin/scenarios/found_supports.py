@@ -65,6 +65,8 @@ ROLLED = 0.3
 LONGEST = 0.8
 """Longest duration of a phase, or 1.5 times its least: a person's step at 0.5 m/s; without it the programme
 often diverges [s]."""
+FLAT_WAY = 0.05
+"""Largest difference in height of two feet on whose way arms swing, of a body of 1.75 m [m]; our choice."""
 SLOPED = 0.1
 """Way of the centre of mass from which on a plane above it is inclined [m]; our choice."""
 LEVEL = 0.94
@@ -112,6 +114,12 @@ def _is_mild(stages: Sequence[Stage], scenario: Scenario) -> bool:
         contact.normal[2] > LEVEL and abs(contact.position[2] - stance[0].position[2]) <= highest
         for stance in held for contact in stance
     )  # fmt: skip
+
+
+def _is_level(plan: ContactPlan, scenario: Scenario) -> bool:
+    """Whether no step needs raised arms to keep clear of the thighs."""
+    heights = [max(c.position[2] for c in stage.contacts.values()) for stage in plan.stages]
+    return float(np.abs(np.diff(heights)).max()) <= FLAT_WAY * scenario.file.body.stature_m / STATURE
 
 
 def _passes_below(plan: ContactPlan, scenario: Scenario) -> bool:
@@ -205,9 +213,13 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
             planning = {**PLANNING_WALKING, "min_margin": walk_margin(scenario, WALKING_MARGIN)}
     # Of a body that walks the region of its postures is known.
     constraints = _given_constraints(scenario) if any(passed) else _constraints(scenario, plan)
+    manner = scenario.file.manner
+    if rolls and _is_level(plan, scenario) and manner == type(scenario.file).model_fields["manner"].default:
+        manner = "walking"
     return scenario.replaced(
-        supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning
-    )
+        supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning,
+        manner=manner,
+    )  # fmt: skip
 
 
 def _entry(contact: Contact, friction: float) -> dict[str, Any]:

@@ -162,13 +162,16 @@ class RunContext:
         return context
 
     def with_supports(self, scenario: Scenario) -> "RunContext":
-        """The same for a scenario of the task frame with supports.
+        """The same for a scenario of the task frame with supports, in its manner where that is another one.
 
         Raises:
             ScenarioError: If the supports do not fit the scene.
         """
         scenario.check_contacts(self.scene)
-        return replace(self, scenario=scenario)
+        settings, manner = self.settings, scenario.file.manner
+        if manner != self.scenario.file.manner:
+            settings = replace(settings, manner=posture_style_of(manner))
+        return replace(self, scenario=scenario, settings=settings)
 
     @cached_property
     def problem(self) -> CentroidalProblem | KeyframeProblem | None:

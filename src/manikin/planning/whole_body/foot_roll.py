@@ -27,8 +27,8 @@ HIGHEST_PITCH, HIGH_STEP = float(np.deg2rad(48.0)), 0.22
 """Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature: with the
 heel down no leg bends far enough for the body to be over the lower foot."""
 
-LONG_FLIGHT = 0.45
-"""Duration of a flight from which on a foot tilts more slowly at lift-off [s]."""
+MOST_EXTENSION = float(np.deg2rad(64.0))
+"""Extension of the toes in flight, their range being 70 degrees [rad]."""
 
 PIVOT_SHIFT = (0.2, 0.85)
 """Shares of the flight between which the point that the curve describes moves from hinge to heel: while
@@ -103,9 +103,9 @@ class FootRoll:
     def _at_lift_off(self) -> list[float]:
         up, off, land, _ = self.instants
         angle = self.push_off if off > up else 0.0
-        # The pitch rate at lift-off is 1.2 times the mean since the heel rose, and less in a long flight: the
-        # pitch goes on to rise by as much as it does in a shorter one.
-        rate = 1.2 * min(1.0, LONG_FLIGHT / (land - off)) * angle / max(off - up, 1e-9)
+        # The pitch rate at lift-off is 1.2 times the mean since the heel rose; less where toes would extend
+        # beyond their range as the pitch goes on to rise, by 0.085 rad per rad of rate times flight.
+        rate = min(1.2 * angle / max(off - up, 1e-9), (MOST_EXTENSION - angle) / (0.085 * (land - off)))
         return [angle, rate, 0.0]
 
     @cached_property
