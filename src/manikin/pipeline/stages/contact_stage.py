@@ -232,7 +232,7 @@ class _LimbSearch(_ContactSearch):
         plain, pace, safe = contacts.LimbSettings(), float(np.sqrt(self._size)), max(self._size, SMALLEST)
         if self._body.stature is not None:
             plain = replace(
-                plain, turns=False, around=1.5, beyond=0.1, brief=0.0, effort=0.0, comfort=10.0, sway=0.3
+                plain, turns=False, around=1.5, beyond=0.1, price=1.0, brief=0.0, comfort=10.0, sway=0.3
             )  # fmt: skip
         if self._on_rungs:
             plain = replace(

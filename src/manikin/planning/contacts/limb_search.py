@@ -24,7 +24,6 @@ from manikin.body import Configuration
 from manikin.body.limbs import limb_placement, limb_slots
 from manikin.contact import Contact, ContactKind
 from manikin.kinematics import Placement
-from manikin.kinematics.efort import efort
 from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
@@ -45,7 +44,6 @@ WIDE = 0.12  # distance to the edges of where it rests at which a trunk is at ea
 NARROW = 3.0  # cost of a move over contacts on one line, without room between their edges, in moves
 OVERREACH = 30.0  # cost of a limb that is beyond its reach then by as much as that, in moves; our choice
 PROVEN = 0.8  # discount on a move that has a posture: such ways are gone on with [moves]; our choice
-HARDEST = 3.0  # largest factor on the cost of effort; our choice
 AHEAD = np.linspace(0.0, 2.0, 7)[1:, None]  # places ahead at which a contact may be kept [strides]
 LOOSE = 1.0  # cost of a limb without a contact, in moves; our choice
 HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
@@ -66,8 +64,8 @@ class LimbSettings(Paces):
         stride: Way of a limb that costs least [m].
         around: Distance from where a limb should be up to which places are tried [strides].
         beyond: How far limbs are beyond their reach from a stiff trunk at most, by that reach.
+        price: Cost of a move as such: the more, the fewer contacts.
         brief: Cost of a contact that can be kept on nothing of the way ahead ([Tonneau2015]_ 7.4), in moves.
-        effort: Cost of a limb whose EFORT upwards is the median of its samples, in moves; inverse to EFORT.
         comfort: Cost of a limb that is as far from where it should be as it reaches, in moves.
         farthest: Longest way of a limb from a contact to the next [strides].
         sway: Distance of the root from the polygon of the contacts that stay at most, by that reach.
@@ -86,8 +84,8 @@ class LimbSettings(Paces):
     stride: float = 0.4
     around: float = 0.45
     beyond: float = 0.0
+    price: float = 2.2
     brief: float = 1.0
-    effort: float = 0.3
     comfort: float = 2.0
     farthest: float = math.inf
     sway: float = 0.12
@@ -155,18 +153,6 @@ class LimbHolds:
             if apart.min(initial=np.inf) >= APART * size and self.is_free(row):
                 near.append(row)
         return [(float(away[row]), replace(self.contact(row), oriented=False)) for row in near]
-
-    @cached_property
-    def _efforts(self) -> tuple[cKDTree, FloatArray]:
-        """Places of the samples, and the median EFORT of a limb that carries over that of each."""
-        up = np.repeat(self.root_to_segment[0][2:], len(self.samples.positions), axis=0)
-        alpha = efort(self.samples.products, up[0], up)
-        return cKDTree(self.samples.positions), np.minimum(np.median(alpha) / alpha, HARDEST)
-
-    def effort(self, places: FloatArray) -> FloatArray:
-        """(k,) how hard it is to carry at places (k, 3) seen from the root, 1 in the middle of all."""
-        (turn, at), (tree, efforts) = self.root_to_segment, self._efforts
-        return efforts[tree.query((places - at) @ turn)[1]]
 
     def room(self, places: FloatArray) -> FloatArray:
         """(k,) distance of places (k, 3) seen from the root to the end of the reach [m]; negative outside."""
@@ -318,8 +304,6 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         for k, item in enumerate(self.holds):
             beyond = np.where(held[:, k], -item.room(local[:, k]) / self.size, 0.0)
             cost += np.where(beyond > self.settings.beyond, np.inf, 4.0 * np.maximum(beyond, 0.0))
-            if self.settings.effort > 0.0:
-                cost += self.settings.effort * held[:, k] * item.effort(local[:, k])
         away, (off_way, onward) = np.linalg.norm(roots - self.goal[:3], axis=1), self._ahead_of(roots)
         off_heading = np.abs(np.mod(yaw - self._yaws[1] + math.pi, 2.0 * math.pi) - math.pi)
         n, stride = len(self.holds), self.settings.stride
@@ -376,7 +360,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             longest = self.settings.farthest * stride if self._held(k, state[k]) else math.inf
             far = (places != state[k]) & (ways > 0.15 * stride) & (ways <= longest)
             states += [(*state[:k], row, *state[k + 1 :]) for row in places[far].tolist()]
-            cost = 1.0 + 0.5 * (ways[far] / (2.0 * stride)) ** 2
+            cost = self.settings.price + 0.5 * (ways[far] / (2.0 * stride)) ** 2
             if self.settings.brief > 0.0:
                 kept = self._duration(k, self._places[k][places[far]], root + AHEAD * away, turn)
                 cost += self.settings.brief * (1.0 - kept)
