@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from manikin.balance import StaticRegion, static_torque_share
 from manikin.body import Configuration, human
-from manikin.contact import ContactKind, Stance, sole, soles_overlap
+from manikin.contact import ContactKind, ContactModel, Stance, sole, soles_overlap
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.contacts import (
@@ -91,7 +91,7 @@ def test_every_change_breaks_or_makes_one_contact(climbed):
         changed = {name for name in before.contacts if before.contacts[name] is not after.contacts.get(name)}
         changed |= set(after.contacts) - set(before.contacts)
         assert len(changed) == 1
-    climbed.sequence()  # refuses contacts that slide
+    climbed.schedule(ContactModel())  # refuses contacts that slide
 
 
 def test_postures_hold_the_contacts_on_both_sides_of_their_change(climbed):

@@ -210,17 +210,14 @@ class ContactPlan:
         ]
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
 
-    def sequence(self, model: ContactModel | None = None) -> StanceSequence:
-        """The stances in order, with a contact model; the default one without a cap when omitted."""
-        return StanceSequence([
-            Phase(Stance(list(stage.contacts.values()), model=model), stage.min_duration)
-            for stage in self.stages
-        ])  # fmt: skip
-
     def schedule(self, model: ContactModel) -> ContactSchedule:
         """The stances with a contact model in time, each as short as it may be, from zero on."""
-        durations = [stage.min_duration for stage in self.stages]
-        return ContactSchedule(self.sequence(model), np.concatenate([[0.0], np.cumsum(durations)]))
+        phases = [
+            Phase(Stance(list(stage.contacts.values()), model=model), stage.min_duration)
+            for stage in self.stages
+        ]
+        ends = np.cumsum([phase.min_duration for phase in phases])
+        return ContactSchedule(StanceSequence(phases), np.concatenate([[0.0], ends]))
 
     def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Key times (k,) [s] and configurations (k, nq): at (n + 1,) changes and, if any, in between."""

@@ -150,7 +150,7 @@ class FootstepSearch:
         Consecutive ones are of different feet; the first two and the last two are those of start and goal.
         """
         graph = Graph(
-            lambda node: self._ahead[node.hold], self._followers, self._tested,
+            lambda node: self._ahead[node.hold], self._steps, self._tested,
             lambda node: node.ends and self._at_goal(node),
         )  # fmt: skip
         way, counts = graph.best([_Node(0, 1), _Node(1, -1)], GREED[self._first_greed :])
@@ -160,11 +160,6 @@ class FootstepSearch:
             self._first_greed += len(counts) - 1
         # The foot that is not the first to stand is where it is at the start.
         return None if way is None else [1 - way[0].hold, *(node.hold for node in way)]
-
-    def _followers(self, node: _Node) -> list[tuple[_Node, float]]:
-        if not self._closed:
-            return self._steps(node)
-        return [item for item in self._steps(node) if (node.hold, item[0].hold) not in self._closed]
 
     def farthest(self) -> tuple[float, Foothold]:
         """Least cost that was left at a foothold which was reached [s], and that foothold."""
