@@ -200,8 +200,7 @@ class CrawlSearch:
                     return f"{landing} finds no way to {_text(feet[landing].position)}"
                 stages[-1] = Stage.of(self._body, contacts, before, TURNING, via=via)
             contacts = after
-            time = PACES.shift_duration if leaving == HANDS[0] else self._settings.reach_duration
-            stages.append(Stage.of(self._body, contacts, posed.q, time))
+            stages.append(Stage.of(self._body, contacts, posed.q, self._settings.reach_duration))
         return stages
 
     # --- on hands and knees -----------------------------------------------------------------------
