@@ -48,6 +48,7 @@ from manikin.planning.whole_body.key_postures import KeyPostures
 from manikin.planning.whole_body.posture_style import (
     CLOSE,
     READY,
+    WALKING,
     Guide,
     PostureStyle,
     plan_guide,
@@ -295,8 +296,8 @@ class _Planner:
         hanging = (hanging_segment(body, body.effector(name).segment) for name in body.effectors)
         toes = [segment.name for segment in hanging if segment is not None]
         best = self._attempt(swings, manner, progress)
-        # Raised arms may have to pass through a thigh.
-        if manner is READY and best.is_too_near(frozenset[str]().union(*arms)):
+        # Raised arms may have to pass through a thigh, swinging ones through a wall.
+        if manner in (READY, WALKING) and best.is_too_near(frozenset[str]().union(*arms)):
             best = self.job.better(best, self._attempt(swings, CLOSE, progress))
         if best.is_too_near(toes):  # Straight toes may be in the way of a flight.
             best = self.job.better(best, self._attempt(swings, manner, progress, straight_toes=False))
