@@ -31,10 +31,12 @@ def refine_contacts(
     body, scene, padded = context.body, context.scene, context.padded
     options = context.scenario.file.wholebody
     schedule = ContactSchedule(schedule.sequence, schedule.instants / options.pace)
-    path = with_mid_flights(body, scene, schedule, KeyPath(time / options.pace, q), padded)
+    rests = _rests(context, schedule)
+    keys = KeyPath(time / options.pace, q)
+    path = with_mid_flights(body, scene, schedule, keys, padded, dense=bool(rests))
     kept = {"contact_variables": options.contact_variables, "speed_share": options.speed_share}
     result = refine_motion(
-        body, scene, path.time, path.q, schedule, padded=padded, rests=_rests(context, schedule),
+        body, scene, path.time, path.q, schedule, padded=padded, rests=rests,
         settings=RefineSettings(scales=RefineScales.of(body), **kept),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip

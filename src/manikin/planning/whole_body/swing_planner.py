@@ -40,13 +40,16 @@ ROOM = 0.01
 
 
 def with_mid_flights(
-    body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, padded: Sequence[str] = ()
-) -> KeyPath:
+    body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, padded: Sequence[str] = (), *,
+    dense: bool = False,
+) -> KeyPath:  # fmt: skip
     """Add postures along a clear curve inside each flight from a contact to another one.
 
     Args:
         path: Key configurations at least at both ends of each flight.
         padded: Obstacles that any part of the body may lean on.
+        dense: Whether more are added where the way between two is not clear; they are not eased, so that a
+            body that does not rest in between may be too weak for them.
 
     Returns:
         The path with the postures that were found; a flight for which there is none stays as it is.
@@ -64,25 +67,26 @@ def with_mid_flights(
             leaning_pairs(body, padded).union(*(touch_pairs(body, scene, item) for item in contacts))
             for contacts in (standing, (*standing, *ends))
         )
-        for share in (*SHARES, *BETWEEN):
+        for share in (*SHARES, *BETWEEN) if dense else SHARES:
             time = curve.start_time + share * curve.duration
             guess = path.at(np.array([time]))[0]
             passes = share in BETWEEN and is_clear(time, Pose.in_posture(body, guess, swing.effector))
             if passes and proximity.minimum_over(guess[None], (beside,)).distance > 0.0:
                 continue
             stance, effector = schedule.stance_at(time), swing.effector
-            q = _posture_on(body, proximity, curve.at(time), effector, stance, guess, touched)
+            kept = KEPT if dense else KEPT[:1]
+            q = _posture_on(body, proximity, curve.at(time), effector, stance, guess, touched, kept)
             path = path if q is None else path.through(time, q)
     return path
 
 
 def _posture_on(
     body: BodyModel, proximity: Proximity, pose: Pose, effector: str, stance: Stance, guess: FloatArray,
-    touched: frozenset[tuple[str, str]],
+    touched: frozenset[tuple[str, str]], shares: Sequence[float],
 ) -> FloatArray | None:  # fmt: skip
     """(nq,) posture with an effector in flight near a pose on its curve, or None."""
     com, distance = Configuration(body, guess).com, RefineScales.of(body).safe_distance
-    for kept in KEPT:
+    for kept in shares:
         problem = PostureProblem(
             body, tuple(stance), {effector: Placement(pose.position, pose.rotation, 0.3)},
             # The effector's attitude and a centre of mass between those at both ends are wished.
