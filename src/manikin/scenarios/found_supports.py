@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from manikin.balance.capturability import MARGIN as RISING_MARGIN
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import yaw_about_normal
 from manikin.planning.contacts import ContactPlan, Stage
-from manikin.planning.contacts.transition import MARGIN as RISING_MARGIN
 from manikin.scenarios.planned import STANDING, STATURE, WEIGHTS, walk_margin
 from manikin.scenarios.problems import overhead_constraints
 from manikin.scenarios.scenario import Scenario

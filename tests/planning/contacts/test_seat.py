@@ -6,25 +6,16 @@ import numpy as np
 import pytest
 
 from manikin.balance import static_room, static_torque_share
-from manikin.balance.margin import stability_margins
-from manikin.balance.wrench import pseudo_wrench, wrench_polytope
 from manikin.body import Configuration, human
-from manikin.contact import Stance, sole
 from manikin.numerics.spatial import IDENTITY
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.pipeline.stages.context import plan_in_world
 from manikin.planning.contacts import Endpoints, Habit, PostureFinder, leave_seat
+from manikin.planning.contacts.footholds import FEET
 from manikin.planning.contacts.seat import hand_supports
-from manikin.planning.contacts.transition import momentum_to_rest
 from manikin.scenarios import load_scenario
 from manikin.scene import Box, Obstacle, Scene
 from manikin.verification import check_contact_plan
-
-FEET = Stance([
-    sole("left_foot", (0.0, 0.09, 0.0), length=0.26, width=0.10, friction=0.7),
-    sole("right_foot", (0.0, -0.09, 0.0), length=0.26, width=0.10, friction=0.7),
-])  # fmt: skip
-REST = np.array([0.0, 0.0, 0.95])
 
 
 def on_chair(*, stature, mass, sex, height, task=None):
@@ -93,7 +84,7 @@ def test_a_seat_that_cannot_be_left_at_rest_is_left_in_motion():
         for name, contact in start.contacts.items()
     }
     posed = poser.pose(moved, moved, start.q, place=start.com[:2], restarts=True)
-    leaving = leave_seat(poser, type(start).of(body, moved, posed.q, 0.35), frozenset(FEET.effectors))
+    leaving = leave_seat(poser, type(start).of(body, moved, posed.q, 0.35), frozenset(FEET))
     assert leaving.failure is None
     off = leaving.stages[-2]
     heel = off.contacts["left_foot"].position[0] - 0.5 * off.contacts["left_foot"].length
@@ -103,27 +94,6 @@ def test_a_seat_that_cannot_be_left_at_rest_is_left_in_motion():
     assert static_room(on_feet, body.mass, off.com) == -np.inf
     assert static_room(on_feet, body.mass, off.com, acceleration=off.momentum.acceleration) > 0.0
     assert off.com == pytest.approx(Configuration(body, off.q).com)
-
-
-@pytest.mark.parametrize("behind", [0.02, 0.05])
-def test_speed_carries_the_centre_of_mass_over_the_feet(behind):
-    """The instant at which a contact is left is balanced, by a polytope about the centre of mass itself."""
-    com = np.array([-0.13 - behind, 0.0, 0.6])
-    found = momentum_to_rest(FEET, 70.0, com, REST)
-    assert found.velocity[0] > 0.0
-    polytope = wrench_polytope(FEET.bounded(70.0))
-    wrench = pseudo_wrench(70.0, com, found.acceleration, None, polytope.reference)
-    assert stability_margins(polytope, wrench, com).wrench >= found.margin - 1e-6
-    assert found.extrapolated(com, FEET)[0] > -0.13
-
-
-def test_no_speed_helps_too_far_behind_the_feet():
-    assert momentum_to_rest(FEET, 70.0, np.array([-0.40, 0.0, 0.6]), REST) is None
-
-
-def test_no_speed_is_asked_for_over_the_feet():
-    found = momentum_to_rest(FEET, 70.0, np.array([-0.05, 0.0, 0.6]), REST)
-    assert np.linalg.norm(found.velocity) == 0.0
 
 
 def test_hands_push_until_the_weight_is_over_the_feet():
@@ -139,7 +109,7 @@ def test_hands_push_until_the_weight_is_over_the_feet():
     sat = Endpoints(PostureFinder(body, scene), 0.7).find(np.zeros(2), 0.0, Habit.SEATED).stage
     held = {**sat.contacts, **hand_supports(scene, sat.contacts["buttocks"], 1.75, 0.7, 0.9)}
     posed = poser.pose(held, held, sat.q, place=sat.com[:2], restarts=True)
-    leaving = leave_seat(poser, type(sat).of(body, held, posed.q, 0.35), frozenset(FEET.effectors))
+    leaving = leave_seat(poser, type(sat).of(body, held, posed.q, 0.35), frozenset(FEET))
     assert leaving.failure is None
     off, free = leaving.stages[-3:-1]
     assert set(off.contacts) == {"left_foot", "right_foot", "left_hand", "right_hand"}

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from manikin.balance.capturability import Momentum
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import (
     Contact,
@@ -23,7 +24,6 @@ from manikin.contact import (
 )
 from manikin.errors import ContactError
 from manikin.numerics.spatial import FloatArray, frozen_array, skew
-from manikin.planning.contacts.transition import Momentum
 
 Contacts = Mapping[str, Contact]
 """Contacts by their effectors."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from manikin.balance.capturability import Momentum, momentum_to_rest
 from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import ANKLE_FROM_HEEL
 from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
@@ -23,7 +24,6 @@ from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage,
 from manikin.planning.contacts.footholds import FEET, Footholds
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder
-from manikin.planning.contacts.transition import Momentum, momentum_to_rest
 from manikin.scene import Scene, Surface
 
 SEATED_ON = frozenset({"buttocks"})  # effectors with which a body sits

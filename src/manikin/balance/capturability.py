@@ -14,9 +14,9 @@ from itertools import product
 import numpy as np
 from scipy.optimize import linprog
 
-from manikin.balance import WrenchPolytope, wrench_polytope
 from manikin.balance.criteria import admissible_com_polygon, support_height
 from manikin.balance.margin import wrench_levers
+from manikin.balance.wrench import WrenchPolytope, wrench_polytope
 from manikin.contact import Stance
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
