@@ -92,6 +92,15 @@ class Surface:
         gap = np.sqrt(np.einsum("kei,kei->ke", nearest, nearest).min(axis=1))
         return np.where(inside_edges(flat, start, end), 0.0, gap)
 
+    def nearest_inside(self, point: FloatArray, inset: float) -> FloatArray | None:
+        """(3,) place nearest to a point (3,), at a distance from all edges [m]; None without."""
+        frame = PlaneFrame(self.polygon[0], self.rotation)
+        room = frame.flat(self.polygon, self.holes).buffer(-inset)
+        if room.is_empty:
+            return None
+        ends = shapely.shortest_line(room, shapely.Point(self._flat(point))).coords
+        return frame.origin + self.rotation[:, :2] @ ends[0]
+
     def holds(self, points: FloatArray) -> NDArray[np.bool_]:
         """(k,) whether (k, 3) points [m], seen along the normal, are inside."""
         return inside_edges(self._flat(points), *self._flat_edges)

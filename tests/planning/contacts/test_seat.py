@@ -111,8 +111,22 @@ def test_hands_push_until_the_weight_is_over_the_feet():
     posed = poser.pose(held, held, sat.q, place=sat.com[:2], restarts=True)
     leaving = leave_seat(poser, type(sat).of(body, held, posed.q, 0.35), frozenset(FEET))
     assert leaving.failure is None
-    off, free = leaving.stages[-3:-1]
-    assert set(off.contacts) == {"left_foot", "right_foot", "left_hand", "right_hand"}
+    off, _, free = leaving.stages[-4:-1]
+    assert set(off.contacts) == {"left_foot", "right_foot", "left_wrist", "right_wrist"}
     assert set(free.contacts) == {"left_foot", "right_foot"}
     assert static_torque_share(body, off.q, off.stance) <= 0.95
-    assert off.contacts["left_hand"].position[2] == pytest.approx(0.66)
+    assert off.contacts["left_wrist"].position[2] == pytest.approx(0.66)
+
+
+@pytest.mark.parametrize(("name", "stature"), [("stand-up-chair@hands", 1.60), ("stand-up-sofa@hands", 1.88)])
+def test_hands_push_where_they_are_to_be_used(name, stature):
+    """The heels of both hands carry with the feet as the seat is left, level within what a palm yields."""
+    scenario = load_scenario(name).replaced(
+        body={"model": "human", "stature_m": stature, "mass_kg": 75.0, "sex": "male"}
+    )  # fmt: skip
+    stages, body = planned(scenario.in_task_frame()).plan.stages, scenario.build_body()
+    off = next(stage for stage in stages if "buttocks" not in stage.contacts)
+    assert set(off.contacts) == {"left_foot", "right_foot", "left_wrist", "right_wrist"}
+    for hand in ("left_wrist", "right_wrist"):
+        up = Configuration(body, off.q).effector_placement(hand)[0][:, 2]
+        assert up[2] > np.cos(np.deg2rad(20.0))

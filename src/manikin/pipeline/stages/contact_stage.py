@@ -65,7 +65,8 @@ class _ContactSearch:
         return contacts.PostureFinderSettings(natural=self._natural, friction_model=model)
 
     def _endpoints(self, poser: contacts.PostureFinder) -> Endpoints:
-        return Endpoints(poser, self._scenario.contacts.friction, rolls=not self._scenario.refines)
+        asked, rolls = self._scenario.contacts, not self._scenario.refines
+        return Endpoints(poser, asked.friction, rolls=rolls, hands=asked.seat_hands == "used")
 
 
 class _FootSearch(_ContactSearch):

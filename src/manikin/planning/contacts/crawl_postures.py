@@ -31,7 +31,6 @@ ROOM = 0.72  # height below which the body is on all fours where nothing is lowe
 OUTWARDS = math.radians(30.0)  # angle of the fingers from the way
 # Distance from a place that is wished for that costs half a unit, and that of a hand from what it left [m].
 MISSED, OFF = 0.05, 0.03
-LEVEL = {"knee": 1.0, "wrist": 6.0}  # weights with which shanks and hands are level [1/rad^2]
 TILT = 0.5  # sine of the largest angle of a hand: neither its edge nor the forearm is pressed into the ground
 _ON_ALL_FOURS = {
     "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 66.0,
@@ -56,7 +55,7 @@ def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
         held[name] = point(name, place, friction=1.0, rotation=fingers_out(name))
     ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * ROOM + 0.5))
     finder = PostureFinder(body, Scene([ceiling]), q, settings)
-    return finder.pose(held, held, q, place=np.zeros(2), placements=_level(held), preferences=_PREFERENCES)
+    return finder.pose(held, held, q, place=np.zeros(2), preferences=_PREFERENCES)
 
 
 class CrawlPostures:
@@ -89,9 +88,8 @@ class CrawlPostures:
         like a guide (nq,), limbs just off what they left ``near``. The other arguments are those of
         :meth:`PostureFinder.pose`.
         """
-        first, crawls, wishes = None, held.keys() <= set(CRAWLERS), _level(held)
-        for name, contact in (near or {}).items():
-            wishes[name] = _wished(contact.position + OFF * contact.normal)
+        first, crawls = None, held.keys() <= set(CRAWLERS)
+        wishes = {name: _wished(item.position + OFF * item.normal) for name, item in (near or {}).items()}
         for share in RESTING if crawls else (0.0,):
             place = None
             if crawls:
@@ -113,7 +111,7 @@ class CrawlPostures:
         """(nq,) posture half way between two, a limb near a place (3,) off the ground [m]."""
         start = 0.5 * (postures[0] + postures[1])
         start[3:7] = postures[1][3:7]
-        wishes = _level(staying) | {name: _wished(middle)}
+        wishes = {name: _wished(middle)}
         return self._finder.pose(
             staying, staying, start, start, placements=wishes, preferences=_PREFERENCES
         ).q
@@ -177,11 +175,3 @@ def _middles(contacts: Contacts) -> tuple[FloatArray, FloatArray]:
 def _wished(place: FloatArray) -> Placement:
     """Wish for a limb at a place (3,) [m], turned as it likes."""
     return Placement(place, None, None, 0.5 / MISSED**2)
-
-
-def _level(held: Contacts) -> dict[str, Placement]:
-    """Wishes for shanks and hands that are level."""
-    return {
-        name: Placement(None, contact.rotation_contact_to_world, LEVEL[name.partition("_")[2]])
-        for name, contact in held.items() if name in CRAWLERS
-    }  # fmt: skip

@@ -7,7 +7,7 @@ import heapq
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from manikin.scene import Surface
 
 SEAT_HEIGHTS = (0.12, 0.40)  # lowest and greatest height of a seat above the feet [statures]; our choice
 FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)  # places of a floor before the middle of the buttocks [statures]
+LEANT = 0.057  # way of the weight of a body that leans down to put its hands beside it [statures]; our choice
 SITTING_TIME = 0.35  # shortest time for which a body sits before it moves [s]
 CROUCH = 0.6  # height of a crouching body's root relative to a standing one's; our choice
 
@@ -47,14 +48,17 @@ class Endpoint:
 class Endpoints:
     """Finds starts and goals of a body on its feet or a seat in one scene."""
 
-    def __init__(self, poser: PostureFinder, friction: float, *, rolls: bool = False) -> None:
+    def __init__(
+        self, poser: PostureFinder, friction: float, *, rolls: bool = False, hands: bool = False
+    ) -> None:
         """Prepare the scene of a finder of postures, of a body with soles.
 
         Args:
             friction: Coulomb coefficient of the soles.
             rolls: Whether a seated pelvis may roll forward on the front of the buttocks.
+            hands: Whether hands push beside a seat wherever they can, not only where they have to.
         """
-        self._poser, self._friction, self._rolls = poser, friction, rolls
+        self._poser, self._friction, self._rolls, self._hands = poser, friction, rolls, hands
         self._body, self._scene = poser.body, poser.scene
         self._stature = stature_of(poser.body)
         self._footholds = Footholds(self._body, self._scene)
@@ -116,6 +120,10 @@ class Endpoints:
             # A body that sits has its weight where its upright trunk puts it, not over the root.
             place = Configuration(self._body, guess).com[:2]
             posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
+            if posed.q is None and len(contacts) > 1 + len(FEET):
+                # Hands come to what is low as the trunk leans.
+                place = place + LEANT * self._stature * rotation_from_yaw(heading)[:2, 0]
+                posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
             if posed.q is None:
                 reasons.append(posed.reason)
                 continue
@@ -129,7 +137,7 @@ class Endpoints:
         return Endpoint(None, f"no posture seated at {np.round(at, 3).tolist()} m: {why}")
 
     def _sittings(self, at: FloatArray, heading: float, height: float | None) -> Iterator[Sitting]:
-        """Ways to sit on each seat, the lowest first; then each with hands that push, where they can."""
+        """Ways to sit on each seat, the lowest first, with hands that push and without."""
         low, high = (share * self._stature for share in SEAT_HEIGHTS)
         sitter = Sitter(self._body, self._footholds, self._friction, rolls=self._rolls)
         # Below the seat there may be no floor: it is looked for where the feet may be.
@@ -139,15 +147,14 @@ class Endpoints:
             for level, seat in self._surfaces(at, height):
                 if not low <= level - floor <= high:
                     continue
-                sittings = list(sitter.sittings(np.array([*at, level]), heading, seat, floor))
-                yield from sittings
-                for contacts, guess in sittings:
-                    hands = hand_supports(
-                        self._scene, contacts["buttocks"], self._stature, self._friction,
-                        self._footholds.steepest,
-                    )  # fmt: skip
-                    if hands:
-                        yield {**contacts, **hands}, guess
+                bare = list(sitter.sittings(np.array([*at, level]), heading, seat, floor))
+                hands = ((self._hands_beside(held["buttocks"]), held, guess) for held, guess in bare)
+                pushing = (({**held, **beside}, guess) for beside, held, guess in hands if beside)
+                yield from chain(pushing, bare) if self._hands else chain(bare, pushing)
+
+    def _hands_beside(self, buttocks: Contact) -> dict[str, Contact]:
+        scene, steepest = self._scene, self._footholds.steepest
+        return hand_supports(scene, buttocks, self._stature, self._friction, steepest)
 
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""

@@ -30,7 +30,7 @@ from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw,
 from manikin.planning.contacts.best_first import Graph, PosedSearch, Refused, heading_of
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.heuristics import duration
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 
 GREED = ((1.5, 200), (3.0, 600), (6.0, 1500))  # on the estimate, states expanded with each; our choice
 GOAL_REACH = 1.5  # distance from the root at the goal within which limbs have to have places, by their reach
@@ -588,16 +588,16 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         It is near the first of some guesses from which there is one.
         """
         if key not in self._postures:
-            posed, placements = Posed(None), {**upright_points(held), **(wishes or {})}
+            posed = Posed(None)
             for guide, start, near in guesses:
                 place = None
                 if self.settings.retreats:
                     near = self._over_feet(carrying, guide[:2] if near is None else near)
                     place = self.poser.resting_place(carrying, near, self.poser.settings.inset)
-                posed = self.poser.pose(held, carrying, start, guide, place=place, placements=placements)
+                posed = self.poser.pose(held, carrying, start, guide, place=place, placements=wishes)
                 if posed.q is not None:
                     break
-            self._postures[key] = self.poser.eased(posed, held, carrying, placements).at_rest
+            self._postures[key] = self.poser.eased(posed, held, carrying, wishes).at_rest
         return self._postures[key]
 
     def _over_feet(self, carrying: Contacts, near: FloatArray) -> FloatArray:

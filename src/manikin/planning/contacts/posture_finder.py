@@ -91,10 +91,16 @@ class Posed:
         return Posed(None, self.reason, too_hard=True) if self.too_hard else self
 
 
-def upright_points(held: Contacts) -> dict[str, Placement]:
+UPRIGHT = {"knee": 1.0, "wrist": 6.0}
+"""Weights with which shanks on knees and hands on their heels are level, other points 0.05 [1/rad^2]."""
+
+
+def _upright_points(held: Contacts) -> dict[str, Placement]:
     """Wishes for what touches at a point to stand upright on its surface, by effector."""
     return {
-        name: Placement(None, contact.rotation_contact_to_world, 0.05)
+        name: Placement(
+            None, contact.rotation_contact_to_world, UPRIGHT.get(name.partition("_")[2], 0.05)
+        )
         for name, contact in held.items() if contact.kind is ContactKind.POINT
     }  # fmt: skip
 
@@ -123,7 +129,7 @@ class PostureFinder:
         com_weight: float | None = None, restarts: bool = False,
         placements: Mapping[str, Placement] | None = None, preferences: Preferences | None = None,
     ) -> Posed:  # fmt: skip
-        """Find a posture that holds contacts and rests on some of them alone.
+        """Find a posture that holds contacts, points upright, and rests on some of them alone.
 
         Args:
             held: Contacts that are held.
@@ -150,7 +156,8 @@ class PostureFinder:
         whole = guide is not None and len(guide) > ROOT
         ignore, beside = self._near(held)
         problem = PostureProblem(
-            self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
+            self.body, tuple(held.values()), {**led, **_upright_points(held), **(placements or {})},
+            com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
             self_clearance=settings.clearance, ignore=ignore, beside=beside,
             range_margin=settings.range_margin, learnt_margin=LEARNT_MARGIN if settings.natural else None,

@@ -9,6 +9,7 @@ feet, else in motion (:mod:`.transition`), else with hands that push on armrests
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -170,10 +171,13 @@ SEAT_OFF_INSETS = (0.045, 0.03, 0.015)
 order [m]; the first is inside the smaller soles on which it is planned."""
 BEHIND = (0.0, 0.02, 0.04)  # ways behind where the centre of mass could rest as a seat is left [m]
 LEAN_WEIGHT = 300.0  # of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice
+EASY_LEAN = 0.8  # share of the farthest lean with which a body leaves a seat on feet and hands; our choice
 RISING_TIME = 0.9  # shortest time from there to standing [s]; the pace of the joints mostly asks for more
+LETTING_GO_TIME = 0.2  # shortest time from one hand that lets go to the other one [s]; our choice
 SETTLING_TIME = 0.8  # shortest time that the body stands then [s]
 SEATED_ROOM = (0.01, 0.01, 0.006)  # for the centre of mass [m]: a seated trunk cannot follow any path
-SEAT_OFF_ROOM = (0.01, 0.01, 0.002)  # where the seat is left at rest [m]: a trunk ends its lean there
+SEAT_OFF_ROOM = (0.01, 0.01, 0.002)
+"""The same where the seat is left at rest, as a trunk ends its lean there, and with hands beside it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,16 +211,12 @@ def leave_seat(
     failure = None
     for lean in _leans(poser, start, held, risen.q):
         if not isinstance(lean, str):
-            return _rising(poser, start, [(held, *lean)], risen.q)
+            return _rising(poser, start, [lean], risen.q)
         failure = lean
     return Leaving((start,), failure)
 
 
-_Lean = tuple[FloatArray, Momentum | None] | str
-"""Posture (nq,) in which a seat is left for the feet, with its motion, None at rest; or why not there."""
-
-
-def _leans(poser: PostureFinder, start: Stage, held: Contacts, risen: FloatArray) -> Iterator[_Lean]:
+def _leans(poser: PostureFinder, start: Stage, held: Contacts, risen: FloatArray) -> Iterator[Stage | str]:
     """Leans that bring the weight over the feet, then such as leave it farther and farther behind them."""
     rest = Configuration(poser.body, risen).com
     over = poser.resting_place(held, start.com[:2], SEAT_OFF_INSETS[-1])
@@ -247,8 +247,10 @@ def _leans(poser: PostureFinder, start: Stage, held: Contacts, risen: FloatArray
     yield f"{lean}; at rest: {reason}" if isinstance(lean, str) else lean
 
 
-def _lean(poser: PostureFinder, q: FloatArray, held: Contacts, rest: FloatArray, *, moving: bool) -> _Lean:
-    """A posture with its motion to rest, where the joints are strong enough."""
+def _lean(
+    poser: PostureFinder, q: FloatArray, held: Contacts, rest: FloatArray, *, moving: bool
+) -> Stage | str:
+    """Stage in which a seat is left for the feet with a posture (nq,) that leans, or why not there."""
     body, momentum = poser.body, None
     if moving:
         com = Configuration(body, q).com
@@ -258,7 +260,10 @@ def _lean(poser: PostureFinder, q: FloatArray, held: Contacts, rest: FloatArray,
             where = f"{behind:.3f} m behind the middle of the feet"
             return f"a lean leaves the centre of mass {where}, from where no speed carries it over them"
     acceleration = None if momentum is None else momentum.acceleration
-    return poser.strained(q, held, STRENGTH_SHARE, acceleration) or (q, momentum)
+    room = SEAT_OFF_ROOM if momentum is None else SEATED_ROOM
+    return poser.strained(q, held, STRENGTH_SHARE, acceleration) or Stage.of(
+        body, held, q, RISING_TIME, room, momentum=momentum
+    )
 
 
 def _pushed_up(
@@ -268,42 +273,48 @@ def _pushed_up(
     # The arms push until they are long: what is left to rise alone is as little as they let.
     failure = None
     for inset in SEAT_OFF_INSETS:
-        free = poser.pose(pushing, held, start.q, risen[:7], inset=inset, restarts=True)
+        place = poser.resting_place(held, start.com[:2], inset)
+        free = poser.pose(pushing, held, start.q, risen[:7], place=place, restarts=True)
         if free.q is None:
             failure = failure or f"hands cannot be let go: {free.reason}"
             continue
         over_feet = Configuration(poser.body, free.q).com[:2]
         off = poser.pose(start.contacts, pushing, start.q, place=over_feet, com_weight=LEAN_WEIGHT)
+        if off.q is not None:
+            # Short of where joint ranges end, as a motion needs room.
+            lean = Configuration(poser.body, off.q).com[:2] - start.com[:2]
+            off = poser.pose(start.contacts, pushing, off.q, place=start.com[:2] + EASY_LEAN * lean)
         if off.q is None:
             failure = failure or off.reason
             continue
         weak = [poser.strained(q, on, STRENGTH_SHARE) for q, on in ((off.q, pushing), (free.q, held))]
         if not any(weak):
-            return _rising(poser, start, [(pushing, off.q, None), (held, free.q, None)], risen)
+            changes = [Stage.of(poser.body, pushing, off.q, RISING_TIME, SEAT_OFF_ROOM)]
+            for hand in [name for name in pushing if name not in held]:
+                pushing = {name: contact for name, contact in pushing.items() if name != hand}
+                last = len(pushing) == len(held)
+                time = RISING_TIME if last else LETTING_GO_TIME
+                changes.append(Stage.of(poser.body, pushing, free.q, time, SEATED_ROOM))
+            return _rising(poser, start, changes, risen)
         failure = weak[0] or weak[1]
     return Leaving((start,), failure)
 
 
-def _rising(
-    poser: PostureFinder, start: Stage,
-    changes: Sequence[tuple[Contacts, FloatArray, Momentum | None]], risen: FloatArray,
-) -> Leaving:  # fmt: skip
-    """Stages that lean up to the first change and then have the contacts of each, up to standing."""
-    body, stages, moving = poser.body, [start], changes[0][2] is not None
-    there, before = Configuration(body, changes[0][1]).com[:2], 0.0
+def _rising(poser: PostureFinder, start: Stage, changes: Sequence[Stage], risen: FloatArray) -> Leaving:
+    """Stages that lean up to the first of some changes of contact, make them, and stand."""
+    body, stages, moving = poser.body, [start], changes[0].momentum is not None
+    there, before = changes[0].com[:2], 0.0
+    room = SEATED_ROOM if len(changes) == 1 else SEAT_OFF_ROOM
     for share in (*LEANING, 1.0):
         time = _leaning_time(share, moving)
         stages[-1] = replace(stages[-1], min_duration=time - before)
         place = (1.0 - share) * start.com[:2] + share * there
         posed = poser.pose(start.contacts, start.contacts, stages[-1].q, place=place) if share < 1.0 else None
         if posed is not None and posed.q is not None:
-            stages.append(Stage.of(body, start.contacts, posed.q, 0.0, SEATED_ROOM))
+            stages.append(Stage.of(body, start.contacts, posed.q, 0.0, room))
             before = time
-    for number, (contacts, q, momentum) in enumerate(changes):
-        room = SEATED_ROOM if moving or number else SEAT_OFF_ROOM
-        stages.append(Stage.of(body, contacts, q, RISING_TIME, room, momentum=momentum))
-    stages.append(Stage.of(body, changes[-1][0], risen, SETTLING_TIME))
-    return Leaving(tuple(stages))
+    standing = Stage.of(body, changes[-1].contacts, risen, SETTLING_TIME)
+    return Leaving((*stages, *changes, standing))
 
 
 def _leaning_time(share: float, moving: bool) -> float:
@@ -319,7 +330,7 @@ def _least_jerk(share: FloatArray) -> FloatArray:
     return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
-HAND_AHEAD, HAND_ASIDE, HAND_ABOVE = 0.08, 0.17, 0.13
+HAND_AHEAD, HAND_ASIDE, HAND_ABOVE = 0.08, 0.15, 0.13
 """Where a hand pushes best from the middle of the buttocks [statures]; our choice."""
 HAND_ROOM = 0.25  # farthest that it is from there [statures]
 HAND_INSET = 0.012  # distance of the middle of the palm to the edges of its surface [m]
@@ -328,41 +339,26 @@ HAND_INSET = 0.012  # distance of the middle of the palm to the edges of its sur
 def hand_supports(
     scene: Scene, buttocks: Contact, stature: float, friction: float, steepest: float
 ) -> dict[str, Contact]:
-    """Places beside a seat on which hands can push down: armrests, a table, the seat itself.
+    """Places beside a seat on which heels of hands can push: armrests, a table, the seat itself.
 
     Args:
         friction: Coulomb coefficient.
         steepest: Largest slope of a surface to push on [rad].
     """
     turn, result = buttocks.rotation_contact_to_world, dict[str, Contact]()
-    for hand, side in (("left_hand", 1.0), ("right_hand", -1.0)):
+    for hand, side in (("left_wrist", 1.0), ("right_wrist", -1.0)):
         wanted = buttocks.position + turn @ (stature * np.array([HAND_AHEAD, side * HAND_ASIDE, HAND_ABOVE]))
         best = HAND_ROOM * stature
         for surface in scene.surfaces_facing((0.0, 0.0, 1.0), steepest):
             if float(surface.polygon[:, 2].max()) < buttocks.position[2] - 0.02:
                 continue
-            place = _nearest_inside(surface, wanted, HAND_INSET)
+            place = surface.nearest_inside(wanted, HAND_INSET)
             away = np.inf if place is None else float(np.linalg.norm(place - wanted))
             if place is not None and away < best:
                 best = away
                 frame = onto_normal(turn, surface.normal)
                 result[hand] = point(hand, place, friction=friction, rotation=frame)
     return result
-
-
-def _nearest_inside(surface: Surface, wanted: FloatArray, inset: float) -> FloatArray | None:
-    """(3,) point of a surface near a place, at a distance from its edges [m]; None where there is none."""
-    flat = wanted - surface.height(wanted[None])[0] * surface.normal
-    for reach in (0.0, 0.05, 0.1, 0.2, 0.3, 0.45):
-        angle = np.linspace(0.0, 2.0 * np.pi, 1 if reach == 0.0 else 32, endpoint=False)
-        ring = flat + reach * (np.cos(angle)[:, None] * surface.rotation[:, 0]
-                               + np.sin(angle)[:, None] * surface.rotation[:, 1])  # fmt: skip
-        corners = inset * (surface.rotation[:, :2] @ np.array([[1, 1, -1, -1], [1, -1, 1, -1]])).T
-        outside = surface.outside((ring[:, None] + corners).reshape(-1, 3)).reshape(len(ring), 4)
-        inside = (outside <= 1e-9).all(axis=1)
-        if inside.any():
-            return ring[int(np.argmax(inside))]
-    return None
 
 
 def take_seat(poser: PostureFinder, way: ContactPlan, sat: Stage) -> ContactPlan | str:
@@ -379,8 +375,11 @@ def take_seat(poser: PostureFinder, way: ContactPlan, sat: Stage) -> ContactPlan
     rising = leave_seat(poser, seated, frozenset(feet), way.goal[:7])
     if rising.failure is not None:
         return f"cannot sit down: {rising.failure}"
-    risen, touch = rising.stages[-1], rising.stages[-2]
-    momentum = None if touch.momentum is None else touch.momentum.backwards
-    up = Stage.of(body, feet, risen.q, RISING_TIME)
-    down = Stage.of(body, contacts, touch.q, SETTLING_TIME, SEATED_ROOM, momentum=momentum)
-    return ContactPlan.of(body, [*way.stages, up, down], seated.q)
+    stages = [*way.stages, Stage.of(body, feet, rising.stages[-1].q, RISING_TIME)]
+    for before, after in reversed(list(pairwise(rising.stages))):
+        if before.contacts.keys() != after.contacts.keys():
+            momentum = None if after.momentum is None else after.momentum.backwards
+            stages.append(Stage.of(
+                body, before.contacts, after.q, SETTLING_TIME, SEATED_ROOM, momentum=momentum
+            ))  # fmt: skip
+    return ContactPlan.of(body, stages, seated.q)

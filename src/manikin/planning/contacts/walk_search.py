@@ -25,7 +25,7 @@ from manikin.planning.contacts.footholds import FEET, Foothold, Footholds, feet_
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.limb_places import stature_of
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder, upright_points
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.seat import leave_seat
 from manikin.scene import Scene
 
@@ -338,14 +338,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if key in self._postures:
             return self._postures[key]
         guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
-        flat = upright_points(held)
-        posed = self.poser.pose(held, carrying, q, guide, inset=inset, placements=flat)
+        posed = self.poser.pose(held, carrying, q, guide, inset=inset)
         if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
-            posed = self.poser.pose(
-                held, carrying, start, guide, inset=inset, restarts=feet_alone, placements=flat
-            )
-        posed = self.poser.eased(posed, held, carrying, flat)
+            posed = self.poser.pose(held, carrying, start, guide, inset=inset, restarts=feet_alone)
+        posed = self.poser.eased(posed, held, carrying)
         if posed.too_hard:
             posed = posed.at_rest if self.replanned < STRONG_TRIES else Posed(posed.q)
         self._postures[key] = posed

@@ -94,6 +94,11 @@ class ContactsSection(Section):
         "what bounds a human's hips and shoulders: the intervals of their hinges alone, or the "
         "volumes learnt from recorded motion as well",
     )
+    seat_hands: Literal["needed", "used"] = preset(
+        "needed",
+        "hands that push on armrests, a table or the seat as a seat is left or taken: where the "
+        "feet alone cannot, or wherever there is a place for them",
+    )
     attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = preset(
         3, "contact plans, or starts of a body on any limbs, that are tried before giving up"
     )
