@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from manikin.balance.capturability import Momentum, momentum_to_rest
+from manikin.balance.capturability import momentum_to_rest
 from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import ANKLE_FROM_HEEL
 from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
