@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from manikin.errors import SceneError
-from manikin.scene import Mesh, Obstacle, load_mesh
+from manikin.scene import Mesh, Obstacle, load_mesh, mesh_place
 from manikin.scene.mesh import UNITS
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
@@ -174,3 +174,31 @@ def _closed(*meshes):
 def test_real_meshes_come_in_metres(scene_files, file, extent):
     low, high = Obstacle("real", load_mesh(scene_files / file)).bounds
     assert np.allclose(high - low, extent, atol=0.01)
+
+
+@pytest.fixture
+def distribution(tmp_path, monkeypatch):
+    """An installed distribution that holds a mesh in its share, as those of robots' packages do."""
+    folder = tmp_path / "site"
+    inside = "prefix/share/some_scenes/meshes/box.stl"
+    (folder / inside).parent.mkdir(parents=True)
+    BOX.export(str(folder / inside))
+    info = folder / "some_scenes-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: some-scenes\nVersion: 1.0\n")
+    (info / "RECORD").write_text(f"{inside},,\nsome_scenes-1.0.dist-info/METADATA,,\n")
+    monkeypatch.syspath_prepend(str(folder))
+    return "package://some_scenes/meshes/box.stl"
+
+
+def test_a_mesh_of_an_installed_distribution_is_found(distribution, tmp_path):
+    """From any folder, and as the same place again."""
+    assert mesh_place(distribution, tmp_path) == distribution
+    assert np.allclose(np.ptp(load_mesh(distribution).vertices, axis=0), (1.0, 2.0, 3.0), rtol=1e-6)
+    with pytest.raises(SceneError, match="is not in the package 'some_scenes'"):
+        load_mesh(distribution.replace("box", "ball"))
+
+
+def test_a_mesh_of_no_installed_distribution_names_what_to_install():
+    with pytest.raises(SceneError, match="not installed; valid: after pip install no-such-scenes"):
+        load_mesh("package://no_such_scenes/box.stl")

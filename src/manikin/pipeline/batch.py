@@ -87,6 +87,8 @@ class RunOptions:
 def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
     """Every built-in scenario followed by its variants, in the order of ``manikin scenarios``.
 
+    Those whose meshes are of a distribution that is not installed are left out.
+
     Args:
         statures: Whether to leave out bodies without a stature, such as a point mass or an insect.
 
@@ -95,6 +97,7 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
     """
     pairs = [(name, variant) for name in list_scenarios() for variant in (None, *list_variants(name))]
     loaded = [(*pair, load_scenario(*pair)) for pair in pairs]
+    loaded = [of for of in loaded if of[-1].missing_mesh() is None]
     return tuple(Job.of(*of) for of in loaded if not statures or of[-1].file.body.model == "human")
 
 

@@ -11,6 +11,7 @@ from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.validation import place, validate
 from manikin.scenarios.yaml_reader import VARIANTS, Tree, merge, read_yaml
+from manikin.scene import mesh_place
 
 EXTENDS = "extends"
 """Key that names the scenario a file is built on; the first key of the file."""
@@ -51,7 +52,7 @@ def _with_absolute_meshes(data: Any, folder: Path) -> Any:
         return data
     changed = dict(data)
     if isinstance(data.get("mesh"), str):
-        changed["mesh"] = str((folder / data["mesh"]).resolve())
+        changed["mesh"] = mesh_place(data["mesh"], folder)
     if isinstance(data.get("scene"), list):
         changed["scene"] = [_with_absolute_meshes(entry, folder) for entry in data["scene"]]
     if isinstance(data.get(VARIANTS), Mapping):

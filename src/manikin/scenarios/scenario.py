@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from manikin.errors import ScenarioError
+from manikin.errors import ScenarioError, SceneError
 from manikin.numerics.spatial import PlanarTransform, finite_number
 from manikin.runtime.display import Displayed
 from manikin.scenarios.placement import FILE_GRID, TASK_GRID, moved_data
@@ -19,6 +19,7 @@ from manikin.scenarios.validation import KeyPath, validate
 from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.scenarios.world import build_scene, check_contacts, stance_sequence
 from manikin.scenarios.yaml_reader import NULL_IS_A_VALUE, VARIANTS, Tree, parse_value
+from manikin.scene import PACKAGE, mesh_place, package_file
 
 
 def override(tree: Tree, settings: Sequence[str]) -> Tree:
@@ -170,6 +171,16 @@ class Scenario(Displayed, ScenarioValues):
             problem = f"is {push.at_s:g}; valid: before the motion ends at {duration:.3f} s"
             raise self.error(("push", "at_s"), problem)
 
+    def missing_mesh(self) -> str | None:
+        """Why a mesh of an installed distribution is not there; None where none is missing."""
+        for item in self.file.scene:
+            if item.mesh is not None and item.mesh.startswith(PACKAGE):
+                try:
+                    package_file(item.mesh)
+                except SceneError as error:
+                    return str(error)
+        return None
+
     def to_yaml(self) -> str:
         """Return the scenario with every default and override written out, ready to run again.
 
@@ -178,7 +189,7 @@ class Scenario(Displayed, ScenarioValues):
         data = self._data()
         for obstacle in data["scene"]:
             if "mesh" in obstacle:
-                obstacle["mesh"] = str((self.folder / obstacle["mesh"]).resolve())
+                obstacle["mesh"] = mesh_place(obstacle["mesh"], self.folder)
         if "recording" in data["planning"]:
             data["planning"]["recording"] = str(self.find_file(data["planning"]["recording"]).resolve())
         return _yaml(data)

@@ -39,7 +39,18 @@ from manikin.planning.whole_body.posture_style import READY, posture_style_of
 from manikin.scenarios.sections.support_sections import ContactSection, SoleSection
 from manikin.scenarios.sections.task_sections import ObstacleSection
 from manikin.scenarios.values import ScenarioValues, build_body
-from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Scene, Sphere, load_mesh
+from manikin.scene import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Obstacle,
+    Plane,
+    Scene,
+    Sphere,
+    load_mesh,
+    mesh_place,
+)  # fmt: skip
 from manikin.scene.obstacle import Shape
 
 
@@ -193,7 +204,7 @@ def _shape(entry: ObstacleSection, folder: Path) -> Shape:
             return kind(given.radius_m, given.length_m)
     if entry.sphere is not None:
         return Sphere(entry.sphere.radius_m)
-    path = folder / str(entry.mesh)
+    path = mesh_place(str(entry.mesh), folder)
     return load_mesh(path, unit=entry.unit, scale=entry.scale or 1.0, convex=entry.convex or "no")
 
 

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
@@ -111,6 +112,39 @@ class MeshPiece:
     convex: bool
 
 
+PACKAGE = "package://"
+"""How the place of a mesh begins that an installed distribution holds: ``package://NAME/path``."""
+
+
+def mesh_place(place: str, folder: Path) -> str:
+    """Where a mesh is, wherever it is asked from: relative to a folder, or in a distribution."""
+    return place if place.startswith(PACKAGE) else str((folder / place).resolve())
+
+
+def package_file(place: str) -> Path:
+    """File of an installed distribution, below its folder ``NAME`` in ``share`` or beside the modules.
+
+    Args:
+        place: ``package://NAME/path``, as ROS and URDF files have it.
+
+    Raises:
+        SceneError: If the distribution is not installed or has no such file.
+    """
+    inside = place.removeprefix(PACKAGE)
+    name = inside.partition("/")[0]
+    try:
+        files = metadata.files(name) or []
+    except metadata.PackageNotFoundError:
+        raise SceneError(
+            f"mesh '{place}' is of the package '{name}', which is not installed; "
+            f"valid: after pip install {name.replace('_', '-')}"
+        ) from None
+    for file in files:
+        if f"/{file.as_posix()}".endswith(f"/{inside}"):
+            return Path(str(file.locate()))
+    raise SceneError(f"mesh '{place}' is not in the package '{name}'; valid: a file that it holds")
+
+
 def load_mesh(
     path: str | Path, *, unit: str | None = None, up: str | None = None, scale: float = 1.0,
     convex: Convexity = "no",
@@ -118,13 +152,14 @@ def load_mesh(
     """Read an STL, OBJ, PLY or DAE file, as its extension says, into metres; SceneError if unusable.
 
     Args:
+        path: The file, or ``package://NAME/path`` of an installed distribution.
         unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``; when omitted, a DAE file's own, else metres.
         up: Axis of the file that points up, ``"x"``, ``"y"`` or ``"z"``; the mesh is turned so that it is z.
             When omitted, a DAE file's own, else z.
         scale: Further factor on every coordinate, > 0.
         convex: As for :class:`Mesh`.
     """
-    file = Path(path)
+    file = package_file(str(path)) if str(path).startswith(PACKAGE) else Path(path)
     extension = file.suffix.lower().lstrip(".")
     if extension not in FORMATS:
         raise SceneError(f"mesh file '{file}' has the extension '{file.suffix}'; valid: {_FORMATS_TEXT}")

@@ -108,8 +108,10 @@ class Sitter:
                 wanted = at + row * FEET_SPACING * turn[:, 0]
                 feet[row] = self._feet(np.array([*wanted[:2], floor]), heading)
             if len(feet[row]) == len(FEET):
+                place = at + forward * turn[:, 0]
+                place[2] -= float(seat.height(place[None])[0] / seat.normal[2])
                 buttocks = sole(
-                    "buttocks", at + forward * turn[:, 0], heading, length=SEAT_LENGTH * size,
+                    "buttocks", place, rotation=onto_normal(turn, seat.normal), length=SEAT_LENGTH * size,
                     width=SEAT_WIDTH * size, friction=SEAT_FRICTION,
                 )  # fmt: skip
                 if self._rolls:

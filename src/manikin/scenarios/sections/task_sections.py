@@ -105,7 +105,10 @@ class ObstacleSection(Section):
     half_space: Vector3 | None = optional(
         "outward normal of a solid half-space at position, turned by rpy_deg"
     )
-    mesh: Text | None = optional("STL, OBJ, PLY or DAE file, relative to this file's folder")
+    mesh: Text | None = optional(
+        "STL, OBJ, PLY or DAE file, relative to this file's folder; or package://NAME/path of an "
+        "installed Python distribution"
+    )
     scale: Positive | None = optional("factor on the mesh's coordinates (default 1)")
     unit: Literal["m", "cm", "mm", "in"] | None = optional(
         "unit of the mesh (default: a DAE file's own, else m)"
