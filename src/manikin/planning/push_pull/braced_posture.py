@@ -25,6 +25,7 @@ from manikin.planning.contacts import (
     Stage,
     WeightedSum,
 )
+from manikin.planning.contacts.contact_plan import COM_ROOM
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
 from manikin.planning.push_pull.stance_heuristics import (
@@ -260,8 +261,10 @@ class _BraceSearch:
             if posed.q is None:
                 return f"{up} does not come to the wall: {posed.reason}"
             postures.append(posed.q)
-        contacts, times = (standing, steps[1][0], rest), (REACHING_TIME, TOUCHING_TIME, LIFTING_TIME)
-        return *(Stage.of(self._body, *item) for item in zip(contacts, postures, times, strict=True)), acting
+        # Arms that hold on leave the centre of mass less room.
+        contacts, rooms = (standing, steps[1][0], rest), (COM_ROOM, ROOM, ROOM)
+        changes = zip(contacts, postures, (REACHING_TIME, TOUCHING_TIME, LIFTING_TIME), rooms, strict=True)
+        return *(Stage.of(self._body, *item) for item in changes), acting
 
     def _none(self, step: int, reason: str) -> None:
         """Keep a reason for which a step found nothing."""
