@@ -50,6 +50,18 @@ def test_long_strides_lower_the_com_and_impossible_ones_leave_no_region(body):
     assert reach.region(feet(body, (0, 0.1, 0, 0), (1.6, -0.1, 0, 0))).empty
 
 
+def test_a_stance_that_few_postures_hold_has_a_region():
+    """A long step down on flat feet, by a small woman: few samples come near, in no box."""
+    body = human(1.61, 63.9, "female")
+    stance = feet(body, (0.554, 0.101, 0.0, 0.0), (0.0, -0.081, 0.153, 0.0))
+    region = ComReach.of(body).region(stance)
+    assert not region.empty
+    # A posture of the full body lies where the region says: its deepest place is within 2 cm of the region.
+    posed = generate_posture(PostureProblem(body, tuple(stance)), settings=SolverSettings(tolerance=1e-4))
+    assert posed.succeeded, posed.failure
+    assert region.violation(Configuration(body, posed.q).com) < 0.02
+
+
 def test_the_region_moves_with_the_stance(body):
     """Turned by 2 rad and moved by 10 m: violations equal to a micrometre."""
     reach = ComReach.of(body)

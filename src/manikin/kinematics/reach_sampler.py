@@ -238,15 +238,17 @@ class ReachSampler:
             return Held(nothing, np.zeros((0, len(self._normals))), float(BEYOND * (low - high).max()))
         x = self._first(low, high)
         projections, violation = self._evaluate(x)
-        for _ in range(ROUNDS):
+        for number in range(ROUNDS + OUTWARD):
             if np.count_nonzero(violation <= 0.0) >= ENOUGH:
                 break
-            # In the box of the best ones, made a little wider.
-            best = x[np.argsort(violation, kind="stable")[:ELITE]]
-            first, last = best.min(axis=0), best.max(axis=0)
-            wider = 0.15 * (last - first)
-            a, b = np.maximum(first - wider, low), np.minimum(last + wider, high)
-            fresh = self._rng.uniform(a, b, (SAMPLES, len(low)))
+            best = np.argsort(violation, kind="stable")[:ELITE]
+            if number < ROUNDS:  # in the box of the best ones, made a little wider
+                first, last = x[best].min(axis=0), x[best].max(axis=0)
+                wider = 0.15 * (last - first)
+                a, b = np.maximum(first - wider, low), np.minimum(last + wider, high)
+                fresh = self._rng.uniform(a, b, (SAMPLES, len(low)))
+            else:  # few postures hold the contacts, in no box
+                fresh = np.clip(self._farther(x, best[None]), low, high)
             more, beyond = self._evaluate(fresh)
             x, projections = np.vstack([x, fresh]), np.vstack([projections, more])
             violation = np.concatenate([violation, beyond])
