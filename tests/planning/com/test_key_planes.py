@@ -27,6 +27,18 @@ def test_the_plan_passes_exactly_behind_a_plane_at_its_key_instant(planned, key)
     assert result.certificate[f"key plane 0 at T_{key}"].value == pytest.approx(beyond, abs=1e-12)
 
 
+def test_a_plan_is_mended_from_the_one_before(planned):
+    """From the plan that a plane cuts off, the same margin is found in fewer iterations than from guesses."""
+    key = 4
+    there = planned.trajectory.position(planned.key_instants[key])
+    plane = KeyPlane.towards(key, there, there - np.array([0.02, 0.0, 0.0]))
+    problem = replace(planned.problem, key_planes=(plane,))
+    near, afresh = plan_com(problem, guesses=0, near=planned.trajectory), plan_com(problem)
+    assert near.succeeded, near.failure
+    assert near.d_min == pytest.approx(afresh.d_min, abs=0.1)
+    assert near.iterations < afresh.iterations
+
+
 def test_a_plane_with_a_lead_bounds_the_speed(planned):
     """Where its velocity carries the CoM in 0.2 s is 1 cm less far than in the free plan, to 1e-6 m."""
     time = planned.key_instants[2]

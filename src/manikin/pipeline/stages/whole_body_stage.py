@@ -39,6 +39,10 @@ KEY_TOLERANCES = (1.0e-3, 2.0e-4)
 found although each posture was just within reach."""
 
 
+EASED_MARGIN = 0.5
+"""Share of the wanted margin with which a body still passes from foot to foot before it rests instead."""
+
+
 @dataclass(frozen=True, eq=False)
 class KeyedPlan:
     """A plan of the centre of mass with its key postures.
@@ -108,7 +112,11 @@ def _eligible(
             padded=() if context.plan is None else context.padded,
         )  # fmt: skip
 
-    return find_eligible_plan(planned, realise, look, replan=not isinstance(context.problem, KeyframeProblem))
+    # Where the body may rest instead, only the way that was found is mended.
+    return find_eligible_plan(
+        planned, realise, look, replan=not isinstance(context.problem, KeyframeProblem),
+        guesses=None if context.resting is None else 0,
+    )  # fmt: skip
 
 
 def _on_real_supports(
@@ -187,8 +195,11 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
     else:
         # Where the body may rest instead, what one guess does not find is not worth the time.
         result = com.plan_com(problem, guesses=None if context.resting is None else 1)
-        bends = context.scenario.keeps_upright and context.resting is None
-        if result.failure is not None and bends:  # the task may need a deeper bend
+        passes, enough = context.resting is not None, EASED_MARGIN * problem.required_margin
+        if passes and result.failure is not None and (result.d_min or 0.0) > enough > 0.0:
+            result = com.plan_com(replace(problem, required_margin=enough), guesses=1)
+        if result.failure is not None and context.scenario.keeps_upright and not passes:
+            # The task may need a deeper bend.
             result = com.plan_com(context.scenario.build_centroidal_problem(upright=False))
     report_centre_of_mass(report, result, centroidal_summary(result))
     if (failure := result.failure) is not None:
@@ -288,8 +299,8 @@ def _planned_postures(context: RunContext, schedule: ContactSchedule) -> FloatAr
     """
     if context.plan is None or len(context.plan.postures) >= len(schedule.instants):
         return None if context.plan is None else context.plan.postures
-    postures, held = align_quaternions(context.plan.postures), [p.stance.effectors for p in schedule.sequence]
-    begins = [0, *(k for k in range(1, len(held)) if held[k] != held[k - 1]), len(held)]
+    begins = [*schedule.sequence.changes, len(schedule.sequence)]
+    postures = align_quaternions(context.plan.postures)
     return Guide(schedule.instants[begins], postures, ()).at(schedule.instants)
 
 

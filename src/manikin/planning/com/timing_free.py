@@ -248,7 +248,9 @@ class CentroidalResult(Displayed):
         return measure(self.problem, trajectory, self.polytopes)
 
 
-def plan_com(problem: CentroidalProblem, *, guesses: int | None = None) -> CentroidalResult:
+def plan_com(
+    problem: CentroidalProblem, *, guesses: int | None = None, near: CentroidalTrajectory | None = None
+) -> CentroidalResult:
     """Find control points, key instants and margin of a CoM trajectory ([Qiu2012]_ 5.20-5.28).
 
     Every solution is measured every millisecond against all facets and all bounds. Where a requirement is
@@ -257,6 +259,7 @@ def plan_com(problem: CentroidalProblem, *, guesses: int | None = None) -> Centr
 
     Args:
         guesses: Number of guesses to start from at most; all where None.
+        near: Trajectory on the same supports to start from before any guess.
     """
     began = time.perf_counter()
     polytopes = polytopes_of(problem)
@@ -266,8 +269,10 @@ def plan_com(problem: CentroidalProblem, *, guesses: int | None = None) -> Centr
     if failure is None and (keys := _resting_keys(problem, polytopes)):
         return _in_parts(problem, polytopes, feasibility, keys)
     if failure is None:
-        for style in guess_styles(problem)[:guesses]:
-            attempts.extend(_rounds(problem, polytopes, style))
+        known = () if near is None else ((near.spline.bezier_points(), near.schedule.durations),)
+        guessed = (guess(problem, style, polytopes) for style in guess_styles(problem)[:guesses])
+        for start in itertools.chain(known, guessed):
+            attempts.extend(_rounds(problem, polytopes, *start))
             if attempts[-1].certificate.within():
                 break
         best = min(attempts, key=lambda attempt: attempt.certificate.rank)
@@ -389,10 +394,12 @@ def _part(
 
 
 def _rounds(
-    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], style: GuessStyle
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], bezier: FloatArray, durations: FloatArray
 ) -> Iterator[Attempt]:
-    """Optimise until the certificate holds with all facets, or until another round cannot help."""
-    bezier, durations = guess(problem, style, polytopes)
+    """Optimise until the certificate holds with all facets, or until another round cannot help.
+
+    It begins with Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s].
+    """
     trajectory = trajectory_of(problem, bezier, durations)
     facets = nearest_facets(facet_distances(problem, trajectory, polytopes))
     targets, faces = MarginTargets.of(problem), nearest_faces(problem, trajectory)

@@ -251,7 +251,7 @@ class Eligibility:
 
 def find_eligible_plan(
     first: CentroidalResult, realise: Callable[[CentroidalTrajectory], CentroidalTrajectory | None],
-    look: Callable[[CentroidalTrajectory], KeyPostures], *, replan: bool = True,
+    look: Callable[[CentroidalTrajectory], KeyPostures], *, replan: bool = True, guesses: int | None = None,
 ) -> Eligibility:  # fmt: skip
     """Test a plan at its key instants; plan again, three times at most, with tightened constraints.
 
@@ -260,6 +260,7 @@ def find_eligible_plan(
         realise: Complete a plan (real supports, a seated part); None ends the search.
         look: Find the key postures of a completed plan.
         replan: Whether its problem may be solved again; a recorded centre of mass is what it is.
+        guesses: Guesses that another plan is sought from at most, after the plan before it; all where None.
     """
     plan, replans = first, 0
     while True:
@@ -284,7 +285,8 @@ def find_eligible_plan(
                 for item in postures.failed if item.nearest_com is not None
             )  # fmt: skip
             tightened = replace(plan.problem, key_planes=(*plan.problem.key_planes, *planes))
-            again, replans = plan_com(tightened), replans + 1
+            again = plan_com(tightened, guesses=guesses, near=plan.trajectory)
+            replans += 1
             if again.failure is None:
                 plan = again
                 continue
