@@ -109,3 +109,37 @@ def test_the_body_rests_after_a_failure(tmp_path):
     assert with_rests(walking, report) is resting
     assert report.failure is None
     assert [item["stage"] for item in report.refused] == ["wholebody"]
+
+
+def test_a_flight_lasts_longer_over_a_sill(tmp_path):
+    """By the way up and down again at 1.2 m/s; beside the sill flights are as before."""
+    sill = "\n- {name: sill, box: [0.1, 1.0, 0.2], position: [0.45, 0.0, 0.1]}\n"
+    context, found = way(tmp_path, 0.0, scene=sill)
+    stages, supports = found.plan.stages, without_rests(context.scenario, found.plan).file.supports
+    flights = [k for k, stage in enumerate(stages) if len(stage.contacts) == 1]
+    for number in flights:
+        (before, after), (foot,) = (
+            (stages[number - 1].contacts, stages[number + 1].contacts),
+            set(stages[number - 1].contacts) - set(stages[number].contacts),
+        )
+        start, end = before[foot].position, after[foot].position
+        crosses = start[0] < 0.4 and end[0] > 0.5
+        swing = max(0.45, float(np.linalg.norm(end - start)) / 2.0)
+        assert supports.phases[number].min_duration_s == pytest.approx(swing + crosses * 0.4 / 1.2)
+    crossing = [stages[k - 1].contacts.keys() - stages[k].contacts.keys() for k in flights]
+    assert len(crossing) >= 2
+
+
+def test_places_of_the_centre_of_mass_stay_where_phases_of_the_file_begin(tmp_path):
+    """Feet that roll divide phases; a rest is asked for where the phase of the file begins."""
+    context, found = way(tmp_path, 0.3)
+    walking = without_rests(context.scenario, found.plan)
+    supports, problem = walking.file.supports, walking.build_centroidal_problem()
+    assert supports.foot == "rolling"
+    rests = [k for k, phase in enumerate(supports.phases) if phase.com_near is not None]
+    assert rests
+    assert len(problem.sequence) > len(supports.phases)
+    assert len(problem.sequence.changes) == len(supports.phases)
+    assert {plane.key for plane in problem.key_planes} == {problem.sequence.changes[k] for k in rests}
+    held = [set(problem.sequence[plane.key].stance.effectors) for plane in problem.key_planes]
+    assert {frozenset(names) for names in held} == {frozenset(found.plan.stages[k].contacts) for k in rests}

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.errors import ContactError
-from manikin.numerics.polytope import convex_polygon
+from manikin.numerics.polytope import chord, convex_polygon
 from manikin.numerics.spatial import (
     GRAVITY,
     FloatArray,
@@ -35,6 +35,9 @@ FRICTION_MODELS: tuple[FrictionModel, ...] = get_args(FrictionModel)
 
 MOST_CORNERS = 8
 """Most corners of what of a sole touches."""
+
+LEAST_TOES = 0.6
+"""Least share of the area before the hinge of the toes that lies on the surface where a foot rises."""
 
 BODY_WEIGHTS_CAP = 3.0
 """Cap on the sum of normal forces of a stance where nothing else is given [body weights]."""
@@ -179,6 +182,25 @@ class Contact(Displayed):
     def outline(self) -> FloatArray:
         """(k, 2) hull of the points in the contact frame, counter-clockwise [m]."""
         return convex_polygon(self.points[:, :2])
+
+    def toe_outline(self, hinge: float) -> FloatArray:
+        """(k, 2) part of the outline before the hinge of the toes, which crosses the x axis there [m]."""
+        ends, outline = chord(self.outline, hinge), self.outline
+        line = np.zeros((0, 2)) if ends is None else np.array([[hinge, y] for y in ends])
+        return np.vstack([outline[outline[:, 0] > hinge], line])
+
+    def rises_on_toes(self, hinge: float) -> bool:
+        """Whether it is a full sole whose toes, before the hinge [m], lie on the surface."""
+        if self.kind is not ContactKind.SOLE or self.part is not SolePart.FULL:
+            return False
+        if not self.hangs_over:
+            return True
+        toes = self.toe_outline(hinge)
+        if len(toes) < 3:
+            return False
+        x, y = convex_polygon(toes).T
+        area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        return area >= LEAST_TOES * (0.5 * self.length - hinge) * self.width
 
     @property
     def centre(self) -> FloatArray:
@@ -345,13 +367,15 @@ def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
         raise ContactError(f"{where} is taken from a {contact.part} {contact.kind}; valid: a full sole")
     if part is SolePart.FULL:
         return contact
-    if contact.hangs_over:
-        raise ContactError(f"{where} is taken from a sole that hangs over an edge; valid: a whole one")
+    if contact.hangs_over and not (part is SolePart.TOES and contact.rises_on_toes(hinge)):
+        raise ContactError(f"{where} is taken from a sole that hangs over an edge there; valid: a whole one")
     x, y = contact.length / 2, contact.width / 2
     line = finite_number(hinge, f"{where} hinge [m]", above=-x, at_most=x, error=ContactError)
     corners = [[-x, -y, 0.0], [-x, y, 0.0]]
     if part is SolePart.TOES:
         corners = [[x, y, 0.0], [x, -y, 0.0], [line, -y, 0.0], [line, y, 0.0]]
+        if contact.hangs_over:
+            corners = [[*place, 0.0] for place in contact.toe_outline(line).tolist()]
     points = frozen_array(corners, f"{where} points", (None, 3))
     return replace(contact, points=points, part=part, torsion_limit=None)
 

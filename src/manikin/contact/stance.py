@@ -195,6 +195,12 @@ class StanceSequence(Displayed):
         """Every effector that is ever in contact, in order of first use."""
         return tuple(dict.fromkeys(name for phase in self.phases for name in phase.stance.effectors))
 
+    @property
+    def changes(self) -> tuple[int, ...]:
+        """Indices of the first phase and of those on other effectors than the phase before."""
+        held = [phase.stance.effectors for phase in self.phases]
+        return (0, *(k for k in range(1, len(held)) if held[k] != held[k - 1]))
+
     def swings(self) -> tuple[Swing, ...]:
         """Every flight of every effector, ordered by its first phase."""
         swings = (swing for effector in self.effectors for swing in self._swings_of(effector))
@@ -281,7 +287,9 @@ def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
 
     The parts' shares are taken from the split phase's least duration, which is never shortened. Soles are
     full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back, or onto a
-    step, lands flat: people land on their whole sole or its front there.
+    step, lands flat: people land on their whole sole or its front there. One that is left above the other
+    rises onto its toes as soon as that has landed: flat, its ankle would have to bend farther than it can.
+    Soles that hang over an edge land flat, and leave flat where their toes have nothing below them.
     """
     flat = {(swing.last_phase + 1, swing.effector) for swing in sequence.swings() if _lands_flat(swing)}
     parts = (_split(sequence, index, hinge, flat) for index in range(len(sequence)))
@@ -300,10 +308,18 @@ def _split(
     sequence: StanceSequence, index: int, hinge: float, flat: Collection[tuple[int, str]]
 ) -> Iterator[Phase]:
     phase = sequence[index]
-    landing = _changing(phase.stance, sequence[index - 1].stance) if index > 0 else ()
-    landing = tuple(name for name in landing if (index, name) not in flat)
-    leaving = _changing(phase.stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
-    taken = (ON_HEEL if landing else 0.0) + (ON_TOES if leaving else 0.0)
+    stance = phase.stance
+    landing = _changing(stance, sequence[index - 1].stance) if index > 0 else ()
+    landing = tuple(name for name in landing if (index, name) not in flat and not stance[name].hangs_over)
+    leaving = _changing(stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
+    leaving = tuple(name for name in leaving if stance[name].rises_on_toes(hinge))
+    if leaving and not landing and _is_above(stance, leaving):
+        toes = _on_part(phase, leaving, SolePart.TOES, hinge, ON_TOES)
+        yield replace(phase, stance=toes.stance)
+        return
+    # Without a landing on the heel there is more time for a rise onto the toes.
+    rise = ON_TOES if landing else min(max(phase.min_duration - FLAT, ON_TOES), ON_TOES + ON_HEEL)
+    taken = (ON_HEEL if landing else 0.0) + (rise if leaving else 0.0)
     if landing:
         yield _on_part(phase, landing, SolePart.HEEL, hinge, ON_HEEL)
     if landing or leaving:
@@ -313,18 +329,21 @@ def _split(
     else:
         yield phase
     if leaving:
-        yield _on_part(phase, leaving, SolePart.TOES, hinge, ON_TOES)
+        yield _on_part(phase, leaving, SolePart.TOES, hinge, rise)
+
+
+def _is_above(stance: Stance, leaving: Sequence[str]) -> bool:
+    """Whether soles that are about to leave are a step above all others."""
+    low = min(stance[name].position[2] for name in leaving)
+    return all(low - other.position[2] > STEP for other in stance if other.effector not in leaving)
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:
-    """Soles that ``other`` lacks; none when nothing else would be left to stand on.
-
-    One that hangs over an edge lands and leaves flat: its heel or its toes have nothing below them.
-    """
+    """Soles that ``other`` lacks; none when nothing else would be left to stand on."""
     changing = tuple(
         contact.effector
         for contact in stance
-        if contact.kind is ContactKind.SOLE and contact.effector not in other and not contact.hangs_over
+        if contact.kind is ContactKind.SOLE and contact.effector not in other
     )
     staying = [contact for contact in stance if contact.effector not in changing]
     return changing if any(contact.kind is ContactKind.SOLE for contact in staying) else ()

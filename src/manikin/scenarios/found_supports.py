@@ -15,7 +15,7 @@ import pinocchio as pin
 from manikin.balance.capturability import MARGIN as RISING_MARGIN
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import yaw_about_normal
-from manikin.planning.contacts import ContactPlan, Stage
+from manikin.planning.contacts import ContactPlan, Footholds, Stage
 from manikin.scenarios.planned import STANDING, STATURE, WEIGHTS, walk_margin
 from manikin.scenarios.problems import overhead_constraints
 from manikin.scenarios.scenario import Scenario
@@ -60,6 +60,9 @@ SWING_SPEED = 2.0
 """Mean speed of a foot in a longer flight [m/s]; our choice."""
 CLIMBING_SPEED = 1.2
 """Mean speed upwards or downwards in what a phase lasts longer for a rise [m/s]; our choice."""
+PASSED_OVER, PASSED_STEP = 0.5, 0.02
+"""Greatest height above the higher end of a flight of what the foot passes over and not below, and distance
+of the places that are asked for it [m]; our choice."""
 ROLLED = 0.3
 """Least duration of a support on both feet, one landing on its heel, the other leaving from its toes [s]."""
 LONGEST = 0.8
@@ -139,16 +142,24 @@ def _ceiling(plan: ContactPlan, number: int) -> dict[str, Any]:
     return {"position": top.tolist(), "normal": [-slope * x, -slope * y, 1.0]}
 
 
-def _walking_time(plan: ContactPlan, number: int, *, rolls: bool) -> float:
-    """Least duration of a phase of a body that does not rest before or after it [s]."""
+def _walking_time(plan: ContactPlan, number: int, ground: Footholds, *, rolls: bool) -> float:
+    """Least duration of a phase of a body that does not rest before or after it [s].
+
+    A foot climbs to the highest surface below its straight way, and from there.
+    """
     held, last = plan.stages[number].contacts, len(plan.stages) - 1
     if len(held) > 1:
         both = STANDING if number in (0, last) else ROLLED if rolls else DOUBLE
         return both + float(np.ptp([contact.position[2] for contact in held.values()])) / CLIMBING_SPEED
     before, after = plan.stages[number - 1].contacts, plan.stages[number + 1].contacts
-    ways = np.array([after[foot].position - before[foot].position for foot in set(before) & set(after)])
-    swing = max(SWING, float(np.linalg.norm(ways, axis=1).max()) / SWING_SPEED)
-    return swing + float(np.abs(ways[:, 2]).max()) / CLIMBING_SPEED
+    ends = np.array([[of[foot].position for of in (before, after)] for foot in set(before) & set(after)])
+    start, end = ends[np.argmax(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))]
+    way, higher = float(np.linalg.norm(end - start)), max(float(start[2]), float(end[2]))
+    places = start + np.linspace(0.0, 1.0, max(2, math.ceil(way / PASSED_STEP)))[:, None] * (end - start)
+    levels = ground.levels(places[:, :2])[1]
+    top = float(levels[levels < higher + PASSED_OVER].max(initial=higher))
+    climbed = 2.0 * top - float(start[2]) - float(end[2])
+    return max(SWING, way / SWING_SPEED) + climbed / CLIMBING_SPEED
 
 
 def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) -> Scenario:
@@ -157,7 +168,8 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
     # Rising legs are soon at full length: there is less room above such postures than below them.
     rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
     below = any(passed) and _passes_below(plan, scenario)
-    rolls = all(passed) and not below
+    rolls = any(passed) and not below
+    ground = Footholds(build_body(scenario), build_scene(scenario)) if any(passed) else None
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -165,10 +177,9 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
             name: "same" if before.get(name) is contact else _entry(contact, friction)
             for name, contact in stage.contacts.items()
         }
-        walks = passed[number] and passed[number + 1]
         phase["min_duration_s"] = stage.min_duration
-        if walks:
-            phase["min_duration_s"] = least = _walking_time(plan, number, rolls=rolls)
+        if ground is not None and passed[number] and passed[number + 1]:
+            phase["min_duration_s"] = least = _walking_time(plan, number, ground, rolls=rolls)
             phase["max_duration_s"] = max(LONGEST, 1.5 * least)
         if rises and "buttocks" in stage.contacts:
             phase["max_duration_s"] = SEATED_LONGER * stage.min_duration

@@ -225,7 +225,7 @@ def centroidal_problem(values: ScenarioValues, *, upright: bool = True) -> Centr
             margin_space=options.margin_space, required_margin=values.required_margin,
             support_distance=values.max_support_distance,
             regions=_regions(values, sequence, geometric if upright else None),
-            geometric=geometric, key_planes=_key_planes(values), rests=_rests(values),
+            geometric=geometric, key_planes=_key_planes(values, sequence), rests=_rests(values, sequence),
             max_duration=options.max_duration_s,
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
             **{key: value for key, value in given.items() if value is not None},
@@ -256,10 +256,29 @@ def _standing(values: ScenarioValues, *, planning: bool = False) -> StanceSequen
     return StanceSequence(sequence.phases[: values.seated_from])
 
 
-def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
+def _begins(values: ScenarioValues, sequence: StanceSequence) -> list[int]:
+    """Phase of a sequence in which each phase of the file begins; feet that roll divide some.
+
+    Raises:
+        ScenarioError: If feet roll and a phase of the file changes no contact: it would begin anywhere.
+    """
+    phases = values.explicit_supports().phases[: values.seated_from]
+    if len(phases) == len(sequence):
+        return [*range(len(phases))]
+    begins = [*sequence.changes]
+    if len(begins) != len(phases):
+        problem = "changes no contact, and feet roll; valid: phases on other contacts than the one before"
+        raise values.error(("supports", "phases"), problem)
+    return begins
+
+
+def _key_planes(values: ScenarioValues, sequence: StanceSequence) -> tuple[KeyPlane, ...]:
     """Faces of the boxes in which phases want the centre of mass to be when they begin."""
     planes: list[KeyPlane] = []
-    for key, phase in enumerate(values.explicit_supports().phases[: values.seated_from]):
+    phases = values.explicit_supports().phases[: values.seated_from]
+    if all(phase.com_near is None for phase in phases):
+        return ()
+    for key, phase in zip(_begins(values, sequence), phases, strict=True):
         if phase.com_near is not None:
             sides = zip(np.eye(3), phase.com_near, phase.com_within_m, strict=True)
             for lead, side, sign in itertools.product(sorted({0.0, phase.com_lead_s}), sides, (1.0, -1.0)):
@@ -268,10 +287,14 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
     return tuple(planes)
 
 
-def _rests(values: ScenarioValues) -> tuple[FloatArray | None, ...]:
+def _rests(values: ScenarioValues, sequence: StanceSequence) -> tuple[FloatArray | None, ...]:
     """CoM of the posture in which each phase before a seat begins, where the file has one."""
     phases = values.explicit_supports().phases[: values.seated_from]
-    return tuple(None if phase.com_near is None else np.array(phase.com_near) for phase in phases)
+    rests: list[FloatArray | None] = [None] * len(sequence)
+    if any(phase.com_near is not None for phase in phases):
+        for key, phase in zip(_begins(values, sequence), phases, strict=True):
+            rests[key] = None if phase.com_near is None else np.array(phase.com_near)
+    return tuple(rests)
 
 
 def _regions(
@@ -285,16 +308,17 @@ def _regions(
     At those, and on stances on which sampling finds no posture, the full search for key postures judges.
     A largest distance from the supports that the file gives takes the place of all regions.
     """
-    planes = [phase.com_below for phase in values.explicit_supports().phases[: values.seated_from]]
-    planes = planes if any(planes) else [None] * len(sequence)  # feet that roll have more phases, and none
+    given = [phase.com_below for phase in values.explicit_supports().phases[: values.seated_from]]
+    planes = [None] * len(sequence)
+    if any(given):
+        lasts = np.diff([*_begins(values, sequence), len(sequence)])
+        planes = [plane for plane, parts in zip(given, lasts, strict=True) for _ in range(parts)]
     free = ComRegion.everywhere()
     if values.is_point_mass or values.max_support_distance is not None:
         bounded = tuple(plane and free.below(plane.position, plane.normal) for plane in planes)
         return bounded if any(planes) else ()
     body = build_body(values)
-    reach, inner = ComReach.of(body), _rests(values)[1:]
-    if len(inner) + 1 != len(sequence):  # feet that roll have more phases, and no rests
-        inner = (None,) * (len(sequence) - 1)
+    reach, inner = ComReach.of(body), _rests(values, sequence)[1:]
     known = [values.start_com, *inner, values.goal_com]
     found = [reach.region(phase.stance.contacts) for phase in sequence]
     tops = [region.top for region in found]

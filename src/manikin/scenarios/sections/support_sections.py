@@ -232,10 +232,6 @@ class SupportsSection(Section):
                 raise refuse(f"planning_{real}", f"is {ours:g}; valid: at most {real} = {limit:g}")
         problem = "is given; valid: task.start.com says where the motion begins"
         refuse_if(self.phases[0].com_near is not None, "phases[0].com_near", problem)
-        for key in ("com_near", "com_below"):
-            bound = any(getattr(phase, key) is not None for phase in self.phases)
-            problem = f"is rolling beside a phase with {key}; valid: flat, or no {key}"
-            refuse_if(self.foot == "rolling" and bound, "foot", problem)
         problem = "is 'same' but the phase before has no such contact; valid: a contact with a position"
         for number, phase in enumerate(self.phases):
             before = self.phases[number - 1].entries() if number else {}
