@@ -196,7 +196,9 @@ def starts_on_limbs(
         for item in holds:
             if item.effector in contacts:
                 near = item.stretched(near, q[:7], contacts[item.effector], state)
-        posed = poser.eased(poser.pose(contacts, contacts, near, q[:7]), contacts, contacts).at_rest
+        # Tips begin as they stand best; upright from the start an insect's legs meet on their way.
+        posed = poser.pose(contacts, contacts, near, q[:7], upright=False)
+        posed = poser.eased(posed, contacts, contacts, upright=False).at_rest
         reason = reason or posed.reason
         if posed.q is not None:
             any_start = True

@@ -128,6 +128,7 @@ class PostureFinder:
         guide: FloatArray | None = None, *, place: FloatArray | None = None, inset: float | None = None,
         com_weight: float | None = None, restarts: bool = False,
         placements: Mapping[str, Placement] | None = None, preferences: Preferences | None = None,
+        upright: bool = True,
     ) -> Posed:  # fmt: skip
         """Find a posture that holds contacts, points upright, and rests on some of them alone.
 
@@ -142,6 +143,7 @@ class PostureFinder:
             restarts: Whether to try again from crouched postures.
             placements: Where further effectors should be, by name.
             preferences: Weights of what is not required; the default ones when omitted.
+            upright: Whether points are wished upright on their surfaces.
         """
         if place is None:
             if guide is None or len(guide) > ROOT:
@@ -156,7 +158,8 @@ class PostureFinder:
         whole = guide is not None and len(guide) > ROOT
         ignore, beside = self._near(held)
         problem = PostureProblem(
-            self.body, tuple(held.values()), {**led, **_upright_points(held), **(placements or {})},
+            self.body, tuple(held.values()),
+            {**led, **(_upright_points(held) if upright else {}), **(placements or {})},
             com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
             self_clearance=settings.clearance, ignore=ignore, beside=beside,
@@ -177,7 +180,7 @@ class PostureFinder:
 
     def eased(
         self, posed: Posed, held: Contacts, carrying: Contacts,
-        placements: Mapping[str, Placement] | None = None,
+        placements: Mapping[str, Placement] | None = None, *, upright: bool = True,
     ) -> Posed:  # fmt: skip
         """A posture that the joints can hold at rest: the given one, or one near it that asks for less.
 
@@ -202,7 +205,9 @@ class PostureFinder:
             if move is None or now.share - move[1] < 0.003:
                 break
             near = pin.integrate(body.pinocchio, best, move[0])
-            q = self.pose(held, carrying, near, near, placements=placements, preferences=LIKE_BEFORE).q
+            q = self.pose(
+                held, carrying, near, near, placements=placements, preferences=LIKE_BEFORE, upright=upright
+            ).q
             then = None if q is None else RestingTorques(body, q, stance)
             if q is not None and then is not None and then.share < now.share - 0.1 * (now.share - move[1]):
                 now, best, turn = then, q, min(1.5 * turn, 0.5)
