@@ -106,7 +106,9 @@ class Controller:
         self._geometry = {key: contact_geometry(body, item, inset) for key, item in contacts.items()}
         self._along = {key: edge_forces.points_along(body, item) for key, item in self._geometry.items()}
         self._points = {contact.effector for contact in every if contact.kind is ContactKind.POINT}
-        self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
+        # The toes of a foot are followed as the foot is.
+        self._toes = [joint for name in self._switch.effectors for joint in _hanging_joints(body, name)]
+        self._others = [joint for joint in range(joints) if joint not in self._toes]
         carriers = {name for phase in schedule.sequence if phase.load for name in phase.load.masses}
         named = dict.fromkeys((*self._switch.effectors, self._root, *sorted(carriers)))
         frames = {name: body.effector_frame(name) for name in named}
@@ -194,7 +196,12 @@ class Controller:
             frame, planned = state.frames[root], reference.effectors[root]
             wanted.append(tasks.orientation_task(root, frame, planned, gains.pelvis, weights.pelvis))
         wanted += [self._effector_task(support, state, reference) for support in supports.values()]
-        wanted.append(tasks.posture_task(state, reference, gains.posture, self._posture_weight(supports)))
+        for name, gain, weight, some in (
+            ("posture", gains.posture, weights.posture, self._others),
+            ("toes", gains.swing, weights.effectors, self._toes),
+        ):
+            if some:
+                wanted.append(tasks.posture_task(name, state, reference, gain, weight, some))
         if (weight := weights.angular_momentum) > 0:
             wanted.append(tasks.angular_momentum_task(state, reference, gains.angular_momentum, weight))
         return wanted
@@ -240,13 +247,6 @@ class Controller:
         target = landing_reference(support, planned) if landing else lifted(planned, support)
         follow, point = 1.0 if landing else support.follow, name in self._points
         return swing_task(name, frame, target, gains.swing, weight, follow, point=point)
-
-    def _posture_weight(self, supports: Mapping[str, SupportState]) -> FloatArray:
-        weight = np.full(self.body.nv - 6, self.settings.weights.posture)
-        for name, support in supports.items():
-            if support.mode is SupportMode.STANCE:
-                weight[self._hanging[name]] = self.settings.weights.effectors
-        return weight
 
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
         frame = state.frames[contact.effector]

@@ -4,6 +4,7 @@ Accelerations, linear in the generalised one, follow references by the impedance
 + stiffness * error + damping * error rate``. A force is what an effector in contact should feel.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -160,12 +161,15 @@ def stance_task(
 
 
 def posture_task(
-    state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: FloatArray
-) -> AccelerationTask:
-    """Follow the planned joint angles, with a weight (nv - 6,) for each."""
+    name: str, state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: float,
+    joints: Sequence[int],
+) -> AccelerationTask:  # fmt: skip
+    """Follow the planned angles of some joints, all with the same weight."""
+    rows = np.asarray(joints, dtype=np.int64)
     error, rate = reference.q[7:] - state.q[7:], reference.v[6:] - state.v[6:]
     wanted = reference.a[6:] + gains.stiffness * error + gains.damping * rate
-    return AccelerationTask("posture", np.eye(len(rate), len(state.v), 6), wanted, weight)
+    jacobian = np.eye(len(rate), len(state.v), 6)[rows]
+    return AccelerationTask(name, jacobian, wanted[rows], np.full(len(rows), weight))
 
 
 def orientation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:
