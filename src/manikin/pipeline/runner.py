@@ -141,11 +141,11 @@ def _followed(
     """
     centroidal = plan_centre_of_mass(context, report)
     plan = with_key_postures(context, report, centroidal)
-    wholebody = follow_centre_of_mass(context, report, plan)
+    plan, wholebody = follow_centre_of_mass(context, report, plan)
     if wholebody is not None and not wholebody.succeeded:
         other = with_stricter_key_postures(context, report, centroidal, plan)
         if other is not None:
-            plan, wholebody = other, follow_centre_of_mass(context, report, other)
+            plan, wholebody = follow_centre_of_mass(context, report, other)
     schedule = None if plan.trajectory is None else plan.trajectory.schedule
     if schedule is None or wholebody is None or not wholebody.succeeded:
         return partial(RunResult.of, report, plan.centroidal, wholebody), schedule

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from manikin.contact import Phase, Stance, StanceSequence, point
+from manikin.errors import SplineError
 from manikin.planning.com import CentroidalProblem, plan_com, timing_free
 from manikin.planning.com.feasibility import Failure
 from manikin.planning.com.timing_free import LEVEL, LONG, PART, _parted
@@ -80,6 +81,26 @@ def test_the_parts_meet_at_rest_where_a_posture_is_known(planned, problem):
     for key in keys:
         position = planned.trajectory.position(planned.key_instants[key])
         np.testing.assert_allclose(position, problem.rests[key], atol=1e-7)
+
+
+def test_a_part_can_be_slower_while_the_others_keep_their_pace(planned, problem):
+    """The same path; accelerations fall by the square of the factor, and what is at rest stays so."""
+    slower, factor = planned.trajectory.slowed((PART, 2 * PART), 1.5), 1.5
+    before, after = planned.key_instants, slower.schedule.instants
+    durations = np.diff(before)
+    durations[PART : 2 * PART] *= factor
+    np.testing.assert_allclose(np.diff(after), durations, atol=1e-9)
+    for first, last, scale in ((0, PART, 1.0), (PART, 2 * PART, factor), (2 * PART, len(durations), 1.0)):
+        times = np.linspace(before[first], before[last], 300)[1:-1]
+        then = np.interp(times, before, after)
+        np.testing.assert_allclose(slower.position(then), planned.trajectory.position(times), atol=1e-7)
+        wanted = planned.trajectory.acceleration(times) / scale**2
+        np.testing.assert_allclose(slower.acceleration(then), wanted, atol=1e-4)
+    again = planned.along(slower)
+    assert again.certificate.within()
+    assert again.d_min >= problem.required_margin
+    with pytest.raises(SplineError, match="rests there"):
+        planned.trajectory.slowed((PART + 1, 2 * PART), 1.5)
 
 
 def test_a_body_that_rises_comes_to_rest_at_each_change(problem):

@@ -41,7 +41,7 @@ MODULE = importlib.import_module("manikin.planning.whole_body.plan_whole_body")
 def first_attempt(body, scene, com):
     """The first attempt at a motion along a trajectory of the centre of mass."""
     planner = MODULE._Planner(body, scene, com, np.random.default_rng(0), WholeBodySettings())
-    swings = tuple(planner.flights.plan(swing) for swing in planner.flights.flights())
+    swings = tuple(planner.flights.plan(swing) for swing in planner.flights.flights)
     return planner._attempt(swings, planner.settings.manner, no_progress)
 
 

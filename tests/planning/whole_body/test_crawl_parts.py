@@ -1,5 +1,7 @@
 """A crawl is fitted in parts, from rest to rest in known postures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,8 @@ from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, poin
 from manikin.numerics.spline import BSpline, clamped_knots
 from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body import WholeBodySettings
-from manikin.planning.whole_body.plan_whole_body import _in_parts, _Planner, resting_keys
+from manikin.planning.whole_body.certificate import WholeBodyFailure
+from manikin.planning.whole_body.plan_whole_body import SLOWER, _in_parts, _Planner, resting_keys
 from manikin.planning.whole_body.posture_style import Guide
 from manikin.scene import Scene
 
@@ -92,3 +95,35 @@ def test_joined_parts_are_one_motion_with_one_certificate(standing):
     assert np.abs(meeting.v).max() < 2e-3
     assert np.abs(meeting.a).max() < 0.05
     assert shares[-1] == 1.0
+
+
+def test_a_part_that_fails_is_given_more_time_and_what_follows_comes_later(standing, monkeypatch):
+    """The second part only: its first attempts are refused here as if a limb had been too fast."""
+    known = Guide(INSTANTS, np.array([standing] * 3), ())
+    rng = np.random.default_rng(0)
+    planner = _Planner(BODY, Scene([]), still(standing), rng, WholeBodySettings(), known=known)
+    run, lengths = _Planner.run, []
+
+    def in_a_hurry(self, *args):
+        begin, end = self.instants
+        lengths.append(end - begin)
+        result = run(self, *args)
+        hurried = begin > 0.0 and end - begin < 0.6
+        return replace(result, failure=WholeBodyFailure("too fast", begin, "")) if hurried else result
+
+    monkeypatch.setattr(_Planner, "run", in_a_hurry)
+    result = _in_parts(planner, [0, 1, 2], 0.0, lambda _: None)
+    assert result.succeeded, result.failure
+    np.testing.assert_allclose(lengths, 0.4 * np.array([1.0, 1.0, *SLOWER]))
+    np.testing.assert_allclose(result.trajectory.schedule.instants, [0.0, 0.4, 0.4 + 0.4 * SLOWER[1]])
+    assert result.motion.time[-1] == pytest.approx(result.trajectory.duration)
+    assert result.guide.time[-1] == pytest.approx(result.trajectory.duration)
+
+
+def test_a_retimed_guide_has_its_postures_later_and_rests_where_it_did(standing):
+    bent = standing.copy()
+    bent[7:] += 0.3
+    smooth = Guide(INSTANTS, np.array([standing, bent, standing]), ()).resting(INSTANTS[[0, 2]])
+    later = smooth.retimed(INSTANTS, 2.0 * INSTANTS)
+    time = np.linspace(0.0, INSTANTS[-1], 50)
+    np.testing.assert_allclose(later.at(2.0 * time), smooth.at(time), atol=1e-9)

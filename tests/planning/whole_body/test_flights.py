@@ -6,11 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from manikin.body import human
-from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, point, sole
+from manikin.body import Configuration, human
+from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence, point, sole
 from manikin.planning.com import plan_com
+from manikin.planning.contacts import PostureFinderSettings
+from manikin.planning.contacts.crawl_postures import CRAWLERS, on_all_fours
 from manikin.planning.whole_body import swing_planner
 from manikin.planning.whole_body.swing import SwingLimits, check_swing
+from manikin.planning.whole_body.swing_path import Pose
 from manikin.planning.whole_body.swing_planner import FlightPlanner
 from manikin.scenarios import load_scenario
 from manikin.scene import Scene
@@ -27,7 +30,7 @@ def planner():
 
 
 def test_every_step_of_the_platform_has_a_smooth_curve_that_keeps_clear(planner):
-    for swing in planner.flights():
+    for swing in planner.flights:
         found = planner.plan(swing)
         assert found.method == "smooth"
         assert found.failure is None
@@ -42,14 +45,14 @@ def test_every_step_of_the_platform_has_a_smooth_curve_that_keeps_clear(planner)
 @pytest.mark.parametrize("number", [0, 2])
 def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypatch, number):
     """With the smooth family made to fail, a step of the platform is searched instead."""
-    swing = planner.flights()[number]
+    swing = planner.flights[number]
     real = swing_planner.plan_swing
 
     def fails(*args, **kwargs):
         return replace(real(*args, **kwargs), failure="made to fail")
 
     monkeypatch.setattr(swing_planner, "plan_swing", fails)
-    found = planner.plan(swing)
+    found = planner._planned(swing)  # not the flight that is known
     assert found.method == "bi-rrt", found.failure
     check = check_swing(found.curve, planner._clearance(swing), SwingLimits())
     # The search checks at its own instants; between them 2 mm may be lost.
@@ -57,7 +60,7 @@ def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypat
 
 
 def test_a_trailing_foot_points_its_toes_down_and_a_leading_one_does_not(planner):
-    first, trailing, _ = planner.flights()
+    first, trailing, _ = planner.flights
     starts = [planner.schedule.swing_interval(swing)[0] for swing in (first, trailing)]
     assert planner._pitch(first, starts[0]) == pytest.approx(0.0)
     assert 0.2 < planner._pitch(trailing, starts[1]) <= 0.9
@@ -65,7 +68,7 @@ def test_a_trailing_foot_points_its_toes_down_and_a_leading_one_does_not(planner
 
 def test_a_foot_does_not_pass_round_the_far_side_of_the_one_that_stands(planner):
     """Legs that did would cross. The last step of the platform ends before the foot that stands."""
-    for swing in planner.flights()[:2]:
+    for swing in planner.flights[:2]:
         sides = {np.sign(lateral) for lateral in planner._laterals(swing)}
         assert sides == ({0.0, 1.0} if swing.effector == "left_foot" else {0.0, -1.0})
 
@@ -85,8 +88,35 @@ def test_a_foot_whose_knee_carries_meanwhile_is_put_away_and_reached_with(side, 
     planner = FlightPlanner(human(), Scene(), trajectory, SwingLimits(), np.random.default_rng(0), None)
     found = [
         (swing.start and swing.start.position[0], swing.end and swing.end.position[0])
-        for swing in planner.flights() if swing.effector == f"{side}_foot"
+        for swing in planner.flights if swing.effector == f"{side}_foot"
     ]  # fmt: skip
     assert found == ([(0.0, None), (None, 0.3)] if apart else [(0.0, 0.3)])
     # Straight up from the knee there is no way for a thigh that stands on it.
-    assert not any(swing.effector.endswith("knee") for swing in planner.flights())
+    assert not any(swing.effector.endswith("knee") for swing in planner.flights)
+
+
+def test_a_thigh_that_kneels_is_kept_clear_of_where_the_posture_has_it():
+    """On hands and knees it is upright; the centre of mass, ahead between the limbs, moves."""
+    body = human()
+    q = on_all_fours(body, PostureFinderSettings()).q
+    state, held = Configuration(body, q), dict[str, Contact]()
+    for name in CRAWLERS:
+        rotation, place = state.effector_placement(name)
+        held[name] = point(name, place, friction=0.7, rotation=rotation)
+    without = [contact for name, contact in held.items() if name != "left_knee"]
+    stances = [[*held.values()], without, [*held.values()]]
+    sequence = StanceSequence([Phase(Stance(contacts, 1500.0), 0.5) for contacts in stances])
+    trajectory = SimpleNamespace(
+        schedule=ContactSchedule(sequence, np.arange(4.0)),
+        position=lambda time: state.com + np.array([0.1 * time, 0.0, 0.0]),
+    )
+    planner = FlightPlanner(body, Scene(), trajectory, SwingLimits(), np.random.default_rng(0), lambda _: q)
+    (swing,) = planner.flights
+    clearance, pose = planner._clearance(swing), Pose.of(held["left_knee"])
+    beside = Pose(pose.position + np.array([0.25, -0.02, 0.08]), pose.rotation)
+    room = [clearance(time, beside) for time in (1.0, 1.5, 2.0)]
+    np.testing.assert_allclose(room, room[0], atol=1e-9)
+    # Nearest is the thigh that stands, upright by less than 20 degrees.
+    radius = {name: body.segment(name).shapes[0].size[0] for name in ("left_leg", "right_thigh")}
+    aside = abs(float(beside.position[1] - held["right_knee"].position[1]))
+    assert room[0] == pytest.approx(aside - sum(radius.values()), abs=0.02)

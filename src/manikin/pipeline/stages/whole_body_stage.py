@@ -263,11 +263,16 @@ def _friction(trajectory: CentroidalTrajectory) -> dict[str, float | str]:
     return friction_use(trajectory.schedule, time, trajectory.schedule.sequence.effectors, forces).summary()
 
 
-def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) -> WholeBodyResult | None:
-    """Plan all joints along a trajectory of the centre of mass; None where there is none."""
+def follow_centre_of_mass(
+    context: RunContext, report: Report, plan: KeyedPlan
+) -> tuple[KeyedPlan, WholeBodyResult | None]:
+    """Plan all joints along a trajectory of the centre of mass; None where there is none.
+
+    The plan is the one that the motion follows, which may have taken more time.
+    """
     trajectory = plan.trajectory
     if trajectory is None:
-        return None
+        return plan, None
     rng = np.random.default_rng(context.scenario.seed)
     unused = rng.bit_generator.state
     result = plan_whole_body(
@@ -276,9 +281,21 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
         known=_known_postures(context, plan, trajectory.schedule.instants),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
+    if result.trajectory is not trajectory:
+        plan = _slowed(report, plan, result.trajectory)
     block = wholebody_summary(result) | {"seed_matters": rng.bit_generator.state != unused}
-    report_whole_body(context, report, trajectory.schedule, result, block)
-    return result
+    report_whole_body(context, report, result.trajectory.schedule, result, block)
+    return plan, result
+
+
+def _slowed(report: Report, plan: KeyedPlan, trajectory: CentroidalTrajectory) -> KeyedPlan:
+    """Report a plan with the trajectory that a motion follows, which took more time than was planned."""
+    postures, instants = plan.postures, trajectory.schedule.instants
+    if postures is not None:
+        timed = (replace(item, time=float(instants[item.key])) for item in postures.postures)
+        postures = replace(postures, postures=tuple(timed))
+    centroidal = plan.centroidal.along(trajectory)
+    return _reported(report, Eligibility(centroidal, trajectory, postures, plan.replans, None))
 
 
 def _known_postures(context: RunContext, plan: KeyedPlan, instants: FloatArray) -> Guide | None:

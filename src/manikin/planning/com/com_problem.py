@@ -101,6 +101,35 @@ class CentroidalTrajectory(Displayed):
         instants = np.concatenate([self.schedule.instants, self.duration + other.schedule.instants[1:]])
         return CentroidalTrajectory(self.mass, spline, ContactSchedule(phases, instants))
 
+    def slowed(self, span: tuple[int, int], factor: float) -> "CentroidalTrajectory":
+        """The same path, slower from one key instant to another, at both of which it rests.
+
+        Raises:
+            SplineError: If it moves there, or turns.
+        """
+        before, ends = self.schedule.instants, self.schedule.instants[list(span)]
+        rates = np.abs([self.velocity(ends), self.acceleration(ends)]).max()
+        if self.turning is not None or rates > 1e-2:
+            raise SplineError(
+                f"trajectory moves with {rates:.2g} m/s or m/s^2 at the ends of what is slowed down, or "
+                "turns; valid: that of a point mass that rests there"
+            )
+        durations = self.schedule.durations.copy()
+        durations[slice(*span)] *= factor
+        instants = np.concatenate([[0.0], np.cumsum(durations)])
+        k, knots = self.spline.degree, np.interp(self.spline.knots * before[-1], before, instants)
+        spans = itertools.pairwise(np.unique(knots))
+        times = np.unique(np.concatenate([np.linspace(a, b, 4 * k) for a, b in spans]))
+        wanted, points = self.position(np.interp(times, instants, before)), self.spline.control_points
+        spline = BSpline.fit(
+            k, knots / instants[-1], times / instants[-1], wanted, first=points[:1], last=points[-1:]
+        )
+        binding = self.binding_until
+        return CentroidalTrajectory(
+            self.mass, spline, ContactSchedule(self.schedule.sequence, instants),
+            None if binding is None else float(np.interp(binding, before, instants)),
+        )  # fmt: skip
+
     def position(self, time: ArrayLike) -> FloatArray:
         """(..., 3) CoM at each time [m] ([Qiu2012]_ 5.5)."""
         return self._derivative(time, 0)

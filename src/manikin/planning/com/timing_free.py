@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 
 from manikin.balance import LimitingConstraint, WrenchPolytope
-from manikin.contact import ContactKind, StanceSequence
+from manikin.contact import ContactKind, ContactSchedule, StanceSequence
 from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, clamped_knots, end_control_points, start_control_points
 from manikin.planning.com.com_certificate import Residuals, measure
@@ -243,6 +243,12 @@ class CentroidalResult(Displayed):
         if self.trajectory is None:
             raise ValueError("no trajectory to measure; valid: a result that succeeded")
         return self._measured(self.trajectory)
+
+    def along(self, trajectory: CentroidalTrajectory) -> "CentroidalResult":
+        """The same plan at another timing, measured anew."""
+        phases = ContactSchedule(self.problem.sequence, trajectory.schedule.instants)
+        timed = replace(trajectory, schedule=phases)
+        return replace(self, trajectory=timed, certificate=self._measured(timed))
 
     def _measured(self, trajectory: CentroidalTrajectory) -> Residuals:
         return measure(self.problem, trajectory, self.polytopes)

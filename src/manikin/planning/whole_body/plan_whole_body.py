@@ -113,11 +113,13 @@ class WholeBodyResult(Displayed):
     """A whole-body motion, or the best attempt and what it breaks.
 
     Attributes:
+        trajectory: The plan that the motion follows: that which was given, or slower in parts.
         motion: Sampled at 1 kHz; of the best attempt when it failed.
         certificate: Measured on the samples of the motion, beside its limits.
         iterations: Gauss-Newton steps of the fit.
     """
 
+    trajectory: CentroidalTrajectory
     motion: Motion
     spline: ConfigurationSpline
     certificate: MotionCertificate
@@ -261,7 +263,7 @@ class _Planner:
         waypoints: Guide | None = None,
     ) -> None:  # fmt: skip
         self.ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
-        self.settles = False
+        self.settles, self.rng = False, rng
         self.instants = trajectory.schedule.instants
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
         self.leaning, self.known, self.waypoints = leaning, known, waypoints
@@ -284,9 +286,25 @@ class _Planner:
         part.job, part.guide = replace(self.job, span=(first, last)), cache(part._guide)
         return part
 
+    def slower(self, first: int, last: int, factor: float) -> "_Planner":
+        """The same job with more time between two key instants at which the body rests."""
+        trajectory = self.trajectory.slowed((first, last), factor)
+        before, after = self.trajectory.schedule.instants, trajectory.schedule.instants
+        known, waypoints = (
+            None if guide is None else guide.retimed(before, after) for guide in (self.known, self.waypoints)
+        )
+        return _Planner(
+            self.body, self.scene, trajectory, self.rng, self.settings, self.leaning, known, waypoints
+        )
+
     def swings(self) -> tuple[PlannedSwing, ...]:
-        """Every flight."""
-        return tuple(self.flights.plan(swing) for swing in self.flights.flights())
+        """Every flight that the motion has to do with; a foot rolls in the phases beside its flight."""
+        first, last = self.job.span or (0, len(self.trajectory.schedule.sequence))
+        flights = self.flights.flights
+        return tuple(
+            self.flights.plan(swing)
+            for swing in flights if swing.first_phase <= last and swing.last_phase >= first - 1
+        )  # fmt: skip
 
     def run(self, swings: tuple[PlannedSwing, ...], began: float, progress: Progress) -> WholeBodyResult:
         """Fit a motion to the swings, in other manners or to other swings where it fails."""
@@ -308,8 +326,8 @@ class _Planner:
         progress(1.0)
         goal, failure = best.goal, best.goal.failure(best.certificate)
         return WholeBodyResult(
-            best.motion, best.result.spline, best.certificate, goal.swings, goal.guide, failure,
-            best.result.iterations, clock.perf_counter() - began,
+            self.trajectory, best.motion, best.result.spline, best.certificate, goal.swings, goal.guide,
+            failure, best.result.iterations, clock.perf_counter() - began,
         )  # fmt: skip
 
     def _search_again(
@@ -443,26 +461,51 @@ def resting_keys(body: BodyModel, trajectory: CentroidalTrajectory, known: Guide
     return np.flatnonzero(still).tolist()
 
 
+SLOWER = (1.3, 1.7)
+"""Factors on the time of a part that fails, tried in turn; our choice."""
+
+
 def _in_parts(planner: _Planner, keys: Sequence[int], began: float, progress: Progress) -> WholeBodyResult:
     """Plan a motion in parts from rest to rest, and join them.
 
     A fit takes or leaves a step for the whole of its motion, and its repairs weigh all of it anew.
     """
-    swings, parts, count = planner.swings(), list[WholeBodyResult](), len(keys) - 1
-    for number, (first, last) in enumerate(pairwise(keys)):
+    parts, count = list[WholeBodyResult](), len(keys) - 1
+    for number, span in enumerate(pairwise(keys)):
         progress(0.2 + 0.8 * number / count)
         start = parts[-1].spline.control_points[-1] if parts else None
-        parts.append(planner.part(first, last, start).run(swings, began, no_progress))
-        swings = parts[-1].swings
+        planner, part = _with_time(planner, span, start, began)
+        parts.append(part)
     spline = ConfigurationSpline.joined([part.spline for part in parts])
     guide = Guide.joined([part.guide for part in parts])
-    goal = _Goal(planner, swings, guide, planner.settings.manner, True)
+    flights = [item for part in parts for item in part.swings]
+    # A flight near the end of a part is one of the next part, too.
+    swings = {(one.swing.effector, one.swing.first_phase, one.swing.start is None): one for one in flights}
+    goal = _Goal(planner, tuple(swings.values()), guide, planner.settings.manner, True)
     motion, certificate = goal.measure(spline)
     progress(1.0)
     return WholeBodyResult(
-        motion, spline, certificate, swings, guide, goal.failure(certificate),
+        planner.trajectory, motion, spline, certificate, goal.swings, guide, goal.failure(certificate),
         sum(part.iterations for part in parts), clock.perf_counter() - began,
     )  # fmt: skip
+
+
+def _with_time(
+    planner: _Planner, span: tuple[int, int], start: FloatArray | None, began: float
+) -> tuple[_Planner, WholeBodyResult]:
+    """Plan a part that begins in a posture (nq,), with more time where it fails; the job at its timing."""
+    part = planner.part(*span, start)
+    first = part.run(part.swings(), began, no_progress)
+    phases = planner.trajectory.schedule.sequence.phases[slice(*span)]
+    if first.succeeded or any(phase.max_duration is not None for phase in phases):
+        return planner, first
+    for factor in SLOWER:
+        slower = planner.slower(*span, factor)
+        part = slower.part(*span, start)
+        other = part.run(part.swings(), began, no_progress)
+        if other.succeeded:
+            return slower, other
+    return planner, first
 
 
 def _limb_of(body: BodyModel, effector: str) -> frozenset[str]:

@@ -64,6 +64,11 @@ class Guide:
         rates[np.isin(self.time, instants)] = 0.0
         return replace(self, rates=rates)
 
+    def retimed(self, before: FloatArray, after: FloatArray) -> "Guide":
+        """The same at other times: ``before`` (k,) becomes ``after`` (k,), linear in between [s]."""
+        slowed = replace(self, time=np.interp(self.time, before, after))
+        return slowed if self.rates is None else slowed.resting(slowed.time[~self.rates.any(axis=1)])
+
     @classmethod
     def joined(cls, parts: "Sequence[Guide]") -> "Guide":
         """Guides one after the other."""

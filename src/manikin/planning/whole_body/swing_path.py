@@ -2,7 +2,7 @@
 
 A path is a polyline of timed poses.  Distances are measured while the rest of the posture is still
 unknown: the effector's own segments are exact, a standing limb is its end segments at their contact and
-its next segment pointing towards the centre of mass.
+its next segment pointing to a given place, such as the centre of mass.
 """
 
 from collections.abc import Callable, Sequence
@@ -124,13 +124,13 @@ class EffectorClearance:
     Args:
         scene: The obstacles, the floor included.
         standing: Contacts of the other effectors during the flight.
-        com: Planned centre of mass (3,) [m] at a time [s], which the standing limbs point to.
+        towards: Place (3,) [m] that the limb above a standing contact points to at a time [s].
         bend: Angle of the hanging segment (toes) at a time [rad]; straight when omitted.
     """
 
     def __init__(
         self, body: BodyModel, scene: Scene, effector: str, standing: Sequence[Contact],
-        com: Callable[[float], FloatArray], bend: Callable[[float], float] | None = None,
+        towards: Callable[[Contact, float], FloatArray], bend: Callable[[float], float] | None = None,
     ) -> None:  # fmt: skip
         self._own, frame = end_shapes(body, effector), body.effector(effector)
         self._first_bent = len(body.segment(frame.segment).shapes)
@@ -145,8 +145,8 @@ class EffectorClearance:
         ]
         for contact in standing:
             self._fixed += _placed(end_shapes(body, contact.effector), Pose.of(contact))
-        limbs = (_standing_limb(body, contact) for contact in standing)
-        self._limbs = [limb for limb in limbs if limb is not None]
+        limbs = ((contact, _standing_limb(body, contact)) for contact in standing)
+        self._limbs = [(contact, *limb) for contact, limb in limbs if limb is not None]
         boxes = [_world_box(geometry, placement) for geometry, placement in self._fixed]
         self._low, self._high = (np.array([box[side] for box in boxes]).reshape(-1, 3) for side in (0, 1))
         balls = [_local_box(geometry) for geometry, _, _ in self._own]
@@ -154,7 +154,7 @@ class EffectorClearance:
             [offset + turn @ ball[0] for (_, turn, offset), ball in zip(self._own, balls, strict=True)]
         )
         self._radii = np.array([np.linalg.norm(half) for _, half in balls])
-        self._com, self._bend = com, bend
+        self._towards, self._bend = towards, bend
         self._placed_limbs, self._bent = cache(self._limbs_at), cache(self._bent_at)
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
 
@@ -188,10 +188,10 @@ class EffectorClearance:
         return [*self._own[: self._first_bent], *bent], reach
 
     def _limbs_at(self, time: float) -> list[Placed]:
-        """Capsules from the joints above the standing effectors towards the centre of mass."""
+        """Capsules from the joints above the standing effectors to where their limbs point."""
         placed = []
-        for joint, length, capsule in self._limbs:
-            direction = self._com(time) - joint
+        for contact, joint, length, capsule in self._limbs:
+            direction = self._towards(contact, time) - joint
             direction = direction / max(float(np.linalg.norm(direction)), 1e-9)
             place = joint + 0.5 * length * direction
             placed.append((capsule, coal.Transform3s(rotation_from_normal(direction), place)))

@@ -7,7 +7,7 @@ aside as bend it, or be caught on the wrong side.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -115,7 +115,7 @@ def _clear_flight(
     given = path.at(times)
     coms = np.array([Configuration(body, q).com for q in given])
 
-    def com(time: float) -> FloatArray:
+    def com(_: Contact, time: float) -> FloatArray:
         return np.array([np.interp(time, times, column) for column in coms.T])
 
     clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
@@ -150,6 +150,9 @@ REACHING_TIME = 0.7
 PASSED, IN_LINE, LEVEL = 0.1, 0.06, 0.6
 """Flights shorter than this along the level pass by nothing; what stands this near to the straight way may be
 passed on either side; standing limbs this much higher or lower than a lift-off are not passed by [m]."""
+
+HINGE_TIMES = 9
+"""Instants of a flight at which the hinges of standing limbs are looked up."""
 
 ROLLING_HEIGHTS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, *HEIGHTS[1:])
 """Apex heights of the point about which a rolling foot tilts: the ankle is lifted by the tilt already [m]."""
@@ -192,7 +195,9 @@ class FlightPlanner:
         self._limits, self._rng, self._reference = limits, rng, reference
         self.schedule, self._proximity = trajectory.schedule, Proximity(body, scene)
         self._touching = cache(partial(touch_pairs, body, scene))
+        self.plan = cache(self._planned)
 
+    @cached_property
     def flights(self) -> tuple[Swing, ...]:
         """Every flight from a contact or to one; the trunk is not flown.
 
@@ -215,7 +220,7 @@ class FlightPlanner:
             ]
         return tuple(found)
 
-    def plan(self, swing: Swing) -> PlannedSwing:
+    def _planned(self, swing: Swing) -> PlannedSwing:
         """Find a smooth curve, or else search one."""
         if swing.start is None or swing.end is None:
             return self._reach(swing)
@@ -328,10 +333,31 @@ class FlightPlanner:
         return float(np.clip(3.0 * (behind - 0.08), 0.0, 0.9))
 
     def _clearance(self, swing: Swing, bend: Callable[[float], float] | None = None) -> EffectorClearance:
-        return EffectorClearance(
-            self._body, self._scene, swing.effector, standing_during(self.schedule, swing),
-            self._trajectory.position, bend,
-        )  # fmt: skip
+        standing = standing_during(self.schedule, swing)
+        towards = self._towards(swing, standing)
+        return EffectorClearance(self._body, self._scene, swing.effector, standing, towards, bend)
+
+    def _towards(self, swing: Swing, standing: Sequence[Contact]) -> Callable[[Contact, float], FloatArray]:
+        """Where the limbs above standing contacts point to: to the centre of mass, as legs of who walks do.
+
+        A thigh that kneels and a limb on its tip point to where they are hinged in the preferred posture.
+        """
+        pointed = {contact.effector for contact in standing if rolls_on_point(contact)}
+        times = np.linspace(*self.schedule.swing_interval(swing), HINGE_TIMES if pointed else 0)
+        states = [Configuration(self._body, self._reference(time)) for time in times.tolist()]
+        hinges = dict[str, FloatArray]()
+        for name in pointed:
+            above = self._body.segment(self._body.effector(name).segment).parent
+            if above is not None:
+                hinges[name] = np.array([state.segment_placement(above)[1] for state in states])
+
+        def towards(contact: Contact, time: float) -> FloatArray:
+            places = hinges.get(contact.effector)
+            if places is None:
+                return self._trajectory.position(time)
+            return np.array([np.interp(time, times, column) for column in places.T])
+
+        return towards
 
     def _problem(self, swing: Swing, time: float) -> PostureProblem:
         others = tuple(item for item in self.schedule.stance_at(time) if item.effector != swing.effector)
