@@ -109,12 +109,12 @@ def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_r
     context, report, planned = ramp
     search, calls = whole_body_stage.find_eligible_plan, []
 
-    def first_fails(first, realise, look, *, replan):
+    def first_fails(first, realise, look, **options):
         calls.append(look)
         if len(calls) == 1:
             report.fail("wholebody", "no final sitting posture", 0.0, "phase 6")
             return Eligibility(first, None, None, 1, None)
-        return search(first, realise, look, replan=replan)
+        return search(first, realise, look, **options)
 
     monkeypatch.setattr(whole_body_stage, "find_eligible_plan", first_fails)
     found = whole_body_stage.with_key_postures(context, report, planned)

@@ -106,9 +106,9 @@ class Controller:
         self._geometry = {key: contact_geometry(body, item, inset) for key, item in contacts.items()}
         self._along = {key: edge_forces.points_along(body, item) for key, item in self._geometry.items()}
         self._points = {contact.effector for contact in every if contact.kind is ContactKind.POINT}
-        # The toes of a foot are followed as the foot is.
-        self._toes = [joint for name in self._switch.effectors for joint in _hanging_joints(body, name)]
-        self._others = [joint for joint in range(joints) if joint not in self._toes]
+        self._toes = {name: _hanging_joints(body, name) for name in self._switch.effectors}
+        hanging = {joint for some in self._toes.values() for joint in some}
+        self._others = [joint for joint in range(joints) if joint not in hanging]
         carriers = {name for phase in schedule.sequence if phase.load for name in phase.load.masses}
         named = dict.fromkeys((*self._switch.effectors, self._root, *sorted(carriers)))
         frames = {name: body.effector_frame(name) for name in named}
@@ -196,12 +196,15 @@ class Controller:
             frame, planned = state.frames[root], reference.effectors[root]
             wanted.append(tasks.orientation_task(root, frame, planned, gains.pelvis, weights.pelvis))
         wanted += [self._effector_task(support, state, reference) for support in supports.values()]
-        for name, gain, weight, some in (
-            ("posture", gains.posture, weights.posture, self._others),
-            ("toes", gains.swing, weights.effectors, self._toes),
-        ):
-            if some:
-                wanted.append(tasks.posture_task(name, state, reference, gain, weight, some))
+        wanted.append(
+            tasks.posture_task("posture", state, reference, gains.posture, weights.posture, self._others)
+        )
+        for name, toes in self._toes.items():  # followed as their foot is
+            gain = gains.posture if supports[name].mode is SupportMode.STANCE else gains.swing
+            if toes:
+                wanted.append(
+                    tasks.posture_task(f"toes of {name}", state, reference, gain, weights.effectors, toes)
+                )
         if (weight := weights.angular_momentum) > 0:
             wanted.append(tasks.angular_momentum_task(state, reference, gains.angular_momentum, weight))
         return wanted

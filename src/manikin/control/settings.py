@@ -12,8 +12,8 @@ class TaskWeights:
 
     Attributes:
         com: Centre of mass [1/(m/s^2)^2].
-        effectors: Placement of feet and grasping hands; also the hinges of toes, with the
-            gains of feet in flight.
+        effectors: Placement of feet and grasping hands; also the hinges of toes, with their
+            feet's gains in flight and those of the posture on the ground.
         pelvis: Orientation of the pelvis.
         posture: Each joint angle.
         angular_momentum: Rate of the angular momentum [1/(N.m)^2]; 0, as in the thesis, leaves it free.
