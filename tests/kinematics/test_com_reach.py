@@ -56,7 +56,7 @@ def test_a_stance_that_few_postures_hold_has_a_region():
     stance = feet(body, (0.554, 0.101, 0.0, 0.0), (0.0, -0.081, 0.153, 0.0))
     region = ComReach.of(body).region(stance)
     assert not region.empty
-    # A posture of the full body lies where the region says: its deepest place is within 2 cm of the region.
+    # A posture of the whole body, whose spine and arms the sampling simplifies, lies there within 2 cm.
     posed = generate_posture(PostureProblem(body, tuple(stance)), settings=SolverSettings(tolerance=1e-4))
     assert posed.succeeded, posed.failure
     assert region.violation(Configuration(body, posed.q).com) < 0.02

@@ -2,14 +2,15 @@
 
 import itertools
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from manikin.contact import SolePart
-from manikin.pipeline.stages import Report, RunContext
+from manikin.pipeline.stages import Report, RunContext, whole_body_stage
 from manikin.pipeline.stages.contact_stage import find_supports, with_rests
-from manikin.planning.com import plan_com
+from manikin.planning.com import Failure, plan_com
 from manikin.scenarios import found_supports, load_scenario
 from manikin.scenarios.found_supports import without_rests
 
@@ -116,8 +117,8 @@ def test_a_flight_lasts_longer_over_a_sill(tmp_path):
     sill = "\n- {name: sill, box: [0.1, 1.0, 0.2], position: [0.45, 0.0, 0.1]}\n"
     context, found = way(tmp_path, 0.0, scene=sill)
     stages, supports = found.plan.stages, without_rests(context.scenario, found.plan).file.supports
-    flights = [k for k, stage in enumerate(stages) if len(stage.contacts) == 1]
-    for number in flights:
+    crossed = 0
+    for number in (k for k, stage in enumerate(stages) if len(stage.contacts) == 1):
         (before, after), (foot,) = (
             (stages[number - 1].contacts, stages[number + 1].contacts),
             set(stages[number - 1].contacts) - set(stages[number].contacts),
@@ -126,8 +127,32 @@ def test_a_flight_lasts_longer_over_a_sill(tmp_path):
         crosses = start[0] < 0.4 and end[0] > 0.5
         swing = max(0.45, float(np.linalg.norm(end - start)) / 2.0)
         assert supports.phases[number].min_duration_s == pytest.approx(swing + crosses * 0.4 / 1.2)
-    crossing = [stages[k - 1].contacts.keys() - stages[k].contacts.keys() for k in flights]
-    assert len(crossing) >= 2
+        crossed += crosses
+    assert crossed == 2  # by each foot once
+
+
+@pytest.mark.parametrize("given", [None, 6.0])
+def test_the_margin_of_a_file_is_not_eased(tmp_path, monkeypatch, given):
+    """Where a walk has 0.7 of what is wanted, half of our own margin is asked for, and all of a file's."""
+    context, found = way(tmp_path, 0.0)
+    if given is not None:
+        context = RunContext.of(context.scenario.with_overrides([f"planning.min_margin={given}"]))
+    walking = context.with_supports(without_rests(context.scenario, found.plan))
+    resting = context.with_supports(found_supports.with_supports(context.scenario, found.plan))
+    walking = replace(walking, resting=resting)
+    wanted, asked = walking.problem.required_margin, list[float]()
+    failure = Failure("balance margin", "too small", 1, 0.5)
+
+    def fails(problem, **_):
+        asked.append(problem.required_margin)
+        result = plan_com(replace(problem, required_margin=0.0), guesses=1)
+        monkeypatch.setattr(type(result), "d_min", property(lambda _: 0.7 * wanted))
+        return replace(result, problem=problem, failure=failure)
+
+    monkeypatch.setattr(whole_body_stage.com, "plan_com", fails)
+    whole_body_stage.plan_centre_of_mass(walking, Report(walking, None, None, time.perf_counter()))
+    assert wanted > 0.0
+    assert asked == pytest.approx([wanted, 0.5 * wanted] if given is None else [wanted])
 
 
 def test_places_of_the_centre_of_mass_stay_where_phases_of_the_file_begin(tmp_path):

@@ -195,10 +195,9 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
     else:
         # Where the body may rest instead, what one guess does not find is not worth the time.
         result = com.plan_com(problem, guesses=None if context.resting is None else 1)
-        passes, enough = context.resting is not None, EASED_MARGIN * problem.required_margin
-        if passes and result.failure is not None and (result.d_min or 0.0) > enough > 0.0:
-            result = com.plan_com(replace(problem, required_margin=enough), guesses=1)
-        if result.failure is not None and context.scenario.keeps_upright and not passes:
+        if result.failure is not None and context.resting is not None:
+            result = _with_less_margin(context, report, result)
+        elif result.failure is not None and context.scenario.keeps_upright:
             # The task may need a deeper bend.
             result = com.plan_com(context.scenario.build_centroidal_problem(upright=False))
     report_centre_of_mass(report, result, centroidal_summary(result))
@@ -207,6 +206,21 @@ def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult
         report.fail("centroidal", failure.reason, failure.time or 0.0, where)
     report.progress("centroidal", 1.0)
     return result
+
+
+def _with_less_margin(context: RunContext, report: Report, failed: CentroidalResult) -> CentroidalResult:
+    """Plan again a body that passes with :data:`EASED_MARGIN` of the margin, where a plan had more than that.
+
+    It keeps what it has to keep at rest, so that no margin of a file is eased; the scenario says so.
+    """
+    assert context.resting is not None
+    asked, rests = context.scenario, context.resting.scenario
+    share = max(EASED_MARGIN, rests.required_margin / max(asked.required_margin, 1e-9))
+    if share >= 1.0 or (failed.d_min or 0.0) <= share * asked.required_margin:
+        return failed
+    eased = asked.with_overrides([f"planning.min_margin={share * asked.file.planning.min_margin!r}"])
+    report.keep_scenario(eased)
+    return com.plan_com(eased.build_centroidal_problem(), guesses=1)
 
 
 def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[str, Any]) -> None:

@@ -4,7 +4,8 @@ Whether a person can rise depends on the start: feet drawn back below the knees,
 the seat's edge, buttocks far enough in front.  Legs on a seat are two triangles seen from the side, so that
 all places and slopes of the shanks are compared in closed form (:class:`Sitter`), and only the best few are
 tried with the whole body.  The body leaves the seat at rest where it can lean until its weight is over its
-feet, else in motion (:mod:`.transition`), else with hands that push on armrests, a table or the seat.
+feet, else in motion (:mod:`manikin.balance.capturability`), else with hands that push on armrests, a table
+or the seat.
 """
 
 from collections.abc import Iterator, Sequence
