@@ -45,7 +45,7 @@ def test_a_part_begins_in_a_given_posture_and_comes_to_rest_where_it_likes(stand
     guide = Guide(INSTANTS, np.array([standing, known, standing]), ())
     rng = np.random.default_rng(0)
     planner = _Planner(BODY, Scene([]), trajectory, rng, WholeBodySettings(), known=guide)
-    spline = planner.part(0, 1, given).run((), 0.0, lambda _: None).spline
+    spline = planner.part(0, 1, (given, None)).run((), 0.0, lambda _: None).spline
     begin, end = (spline.evaluate(INSTANTS[k : k + 1]) for k in (0, 1))
     np.testing.assert_allclose(begin.q[0], given, atol=1e-9)
     for rate in (begin.v, begin.a):
@@ -118,6 +118,32 @@ def test_a_part_that_fails_is_given_more_time_and_what_follows_comes_later(stand
     np.testing.assert_allclose(result.trajectory.schedule.instants, [0.0, 0.4, 0.4 + 0.4 * SLOWER[1]])
     assert result.motion.time[-1] == pytest.approx(result.trajectory.duration)
     assert result.guide.time[-1] == pytest.approx(result.trajectory.duration)
+
+
+def test_a_part_that_fails_begins_in_the_known_posture_instead(standing, monkeypatch):
+    """The one before is planned again to that posture; any other is refused as if a thigh were in the way."""
+    known = standing.copy()
+    known[7 + BODY.joint_index("left_forearm_pronation")] += 0.3  # it moves no centre of mass
+    guide = Guide(INSTANTS, np.array([standing, known, known]), ())
+    planner = _Planner(
+        BODY, Scene([]), still(standing), np.random.default_rng(0), WholeBodySettings(),
+        known=guide.resting(INSTANTS),
+    )  # fmt: skip
+    run = _Planner.run
+
+    def caught(self, *args):
+        result, start = run(self, *args), self.ends[0]
+        if start is None or np.allclose(start, known, atol=1e-6):
+            return result
+        return replace(result, failure=WholeBodyFailure("caught", self.instants[0], ""))
+
+    monkeypatch.setattr(_Planner, "run", caught)
+    result = _in_parts(planner, [0, 1, 2], 0.0, lambda _: None)
+    assert result.succeeded, result.failure
+    np.testing.assert_allclose(result.trajectory.schedule.instants, INSTANTS)
+    meeting = result.spline.evaluate(INSTANTS[1:2])
+    np.testing.assert_allclose(meeting.q[0, 7:], known[7:], atol=1e-6)
+    np.testing.assert_allclose(meeting.v, 0.0, atol=1e-6)
 
 
 def test_a_retimed_guide_has_its_postures_later_and_rests_where_it_did(standing):

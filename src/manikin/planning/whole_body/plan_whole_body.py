@@ -254,6 +254,10 @@ class _Goal:
         )  # fmt: skip
 
 
+Ends = tuple[FloatArray | None, FloatArray | None]
+"""Postures (nq,) in which a motion begins and ends; None for any."""
+
+
 class _Planner:
     """One planning job, with what its attempts share."""
 
@@ -262,7 +266,7 @@ class _Planner:
         settings: WholeBodySettings, leaning: Ignored = frozenset(), known: Guide | None = None,
         waypoints: Guide | None = None,
     ) -> None:  # fmt: skip
-        self.ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
+        self.ends: Ends = (None, None)
         self.settles, self.rng = False, rng
         self.instants = trajectory.schedule.instants
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
@@ -278,10 +282,10 @@ class _Planner:
         )  # fmt: skip
         self.guide = cache(self._guide)
 
-    def part(self, first: int, last: int, start: FloatArray | None) -> "_Planner":
-        """The same job from one key instant to another, at rest at both; it begins in a posture (nq,)."""
+    def part(self, first: int, last: int, ends: Ends) -> "_Planner":
+        """The same job from one key instant to another, at rest at both, in given postures (nq,) or any."""
         part = copy(self)
-        part.ends, part.settles = (start, None), last < len(self.instants) - 1
+        part.ends, part.settles = ends, last < len(self.instants) - 1
         part.instants = self.instants[first : last + 1]
         part.job, part.guide = replace(self.job, span=(first, last)), cache(part._guide)
         return part
@@ -468,13 +472,18 @@ SLOWER = (1.3, 1.7)
 def _in_parts(planner: _Planner, keys: Sequence[int], began: float, progress: Progress) -> WholeBodyResult:
     """Plan a motion in parts from rest to rest, and join them.
 
-    A fit takes or leaves a step for the whole of its motion, and its repairs weigh all of it anew.
+    A fit takes or leaves a step for the whole of its motion, and its repairs weigh all of it anew. A part
+    ends in any posture of its contacts; where the next one fails from there, it is planned to the known one.
     """
-    parts, count = list[WholeBodyResult](), len(keys) - 1
-    for number, span in enumerate(pairwise(keys)):
-        progress(0.2 + 0.8 * number / count)
-        start = parts[-1].spline.control_points[-1] if parts else None
-        planner, part = _with_time(planner, span, start, began)
+    parts, spans = list[WholeBodyResult](), list(pairwise(keys))
+    for number, span in enumerate(spans):
+        progress(0.2 + 0.8 * number / len(spans))
+        later, part = _with_time(planner, span, (_end_of(parts), None), began)
+        if parts and not part.succeeded:
+            mended = _from_known(planner, spans[number - 1 : number + 1], _end_of(parts[:-1]), began)
+            if mended is not None:
+                later, parts[-1], part = mended
+        planner = later
         parts.append(part)
     spline = ConfigurationSpline.joined([part.spline for part in parts])
     guide = Guide.joined([part.guide for part in parts])
@@ -490,18 +499,40 @@ def _in_parts(planner: _Planner, keys: Sequence[int], began: float, progress: Pr
     )  # fmt: skip
 
 
+def _end_of(parts: Sequence[WholeBodyResult]) -> FloatArray | None:
+    """Posture (nq,) in which the last part ends; None without parts."""
+    return parts[-1].spline.control_points[-1] if parts else None
+
+
+def _from_known(
+    planner: _Planner, spans: Sequence[tuple[int, int]], start: FloatArray | None, began: float
+) -> tuple[_Planner, WholeBodyResult, WholeBodyResult] | None:
+    """Plan two parts that meet in the posture that is known there, after a ``start`` (nq,).
+
+    Returns:
+        The job at their timing and both parts; None where one fails.
+    """
+    assert planner.known is not None  # parts meet only where postures are known
+    meeting = planner.known.at(planner.instants[[spans[0][1]]])[0]
+    planner, before = _with_time(planner, spans[0], (start, meeting), began)
+    if not before.succeeded:
+        return None
+    planner, after = _with_time(planner, spans[1], (meeting, None), began)
+    return (planner, before, after) if after.succeeded else None
+
+
 def _with_time(
-    planner: _Planner, span: tuple[int, int], start: FloatArray | None, began: float
+    planner: _Planner, span: tuple[int, int], ends: Ends, began: float
 ) -> tuple[_Planner, WholeBodyResult]:
-    """Plan a part that begins in a posture (nq,), with more time where it fails; the job at its timing."""
-    part = planner.part(*span, start)
+    """Plan a part between postures (nq,), with more time where it fails; the job at its timing."""
+    part = planner.part(*span, ends)
     first = part.run(part.swings(), began, no_progress)
     phases = planner.trajectory.schedule.sequence.phases[slice(*span)]
     if first.succeeded or any(phase.max_duration is not None for phase in phases):
         return planner, first
     for factor in SLOWER:
         slower = planner.slower(*span, factor)
-        part = slower.part(*span, start)
+        part = slower.part(*span, ends)
         other = part.run(part.swings(), began, no_progress)
         if other.succeeded:
             return slower, other
