@@ -34,6 +34,7 @@ HIGHEST = 0.48  # largest difference in height of two soles, of a body of 1.75 m
 HELD_HIGHEST = 0.80  # the same of a body that has something to hold on to or lean on [m]
 HELD_COST = 4.0 * STEP  # cost of a step that is higher than HIGHEST: hands come and go [s]
 NARROWEST = 0.115  # least distance of the middles of two soles across, of a body of 1.75 m [m]
+SOLES_APART = 0.016  # least distance of two soles seen from above: a little more than postures keep [m]
 ALONG = (-0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
 ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
 TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
@@ -179,9 +180,16 @@ class FootstepSearch:
         if pair in self._closed or self._is_refused(*pair):
             return math.inf
         if pair not in self._pairs:
-            both = [self.holds[number] for number in (pair if parent.side > 0 else pair[::-1])]
-            self._pairs[pair] = self._pair_cost(*both) if self._is_free(node.hold) else math.inf
+            both = [self.holds[number] for number in pair]
+            passes = self._is_free(node.hold) and self._is_made(*both, -parent.side)
+            both = both if parent.side > 0 else both[::-1]
+            self._pairs[pair] = self._pair_cost(*both) if passes else math.inf
         return self._pairs[pair]
+
+    def _is_made(self, stand: Foothold, step: Foothold, out: int) -> bool:
+        """Whether a body makes a step: its place may stand for one close by, for which that is known."""
+        place = step.position[None], np.array([step.yaw]), np.array([step.share])
+        return bool(np.isfinite(self._step_costs(stand, out, *place)[0]))
 
     def _is_refused(self, stand: int, step: int) -> bool:
         if self._too_hard and self._harder(self._shape(stand, step)):
@@ -247,13 +255,29 @@ class FootstepSearch:
         apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
         made = self._reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
         made &= (rise <= self._highest * size) & (turned >= -0.8) & (turned <= 1.1)
-        made &= aside >= NARROWEST * size + 0.10 * np.maximum(0.0, np.abs(turned) - 0.2)
+        made &= aside >= NARROWEST * size
+        made &= _soles_apart(ahead, aside, turned, self._footholds.size) >= SOLES_APART
         cost = STEP * (1.0 + (way / (EASY * self._stride * size)) ** 4)
         steep = 8.0 * np.maximum(0.0, rise - 0.2 * size)
         cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + 3.0 * (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
         cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
         return np.where(made, cost, np.inf)
+
+
+def _soles_apart(
+    ahead: FloatArray, aside: FloatArray, turned: FloatArray, size: tuple[float, float]
+) -> FloatArray:
+    """(k,) widest gap between two soles of a size along the edges of one of them [m]; negative: overlap.
+
+    The middle of the second one is ahead and aside (k,) of that of the first [m], and turned (k,) [rad].
+    """
+    c, s = np.cos(turned), np.sin(turned)
+    half, width = 0.5 * size[0], 0.5 * size[1]
+    along, across = half * np.abs(c) + width * np.abs(s), half * np.abs(s) + width * np.abs(c)
+    ways = np.abs(np.array([ahead, aside, c * ahead + s * aside, c * aside - s * ahead]))
+    reach = np.array([half + along, width + across, along + half, across + width])
+    return np.asarray((ways - reach).max(axis=0))
 
 
 def _offsets(scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:

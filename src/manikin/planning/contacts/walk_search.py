@@ -147,6 +147,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             self.settings.stride, HELD_HIGHEST if self._handholds.exist else HIGHEST,
         )  # fmt: skip
         self._risen: tuple[Stage, ...] = ()
+        self._lenient = False  # whether postures count that are too hard at rest
 
     def _best(self) -> list[int] | str:
         if not self._risen:
@@ -256,11 +257,12 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     ) -> tuple[list[Stage], dict[str, Contact], FloatArray | None, Posed]:
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
         failed: tuple[FloatArray | None, Posed] | None = None
-        for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
-            lifted, landed = self._step(feet, before, after, start, held)
-            if landed.q is not None:
-                return changes, held, lifted, landed
-            failed = failed or (lifted, landed)
+        for self._lenient in (False, True) if self.replanned >= STRONG_TRIES else (False,):
+            for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
+                lifted, landed = self._step(feet, before, after, start, held)
+                if landed.q is not None:
+                    return changes, held, lifted, landed
+                failed = failed or (lifted, landed)
         lifted, landed = failed or (None, Posed(None, f"{' and '.join(hands)} cannot be left"))
         return [], hands, lifted, landed
 
@@ -336,14 +338,15 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         """Posture that holds contacts and rests on some; looked for once with each trunk and inset."""
         key = frozenset(held.values()), frozenset(carrying), place.trunk, inset
         if key in self._postures:
-            return self._postures[key]
+            return self._strong(self._postures[key])
         guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
         posed = self.poser.pose(held, carrying, q, guide, inset=inset)
         if posed.q is None and (feet_alone or len(held) > 2):
             start = np.concatenate([guide, q[len(guide) :]])
             posed = self.poser.pose(held, carrying, start, guide, inset=inset, restarts=feet_alone)
-        posed = self.poser.eased(posed, held, carrying)
-        if posed.too_hard:
-            posed = posed.at_rest if self.replanned < STRONG_TRIES else Posed(posed.q)
-        self._postures[key] = posed
-        return posed
+        self._postures[key] = self.poser.eased(posed, held, carrying)
+        return self._strong(self._postures[key])
+
+    def _strong(self, posed: Posed) -> Posed:
+        """The posture, or none where the joints are too weak for it and that counts."""
+        return Posed(posed.q) if self._lenient and posed.too_hard else posed.at_rest
