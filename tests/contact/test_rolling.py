@@ -15,6 +15,7 @@ from manikin.contact import (
     sole_part,
 )
 from manikin.contact import sole as make_sole
+from manikin.contact.stance import ON_BALL, ON_TOES
 from manikin.errors import ContactError
 from manikin.numerics.polytope import signed_distance
 
@@ -59,13 +60,27 @@ def parts_of(*stances):
 
 def test_a_foot_above_the_other_rises_onto_its_toes_as_that_lands():
     """The phase on both feet keeps its bounds: on a flat upper foot no time is spent."""
-    upper, lower = foot("right_foot", (0.0, -0.1, 0.3), 0.0), foot("left_foot", (0.4, 0.1, 0.0), 0.0)
-    beside = foot("left_foot", (0.0, 0.1, 0.3), 0.0)
+    upper, lower = foot("right_foot", (0.0, -0.1, 0.2), 0.0), foot("left_foot", (0.4, 0.1, 0.0), 0.0)
+    beside = foot("left_foot", (0.0, 0.1, 0.2), 0.0)
     rolled, parts = parts_of([beside, upper], [upper], [lower, upper], [lower])
     landed, left = rolled.changes[2:]
     assert left == landed + 1
     assert parts[landed] == {"left_foot": SolePart.FULL, "right_foot": SolePart.TOES}
     assert (rolled[landed].min_duration, rolled[landed].max_duration) == (0.3, 0.8)
+
+
+def test_a_foot_deep_below_the_other_lands_on_its_ball():
+    """Its heel comes down before the upper one rises; both take their time from the phase on both feet."""
+    upper, lower = foot("right_foot", (0.0, -0.1, 0.3), 0.0), foot("left_foot", (0.3, 0.1, 0.0), 0.0)
+    beside = foot("left_foot", (0.0, 0.1, 0.3), 0.0)
+    rolled, parts = parts_of([beside, upper], [upper], [lower, upper], [lower])
+    landed, left = rolled.changes[2:]
+    assert parts[landed:left] == [
+        {"left_foot": SolePart.TOES, "right_foot": SolePart.FULL},
+        {"left_foot": SolePart.FULL, "right_foot": SolePart.TOES},
+    ]
+    assert rolled[landed].min_duration == ON_BALL
+    assert rolled[landed + 1].min_duration == max(0.3 - ON_BALL, ON_TOES)
 
 
 @pytest.mark.parametrize(("toes_end", "rises"), [(0.13, True), (0.08, False)])

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel
-from manikin.body.limbs import hanging_segment, hinge_line
+from manikin.body.limbs import hanging_segment, hinge_line, toe_hinge
 from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
 from manikin.contact.contact import sole
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
@@ -24,13 +24,6 @@ def effector_placements(body: BodyModel, q: FloatArray, name: str) -> tuple[Floa
         pin.framesForwardKinematics(body.pinocchio, data, one)
         position[row], rotation[row] = data.oMf[frame].translation, data.oMf[frame].rotation
     return position, rotation
-
-
-def toe_hinge(body: BodyModel, name: str) -> FloatArray | None:
-    """(3,) middle of the hinge of a foot's toes in the frame of its sole [m]; None without toes."""
-    frame = body.effector(name)
-    toes = hanging_segment(body, frame.segment)
-    return None if toes is None else frame.rotation.T @ (toes.origin - frame.translation)
 
 
 RAISED = 0.02

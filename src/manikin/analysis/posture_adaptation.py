@@ -13,11 +13,11 @@ from itertools import groupby
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manikin.analysis.contact_adaptation import effector_placements, toe_hinge
+from manikin.analysis.contact_adaptation import effector_placements
 from manikin.balance import WrenchPolytope
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
-from manikin.body.limbs import hanging_segment
+from manikin.body.limbs import hanging_segment, toe_hinge
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline, align_quaternions

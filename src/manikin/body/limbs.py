@@ -95,11 +95,17 @@ def with_round_tips(body: BodyModel, effectors: Iterable[str]) -> BodyModel:
     return replace(body, segments=tuple(segments)) if added else body
 
 
-def hinge_line(body: BodyModel, effector: str) -> float | None:
-    """Place where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
+def toe_hinge(body: BodyModel, effector: str) -> FloatArray | None:
+    """(3,) hinge of the segment that hangs on an effector's, in the effector's frame [m], or None."""
     frame = body.effector(effector)
     hanging = hanging_segment(body, frame.segment)
-    return None if hanging is None else float((frame.rotation.T @ (hanging.origin - frame.translation))[0])
+    return None if hanging is None else frame.rotation.T @ (hanging.origin - frame.translation)
+
+
+def hinge_line(body: BodyModel, effector: str) -> float | None:
+    """Place where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
+    hinge = toe_hinge(body, effector)
+    return None if hinge is None else float(hinge[0])
 
 
 def carrying_segment(body: BodyModel, effector: str, point: FloatArray) -> str:

@@ -271,8 +271,9 @@ class ContactSchedule(Displayed):
         return float(self.instants[swing.first_phase]), float(self.instants[swing.last_phase + 1])
 
 
-ON_HEEL, FLAT, ON_TOES = 0.08, 0.04, 0.14
-"""Least times of a rolling foot on the heel's edge, with both feet flat, and on its toes [s]."""
+ON_HEEL, FLAT, ON_TOES, ON_BALL = 0.08, 0.04, 0.14, 0.2
+"""Least times of a rolling foot on the heel's edge, with both feet flat, on its toes before it leaves, and on
+the ball of the foot after it has landed there [s]."""
 
 STRETCH = 1.5
 """The phases on heel or toes last at most this many times their least time."""
@@ -281,15 +282,19 @@ STRETCH = 1.5
 BACK, STEP = 0.02, 0.05
 """Way behind, and above or below, its last place from which on a foot lands flat [m]; our choice."""
 
+BALL_STEP = 0.25
+"""Depth below the other one from which on a foot lands on its ball [m]; our choice."""
+
 
 def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
     """Split every phase in which a foot lands or leaves beside another full contact.
 
     The parts' shares are taken from the split phase's least duration, which is never shortened. Soles are
     full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back, or onto a
-    step, lands flat: people land on their whole sole or its front there. One that is left above the other
-    rises onto its toes as soon as that has landed: flat, its ankle would have to bend farther than it can.
-    Soles that hang over an edge land flat, and leave flat where their toes have nothing below them.
+    step, lands flat, and deep below the other one on its ball, which is reached with the other knee bent
+    less. One that is left above the other rises onto its toes as soon as that has landed: flat, its ankle
+    would have to bend farther than it can.  Soles that hang over an edge land flat, and leave flat where
+    their toes have nothing below them.
     """
     flat = {(swing.last_phase + 1, swing.effector) for swing in sequence.swings() if _lands_flat(swing)}
     parts = (_split(sequence, index, hinge, flat) for index in range(len(sequence)))
@@ -310,10 +315,16 @@ def _split(
     phase = sequence[index]
     stance = phase.stance
     landing = _changing(stance, sequence[index - 1].stance) if index > 0 else ()
+    balls = tuple(name for name in landing if stance[name].rises_on_toes(hinge))
     landing = tuple(name for name in landing if (index, name) not in flat and not stance[name].hangs_over)
     leaving = _changing(stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
     leaving = tuple(name for name in leaving if stance[name].rises_on_toes(hinge))
-    if leaving and not landing and _is_above(stance, leaving):
+    if balls and not landing and _depth(stance, balls) > BALL_STEP:
+        yield _on_part(phase, balls, SolePart.TOES, hinge, ON_BALL)
+        least = max(phase.min_duration - ON_BALL, ON_TOES)
+        most = None if phase.max_duration is None else max(phase.max_duration - ON_BALL, least)
+        phase = replace(phase, min_duration=least, max_duration=most)
+    if leaving and not landing and _height(stance, leaving) > STEP:
         toes = _on_part(phase, leaving, SolePart.TOES, hinge, ON_TOES)
         yield replace(phase, stance=toes.stance)
         return
@@ -332,10 +343,16 @@ def _split(
         yield _on_part(phase, leaving, SolePart.TOES, hinge, rise)
 
 
-def _is_above(stance: Stance, leaving: Sequence[str]) -> bool:
-    """Whether soles that are about to leave are a step above all others."""
-    low = min(stance[name].position[2] for name in leaving)
-    return all(low - other.position[2] > STEP for other in stance if other.effector not in leaving)
+def _depth(stance: Stance, feet: Sequence[str]) -> float:
+    """How far the highest of some feet is below the lowest other contact [m]."""
+    others = [other.position[2] for other in stance if other.effector not in feet]
+    return float(min(others) - max(stance[name].position[2] for name in feet))
+
+
+def _height(stance: Stance, feet: Sequence[str]) -> float:
+    """How far the lowest of some feet is above the highest other contact [m]."""
+    others = [other.position[2] for other in stance if other.effector not in feet]
+    return float(min(stance[name].position[2] for name in feet) - max(others))
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
-from manikin.body.limbs import end_segments, ends_before_tip, hanging_segment, hangs
+from manikin.body.limbs import end_segments, ends_before_tip, hanging_segment, hangs, toe_hinge
 from manikin.body.model import BodyModel
 from manikin.body.natural_range import LearntJoint, learnt_joints
 from manikin.contact import Contact, ContactKind, SolePart
@@ -215,8 +215,9 @@ class PostureProblem:
         on_toes = contact.part is SolePart.TOES
         x = contact.points[:, 0].min() if on_toes else contact.points[:, 0].max()
         toes = hanging_segment(self.body, self.body.effector(contact.effector).segment) if on_toes else None
+        hinge = None if toes is None else toe_hinge(self.body, contact.effector)
         return EdgeTerm(
-            contact.effector, np.array([float(x), 0.0, 0.0]), contact.position,
+            contact.effector, np.array([float(x), 0.0, 0.0]) if hinge is None else hinge, contact.position,
             contact.rotation_contact_to_world, *((0.0, HEEL_UP) if on_toes else (-TOES_UP, 0.0)),
             None if toes is None else 6 + self.body.joint_index(toes.hinges[0].name),
         )  # fmt: skip

@@ -74,8 +74,8 @@ SLOPED = 0.1
 """Way of the centre of mass from which on a plane above it is inclined [m]; our choice."""
 LEVEL = 0.94
 """Least upward part of the normal of a sole on which a body steps without rest; our choice."""
-MILD = 0.21
-"""Largest difference in height of such soles, of a body of 1.75 m [m]: steps of stairs; our choice."""
+MILD = 0.48
+"""Largest difference in height of such soles, of a body of 1.75 m [m]: what feet alone make."""
 WALKING_MARGIN = 6.0
 """Margin that the plan of such a body keeps on its smaller soles, of a person of 1.75 m and 70 kg [N.m]."""
 WALKING_SHARE = (0.8, 0.5)

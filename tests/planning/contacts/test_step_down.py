@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration, human
-from manikin.body.limbs import hinge_line
+from manikin.body.limbs import hinge_line, toe_hinge
 from manikin.contact import SolePart, sole, sole_part
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.walk_search import LANDING_INSETS
@@ -31,7 +31,7 @@ def test_the_body_rests_on_the_lower_foot_with_the_upper_one_on_its_toes(stature
     state = Configuration(body, found.q)
     rotation, position = state.effector_placement("left_foot")
     assert 8.0 < np.rad2deg(np.arcsin(-rotation[2, 0])) < 55.0
-    toes = np.array([hinge_line(body, "left_foot"), 0.0, 0.0])
+    toes = toe_hinge(body, "left_foot")
     np.testing.assert_allclose(position + rotation @ toes, upper.position + toes, atol=1e-3)
     assert abs(state.com[0] - lower.position[0]) < edge
 

@@ -9,6 +9,7 @@ from manikin.body import human
 from manikin.contact import ContactSchedule, SolePart, roll_feet
 from manikin.contact.stance import ON_TOES
 from manikin.planning.whole_body.foot_roll import (
+    BALL_PITCH,
     HEEL_STRIKE_PITCH,
     HIGHEST_PITCH,
     PUSH_OFF_PITCH,
@@ -81,6 +82,22 @@ def test_the_motion_has_no_jump_in_speed(rolled):
     for local in (roll.heel, np.array([0.14, 0.0, 0.0])):
         acceleration = np.diff(placed(roll, curve, time, local), 2, axis=0) / (time[1] - time[0]) ** 2
         assert np.abs(np.diff(acceleration, axis=0)).max() < 0.1 * np.abs(acceleration).max()
+
+
+def test_a_foot_that_lands_on_its_ball_keeps_its_toes_flat_there(rolled):
+    """After landing the hinge rests and the toes are level; in flight their angle has no jump.
+
+    Of 2000 samples of a quintic the largest step is 0.2 degrees in 1.1 ms: 3.5 rad/s.
+    """
+    roll = replace(rolled[0], touch=BALL_PITCH)
+    _, off, land, flat = roll.instants
+    curve = SwingCurve.lift(*roll.pivots, off, land, height=0.06)
+    time = np.linspace(land, flat, 50)
+    assert np.ptp(placed(roll, curve, time, roll.hinge), axis=0) == pytest.approx([0.0] * 3, abs=1e-12)
+    assert roll.toe_extension(time) == pytest.approx(roll.pitch(time))
+    assert roll.pitch(roll.instants[2:]) == pytest.approx([BALL_PITCH, 0.0])
+    flight = roll.toe_extension(np.linspace(off, flat, 2000))
+    assert np.abs(np.diff(flight)).max() < np.deg2rad(0.5)
 
 
 @pytest.mark.parametrize("flight", [0.4, 0.6, 1.1, 2.0])

@@ -292,7 +292,7 @@ def follow_centre_of_mass(
     result = plan_whole_body(
         context.body, context.scene, trajectory, rng=rng, settings=context.settings,
         padded=context.padded, waypoints=plan.postures,
-        known=_known_postures(context, plan, trajectory.schedule.instants),
+        known=_known_postures(context, plan, trajectory.schedule),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     if result.trajectory is not trajectory:
@@ -312,14 +312,15 @@ def _slowed(report: Report, plan: KeyedPlan, trajectory: CentroidalTrajectory) -
     return _reported(report, Eligibility(centroidal, trajectory, postures, plan.replans, None))
 
 
-def _known_postures(context: RunContext, plan: KeyedPlan, instants: FloatArray) -> Guide | None:
-    """Postures of the contact plan at (n,) key instants [s]; those on the CoM of a body that passes them."""
+def _known_postures(context: RunContext, plan: KeyedPlan, schedule: ContactSchedule) -> Guide | None:
+    """Postures of the contact plan at its changes in a schedule; those on the CoM of who passes them."""
     if context.plan is None:
         return None
     if context.resting is None or plan.postures is None:
-        times, postures = context.plan.keys(instants)
+        begins = [*schedule.sequence.changes, len(schedule.sequence)]
+        times, postures = context.plan.keys(schedule.instants[begins])
     else:
-        times, postures = instants, np.array([item.q for item in plan.postures.postures])
+        times, postures = schedule.instants, np.array([item.q for item in plan.postures.postures])
     return Guide(times, align_quaternions(postures), ())
 
 

@@ -180,9 +180,9 @@ class FootstepSearch:
         if pair in self._closed or self._is_refused(*pair):
             return math.inf
         if pair not in self._pairs:
-            both = [self.holds[number] for number in pair]
-            passes = self._is_free(node.hold) and self._is_made(*both, -parent.side)
-            both = both if parent.side > 0 else both[::-1]
+            stand, step = self.holds[parent.hold], self.holds[node.hold]
+            passes = self._is_free(node.hold) and self._is_made(stand, step, -parent.side)
+            both = (stand, step) if parent.side > 0 else (step, stand)
             self._pairs[pair] = self._pair_cost(*both) if passes else math.inf
         return self._pairs[pair]
 

@@ -257,7 +257,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     ) -> tuple[list[Stage], dict[str, Contact], FloatArray | None, Posed]:
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
         failed: tuple[FloatArray | None, Posed] | None = None
-        for self._lenient in (False, True) if self.replanned >= STRONG_TRIES else (False,):
+        for lenient in (False, True) if self.replanned >= STRONG_TRIES else (False,):
+            self._lenient = lenient
             for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
                 lifted, landed = self._step(feet, before, after, start, held)
                 if landed.q is not None:

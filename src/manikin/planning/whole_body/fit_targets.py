@@ -172,7 +172,7 @@ def toe_angles(body: BodyModel, rolls: Rolls, time: FloatArray) -> dict[int, Flo
     for name, roll in rolls:
         toes = hanging_segment(body, body.effector(name).segment)
         if toes is not None:
-            rows = (time >= roll.instants[0]) & (time < roll.instants[2])
+            rows = (time >= roll.instants[0]) & (time < roll.instants[2 if roll.touch < 0.0 else 3])
             angle = found.setdefault(body.joint_index(toes.hinges[0].name), np.zeros(len(time)))
             angle[rows] = roll.toe_extension(time[rows])
     return found
@@ -202,10 +202,14 @@ def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> 
         toes = hanging_segment(body, body.effector(name).segment)
         if toes is None:
             continue
-        held = np.zeros(len(time))
+        held, before = np.zeros(len(time)), SolePart.FULL
         for phase, (start, end) in zip(schedule.sequence, pairwise(schedule.instants), strict=True):
-            if name in phase.stance and phase.stance[name].part is SolePart.FULL:
+            part, after = before, phase.stance[name].part if name in phase.stance else SolePart.FULL
+            before = after
+            if name in phase.stance and after is SolePart.FULL:
                 coming = 1.0 - np.clip((start - time - STRAIGHT) / STRAIGHTENING, 0.0, 1.0)
+                if part is SolePart.TOES:  # bent until the heel is down
+                    coming = 1.0 - np.clip((start - time) / STRAIGHT, 0.0, 1.0)
                 leaving = 1.0 - np.clip((time - end) / STRAIGHT, 0.0, 1.0)
                 held = np.maximum(held, np.minimum(coming, leaving))
         found |= dict.fromkeys((body.joint_index(hinge.name) for hinge in toes.hinges), held)

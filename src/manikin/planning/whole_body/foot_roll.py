@@ -1,10 +1,11 @@
 """Pitch of a foot from the rise of its heel to its next flat landing.
 
 The foot tilts about the hinge of its toes, which stay flat, until it leaves the ground; flies; lands on the
-edge of its heel and tilts down onto its sole. One pitch, twice continuously differentiable, covers all of it,
-so that the foot does not stop at lift-off or landing. Where the foot is follows from the point about which it
-tilts: the hinge before lift-off, the heel's edge after landing, and in flight a point that moves from one to
-the other along the swing's curve. The angles and their timing are our own choice.
+edge of its heel, or deep below on its flat toes, and tilts down onto its sole. One pitch, twice continuously
+differentiable, covers all of it, so that the foot does not stop at lift-off or landing. Where the foot is
+follows from the point about which it tilts: the hinge before lift-off, the heel's edge or the hinge after
+landing, and in flight a point that moves from one to the other along the swing's curve. The angles and their
+timing are our own choice.
 """
 
 from collections.abc import Sequence
@@ -15,13 +16,16 @@ import numpy as np
 from scipy.interpolate import BPoly
 
 from manikin.body import BodyModel
-from manikin.body.limbs import hanging_segment
+from manikin.body.limbs import toe_hinge
 from manikin.contact import ContactSchedule, SolePart, Swing
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.swing_path import Pose
 
 PUSH_OFF_PITCH, HEEL_STRIKE_PITCH = float(np.deg2rad(24.0)), float(np.deg2rad(10.0))
-"""Pitch at lift-off on the level, heel up, and at landing, toes up [rad]."""
+"""Pitch at lift-off on the level, heel up, and at landing on the heel, toes up [rad]."""
+
+BALL_PITCH = float(np.deg2rad(20.0))
+"""Pitch at landing on the ball of the foot, heel up [rad]."""
 
 HIGHEST_PITCH, HIGH_STEP = float(np.deg2rad(48.0)), 0.22
 """Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature: with the
@@ -46,6 +50,7 @@ class FootRoll:
         hinge: (3,) hinge of the toes in the sole's frame [m].
         heel: (3,) middle of the heel's edge in the sole's frame [m].
         push_off: Pitch at lift-off, heel up [rad].
+        touch: Pitch at landing, on the toes when positive, on the heel when negative [rad].
     """
 
     instants: FloatArray
@@ -54,23 +59,29 @@ class FootRoll:
     hinge: FloatArray
     heel: FloatArray
     push_off: float = PUSH_OFF_PITCH
+    touch: float = -HEEL_STRIKE_PITCH
 
     @property
     def pivots(self) -> tuple[Pose, Pose]:
-        """Poses of the toes' hinge before the flight and of the heel's edge after it."""
+        """Poses of the points about which the foot tilts before the flight and after it."""
         return (
             Pose(self.start.position + self.start.rotation @ self.hinge, self.start.rotation),
-            Pose(self.end.position + self.end.rotation @ self.heel, self.end.rotation),
+            Pose(self.end.position + self.end.rotation @ self._last_pivot, self.end.rotation),
         )
+
+    @property
+    def _last_pivot(self) -> FloatArray:
+        return self.hinge if self.touch > 0.0 else self.heel
 
     def pitch(self, time: FloatArray) -> FloatArray:
         """(n,) turn of the foot about its own y axis, heel up when positive [rad]."""
         return _held(self._pitch, self.instants[[0, 3]], time)
 
     def toe_extension(self, time: FloatArray) -> FloatArray:
-        """(n,) angle of the toes that keeps them flat before lift-off, back to 0 in flight [rad]."""
+        """(n,) angle of the toes that keeps them flat where they touch, back to 0 in flight [rad]."""
         curve = self._toe_return
-        return np.where(time < curve.x[0], self.pitch(time), _held(curve, curve.x, time))
+        flat = (time < curve.x[0]) | ((time > curve.x[-1]) & (self.touch > 0.0))
+        return np.where(flat, self.pitch(time), _held(curve, curve.x[[0, -1]], time))
 
     def pose(
         self, position: FloatArray, rotation: FloatArray, time: FloatArray
@@ -96,7 +107,7 @@ class FootRoll:
         first, last = PIVOT_SHIFT
         share = np.clip(((time - off) / (land - off) - first) / (last - first), 0.0, 1.0)[:, None]
         blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-        pivot = (1.0 - blend) * self.hinge + blend * self.heel
+        pivot = (1.0 - blend) * self.hinge + blend * self._last_pivot
         return turn, np.einsum("nij,nj->ni", turn, pivot)
 
     @property
@@ -110,18 +121,25 @@ class FootRoll:
 
     @cached_property
     def _toe_return(self) -> BPoly:
-        _, off, land, _ = self.instants
+        _, off, land, flat = self.instants
         # Share of the flight after which the toes are straight again.
         back = off + 0.6 * (land - off)
-        return BPoly.from_derivatives([off, back], [self._at_lift_off, [0.0] * 3])
+        knots = {off: self._at_lift_off, back: [0.0] * 3}
+        if flat > land and self.touch > 0.0:
+            knots[land] = self._at_landing
+        return BPoly.from_derivatives(list(knots), list(knots.values()))
+
+    @property
+    def _at_landing(self) -> list[float]:
+        """Pitch at landing, and its rate: the mean until the sole lies flat."""
+        _, _, land, flat = self.instants
+        angle = self.touch if flat > land else 0.0
+        return [angle, -angle / max(flat - land, 1e-9), 0.0]
 
     @cached_property
     def _pitch(self) -> BPoly:
         up, off, land, flat = self.instants
-        angle = HEEL_STRIKE_PITCH if flat > land else 0.0
-        # The pitch rate at landing is the mean until the sole lies flat.
-        at_landing = [-angle, angle / max(flat - land, 1e-9), 0.0]
-        knots = {up: [0.0] * 3, off: self._at_lift_off, land: at_landing, flat: [0.0] * 3}
+        knots = {up: [0.0] * 3, off: self._at_lift_off, land: self._at_landing, flat: [0.0] * 3}
         return BPoly.from_derivatives(list(knots), list(knots.values()))
 
 
@@ -134,17 +152,16 @@ def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootR
     start, end = swing.start, swing.end
     if start is None or end is None or {start.part, end.part} == {SolePart.FULL}:
         return None
-    frame = body.effector(swing.effector)
-    toes = hanging_segment(body, frame.segment)
+    toes = toe_hinge(body, swing.effector)
     off, land = schedule.swing_interval(swing)
     up = schedule.instants[swing.first_phase - 1] if start.part is SolePart.TOES else off
-    flat = schedule.instants[swing.last_phase + 2] if end.part is SolePart.HEEL else land
-    hinge = np.zeros(3) if toes is None else frame.rotation.T @ (toes.origin - frame.translation)
+    flat = land if end.part is SolePart.FULL else schedule.instants[swing.last_phase + 2]
     drop = float(start.position[2] - end.position[2]) / (HIGH_STEP * (body.stature or 1.75))
     return FootRoll(
-        np.array([up, off, land, flat]), Pose.of(start), Pose.of(end), hinge,
+        np.array([up, off, land, flat]), Pose.of(start), Pose.of(end), np.zeros(3) if toes is None else toes,
         np.array([-0.5 * (body.sole_length or start.length), 0.0, 0.0]),
         PUSH_OFF_PITCH + float(np.clip(drop, 0.0, 1.0)) * (HIGHEST_PITCH - PUSH_OFF_PITCH),
+        BALL_PITCH if end.part is SolePart.TOES else -HEEL_STRIKE_PITCH,
     )  # fmt: skip
 
 
