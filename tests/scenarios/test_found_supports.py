@@ -54,21 +54,19 @@ def test_a_body_walks_on_level_ground(tmp_path):
     assert problem.regions[-1].violation(problem.goal_com) <= 0.0
 
 
-@pytest.mark.parametrize(("height", "rests"), [(0.12, False), (0.3, True)])
-def test_a_body_rests_where_it_climbs_high(tmp_path, height, rests):
-    """On a step of stairs it walks, on feet that land flat there; on a higher one it is near its posture."""
+@pytest.mark.parametrize("height", [0.12, 0.3])
+def test_a_body_climbs_without_rest_what_feet_alone_make(tmp_path, height):
+    """On a step of stairs and on a high one it passes from foot to foot, on feet that land flat there."""
     context, found = way(tmp_path, height)
     walking = without_rests(context.scenario, found.plan)
-    phases = found.scenario.file.supports.phases if walking is None else walking.file.supports.phases
-    assert any(phase.com_near is not None for phase in phases) == rests
-    if not rests:
-        sequence = walking.build_centroidal_problem().sequence
-        parts = {contact.part for phase in sequence for contact in phase.stance if contact.position[2] > 0.05}
-        assert SolePart.TOES in parts  # the foot below leaves from its toes before the other has flown
-        rising = [phase.stance for phase in sequence if np.ptp([c.position[2] for c in phase.stance]) > 0.05]
-        landed = [contact.part for stance in rising for contact in stance if contact.position[2] > 0.05]
-        assert rising
-        assert set(landed) == {SolePart.FULL}
+    assert all(phase.com_near is None for phase in walking.file.supports.phases)
+    sequence = walking.build_centroidal_problem().sequence
+    parts = {contact.part for phase in sequence for contact in phase.stance if contact.position[2] > 0.05}
+    assert SolePart.TOES in parts  # the foot below leaves from its toes before the other has flown
+    rising = [phase.stance for phase in sequence if np.ptp([c.position[2] for c in phase.stance]) > 0.05]
+    landed = [contact.part for stance in rising for contact in stance if contact.position[2] > 0.05]
+    assert rising
+    assert set(landed) == {SolePart.FULL}
 
 
 BAR = """
@@ -155,8 +153,9 @@ def test_the_margin_of_a_file_is_not_eased(tmp_path, monkeypatch, given):
     assert asked == pytest.approx([wanted, 0.5 * wanted] if given is None else [wanted])
 
 
-def test_places_of_the_centre_of_mass_stay_where_phases_of_the_file_begin(tmp_path):
+def test_places_of_the_centre_of_mass_stay_where_phases_of_the_file_begin(tmp_path, monkeypatch):
     """Feet that roll divide phases; a rest is asked for where the phase of the file begins."""
+    monkeypatch.setattr(found_supports, "MILD", 0.2)  # so that it rests on the step
     context, found = way(tmp_path, 0.3)
     walking = without_rests(context.scenario, found.plan)
     supports, problem = walking.file.supports, walking.build_centroidal_problem()

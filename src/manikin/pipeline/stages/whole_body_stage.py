@@ -292,7 +292,7 @@ def follow_centre_of_mass(
     result = plan_whole_body(
         context.body, context.scene, trajectory, rng=rng, settings=context.settings,
         padded=context.padded, waypoints=plan.postures,
-        known=_known_postures(context, plan, trajectory.schedule),
+        known=_known_postures(context, plan, trajectory.schedule.instants),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     if result.trajectory is not trajectory:
@@ -312,15 +312,14 @@ def _slowed(report: Report, plan: KeyedPlan, trajectory: CentroidalTrajectory) -
     return _reported(report, Eligibility(centroidal, trajectory, postures, plan.replans, None))
 
 
-def _known_postures(context: RunContext, plan: KeyedPlan, schedule: ContactSchedule) -> Guide | None:
-    """Postures of the contact plan at its changes in a schedule; those on the CoM of who passes them."""
+def _known_postures(context: RunContext, plan: KeyedPlan, instants: FloatArray) -> Guide | None:
+    """Postures of the contact plan at (n,) key instants [s]; those on the CoM of a body that passes them."""
     if context.plan is None:
         return None
     if context.resting is None or plan.postures is None:
-        begins = [*schedule.sequence.changes, len(schedule.sequence)]
-        times, postures = context.plan.keys(schedule.instants[begins])
+        times, postures = context.plan.keys(instants)
     else:
-        times, postures = schedule.instants, np.array([item.q for item in plan.postures.postures])
+        times, postures = instants, np.array([item.q for item in plan.postures.postures])
     return Guide(times, align_quaternions(postures), ())
 
 
