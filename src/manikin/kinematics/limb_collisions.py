@@ -78,8 +78,12 @@ class LimbCollisions:
         self.soft, self._depth = yielding(body, limb)
         self._touched: tuple[str, ...] = ()
         self._yielding: dict[str, list[int]] = {}
+        # Triangles of an open surface have no inside into which anything could sink.
+        sheets = [isinstance(part.geometry, coal.BVHModelBase) for part in parts]
+        self._thin = {number for number, (_, part) in enumerate(outer) if sheets[part - count]}
         for number, (shape, obstacle) in enumerate(self.names[: len(outer)]):
-            self._placed.collisionRequests[number].security_margin = -TOUCH
+            if number not in self._thin:
+                self._placed.collisionRequests[number].security_margin = -TOUCH
             if segment_of(shape) in self.soft:
                 self._yielding.setdefault(obstacle, []).append(number)
         # A shape of the limb is within a ball around the limb's origin whatever the joints do.
@@ -118,6 +122,7 @@ class LimbCollisions:
         if np.array_equal(q, self._begun):
             return
         self._begun = np.array(q)
+        self._touch(())
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._placed, np.asarray(q))
         near = self._near(origin)
         for number in np.flatnonzero(near & ~self.active).tolist():
@@ -140,14 +145,26 @@ class LimbCollisions:
             q: (nq,) configuration; all but the limb as where it was begun, if it was.
             touched: Names of the obstacles on which the limb has its contact.
         """
-        if touched != self._touched:
-            for obstacles, depth in ((self._touched, TOUCH), (touched, max(self._depth, TOUCH))):
-                for number in (pair for name in obstacles for pair in self._yielding.get(name, ())):
-                    self._placed.collisionRequests[number].security_margin = -depth
-            self._touched = touched
+        self._touch(touched)
         if not pin.computeCollisions(self._model, self._data, self._shapes, self._placed, q, True):
             return None
         return next(names for names, result in self._tested if result.isCollision())
+
+    def _touch(self, touched: tuple[str, ...]) -> None:
+        """Let what yields sink into obstacles, and none into those before; on thin ones it is not tested."""
+        if touched == self._touched:
+            return
+        for obstacles, depth, tested in (
+            (self._touched, TOUCH, True), (touched, max(self._depth, TOUCH), False)
+        ):  # fmt: skip
+            for number in (pair for name in obstacles for pair in self._yielding.get(name, ())):
+                if number not in self._thin:
+                    self._placed.collisionRequests[number].security_margin = -depth
+                elif tested and self.active[number]:
+                    self._placed.activateCollisionPair(number)
+                elif not tested:
+                    self._placed.deactivateCollisionPair(number)
+        self._touched = touched
 
     def _near(self, origin: FloatArray) -> NDArray[np.bool_]:
         """(p,) whether a pair may touch when the origin of the limb's frame is at (3,) and the rest stays."""

@@ -116,6 +116,20 @@ def test_whatever_is_found_is_true(person, at_wall, x, y, yaw, number):
         check(person, wall_scene(), answer, q, limb)
 
 
+def test_an_open_mesh_is_touched_and_not_gone_through(person, person_samples):
+    """A wall of two triangles has no inside: hands find the same kind of contact as on a box, none behind."""
+    corners = np.array([[0.5, -1.5, 0.0], [0.5, 1.5, 0.0], [0.5, 1.5, 3.0], [0.5, -1.5, 3.0]])
+    sheet = Obstacle("wall", Mesh(corners, np.array([[0, 2, 1], [0, 3, 2]])))
+    generator = ContactGenerator(person, Scene([sheet], floor_height=None), person_samples)
+    answer = generator.request(person.standing_posture(), "right_arm", PUSH)
+    assert answer.found, answer.message
+    assert answer.contact.position[0] == pytest.approx(0.5, abs=1e-3)
+    assert answer.contact.normal @ [-1.0, 0.0, 0.0] == pytest.approx(1.0, abs=1e-6)
+    state = Configuration(person, answer.q)
+    for segment in ("right_upper_arm", "right_forearm"):
+        assert state.point(segment, [0.0, 0.0, 0.0])[0] < 0.5
+
+
 def test_hands_that_push_go_to_the_wall_and_not_to_the_table(person, person_samples):
     """EFORT against the closest surface: a table under the hands, a wall before them."""
     table = Obstacle("table", Box((0.4, 3.0, 0.05)), translation=(0.3, 0.0, 0.85))
