@@ -146,6 +146,24 @@ def test_a_part_that_fails_begins_in_the_known_posture_instead(standing, monkeyp
     np.testing.assert_allclose(meeting.v, 0.0, atol=1e-6)
 
 
+def test_a_guide_through_another_posture_has_it_at_that_time_and_rests_there_still(standing):
+    """What leads a part begins where the body is: the way from there does not jump to what was planned."""
+    bent = standing.copy()
+    bent[7:] += 0.3
+    known = Guide(INSTANTS, np.array([standing, standing, bent]), ()).resting(INSTANTS[:2])
+    away = standing.copy()
+    away[7:] -= 0.1
+    guide = known.through(INSTANTS[1], away)
+    np.testing.assert_allclose(guide.at(INSTANTS), [standing, away, bent], atol=1e-12)
+    near = guide.at(INSTANTS[1] + np.array([0.0, 1e-4]))
+    assert np.abs(np.diff(near, axis=0)).max() < 1e-4 * 0.1  # no faster than 0.1 rad/s just after the rest
+    planner = _Planner(
+        BODY, Scene([]), still(standing), np.random.default_rng(0), WholeBodySettings(), known=known
+    )
+    np.testing.assert_allclose(planner.part(1, 2, (away, None)).known.at(INSTANTS), guide.at(INSTANTS))
+    np.testing.assert_allclose(planner.part(0, 1, (None, away)).known.at(INSTANTS), known.at(INSTANTS))
+
+
 def test_a_retimed_guide_has_its_postures_later_and_rests_where_it_did(standing):
     bent = standing.copy()
     bent[7:] += 0.3

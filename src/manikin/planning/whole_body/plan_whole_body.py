@@ -283,10 +283,15 @@ class _Planner:
         self.guide = cache(self._guide)
 
     def part(self, first: int, last: int, ends: Ends) -> "_Planner":
-        """The same job from one key instant to another, at rest at both, in given postures (nq,) or any."""
+        """The same job from one key instant to another, at rest at both, in given postures (nq,) or any.
+
+        Its known postures lead on from that in which it begins, not from that which was planned there.
+        """
         part = copy(self)
         part.ends, part.settles = ends, last < len(self.instants) - 1
         part.instants = self.instants[first : last + 1]
+        if self.known is not None and ends[0] is not None:
+            part.known = self.known.through(part.instants[0], ends[0])
         part.job, part.guide = replace(self.job, span=(first, last)), cache(part._guide)
         return part
 

@@ -66,8 +66,17 @@ class Guide:
 
     def retimed(self, before: FloatArray, after: FloatArray) -> "Guide":
         """The same at other times: ``before`` (k,) becomes ``after`` (k,), linear in between [s]."""
-        slowed = replace(self, time=np.interp(self.time, before, after))
-        return slowed if self.rates is None else slowed.resting(slowed.time[~self.rates.any(axis=1)])
+        return replace(self, time=np.interp(self.time, before, after))._smooth_again()
+
+    def through(self, instant: float, posture: FloatArray) -> "Guide":
+        """The same with another posture (nq,) at one of its times [s]."""
+        rows = np.isclose(self.time, instant)[:, None]
+        postures = align_quaternions(np.where(rows, posture, self.configurations))
+        return replace(self, configurations=postures)._smooth_again()
+
+    def _smooth_again(self) -> "Guide":
+        """The same with rates of its own times and postures, at rest where it was."""
+        return self if self.rates is None else self.resting(self.time[~self.rates.any(axis=1)])
 
     @classmethod
     def joined(cls, parts: "Sequence[Guide]") -> "Guide":
