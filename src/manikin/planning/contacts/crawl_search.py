@@ -40,9 +40,9 @@ STEEPEST = math.radians(30.0)  # largest slope of a surface for hands and knees
 INSET = 0.03  # distance of hands and knees to the edges of what they are on [m]
 LIFT, STEP = 0.05, 0.1  # heights of a limb in flight, and of a foot between its knee's place and its own [m]
 # On all fours; our choice.
-PACES = Paces(swing_duration=0.5, swing_speed=1.2, shift_duration=0.2, hinge_pace=2.5, com_pace=0.5)
+PACES = Paces(swing_duration=0.4, swing_speed=1.5, shift_duration=0.15, hinge_pace=3.0, com_pace=0.5)
 ON_FOURS_ROOM = (0.02, 0.02, 0.01)  # way of the centre of mass off a posture on all fours [m]; our choice
-TURNING = 1.4  # time in which a leg goes from its knee onto its foot or back [s]
+TURNING = 1.0  # time in which a leg goes from its knee onto its foot or back [s]
 
 
 class _Way(NamedTuple):
