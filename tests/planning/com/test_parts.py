@@ -5,11 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from manikin.balance import motion_margin
 from manikin.contact import Phase, Stance, StanceSequence, point
 from manikin.errors import SplineError
 from manikin.planning.com import CentroidalProblem, plan_com, timing_free
 from manikin.planning.com.feasibility import Failure
-from manikin.planning.com.timing_free import LEVEL, LONG, PART, _parted
+from manikin.planning.com.timing_free import (
+    CALM_ON_POINTS,
+    LEVEL,
+    LONG,
+    PART,
+    _part,
+    _parted,
+    _rest_margin,
+)
 
 LIMBS = {
     "left_wrist": (0.5, 0.15),
@@ -81,6 +90,23 @@ def test_the_parts_meet_at_rest_where_a_posture_is_known(planned, problem):
     for key in keys:
         position = planned.trajectory.position(planned.key_instants[key])
         np.testing.assert_allclose(position, problem.rests[key], atol=1e-7)
+
+
+def test_a_crawl_keeps_most_of_the_margin_of_its_rests(planned, problem):
+    """In the middle part, whose ends are rests: a limb that carries little keeps its load."""
+    first, last = PART, 2 * PART
+    margins = [_rest_margin(problem, planned.polytopes, key) for key in range(first, last + 1)]
+    least = CALM_ON_POINTS * min(margins)
+    assert _part(problem, planned.polytopes, first, last).required_margin == pytest.approx(least)
+    assert least > problem.required_margin
+    measured = planned.trajectory  # along the part, on the contacts of its phases
+    times = np.linspace(*planned.key_instants[[first, last]], 200)[1:-1]
+    stances = [phase.stance for phase in problem.sequence]
+    found = motion_margin(
+        stances, measured.schedule.phase_at(times), measured.pseudo_wrench(times),
+        measured.position(times), polytopes=planned.polytopes,
+    )  # fmt: skip
+    assert found.margin.min() > least - 0.1  # the tolerance of the certificate is less [N.m]
 
 
 def test_a_part_can_be_slower_while_the_others_keep_their_pace(planned, problem):

@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 
 from manikin.balance import LimitingConstraint, WrenchPolytope
-from manikin.contact import ContactKind, ContactSchedule, StanceSequence
+from manikin.contact import ContactKind, ContactSchedule, Phase, StanceSequence
 from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, clamped_knots, end_control_points, start_control_points
 from manikin.planning.com.com_certificate import Residuals, measure
@@ -303,8 +303,9 @@ LEVEL = 0.04
 """Difference of the heights of rests up to which a body goes on from one to the other without coming to rest;
 where they differ more it folds and stretches its limbs [m]."""
 
-CALM = 0.6
-"""Share of the margins of the rests of a part that its motion keeps."""
+CALM, CALM_ON_POINTS = 0.6, 0.85
+"""Share of the margins of the rests of a part that its motion keeps, and the same of one on points alone:
+there a limb that carries little, as a hand when the other side's knee leaves, soon carries nothing."""
 
 
 def _resting_keys(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]) -> list[int]:
@@ -320,7 +321,7 @@ def _parted(problem: CentroidalProblem, keys: Sequence[int]) -> list[int]:
     """The fewest of the resting keys between which a body on points alone stays level, not far apart."""
     rests = [problem.start_com, *problem.rests[1:], problem.goal_com]
     heights = {key: float(rests[key][2]) for key in keys}
-    pointed = [all(one.kind is ContactKind.POINT for one in phase.stance) for phase in problem.sequence]
+    pointed = [_is_on_points(phase) for phase in problem.sequence]
     chosen = [keys[0]]
     for key, following in itertools.pairwise(keys[1:]):
         first = chosen[-1]
@@ -328,6 +329,11 @@ def _parted(problem: CentroidalProblem, keys: Sequence[int]) -> list[int]:
         if steep or following - first > PART or not all(pointed[first:following]):
             chosen.append(key)
     return [*chosen, keys[-1]]
+
+
+def _is_on_points(phase: Phase) -> bool:
+    """Whether every contact of a phase is a point, as on hands and knees."""
+    return all(one.kind is ContactKind.POINT for one in phase.stance)
 
 
 def _rest_margin(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], key: int) -> float:
@@ -385,7 +391,8 @@ def _part(
     """
     count, still = len(problem.sequence), np.zeros(3)
     margins = [_rest_margin(problem, polytopes, key) for key in range(max(first, 1), min(last + 1, count))]
-    calm = CALM * min((margin for margin in margins if margin > 0.0), default=0.0)
+    share = CALM_ON_POINTS if all(map(_is_on_points, problem.sequence.phases[first:last])) else CALM
+    calm = share * min((margin for margin in margins if margin > 0.0), default=0.0)
     planes = [replace(one, key=one.key - first) for one in problem.key_planes if first < one.key < last]
     ends: dict[str, Any] = {}
     for key, end in ((first, "start"), (last, "goal")):
