@@ -9,7 +9,7 @@ import pytest
 
 from manikin.contact import SolePart
 from manikin.pipeline.stages import Report, RunContext, whole_body_stage
-from manikin.pipeline.stages.contact_stage import find_supports, with_rests
+from manikin.pipeline.stages.contact_stage import find_supports, plan_contacts, slower
 from manikin.planning.com import Failure, plan_com
 from manikin.scenarios import found_supports, load_scenario
 from manikin.scenarios.found_supports import without_rests
@@ -94,6 +94,24 @@ def test_a_body_that_bends_below_a_bar_walks(tmp_path):
     assert result.iterations < 150
 
 
+def test_a_walk_that_fails_has_longer_flights_before_it_rests(tmp_path):
+    """Flights last 1.4 times as long then, supports on both feet as long; after that the body rests."""
+    context, _ = way(tmp_path, 0.12)
+    report = Report(context, None, None, time.perf_counter())
+    quick = plan_contacts(context, report)
+    report.fail("wholebody", "left_foot misses its position", 1.0, "phase 2")
+    slow = slower(quick, report)
+    for fast, long in zip(
+        quick.scenario.file.supports.phases, slow.scenario.file.supports.phases, strict=True
+    ):
+        factor = found_supports.SLOWER if len(fast.entries()) == 1 else 1.0
+        assert long.min_duration_s == pytest.approx(factor * fast.min_duration_s)
+    report.fail("wholebody", "left_foot misses its position", 1.0, "phase 2")
+    resting = slower(slow, report)
+    assert any(phase.com_near is not None for phase in resting.scenario.file.supports.phases)
+    assert resting.resting is None
+
+
 def test_the_body_rests_after_a_failure(tmp_path):
     context, found = way(tmp_path, 0.0)
     resting = context.with_supports(found.scenario)
@@ -103,9 +121,9 @@ def test_the_body_rests_after_a_failure(tmp_path):
     # Of supports with and without rests the centre of mass is mostly planned on one: none is posed before.
     assert not {"problem"} & (vars(walking).keys() | vars(resting).keys())
     assert walking.problem.regions != resting.problem.regions
-    assert with_rests(walking, report) is None  # nothing has failed
+    assert slower(walking, report) is None  # nothing has failed
     report.fail("wholebody", "left_foot misses its position", 1.0, "phase 2")
-    assert with_rests(walking, report) is resting
+    assert slower(walking, report) is resting
     assert report.failure is None
     assert [item["stage"] for item in report.refused] == ["wholebody"]
 

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from manikin.contact import ContactSchedule
 from manikin.errors import ScenarioError
 from manikin.pipeline.stages import ExecutionRequirements, Progress, Report, RunContext, RunResult
-from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_again, with_rests
+from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_again, slower
 from manikin.pipeline.stages.context import StageFailure
 from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, execute_motion
 from manikin.pipeline.stages.recovery_stage import recover_from_push
@@ -96,8 +96,8 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         centroidal = plan_centre_of_mass(with_contacts, report)
         return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
     result, schedule = _planned(with_contacts, report, requirements)
-    if (resting := with_rests(with_contacts, report)) is not None:
-        with_contacts = resting
+    while (other := slower(with_contacts, report)) is not None:
+        with_contacts = other
         result, schedule = _planned(with_contacts, report, requirements)
     if (rolling := with_rolling_feet(with_contacts, report)) is not None:
         again = _planned(rolling, report, requirements)

@@ -74,6 +74,8 @@ SLOPED = 0.1
 """Way of the centre of mass from which on a plane above it is inclined [m]; our choice."""
 LEVEL = 0.94
 """Least upward part of the normal of a sole on which a body steps without rest; our choice."""
+SLOWER = 1.4
+"""Factor on the least durations of flights of a walk that failed without it; our choice."""
 MILD = 0.48
 """Largest difference in height of such soles, of a body of 1.75 m [m]: what feet alone make."""
 WALKING_MARGIN = 6.0
@@ -95,18 +97,21 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     return _supported(scenario, plan, [False] * (len(plan.stages) + 1))
 
 
-def without_rests(scenario: Scenario, plan: ContactPlan) -> Scenario | None:
+def without_rests(scenario: Scenario, plan: ContactPlan, flight: float = 1.0) -> Scenario | None:
     """The same for a body that passes from foot to foot without a rest where the ground is mild.
 
     There the centre of mass may be wherever the body reaches, and phases last as long as balance asks for.
     None where the body rests at every change, where anything but feet carries, and before an act.
+
+    Args:
+        flight: Factor on the least durations of flights.
     """
     carriers = {name for stage in plan.stages for name in stage.contacts}
     if scenario.file.task.act is not None or not carriers <= set(FEET):
         return None
     inner = range(1, len(plan.stages))
     passed = [_is_mild(plan.stages[key - 1 : key + 2], scenario) for key in inner]
-    return _supported(scenario, plan, [True, *passed, True]) if any(passed) else None
+    return _supported(scenario, plan, [True, *passed, True], flight) if any(passed) else None
 
 
 def _is_mild(stages: Sequence[Stage], scenario: Scenario) -> bool:
@@ -162,7 +167,9 @@ def _walking_time(plan: ContactPlan, number: int, ground: Footholds, *, rolls: b
     return max(SWING, way / SWING_SPEED) + climbed / CLIMBING_SPEED
 
 
-def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) -> Scenario:
+def _supported(
+    scenario: Scenario, plan: ContactPlan, passed: Sequence[bool], flight: float = 1.0
+) -> Scenario:
     """The scenario with supports; at each key instant, of start and goal too, the body rests or passes."""
     friction = scenario.contacts.friction
     # Rising legs are soon at full length: there is less room above such postures than below them.
@@ -180,6 +187,8 @@ def _supported(scenario: Scenario, plan: ContactPlan, passed: Sequence[bool]) ->
         phase["min_duration_s"] = stage.min_duration
         if ground is not None and passed[number] and passed[number + 1]:
             phase["min_duration_s"] = least = _walking_time(plan, number, ground, rolls=rolls)
+            if len(stage.contacts) == 1:
+                phase["min_duration_s"] = least = flight * least
             phase["max_duration_s"] = max(LONGEST, 1.5 * least)
         if rises and "buttocks" in stage.contacts:
             phase["max_duration_s"] = SEATED_LONGER * stage.min_duration

@@ -25,7 +25,7 @@ from manikin.planning.contacts import ContactPlan, Endpoint, Endpoints, Extensio
 from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
 from manikin.planning.whole_body.posture_style import LADDER, posture_style_of
 from manikin.scenarios import Scenario
-from manikin.scenarios.found_supports import with_supports, without_rests
+from manikin.scenarios.found_supports import SLOWER, with_supports, without_rests
 from manikin.scenarios.sections.task_sections import StateSection
 from manikin.scenarios.world import CLIMBING, carried_to, contact_rules
 from manikin.scene import Scene
@@ -348,15 +348,16 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     planned = _with_contacts(context, report, result)
     if planned is None or result.plan is None or scenario.contact_limbs is not None or scenario.refines:
         return planned
-    walking = without_rests(scenario, result.plan)
-    if walking is None:
-        return planned
-    report.keep_scenario(walking)
-    return replace(planned.with_supports(walking), resting=planned)
+    for flight in (SLOWER, 1.0):
+        walking = without_rests(scenario, result.plan, flight)
+        if walking is not None:
+            report.keep_scenario(walking)
+            planned = replace(planned.with_supports(walking), resting=planned)
+    return planned
 
 
-def with_rests(context: RunContext, report: Report) -> RunContext | None:
-    """The task with rests at all changes of contact, after a later stage failed without; None otherwise."""
+def slower(context: RunContext, report: Report) -> RunContext | None:
+    """The walk with longer flights, or with rests, after a later stage failed without; None otherwise."""
     if report.failure is None or context.resting is None:
         return None
     report.try_again()

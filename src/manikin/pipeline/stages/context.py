@@ -131,7 +131,8 @@ class RunContext:
         settings: Options of the whole-body stage.
         plan: The contacts that were found from start and goal, or None.
         search_again: Searches on for other contacts without the change of a phase, which failed for a reason.
-        resting: The task with rests at all changes of contact, where this one passes some without; or None.
+        resting: The task with longer flights, or with rests at all changes of contact, where this one passes
+            some without; or None.
     """
 
     given: Scenario

@@ -213,9 +213,10 @@ def _with_less_margin(context: RunContext, report: Report, failed: CentroidalRes
 
     It keeps what it has to keep at rest, so that no margin of a file is eased; the scenario says so.
     """
-    assert context.resting is not None
-    asked, rests = context.scenario, context.resting.scenario
-    share = max(EASED_MARGIN, rests.required_margin / max(asked.required_margin, 1e-9))
+    asked, resting = context.scenario, context
+    while resting.resting is not None:
+        resting = resting.resting
+    share = max(EASED_MARGIN, resting.scenario.required_margin / max(asked.required_margin, 1e-9))
     if share >= 1.0 or (failed.d_min or 0.0) <= share * asked.required_margin:
         return failed
     eased = asked.with_overrides([f"planning.min_margin={share * asked.file.planning.min_margin!r}"])
