@@ -207,12 +207,13 @@ def aside():
     """A walking path of 1.2 m to the left that keeps its heading, in 6 s from rest to rest."""
     from dataclasses import replace
 
+    from manikin.numerics.signals import least_jerk
     from manikin.numerics.spline import BSpline
     from manikin.walking import walking_path
 
     path = walking_path((0, 0, 0), (0, 1.2, 0), max_speed=0.6)
     share = np.linspace(0.0, 1.0, 200)
-    way = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    way = least_jerk(share)[0]
     places = np.column_stack([0.0 * share, 1.2 * way, 0.0 * share])
     spline = BSpline.fit(path.spline.degree, path.spline.knots, share, places)
     return replace(path, spline=spline, duration=6.0)

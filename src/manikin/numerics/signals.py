@@ -1,8 +1,9 @@
-"""Sampled signals: low-pass filter, Fourier series of periodic ones, runs of frames, spread of measures."""
+"""Signals: low-pass filter, Fourier series of periodic ones, least jerk, runs of frames, spread."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 
+Share = TypeVar("Share", float, FloatArray)
 HARMONICS = 8
 """Harmonics of a walking cycle; the rest of recorded cycles is 0.4 deg RMS in the median, 1.0 at most."""
 
@@ -37,6 +39,19 @@ def shifted(coefficients: FloatArray, phase: float) -> FloatArray:
     mean, cosine, sine = np.split(coefficients, [1, harmonics + 1], axis=-2)
     c, s = np.cos(angle), np.sin(angle)
     return np.concatenate([mean, cosine * c + sine * s, sine * c - cosine * s], axis=-2)
+
+
+def least_jerk(s: Share) -> tuple[Share, Share, Share]:
+    """Share of a way from rest to rest that is done at a share of its time, and the first two derivatives.
+
+    With the least jerk: ``10 s^3 - 15 s^4 + 6 s^5`` (Flash and Hogan 1985, J Neurosci 5:1688); of one share
+    in [0, 1], or of each of several.
+    """
+    return (
+        s**3 * (10.0 - 15.0 * s + 6.0 * s**2),
+        30.0 * s**2 * (1.0 - s) ** 2,
+        60.0 * s * (1.0 - 3.0 * s + 2.0 * s**2),
+    )
 
 
 def mask_runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -18,6 +18,7 @@ from manikin.control.reference import EffectorReference
 from manikin.control.stepping.step_placement import StepGoal, StepSettings, capture_after, step_goals
 from manikin.errors import ContactError
 from manikin.kinematics import Placement, PostureProblem, com_target, generate_posture, touching_pairs
+from manikin.numerics.signals import least_jerk
 from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.scene import Proximity, Scene
 
@@ -70,8 +71,7 @@ class SwingFoot:
         bump, slope = 16.0 * x**2 * (1.0 - x) ** 2, 32.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
         bend = 32.0 * (1.0 - 6.0 * x + 6.0 * x**2)
         rise = self.goal[2] - self._ground
-        ramp = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-        ramp_slope, ramp_bend = 30.0 * x**2 * (1.0 - x) ** 2, 60.0 * x * (1.0 - 3.0 * x + 2.0 * x**2)
+        ramp, ramp_slope, ramp_bend = least_jerk(x)
         return (
             self._ground + self.clearance * bump + rise * ramp,
             (self.clearance * slope + rise * ramp_slope) / self.duration,

@@ -21,6 +21,7 @@ from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
 from manikin.body.limbs import of_both_sides
 from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
+from manikin.numerics.signals import least_jerk
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage, onto_normal
 from manikin.planning.contacts.footholds import FEET, Footholds
@@ -325,12 +326,8 @@ def _leaning_time(share: float, moving: bool) -> float:
     shares = np.linspace(0.0, 1.0, 101)
     # Half of a way twice as long ends with its largest speed.
     half = 0.5 if moving else 1.0
-    way = _least_jerk(half * shares) / _least_jerk(np.array(half))
+    way = least_jerk(half * shares)[0] / least_jerk(half)[0]
     return float(LEANING_TIMES[moving] * np.interp(share, way, shares))
-
-
-def _least_jerk(share: FloatArray) -> FloatArray:
-    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
 HAND_AHEAD, HAND_ASIDE, HAND_ABOVE = 0.08, 0.15, 0.13

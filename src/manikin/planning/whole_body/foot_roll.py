@@ -18,6 +18,7 @@ from scipy.interpolate import BPoly
 from manikin.body import BodyModel
 from manikin.body.limbs import toe_hinge
 from manikin.contact import ContactSchedule, SolePart, Swing
+from manikin.numerics.signals import least_jerk
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.swing_path import Pose
 
@@ -106,7 +107,7 @@ class FootRoll:
         _, off, land, _ = self.instants
         first, last = PIVOT_SHIFT
         share = np.clip(((time - off) / (land - off) - first) / (last - first), 0.0, 1.0)[:, None]
-        blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        blend = least_jerk(share)[0]
         pivot = (1.0 - blend) * self.hinge + blend * self._last_pivot
         return turn, np.einsum("nij,nj->ni", turn, pivot)
 
