@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.body.limbs import hinge_line
 from manikin.body.strength import hand_masses
 from manikin.contact import (
     CarriedLoad,
@@ -99,12 +100,8 @@ def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
     """Rules of the file's ``contacts`` for its body; one without soles has no front of them."""
     options, patch, end = values.contacts, None, None
     if body.sole_length and body.sole_width and body.stature is not None:
-        foot = body.effector("left_foot")
-        toes = [item for item in body.segments if item.parent == foot.segment and item.hinges]
-        hinge = 0.5 * body.sole_length  # the tip, without a hinge of the toes
-        if toes:
-            hinge = float((foot.rotation.T @ (toes[0].origin - foot.translation))[0])
-        end = hinge - HINGE_ROOM
+        hinge = hinge_line(body, "left_foot")
+        end = (0.5 * body.sole_length if hinge is None else hinge) - HINGE_ROOM  # without toes, of the tip
         if options.forefoot_m is not None:
             patch = (end - options.forefoot_m, end, PATCH_WIDTH * body.sole_width)
     return ContactRules(friction_of(values), options.grasp_force_N, 0.0, patch, end)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import hanging_segment
+from manikin.body.limbs import hanging_segment, toe_hinge
 from manikin.contact import Contact
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_normal
@@ -134,10 +134,9 @@ class EffectorClearance:
     ) -> None:  # fmt: skip
         self._own, frame = end_shapes(body, effector), body.effector(effector)
         self._first_bent = len(body.segment(frame.segment).shapes)
-        hanging, to_frame = hanging_segment(body, frame.segment), frame.rotation.T
-        self._hinge = None if hanging is None else (
-            to_frame @ (hanging.origin - frame.translation), to_frame @ hanging.hinges[0].axis
-        )  # fmt: skip
+        hanging, place = hanging_segment(body, frame.segment), toe_hinge(body, effector)
+        axis = None if hanging is None else frame.rotation.T @ hanging.hinges[0].axis
+        self._hinge = None if place is None or axis is None else (place, axis)
         self._fixed = [
             (part.geometry, coal.Transform3s(part.rotation, part.translation))
             for obstacle in scene.obstacles
