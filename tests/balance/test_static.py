@@ -5,23 +5,57 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
-from manikin.balance import StaticRegion, static_room, static_torque_share
+from manikin.balance import StaticRegion, static_torque_share
+from manikin.balance.contact_forces import ContactGenerators
 from manikin.balance.criteria import RestingTorques
 from manikin.body import Configuration, human, insect
-from manikin.contact import FRICTION_MODELS, ContactModel, Stance, grasp, point, sole
+from manikin.contact import (
+    FRICTION_MODELS,
+    ContactModel,
+    Stance,
+    default_normal_force_cap,
+    grasp,
+    point,
+    sole,
+)
 from manikin.numerics.polytope import signed_distance
+from manikin.numerics.spatial import GRAVITY
 
 CORNERS = [(0.2, 0.2, 0.0), (-0.2, 0.2, 0.0), (-0.2, -0.2, 0.0), (0.2, -0.2, 0.0)]
 
 
-def test_on_level_points_the_room_is_the_distance_to_their_polygon():
+def static_room(stance, mass, com, directions=8):
+    """Distance that the centre of mass may move in any horizontal direction while held at rest [m].
+
+    One linear program over the contact forces for each direction; minus infinity where they cannot hold it.
+    """
+    generators, cap = ContactGenerators.of(stance), default_normal_force_cap(mass)
+    bounds = [*((0.0, limit) for limit in generators.upper), (0.0, 1e3)]
+    weight, room = mass * np.array([0.0, 0.0, GRAVITY]), np.inf
+    wanted = np.concatenate([weight, np.cross(com, weight)])
+    for angle in 2.0 * np.pi * np.arange(directions) / directions:
+        step = np.array([np.cos(angle), np.sin(angle), 0.0])
+        column = np.concatenate([np.zeros(3), -np.cross(step, weight)])
+        solution = linprog(
+            np.append(np.zeros(len(bounds) - 1), -1.0),
+            A_ub=np.append(generators.normal, 0.0)[None], b_ub=[stance.normal_force_cap or cap],
+            A_eq=np.column_stack([generators.about(np.zeros(3)), column]), b_eq=wanted, bounds=bounds,
+        )  # fmt: skip
+        if not solution.success:
+            return -np.inf
+        room = min(room, float(solution.x[-1]))
+    return room
+
+
+def test_on_level_points_the_region_is_their_polygon():
     """A square of 0.4 m: 0.2 m from its middle to each side, 0.15 m from 5 cm beside it."""
     feet = Stance([point(f"p{k}", place, friction=0.7) for k, place in enumerate(CORNERS)])
-    assert static_room(feet, 75.0, np.array([0.0, 0.0, 1.0])) == pytest.approx(0.2)
-    assert static_room(feet, 75.0, np.array([0.05, 0.0, 1.0])) == pytest.approx(0.15)
-    assert static_room(feet, 75.0, np.array([0.25, 0.0, 1.0])) == -np.inf
-    assert static_room(Stance([]), 75.0, np.zeros(3)) == -np.inf
+    region = StaticRegion.of(feet, 75.0)
+    for x, room in ((0.0, 0.2), (0.05, 0.15), (0.25, -0.05)):
+        assert float(signed_distance(np.array([x, 0.0]), region.polygon)) == pytest.approx(room)
+    assert StaticRegion.of(Stance([]), 75.0).is_empty
 
 
 @given(

@@ -6,7 +6,6 @@ from manikin.balance.criteria import (
     admissible_zmp_polygon,
     centroidal_moment_pivot,
     foot_rotation_indicator,
-    static_room,
     static_torque_share,
     support_height,
     support_polygon,
@@ -35,7 +34,7 @@ __all__ = [
     "BalanceReport", "LimitKind", "LimitingConstraint", "MotionMargin", "StaticRegion", "WrenchPolytope",
     "admissible_com_polygon", "admissible_zmp_polygon", "centroidal_moment_pivot", "contact_limits",
     "evaluate_balance", "foot_rotation_indicator", "force_space", "least_zmp_distance", "moment_space",
-    "motion_margin", "pseudo_wrench", "stability_margins", "static_room", "static_torque_share",
+    "motion_margin", "pseudo_wrench", "stability_margins", "static_torque_share",
     "support_height", "support_plane", "support_polygon", "wrench_polytope", "wrench_polytopes",
     "zero_moment_point",
 ]  # fmt: skip

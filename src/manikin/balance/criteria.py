@@ -174,42 +174,6 @@ def _onto(polygon: FloatArray, point: FloatArray) -> FloatArray:
     return points[int(np.argmin(np.linalg.norm(points - point, axis=1)))]
 
 
-def static_room(
-    stance: Stance, mass: float, com: FloatArray, directions: int = 8, acceleration: FloatArray | None = None
-) -> float:
-    """Distance that the centre of mass may move in any horizontal direction while held at rest [m].
-
-    One linear program for each direction; the room is exact in these directions, and minus infinity where the
-    contacts cannot hold the body as it is.
-
-    Args:
-        stance: The contacts that carry the body; a sum of normal forces without a cap has the default one.
-        mass: Of the body [kg].
-        com: (3,) centre of mass [m].
-        acceleration: (3,) of the centre of mass, held in that motion then [m/s^2]; none when omitted.
-    """
-    if not len(stance):
-        return -np.inf
-    generators, cap = ContactGenerators.of(stance), _cap(stance, mass)
-    bounds = [(0.0, limit) for limit in generators.upper]
-    about_origin = generators.about(np.zeros(3))
-    force = mass * (np.array([0.0, 0.0, GRAVITY]) + (0.0 if acceleration is None else acceleration))
-    wanted, room = np.concatenate([force, np.cross(com, force)]), np.inf
-    for angle in 2.0 * np.pi * np.arange(directions) / directions:
-        step = np.array([np.cos(angle), np.sin(angle), 0.0])
-        column = np.concatenate([np.zeros(3), -np.cross(step, force)])
-        solution = linprog(
-            np.append(np.zeros(len(bounds)), -1.0),
-            A_ub=np.append(generators.normal, 0.0)[None], b_ub=[cap],
-            A_eq=np.column_stack([about_origin, column]), b_eq=wanted,
-            bounds=[*bounds, (0.0, 1e3)], method="highs",
-        )  # fmt: skip
-        if not solution.success:
-            return -np.inf
-        room = min(room, float(solution.x[-1]))
-    return room
-
-
 def static_torque_share(
     body: BodyModel, q: FloatArray, stance: Stance, acceleration: FloatArray | None = None
 ) -> float:
@@ -217,7 +181,7 @@ def static_torque_share(
 
     Args:
         q: (nq,) posture that holds the contacts.
-        stance: The contacts that carry it, with a cap as in :func:`static_room`.
+        stance: The contacts that carry it; a sum of normal forces without a cap has the default one.
         acceleration: (3,) of the whole body, which moves as one [m/s^2]; none when omitted.
     """
     return RestingTorques(body, q, stance, acceleration).share

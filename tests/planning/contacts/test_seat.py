@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manikin.balance import static_room, static_torque_share
+from manikin.balance import StaticRegion, static_torque_share
 from manikin.body import Configuration, human
+from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import IDENTITY
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.pipeline.stages.context import plan_in_world
@@ -51,7 +52,8 @@ def test_the_pelvis_rolls_so_that_the_spine_need_not_bend():
     """The weight is 4.5 cm inside the feet with less than half of the bend that lumbar and thorax have."""
     found = planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
     body, off = human(1.75, 75.0, "male"), next(s for s in found.plan.stages if "buttocks" not in s.contacts)
-    assert static_room(off.stance, body.mass, off.com) > 0.044
+    region = StaticRegion.of(off.stance, body.mass)
+    assert signed_distance(off.com[:2], region.polygon) > 0.044
     bend = {name: angle for name, angle in zip(body.joint_names, off.q[7:], strict=True) if "flexion" in name}
     assert bend["lumbar_flexion"] < 0.5
     assert bend["thorax_flexion"] < 0.35
@@ -91,8 +93,8 @@ def test_a_seat_that_cannot_be_left_at_rest_is_left_in_motion():
     assert off.com[0] < heel
     assert 0.1 <= off.momentum.velocity[0] <= 0.6
     on_feet = off.stance
-    assert static_room(on_feet, body.mass, off.com) == -np.inf
-    assert static_room(on_feet, body.mass, off.com, acceleration=off.momentum.acceleration) > 0.0
+    assert static_torque_share(body, off.q, on_feet) == np.inf
+    assert static_torque_share(body, off.q, on_feet, off.momentum.acceleration) < 1.0
     assert off.com == pytest.approx(Configuration(body, off.q).com)
 
 
