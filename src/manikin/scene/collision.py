@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import coal
 import numpy as np
@@ -38,6 +39,21 @@ class CollisionPart:
     low: FloatArray
     high: FloatArray
     surface: "ClosedSurface | None" = None
+
+    @property
+    def world_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper corner (3,) of a box around the part with the world's axes [m]."""
+        if not np.isfinite([self.low, self.high]).all():
+            return np.full(3, -np.inf), np.full(3, np.inf)
+        centre = self.translation + 0.5 * self.rotation @ (self.low + self.high)
+        half = 0.5 * np.abs(self.rotation) @ (self.high - self.low)
+        return centre - half, centre + half
+
+    def meets(self, geometry: Any, place: coal.Transform3s, request: coal.CollisionRequest) -> bool:
+        """Whether the part collides with another geometry at a place in the world."""
+        here, result = coal.Transform3s(self.rotation, self.translation), coal.CollisionResult()
+        coal.collide(geometry, place, self.geometry, here, request, result)
+        return bool(result.isCollision())
 
 
 def collision_parts(obstacle: Obstacle) -> tuple[CollisionPart, ...]:
@@ -199,19 +215,24 @@ def column_is_free(
 
     The column has a radius, and a lowest and a highest end above the place [m].
     """
+    return column_is_clear((part for item in scene for part in collision_parts(item)), places, column)
+
+
+def column_is_clear(
+    parts: Iterable[CollisionPart], places: FloatArray, column: tuple[float, float, float]
+) -> NDArray[np.bool_]:
+    """As :func:`column_is_free`, of some parts of obstacles."""
     radius, bottom, top = column
     length = max(top - bottom - 2.0 * radius, 1e-3)
     shape, middle = coal.Capsule(radius, length), np.array([0.0, 0.0, 0.5 * (bottom + top)])
     free = np.ones(len(places), dtype=bool)
-    for part in (part for item in scene for part in collision_parts(item)):
+    for part in parts:
         # The distance of the capsule's axis to the box about the part is that of their extents along the
         # sides of the box where the axis is along one of them, and no less than it elsewhere.
         half, rows = 0.5 * length * np.abs(part.rotation[2]), np.flatnonzero(free)
-        if np.isfinite(part.low).all():
-            centre = part.translation + 0.5 * part.rotation @ (part.low + part.high)
-            reach = (0.5 * np.abs(part.rotation) @ (part.high - part.low))[:2] + radius
-            away = np.abs(places[rows, :2] - centre[:2])
-            rows = rows[(away[:, 0] <= reach[0]) & (away[:, 1] <= reach[1])]
+        low, high = part.world_bounds
+        inside = (places[rows] >= low - radius) & (places[rows] <= high + radius)
+        rows = rows[inside[:, 0] & inside[:, 1]]
         centres = (places[rows] + (middle - part.translation)) @ part.rotation
         gaps = np.maximum(np.maximum(part.low - half - centres, centres - half - part.high), 0.0)
         near = rows[np.einsum("ki,ki->k", gaps, gaps) <= radius**2]
@@ -219,11 +240,8 @@ def column_is_free(
         if isinstance(part.geometry, coal.Halfspace) or (isinstance(part.geometry, coal.Box) and upright):
             free[near] = False
             continue
-        there = coal.Transform3s(part.rotation, part.translation)
         for row in near.tolist():
-            here, result = coal.Transform3s(np.eye(3), places[row] + middle), coal.CollisionResult()
-            coal.collide(shape, here, part.geometry, there, _MEETS, result)
-            free[row] = not result.isCollision()
+            free[row] = not part.meets(shape, coal.Transform3s(np.eye(3), places[row] + middle), _MEETS)
     return free
 
 

@@ -21,6 +21,7 @@ from manikin.planning.contacts import (
     WalkSearch,
     WalkSettings,
 )
+from manikin.planning.contacts.footholds import Foothold
 from manikin.planning.contacts.handholds import Handholds
 from manikin.scene import Box, Capsule, Cylinder, Obstacle, Scene
 from manikin.scene.collision import collision_parts, column_is_free
@@ -53,6 +54,28 @@ def test_a_foothold_keeps_the_clearance_of_a_foot_to_what_is_beside_it():
         footholds = Footholds(BODY, Scene([curb]))
         laid = footholds.lay(np.zeros((1, 2)), np.zeros(1), 0.0, 0.001)
         assert footholds.is_free(footholds.hold(laid, 0)) is free
+
+
+@pytest.mark.parametrize(
+    ("height", "edge", "apart", "passes"),
+    [
+        (0.4, 0.0, 0.2, True), (0.8, 0.0, 0.2, False), (0.8, 0.0, 0.4, True), (0.8, 0.07, 0.2, True),
+        (0.8, -0.3, 0.4, False),
+    ],
+)  # fmt: skip
+def test_a_foot_passes_beside_what_is_too_high_between_it_and_the_other_foot(height, edge, apart, passes):
+    """A box stands beside the straight way of the left foot or on it, the right foot on the other side.
+
+    Half a sole and 1.5 cm have to fit on the side of the box, a whole sole and 1.5 cm on that of the foot.
+    """
+    assert 0.11 < BODY.sole_width < 0.13
+    middle, turn = 0.3 + edge, rotation_from_yaw(0.3)
+    box = Obstacle("box", Box((0.2, 0.6, height)), turn, turn @ np.array([0.4, middle, 0.5 * height]))
+    footholds = Footholds(BODY, Scene([box]))
+    left, reached, standing = (
+        Foothold(turn @ np.array([x, y, 0.0]), 0.3, turn) for x, y in ((0.0, 0.0), (0.8, 0.0), (0.4, -apart))
+    )
+    assert footholds.passes(left, reached, standing) is passes
 
 
 @pytest.mark.parametrize("lean", [0.0, 1.0])

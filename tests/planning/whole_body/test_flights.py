@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration, human
-from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence, point, sole
+from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence, point, roll_feet, sole
 from manikin.planning.com import plan_com
 from manikin.planning.contacts import PostureFinderSettings
 from manikin.planning.contacts.crawl_postures import CRAWLERS, on_all_fours
@@ -17,6 +17,8 @@ from manikin.planning.whole_body.swing_path import Pose
 from manikin.planning.whole_body.swing_planner import FlightPlanner
 from manikin.scenarios import load_scenario
 from manikin.scene import Scene
+
+from .conftest import step_sequence
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +59,27 @@ def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypat
     check = check_swing(found.curve, planner._clearance(swing), SwingLimits())
     # The search checks at its own instants; between them 2 mm may be lost.
     assert check.slack > -2e-3
+
+
+def test_a_roll_is_searched_where_no_smooth_curve_is_clear(monkeypatch):
+    """The foot still tilts, and what it tilts about keeps clear with it."""
+    sequence = roll_feet(step_sequence(), 0.0644)
+    schedule = ContactSchedule(sequence, np.cumsum([0.0, *(phase.min_duration for phase in sequence)]))
+    trajectory = SimpleNamespace(schedule=schedule, position=lambda _: np.array([0.1, 0.0, 0.9]))
+    planner = FlightPlanner(human(), Scene(), trajectory, SwingLimits(), np.random.default_rng(0), None)
+    (swing,) = planner.flights
+    smooth = planner.plan(swing)
+    assert (smooth.method, smooth.failure) == ("smooth", None)
+    failed = SimpleNamespace(curve=smooth.curve, failure="made to fail", succeeded=False, clearance=-0.01)
+    monkeypatch.setattr(swing_planner, "plan_swing", lambda *_, **__: failed)
+    found = planner._planned(swing)
+    assert found.method == "bi-rrt", found.failure
+    assert found.roll is not None
+    ends, clearance, limits = planner._way(swing, found.roll)
+    for pose, end in zip((found.curve.start, found.curve.end), ends, strict=True):
+        np.testing.assert_allclose(pose.position, end.position, atol=1e-12)
+    # The search checks at its own instants; between them 2 mm may be lost.
+    assert check_swing(found.curve, clearance, limits).slack > -2e-3
 
 
 def test_a_trailing_foot_points_its_toes_down_and_a_leading_one_does_not(planner):

@@ -11,12 +11,15 @@ from manikin.planning.whole_body.fit_targets import (
     FLIGHT_POSITION_WEIGHT,
     FLIGHT_ROTATION_WEIGHT,
     LEAVING_RAMP,
+    LOW,
     POINT_ROTATION_WEIGHT,
     POSITION_RAMP,
     ROTATION_RAMP,
     STRAIGHT,
     STRAIGHTENING,
+    TOUCHING,
     EffectorTarget,
+    LowFlights,
     effector_targets,
     flat_share,
     ignored_pairs,
@@ -26,6 +29,7 @@ from manikin.planning.whole_body.swing_curve import SwingCurve
 from manikin.planning.whole_body.swing_path import Pose
 from manikin.planning.whole_body.swing_planner import PlannedSwing
 from manikin.scene import Box, Obstacle, Scene
+from manikin.scene.distance import ProximitySamples
 
 BODY = human()
 SIZE = {"length": 0.26, "width": 0.1, "friction": 0.7}
@@ -222,3 +226,23 @@ def test_targets_of_a_part_are_those_of_the_whole_then():
     for name, target in rest.items():
         np.testing.assert_array_equal(target.position, all_of_it[name].position[part])
         np.testing.assert_array_equal(target.weight, all_of_it[name].weight[part])
+
+
+def test_a_foot_in_flight_keeps_off_what_it_leaves_and_reaches_in_the_middle_of_its_way():
+    """It may be on both at their ends; the foot that stands stays on the ground, other pairs apart."""
+    time = np.array([0.2, LIFT, 0.5 * (LIFT + LAND), LAND - 1e-9, 2.5])
+    flights = LowFlights.of(BODY, SCENE, SCHEDULE, time)
+    assert flights is not None
+    ignored = ignored_pairs(BODY, SCENE, SCHEDULE, time)
+    counted = flights.without(ignored)
+    own = {("right_foot", "step"), ("right_toes", "step"), ("right_foot", "floor"), ("right_toes", "floor")}
+    for number, flying in enumerate((False, True, True, True, False)):
+        assert ignored[number] - counted[number] == (ignored[number] & own if flying else set())
+    pairs = (("right_toes/box", "floor"), ("right_foot/box", "step"), ("left_foot/box", "post"))
+    found = ProximitySamples(np.repeat(np.arange(5), 3), np.zeros(15), np.zeros((15, BODY.nv)), pairs * 5)
+    wanted = flights.wanted(found, 0.028).reshape(5, 3)
+    np.testing.assert_allclose(wanted[[0, 4]], 0.028)
+    np.testing.assert_allclose(wanted[:, 2], 0.028)
+    np.testing.assert_allclose(wanted[2, :2], LOW)
+    np.testing.assert_allclose([wanted[1, 0], wanted[3, 1]], -TOUCHING, atol=1e-9)
+    np.testing.assert_allclose([wanted[1, 1], wanted[3, 0]], LOW)

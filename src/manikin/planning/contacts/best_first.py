@@ -33,13 +33,13 @@ class Graph(Generic[Node]):
         ahead: Estimate of the cost from a node to the goal.
         followers: Nodes after one, with the cost of each.
         tested: What a step to a node costs beyond that, infinite where it is not possible; asked when the
-            step is about to be taken.
+            step is about to be taken, with the node before both where there is one.
         ended: Whether a node is a goal.
     """
 
     ahead: Callable[[Node], float]
     followers: Callable[[Node], Iterable[tuple[Node, float]]]
-    tested: Callable[[Node, Node], float]
+    tested: Callable[[Node | None, Node, Node], float]
     ended: Callable[[Node], bool]
 
     def best(
@@ -74,7 +74,7 @@ class Graph(Generic[Node]):
             if node in parents:
                 continue
             if not tested and parent is not None:
-                total = cost + self.tested(parent, node)
+                total = cost + self.tested(parents[parent], parent, node)
                 if math.isfinite(total):
                     push(total, node, parent, True)
                 continue

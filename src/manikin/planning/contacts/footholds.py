@@ -18,7 +18,7 @@ from manikin.contact import Contact, sole
 from manikin.errors import ContactError
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Scene
-from manikin.scene.collision import collision_parts
+from manikin.scene.collision import CollisionPart, collision_parts, column_is_clear
 from manikin.scene.footing import WHOLE, FootingTable, Places
 
 FEET = ("left_foot", "right_foot")
@@ -27,6 +27,9 @@ SHIFT = 0.08  # longest shift of a candidate along the sole [m]; half of it acro
 STEEPEST = math.radians(30.0)  # largest slope of a surface to stand on [rad]; our choice
 FOOT_HEIGHT = 0.10  # height above a sole that has to be free for the foot [m]; our choice
 FOOT_CLEARANCE = 0.015  # distance of the foot to what stands beside it [m]; our choice
+FLOWN = 0.45  # height from which on a foot passes beside what is there, at 1.75 m [m]; our choice
+BESIDE = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15)  # offsets of its way to the left [m]; our choice
+_PASSED = np.array([0.25, 0.5, 0.75])  # shares of a flight at which a foot needs room
 ON_PLANE = 0.02  # height up to which a neighbouring surface does not hinder a foot [m]
 _REQUEST = coal.CollisionRequest()
 _CLEAR = coal.CollisionRequest()
@@ -103,20 +106,12 @@ class Footholds:
         self.size, self.steepest = size or (body.sole_length, body.sole_width), steepest
         surfaces = scene.surfaces_facing((0.0, 0.0, 1.0), steepest)
         self._table = FootingTable(surfaces, 0.5 * np.array(self.size) * _CORNERS)
-        parts = [part for item in scene for part in collision_parts(item)]
-        self._parts = [
-            (part.obstacle, part.geometry, coal.Transform3s(part.rotation, part.translation))
-            for part in parts
-        ]
-        self._rotations = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
-        self._places, self._low, self._high = (
-            np.array([getattr(part, name) for part in parts]).reshape(-1, 3)
-            for name in ("translation", "low", "high")
-        )
+        self._parts = parts = [part for item in scene for part in collision_parts(item)]
+        bounds = np.array([part.world_bounds for part in parts]).reshape(-1, 2, 3)
+        self._low, self._high, self._lift = bounds[:, 0], bounds[:, 1], FLOWN * (body.stature or 1.75) / 1.75
         self._reach = 0.5 * float(np.linalg.norm([*self.size, FOOT_HEIGHT])) + 2.0 * FOOT_CLEARANCE
-        gap = 2.0 * FOOT_CLEARANCE
         self._foot = coal.Box(*self.size, FOOT_HEIGHT)
-        self._wide_foot = coal.Box(self.size[0] + gap, self.size[1] + gap, FOOT_HEIGHT)
+        self._wide_foot = coal.Box(*(side + 2.0 * FOOT_CLEARANCE for side in self.size), FOOT_HEIGHT)
         self._point = FootingTable(self._table.surfaces, 1e-6 * _CORNERS)
 
     def levels(self, places: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
@@ -170,18 +165,38 @@ class Footholds:
         """
         touched = self._table.surfaces[hold.surface].obstacles if hold.surface >= 0 else ()
         middle = hold.position + 0.5 * FOOT_HEIGHT * hold.rotation[:, 2]
-        local = np.einsum("nji,nj->ni", self._rotations, middle - self._places)
-        away = np.maximum(np.maximum(self._low - local, local - self._high), 0.0)
-        for number in np.flatnonzero(np.einsum("ni,ni->n", away, away) <= self._reach**2).tolist():
-            name, geometry, place = self._parts[number]
-            on = name in touched
+        for part in self._near(middle - self._reach, middle + self._reach):
+            on = part.obstacle in touched
             foot, request, lift = (self._wide_foot, _REQUEST, 2e-3) if on else (self._foot, _CLEAR, 0.0)
             above = (0.5 * FOOT_HEIGHT + lift) * hold.rotation[:, 2]
-            pose, result = coal.Transform3s(hold.rotation, hold.position + above), coal.CollisionResult()
-            coal.collide(foot, pose, geometry, place, request, result)
-            if result.isCollision():
+            if part.meets(foot, coal.Transform3s(hold.rotation, hold.position + above), request):
                 return False
         return True
+
+    def _near(self, low: FloatArray, high: FloatArray) -> list[CollisionPart]:
+        """Parts whose bounds meet a box with the world's axes, by its corners (3,) [m]."""
+        near = ((self._low <= high) & (self._high >= low)).all(axis=1)
+        return [self._parts[number] for number in np.flatnonzero(near)]
+
+    def passes(self, left: Foothold, reached: Foothold, standing: Foothold) -> bool:
+        """Whether a foot on its way passes beside what is too high to step over, and the other foot."""
+        ends, radius = np.array([left.position, reached.position]), 0.5 * self.size[1] + FOOT_CLEARANCE
+        low, wide = float(ends[:, 2].max()) + self._lift, max(BESIDE) + 0.5 * self.size[0]
+        high = low + 3.0 * radius
+        corners = [*(ends.min(axis=0) - wide)[:2], low], [*(ends.max(axis=0) + wide)[:2], high]
+        near = [part for part in self._near(*np.array(corners)) if low < part.world_bounds[1][2] < np.inf]
+        # Places seen from above are complex numbers.
+        start, end, other = (complex(*hold.position[:2]) for hold in (left, reached, standing))
+        if not near or start == end:
+            return True
+        bows = np.multiply.outer(BESIDE, 4.0j * _PASSED * (1.0 - _PASSED)) * (end - start) / abs(end - start)
+        yaws = np.interp(_PASSED, [0.0, 1.0], np.unwrap([left.yaw, reached.yaw]))
+        parts = (0.5 * self.size[0] - radius) * np.array([-1.0, 0.0, 1.0])
+        feet = (start + _PASSED * (end - start) + bows)[..., None] + np.exp(1j * yaws[:, None]) * parts
+        apart = np.abs(feet[..., None] - other - np.exp(1j * standing.yaw) * parts).min(axis=(1, 2, 3))
+        feet = feet[apart > 2.0 * radius - FOOT_CLEARANCE]
+        places = np.column_stack([feet.real.ravel(), feet.imag.ravel(), np.zeros(feet.size)])
+        return bool(column_is_clear(near, places, (radius, low, high)).reshape(-1, 9).all(axis=1).any())
 
     def near(self, foot: str, wanted: FloatArray, yaw: float, friction: float) -> Iterator[Contact]:
         """Contacts of a foot around a place (3,) of its sole's middle [m], the nearest first.

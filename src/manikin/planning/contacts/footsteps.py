@@ -95,6 +95,7 @@ class FootstepSearch:
         self.holds = [*start, *goal]
         self._keys: dict[int, int] = {}
         self._is_free = cache(lambda number: number < 4 or footholds.is_free(self.holds[number]))
+        self._passes = cache(lambda *numbers: footholds.passes(*(self.holds[number] for number in numbers)))
         self._pairs: dict[tuple[int, int], float] = {}
         self._next: dict[tuple[int, int], list[tuple[_Node, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
@@ -174,17 +175,17 @@ class FootstepSearch:
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
 
-    def _tested(self, parent: _Node, node: _Node) -> float:
-        """Cost of the body's room at a step; infinite where the foot or the body has none."""
+    def _tested(self, before: _Node | None, parent: _Node, node: _Node) -> float:
+        """Cost of the body's room at a step; infinite where the foot, its flight or the body has none."""
         pair = parent.hold, node.hold
         if pair in self._closed or self._is_refused(*pair):
             return math.inf
         if pair not in self._pairs:
             stand, step = self.holds[parent.hold], self.holds[node.hold]
             passes = self._is_free(node.hold) and self._is_made(stand, step, -parent.side)
-            both = (stand, step) if parent.side > 0 else (step, stand)
-            self._pairs[pair] = self._pair_cost(*both) if passes else math.inf
-        return self._pairs[pair]
+            self._pairs[pair] = self._pair_cost(*(stand, step)[:: parent.side]) if passes else math.inf
+        left, cost = 1 - parent.hold if before is None else before.hold, self._pairs[pair]
+        return cost if math.isinf(cost) or self._passes(left, *pair[::-1]) else math.inf
 
     def _is_made(self, stand: Foothold, step: Foothold, out: int) -> bool:
         """Whether a body makes a step: its place may stand for one close by, for which that is known."""

@@ -405,11 +405,9 @@ def _none_fits(limb: str, faults: _Faults, candidates: int, usable: UsableEfort 
         Hindrance.ALIGNMENT: tilted + unnatural, Hindrance.COLLISION: collided, Hindrance.DIRECTION: weak
     }  # fmt: skip
     kind = max(counts, key=lambda item: counts[item])
-    what = [f"{tilted} cannot lie flat on the surface"] if tilted else []
-    if unnatural:
-        what.append(f"{unnatural} are beyond the range of motion")
-    if weak:
-        what.append(f"{weak} have too little EFORT in their posture")
+    what = [f"{tilted} cannot lie flat on the surface"] * (tilted > 0)
+    what += [f"{unnatural} are beyond the range of motion"] * (unnatural > 0)
+    what += [f"{weak} have too little EFORT in their posture"] * (weak > 0)
     if collided:
         (shape, other), count = faults.most_common(1)[0]
         what.append(f"{collided} collide, {count} by {shape} in {other}")

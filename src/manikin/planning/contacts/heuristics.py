@@ -35,9 +35,7 @@ def cached_score(
     keys = np.column_stack([candidates.surfaces, np.round(candidates.points / spacing)])
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
-    wanted = np.ones(len(first), dtype=bool)
-    if asked is not None:
-        wanted = np.isin(np.arange(len(first)), group[asked])
+    wanted = np.isin(np.arange(len(first)), group if asked is None else group[asked])
     return np.array([value(int(row)) if w else 0.0 for row, w in zip(first, wanted, strict=True)])[group]
 
 

@@ -386,7 +386,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         local = (places[:, None] - roots) @ turn
         return duration(self.holds[k].room(local.reshape(-1, 3)).reshape(local.shape[:2]) >= 0.0)
 
-    def _tested(self, before: State, after: State) -> float:
+    def _tested(self, _: State | None, before: State, after: State) -> float:
         """What a move costs beyond its way; infinite where it is closed, blocked or without balance."""
         k = self._moved(before, after)
         if (before, k) in self._stuck:

@@ -25,10 +25,8 @@ from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
 
 ROOT = 7  # numbers of a posture that are the pose of its root
-EASING_MOVES, EASING_TURN = (
-    8,
-    (0.3, 0.03),
-)  # most moves towards an easier posture; first and least turns [rad]
+EASING_MOVES, EASING_TURN = 8, (0.3, 0.03)
+"""Most moves towards an easier posture; the first and the least turns of its joints [rad]."""
 EASY, EASY_ENOUGH = 0.9, 0.98  # shares of the strength at which they aim, and with which they end
 LIKE_BEFORE = Preferences(hinges={}, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 """What is wished for where a posture is near another one: that all its hinges stay."""

@@ -248,12 +248,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return self._near[key]
 
     def _moved(
-        self,
-        feet: Sequence[Contact],
-        before: _Stand,
-        after: _Stand,
-        hands: dict[str, Contact],
-        q: FloatArray,
+        self, feet: Sequence[Contact], before: _Stand, after: _Stand, hands: dict[str, Contact], q: FloatArray
     ) -> tuple[list[Stage], dict[str, Contact], FloatArray | None, Posed]:
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
         failed: tuple[FloatArray | None, Posed] | None = None
@@ -268,12 +263,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return [], hands, lifted, landed
 
     def _hands_before(
-        self,
-        feet: Sequence[Contact],
-        before: _Stand,
-        after: _Stand,
-        hands: dict[str, Contact],
-        q: FloatArray,
+        self, feet: Sequence[Contact], before: _Stand, after: _Stand, hands: dict[str, Contact], q: FloatArray
     ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:
         """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
         standing = {foot.effector: foot for foot in feet}

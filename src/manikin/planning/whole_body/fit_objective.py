@@ -114,6 +114,8 @@ class MotionObjective:
         self._known = KnownDistances()
         meeting = targets.meeting
         self._ignored = targets.ignored if meeting is None else meeting.without(targets.ignored)
+        if targets.low_flights is not None:
+            self._ignored = targets.low_flights.without(self._ignored)
         self._last: tuple[FloatArray, MotionSamples] | None = None
         with np.errstate(divide="ignore"):
             self._reference_weight = np.atleast_2d(1.0 / targets.reference_scale)
@@ -195,8 +197,8 @@ class MotionObjective:
 
     def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray | float:
         """Wanted clearance of close pairs [m]."""
-        del found
-        return scales.safe_distance
+        flights = self.targets.low_flights
+        return scales.safe_distance if flights is None else flights.wanted(found, scales.safe_distance)
 
     def _add_reference(self, out: FitLinearisation, motion: MotionSamples) -> None:
         """Deviation from the reference posture; the pelvis' place does not count."""

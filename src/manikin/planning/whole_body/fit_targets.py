@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +22,7 @@ from manikin.planning.whole_body.swing_planner import (
     touch_pairs,
 )
 from manikin.scene import Scene
+from manikin.scene.distance import ProximitySamples, considered
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +85,7 @@ class FitTargets:
         ends: (nq,) postures in which the body rests at the start and at the end; None where it only comes to
             rest.
         settles: Whether it comes to rest at the end without acceleration: another part goes on from there.
+        low_flights: What feet in flight keep off although it is ignored, or None without.
     """
 
     time: FloatArray
@@ -101,6 +104,7 @@ class FitTargets:
     forces: HeldForces | None = None
     ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
     settles: bool = False
+    low_flights: "LowFlights | None" = None
 
 
 def effector_targets(
@@ -306,3 +310,59 @@ def ignored_pairs(
             for index in range(swing.first_phase, swing.last_phase + 1):
                 per_phase[index] |= touch_pairs(body, scene, contact)
     return with_pairs([per_phase[index] for index in schedule.phase_at(time)], landing)
+
+
+LOW, TOUCHING, RISING = 4.0e-3, 8.0e-3, 0.3
+"""Distance that a foot in flight keeps at least from what it leaves and reaches, and depth that is allowed at
+the contact itself, where places alone decide [m]; share of the flight in which one becomes the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class LowFlights:
+    """Distances that feet in flight keep from what they leave and reach.
+
+    Attributes:
+        ends: Of each end of a flight the pairs of segment and obstacle, and the distance (n,) that is wanted
+            at each sample [m]; infinite outside the flight.
+    """
+
+    ends: tuple[tuple[Ignored, FloatArray], ...]
+
+    @classmethod
+    def of(
+        cls, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
+    ) -> "LowFlights | None":
+        """Those of flights between soles at times (n,) [s]; None without any."""
+        ends = list[tuple[Ignored, FloatArray]]()
+        for swing in schedule.sequence.swings():
+            if swing.start is None or swing.end is None or not hangs(body, swing.effector):
+                continue
+            if {swing.start.kind, swing.end.kind} != {ContactKind.SOLE}:
+                continue
+            start, end = schedule.swing_interval(swing)
+            for contact, gone in ((swing.start, time - start), (swing.end, end - time)):
+                share = np.clip(gone / (RISING * (end - start)), 0.0, 1.0)
+                wanted = share**2 * (3.0 - 2.0 * share) * (LOW + TOUCHING) - TOUCHING
+                wanted[(time < start) | (time >= end)] = np.inf
+                ends.append((touch_pairs(body, scene, contact), wanted))
+        return cls(tuple(ends)) if ends else None
+
+    def without(self, ignored: Sequence[Ignored]) -> tuple[Ignored, ...]:
+        """The pairs that are ignored at each sample, but for those of feet in flight."""
+
+        @cache
+        def apart(found: Ignored, *flying: bool) -> Ignored:
+            return found.difference(*(self.ends[k][0] for k, counts in enumerate(flying) if counts))
+
+        flying = np.isfinite([wanted for _, wanted in self.ends]).T.tolist()
+        return tuple(apart(found, *row) for found, row in zip(ignored, flying, strict=True))
+
+    def wanted(self, found: ProximitySamples, safe: float) -> FloatArray:
+        """(k,) wanted distances of close pairs, ``safe`` of all but feet in flight [m]."""
+        wanted, distinct = np.full(len(found.distance), safe), list(dict.fromkeys(found.pairs))
+        numbers = {pair: number for number, pair in enumerate(distinct)}
+        number = np.array([numbers[pair] for pair in found.pairs], dtype=np.int64)
+        for pairs, distance in self.ends:
+            rows = ~considered(distinct, pairs)[number]
+            wanted[rows] = np.minimum(wanted[rows], distance[found.sample[rows]])
+        return wanted

@@ -38,6 +38,7 @@ from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.fit_targets import (
     FLAT_TOES,
     FitTargets,
+    LowFlights,
     effector_targets,
     flat_share,
     ignored_pairs,
@@ -251,6 +252,7 @@ class _Goal:
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             forces=None if self.forces is None else HeldForces.of(planner.body, schedule, self.forces, time),
             ends=planner.ends, settles=planner.settles,
+            low_flights=LowFlights.of(planner.body, planner.scene, schedule, time),
         )  # fmt: skip
 
 

@@ -262,9 +262,9 @@ TRUST, SETTLED, STATIONARY = 0.05, 0.004, 1e-5
 """Largest change of a control coordinate in one iteration, and changes below which the optimisation stops:
 where the limits are kept, and where they are not but the next curve would be the same [m]."""
 
-TOLERANCE, BUFFER = 1e-5, 0.003
-"""Accuracy expected of measured distances, and what is aimed at beyond the required clearance, for what lies
-between the samples [m]."""
+TOLERANCE, BUFFER = 5e-5, 0.003
+"""Accuracy expected of distances, by which toes may dip as they leave, and what is aimed at beyond the
+required clearance, for what lies between the samples [m]."""
 
 
 def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, free: FloatArray) -> FloatArray:

@@ -226,24 +226,30 @@ class FlightPlanner:
             return self._reach(swing)
         start, end = self.schedule.swing_interval(swing)
         roll = foot_roll(self._body, self.schedule, swing)
-        if roll is None:
-            ends, clearance = (Pose.of(swing.start), Pose.of(swing.end)), self._clearance(swing)
-            limits, heights, pitch = self._limits, HEIGHTS, self._pitch(swing, start)
-            if rolls_on_point(swing.start):  # a knee or wrist turns about its point as it goes
-                limits = replace(limits, clearance=2.0 * limits.clearance)
-        else:
-            # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it rises.
-            limits = replace(
-                self._limits, clearance=0.6 * self._limits.clearance, departure=0.4 * self._limits.departure
-            )
-            ends, clearance = roll.pivots, self._rolling_clearance(swing, roll)
-            heights, pitch = ROLLING_HEIGHTS, 0.0
+        ends, clearance, limits = self._way(swing, roll)
+        heights, pitch = (HEIGHTS, self._pitch(swing, start)) if roll is None else (ROLLING_HEIGHTS, 0.0)
         plan = plan_swing(
             *ends, start, end, clearance, limits=limits, start_normal=swing.start.normal,
             end_normal=swing.end.normal, pitch=pitch, heights=heights, laterals=self._laterals(swing),
         )  # fmt: skip
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure, roll)
-        return smooth if plan.succeeded or roll is not None else self.search(swing, smooth)
+        if plan.succeeded or (roll is not None and plan.clearance >= 0.0):
+            return smooth  # a foot that rolls may come a little nearer than wanted
+        return self.search(swing, smooth, 2000 if roll is None else 600)
+
+    def _way(self, swing: Swing, roll: FootRoll | None) -> tuple[tuple[Pose, Pose], Clearance, SwingLimits]:
+        """Poses at both ends of a flight, the clearance of a pose, and limits; of the pivot of a roll."""
+        assert swing.start is not None
+        assert swing.end is not None
+        if roll is not None:
+            # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it rises.
+            gained = 0.6 * self._limits.clearance, 0.4 * self._limits.departure
+            limits = replace(self._limits, clearance=gained[0], departure=gained[1])
+            return roll.pivots, self._rolling_clearance(swing, roll), limits
+        # A knee or wrist turns about its point as it goes.
+        factor = 2.0 if rolls_on_point(swing.start) else 1.0
+        limits = replace(self._limits, clearance=factor * self._limits.clearance)
+        return (Pose.of(swing.start), Pose.of(swing.end)), self._clearance(swing), limits
 
     def _reach(self, swing: Swing) -> PlannedSwing:
         """Curve between a contact, where alone it must be kept, and the effector in the preferred posture."""
@@ -287,24 +293,27 @@ class FlightPlanner:
         return clearance
 
     def search(self, swing: Swing, fallback: PlannedSwing, iterations: int = 2000) -> PlannedSwing:
-        """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""
-        assert swing.start is not None
-        assert swing.end is not None
-        times, ends = self.schedule.swing_interval(swing), (Pose.of(swing.start), Pose.of(swing.end))
-        clearance = self._clearance(swing)
+        """Search a curve with the Bi-RRT; ``fallback`` when there is none, with whose roll it is.
 
-        def check(extra: float) -> PostureCheck:
-            screen = ClearFlight(clearance, ends, times, self._limits, extra)
+        A foot that lies flat at its ends must have postures on its way; a roll is kept clear alone.
+        """
+        times, roll = self.schedule.swing_interval(swing), fallback.roll
+        ends, clearance, limits = self._way(swing, roll)
+        limits = limits if roll is not None else self._limits
+
+        def check(extra: float) -> Feasible:
+            screen = ClearFlight(clearance, ends, times, limits, extra)
+            if roll is not None:
+                return lambda pose, time, _: screen(time, pose) or None
             return PostureCheck(swing.effector, partial(self._problem, swing), screen, rotation_weight=0.3)
 
         found = search_swing(
-            *ends, *times, check(0.0), self._rng, roomy=check(ROOM), limits=self._limits,
-            iterations=iterations,
-        )  # fmt: skip
+            *ends, *times, check(0.0), self._rng, roomy=check(ROOM), limits=limits, iterations=iterations
+        )
         if found.curve is None:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
-            return PlannedSwing(swing, fallback.curve, fallback.method, reason)
-        return PlannedSwing(swing, found.curve, "bi-rrt")
+            return PlannedSwing(swing, fallback.curve, fallback.method, reason, roll)
+        return PlannedSwing(swing, found.curve, "bi-rrt", roll=roll)
 
     def _laterals(self, swing: Swing) -> tuple[float, ...]:
         """Offsets with which the limb does not pass round the far side of one that stands beside its way."""
