@@ -115,7 +115,7 @@ def running(pid):
 NEAR_GRID = """
 from manikin.cli import main
 from manikin.walking import words
-words.THESIS_GRID = words.WordGrid((-1.0, 1.0), (3.0, 3.4), 0.2)
+words.THESIS_GRID = words.WordGrid((-0.6, 0.6), (3.0, 3.4), 0.2)
 raise SystemExit(main())
 """
 """The command, on some of the thesis' goals that are near."""
