@@ -209,6 +209,9 @@ class LimitTerm:
 BESIDE = 5e-4
 """Distance of what may be as near as touching; more than the solver's tolerance [m]."""
 
+SINKING = 4e-3
+"""Depth to which what touches at a point may be in what it touches [m]: 1 mm less than a check allows."""
+
 
 @dataclass(frozen=True, eq=False)
 class ClearanceTerm:
@@ -221,6 +224,7 @@ class ClearanceTerm:
         activation: Pairs farther apart than the safety distance plus this are left out [m].
         ignore: Pairs of names that may touch.
         beside: Pairs (segment, obstacle) that may be as near as touching.
+        sinking: Pairs (segment, obstacle) that may be :data:`SINKING` deep, but no deeper.
     """
 
     proximity: Proximity | SphereProximity
@@ -229,6 +233,7 @@ class ClearanceTerm:
     activation: float
     ignore: Ignored
     beside: Ignored = NOTHING
+    sinking: Ignored = NOTHING
 
     def evaluate(self, configuration: Configuration) -> tuple[Linearised, tuple[Pair, ...]]:
         """Distances beyond the safety distance [m] of the pairs of shapes that are close."""
@@ -249,4 +254,7 @@ class ClearanceTerm:
         """Distance that a pair has to keep [m]."""
         if "/" in other:
             return self.self_safety
-        return min(BESIDE, self.safety) if (segment_of(shape), other) in self.beside else self.safety
+        pair = segment_of(shape), other
+        if pair in self.beside:
+            return min(BESIDE, self.safety)
+        return -SINKING if pair in self.sinking else self.safety

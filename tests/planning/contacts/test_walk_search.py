@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from manikin.balance import StaticRegion, static_torque_share
 from manikin.body import Configuration, human
-from manikin.contact import ContactKind, ContactModel, Stance, sole, soles_overlap
+from manikin.contact import ContactKind, ContactModel, Stance, point, sole, soles_overlap
+from manikin.kinematics.posture_terms import SINKING
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.contacts import (
@@ -23,7 +24,7 @@ from manikin.planning.contacts import (
 )
 from manikin.planning.contacts.footholds import Foothold
 from manikin.planning.contacts.handholds import Handholds
-from manikin.scene import Box, Capsule, Cylinder, Obstacle, Scene
+from manikin.scene import Box, Capsule, Cylinder, Obstacle, Proximity, Scene
 from manikin.scene.collision import collision_parts, column_is_free
 
 BODY = human(1.75, 75.0, "male")
@@ -248,7 +249,7 @@ def test_a_hand_joins_where_feet_alone_do_not_make_a_step(checked):
     ])  # fmt: skip
     found, _, _ = planned(scene, (0.95, 0.0))
     assert found.failure is None
-    hands = [c for stage in found.plan.stages for name, c in stage.contacts.items() if name.endswith("hand")]
+    hands = [c for stage in found.plan.stages for name, c in stage.contacts.items() if "foot" not in name]
     assert hands
     for contact in hands:
         assert scene.touched_obstacles(contact) in (("rail",), ("block",))
@@ -260,7 +261,7 @@ def test_a_hand_joins_where_feet_alone_do_not_make_a_step(checked):
 
 
 def test_holds_are_in_reach_and_on_what_a_hand_can_hold_or_lean_on():
-    """A bar at the left is grasped; a table at the right carries a palm at one point."""
+    """A bar at the left is grasped; a table at the right carries the heel of a hand at one point."""
     scene = Scene([
         Obstacle("rail", Cylinder(0.02, 2.0), rotation=ALONG_X, translation=(0.0, 0.45, 1.0)),
         Obstacle("table", Box((1.0, 0.6, 0.04)), translation=(0.2, -0.7, 0.75)),
@@ -270,10 +271,36 @@ def test_holds_are_in_reach_and_on_what_a_hand_can_hold_or_lean_on():
     found = Handholds(BODY, scene, 0.7).near([root], 0.0, 20)
     kinds = {(item.effector, item.kind, *scene.touched_obstacles(item)) for item in found}
     assert ("left_hand", ContactKind.GRASP, "rail") in kinds
-    assert ("right_hand", ContactKind.POINT, "table") in kinds
+    assert ("right_wrist", ContactKind.POINT, "table") in kinds
+    assert ("right_hand", ContactKind.POINT, "table") not in kinds
     assert not any("far" in item for item in kinds)
     for item in found:
         assert np.linalg.norm(item.position - root[:3]) < 1.0
+
+
+@pytest.mark.parametrize("low", [0.0, 0.85])
+@pytest.mark.parametrize(("effector", "accepted"), [("right_wrist", True), ("right_hand", False)])
+def test_a_hand_is_on_a_table_and_not_in_it(effector, low, accepted):
+    """The heel of a hand on a solid or thin top at 0.9 m; fingers or forearm of a palm would be in it.
+
+    A hand that hung down there had its fingers 10 cm inside.
+    """
+    top = 0.9
+    table = Obstacle("table", Box((0.6, 1.2, top - low)), translation=(0.6, 0.0, 0.5 * (low + top)))
+    scene = Scene([table])
+    feet = [
+        sole(foot, (0.0, y, 0.0), length=0.28, width=0.12, friction=0.7)
+        for foot, y in (("left_foot", 0.1), ("right_foot", -0.1))
+    ]
+    hand = point(effector, (0.36, -0.25, top), friction=0.7)
+    carrying = {contact.effector: contact for contact in feet}
+    held, start = {**carrying, effector: hand}, BODY.standing_posture()
+    posed = PostureFinder(BODY, scene).pose(held, carrying, start)
+    assert (posed.q is not None) is accepted, posed.reason
+    if posed.q is not None:
+        near = Proximity(BODY, scene).evaluate(posed.q, 0.1)
+        depths = [d for (_, other), d in zip(near.pairs, near.distance, strict=True) if other == "table"]
+        assert min(depths) > -SINKING - 1e-4
 
 
 def test_a_step_that_a_later_stage_refused_is_not_taken_again():

@@ -45,6 +45,9 @@ def refine_contacts(
     return result
 
 
+HANDS = ("hand", "wrist")
+"""How the names of contacts of hands end: of what they hold, and of their heels, which push."""
+
 HOLDING_PACE, HOLDING_ACCELERATION = 1.0, 1.0
 """Mean speed of hinges [rad/s] and largest acceleration of the CoM [m/s^2] of who holds on; our choice."""
 
@@ -56,7 +59,7 @@ def from_rest_to_rest(context: RunContext) -> RunContext | None:
         return None
     names = set[str]().union(*(stage.contacts for stage in plan.stages))
     moving = any(stage.momentum is not None for stage in plan.stages)
-    if moving or scenario.file.task.act is not None or not all("foot" in x or "hand" in x for x in names):
+    if moving or scenario.file.task.act is not None or not all(x.endswith(("foot", *HANDS)) for x in names):
         return None
     paces = Paces(hinge_pace=HOLDING_PACE, com_acceleration=HOLDING_ACCELERATION)
     return replace(context, plan=ContactPlan.of(context.body, plan.stages, plan.goal, paces))
@@ -65,7 +68,7 @@ def from_rest_to_rest(context: RunContext) -> RunContext | None:
 def is_hard(context: RunContext) -> bool:
     """Whether hands carry on the way, or a step is higher than feet alone are to make."""
     stages = () if context.plan is None else context.plan.stages
-    if any("hand" in name for stage in stages for name in stage.contacts):
+    if any(name.endswith(HANDS) for stage in stages for name in stage.contacts):
         return True
     heights = [[float(contact.position[2]) for contact in stage.contacts.values()] for stage in stages]
     rises = [max(a + b) - min(a + b) for a, b in pairwise(heights)]

@@ -1,6 +1,6 @@
 """Places for the hands of a body that goes on its feet: bars to hold on to, level surfaces to lean on.
 
-A hand closes round a bar and may pull; on a surface its palm only presses, at one point with friction.
+A hand closes round a bar and may pull; on a surface its heel only presses, at one point with friction.
 Lengths are those of a body of 1.75 m and scale with the stature; they are our choice.
 """
 
@@ -14,6 +14,7 @@ from manikin.body import BodyModel
 from manikin.contact import Contact, grasp, point
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.best_first import heading_of
+from manikin.planning.contacts.contact_plan import onto_normal
 from manikin.planning.contacts.limb_places import PALM_ROOM, stature_of
 from manikin.scene import Scene
 
@@ -63,7 +64,7 @@ class Handholds:
                     offers.append((float(np.linalg.norm(wanted - place, axis=1).max()), contact))
         chosen: list[Contact] = []
         for _, contact in sorted(offers, key=lambda item: item[0]):
-            same = (item for item in chosen if item.effector == contact.effector)
+            same = (item for item in chosen if item.effector[0] == contact.effector[0])  # of one side
             if all(np.linalg.norm(item.position - contact.position) >= APART * size for item in same):
                 chosen.append(contact)
         return chosen[:most]
@@ -95,7 +96,7 @@ class Handholds:
             places = places[np.argsort(np.linalg.norm(places - flat, axis=1), kind="stable")]
             corners = (places[:, None] + self._size * _CORNERS @ axes).reshape(-1, 3)
             inside = (surface.outside(corners).reshape(len(places), -1) <= 0.0).all(axis=1)
-            rotation = surface.rotation if abs(surface.normal[2]) < 1.0 - 1e-9 else turn
+            flat, heel = onto_normal(turn, surface.normal), hand.replace("hand", "wrist")
             for place in islice(places[inside], 12):
-                found.append(point(hand, place, friction=self._friction, rotation=rotation))
+                found.append(point(heel, place, friction=self._friction, rotation=flat))
         return found

@@ -23,6 +23,7 @@ from manikin.kinematics import (
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
+from manikin.scene.distance import Ignored
 
 ROOT = 7  # numbers of a posture that are the pose of its root
 EASING_MOVES, EASING_TURN = 8, (0.3, 0.03)
@@ -154,13 +155,13 @@ class PostureFinder:
         self.searches += 1
         settings, led = self.settings, {} if guide is None else self.led(guide[:ROOT])
         whole = guide is not None and len(guide) > ROOT
-        ignore, beside = self._near(held)
+        ignore, beside, sinking = self._near(held)
         problem = PostureProblem(
             self.body, tuple(held.values()),
             {**led, **(_upright_points(held) if upright else {}), **(placements or {})},
             com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
-            self_clearance=settings.clearance, ignore=ignore, beside=beside,
+            self_clearance=settings.clearance, ignore=ignore, beside=beside, sinking=sinking,
             range_margin=settings.range_margin, learnt_margin=LEARNT_MARGIN if settings.natural else None,
             reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
@@ -244,15 +245,16 @@ class PostureFinder:
         wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
         return {self._root: wish}
 
-    def _near(self, held: Contacts) -> tuple[frozenset[tuple[str, str]], frozenset[tuple[str, str]]]:
-        """Pairs that touch, or may be as near: shanks on their tips, and forearms at what hands hold."""
+    def _near(self, held: Contacts) -> tuple[Ignored, Ignored, Ignored]:
+        """Pairs that touch; those, and forearms at what is held, that are as near at most; or hardly deep."""
         touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched(item)]
+        points = [pair for pair in touched if held[pair[0]].kind is ContactKind.POINT]
         wrists = {
             (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)
-            for name, item in held.items() if item.kind is ContactKind.GRASP and self.settings.forearms_beside
-            for obstacle in self._touched(item)
+            for name, obstacle in touched if held[name].kind is ContactKind.GRASP
         }  # fmt: skip
-        return touching_pairs(self.body, touched), pairs_beside(self.body, touched) | wrists
+        beside = pairs_beside(self.body, touched) | (wrists if self.settings.forearms_beside else set())
+        return touching_pairs(self.body, touched), beside, touching_pairs(self.body, points) - beside
 
 
 def _strained(carrying: Contacts, share: float, most: float) -> str:

@@ -277,7 +277,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if bare is None or (rise < HIGH * self._scale and self.replanned < HAND_TRIES):
             return
         holds = self._holds_near(before, after)
-        pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector != b.effector]
+        pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector[0] != b.effector[0]]
         for contacts in [*((hold,) for hold in holds), *pairs[:2]]:
             stages, held, at = list(bare), dict[str, Contact](), start
             for contact in contacts:
