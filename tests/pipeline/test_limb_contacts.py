@@ -94,7 +94,7 @@ def test_a_flight_passes_a_posture_off_its_contacts(found):
         left = set(before.contacts) - set(after.contacts)
         assert (after.via is not None) == bool(left)
     schedule = result.plan.schedule(ContactModel(normal_force_cap=1000.0))
-    times, keys = result.plan.keys(schedule.instants)
+    times, keys = result.plan.keys(schedule)
     flights = sum(stage.via is not None for stage in result.plan.stages)
     assert len(keys) == len(times) == len(result.plan.stages) + 1 + flights
     assert np.all(np.diff(times) > 0.0)

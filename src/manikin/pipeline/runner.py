@@ -5,6 +5,7 @@ nothing already computed is lost.  A stage that finds nothing ends the run with 
 explanation; only misuse and broken input raise.
 """
 
+import bisect
 import re
 import time as clock
 from collections.abc import Callable, Sequence
@@ -32,6 +33,7 @@ from manikin.pipeline.stages.whole_body_stage import (
     with_rolling_feet,
     with_stricter_key_postures,
 )
+from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import WholeBodySettings
 from manikin.scenarios import Scenario, load_scenario
 
@@ -103,8 +105,8 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         again = _planned(rolling, report, requirements)
         result, schedule = (result, schedule) if report.prefer_earlier() else again
     for _ in range(1, context.scenario.contacts.attempts):
-        phase = failed_phase(report.failure, schedule)
-        other = None if phase is None else plan_contacts_again(with_contacts, report, phase)
+        stage = failed_stage(report.failure, schedule, with_contacts.plan)
+        other = None if stage is None else plan_contacts_again(with_contacts, report, stage)
         if other is None:
             break
         with_contacts = other
@@ -158,13 +160,19 @@ def _followed(
     return partial(RunResult.of, report, plan.centroidal, wholebody, execution), schedule
 
 
-def failed_phase(failure: StageFailure | None, schedule: ContactSchedule | None) -> int | None:
-    """Index of the phase in which a stage failed, or None where that is not known."""
-    if failure is None:
+def failed_stage(
+    failure: StageFailure | None, schedule: ContactSchedule | None, plan: ContactPlan | None
+) -> int | None:
+    """Index of the stage of a contact plan in which a later stage failed, or None where it is not known."""
+    if failure is None or plan is None:
         return None
     if (named := re.match(r"phase (\d+)", failure.where)) is not None:
-        return int(named[1])
-    return None if schedule is None else int(schedule.phase_at(failure.time_s))
+        phase = int(named[1])
+    elif schedule is not None:
+        phase = int(schedule.phase_at(failure.time_s))
+    else:
+        return None
+    return phase if schedule is None else bisect.bisect_right(plan.begins(schedule), phase) - 1
 
 
 def _refined(
@@ -174,7 +182,7 @@ def _refined(
     centroidal = None
     if context.plan is not None:
         schedule = context.plan.schedule(context.scenario.contact_model)
-        keys = context.plan.keys(schedule.instants)
+        keys = context.plan.keys(schedule)
     else:
         plan = with_key_postures(context, report, plan_centre_of_mass(context, report))
         centroidal = plan.centroidal

@@ -168,7 +168,8 @@ class _Check:
     def _postures(self) -> Iterator[HeldPosture]:
         for change in self._changes:
             if change.q is not None:
-                yield HeldPosture(change.q, change.held, change.where)
+                on_toes = change.after.on_toes if change.after is not None else frozenset[str]()
+                yield HeldPosture(change.q, change.held, change.where, on_toes)
             if change.after is not None and change.after.via is not None:
                 own = tuple(change.after.contacts.values())
                 yield HeldPosture(change.after.via, own, f"{change.where}.via")

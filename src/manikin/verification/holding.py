@@ -5,6 +5,7 @@ For plans without postures there are a bound of the reach from lengths, and a se
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -43,11 +44,13 @@ class HeldPosture:
         q: (nq,) posture.
         held: Contacts that it has to hold.
         where: Its place in the plan.
+        on_toes: Feet of which the toes alone lie on their contact.
     """
 
     q: FloatArray
     held: tuple[Contact, ...]
     where: str
+    on_toes: frozenset[str] = frozenset()
 
 
 class HoldingRows:
@@ -86,6 +89,9 @@ class HoldingRows:
         for contact in item.held:
             place = self._data.oMf[self._body.effector_frame(contact.effector)]
             where = f"{contact.effector}, {item.where}"
+            if contact.effector in item.on_toes:
+                self._error.take(self._toes_away(contact), f"toes of {where}")
+                continue
             frame = contact.rotation_contact_to_world
             missed, turn = place.translation - contact.position, place.rotation.T @ frame
             if contact.rolls:  # the axis of its edge goes forward with the pitch, which is free
@@ -102,6 +108,19 @@ class HoldingRows:
             most = int(np.argmax(beyond))
             where = f"{self._body.joint_names[most]}, {item.where}"
             self._range.take(float(np.rad2deg(max(beyond[most], 0.0))), where)
+
+    def _toes_away(self, contact: Contact) -> float:
+        """Largest distance of a corner of the toes from where it is when the foot lies flat [m]."""
+        effector, away = self._body.effector(contact.effector), 0.0
+        toes = next(segment for segment in self._body.segments if segment.parent == effector.segment)
+        hinge = effector.rotation.T @ (toes.origin - effector.translation)
+        place = self._data.oMf[self._body.segment_frame(toes.name)]
+        for x, y in product((hinge[0], 0.5 * contact.length), (-0.5 * contact.width, 0.5 * contact.width)):
+            corner = np.array([x, y, 0.0])
+            wanted = contact.position + contact.rotation_contact_to_world @ corner
+            inside = effector.translation + effector.rotation @ corner - toes.origin
+            away = max(away, float(np.linalg.norm(place.act(inside) - wanted)))
+        return away
 
     def _clear(self, postures: Sequence[HeldPosture], touched: Mapping[int, frozenset[str]]) -> None:
         shapes, every = BodySolids(self._body), np.array([item.q for item in postures])

@@ -17,6 +17,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from manikin.body import BodyModel
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.body.limbs import hinge_line
 from manikin.contact import Contact, ContactKind
 from manikin.errors import ContactError, InputError, ScenarioError
 from manikin.numerics.spatial import FloatArray, check_rotation
@@ -87,6 +88,9 @@ class StageSection(Section):
         False, "whether the body moves through the stage without a place at which it could rest"
     )
     duration_s: Duration | None = optional("how long it lasts [s]; of a dynamic stage required")
+    on_toes: list[Text] = preset(
+        [], "feet that end with the stage before and are on their toes in the posture, the heel up"
+    )
 
     @model_validator(mode="after")
     def _timed(self) -> Self:
@@ -142,6 +146,7 @@ class PlannedStage:
         via: (nq,) posture in its middle, or None.
         dynamic: Whether the body moves through it without a place of rest.
         duration: How long it lasts [s], or None.
+        on_toes: Feet that leave as it begins, on their toes in the posture.
     """
 
     contacts: Mapping[str, Contact]
@@ -151,6 +156,7 @@ class PlannedStage:
     via: FloatArray | None = None
     dynamic: bool = False
     duration: float | None = None
+    on_toes: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +259,14 @@ def parse_contact_plan(
         posture = _posture(section.posture, body, f"{where}.posture")
         com, velocity = _array(section.com), np.array(section.com_velocity_m_s)
         via, dynamic = _posture(section.via, body, f"{where}.via"), section.dynamic
-        stages.append(PlannedStage(contacts, posture, com, velocity, via, dynamic, section.duration_s))
+        on_toes = frozenset(section.on_toes)
+        feet = {name for name in before.keys() - contacts.keys() if hinge_line(body, name) is not None}
+        if unknown := sorted(on_toes - feet):
+            valid = ", ".join(sorted(feet)) or "none here"
+            raise ScenarioError(f"{where}.on_toes names {unknown[0]!r}; valid: feet that end, {valid}")
+        stages.append(
+            PlannedStage(contacts, posture, com, velocity, via, dynamic, section.duration_s, on_toes)
+        )
         before = contacts
     goal = _posture(file.goal.posture, body, f"{source}: goal.posture")
     return scenario, PlannedContacts(tuple(stages), goal, _array(file.goal.com), file.planner)
@@ -336,6 +349,8 @@ def _stage_dict(body: BodyModel, stage: PlannedStage, before: Mapping[str, Conta
         result["com_velocity_m_s"] = stage.com_velocity.tolist()
     if stage.dynamic:
         result["dynamic"] = True
+    if stage.on_toes:
+        result["on_toes"] = sorted(stage.on_toes)
     return {key: value for key, value in result.items() if value is not None}
 
 

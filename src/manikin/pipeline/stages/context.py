@@ -99,6 +99,7 @@ def plan_in_world(plan: ContactPlan, transform_task_to_world: PlanarTransform) -
             {name: moved[id(contact)] for name, contact in stage.contacts.items()},
             transform.poses(stage.q), transform.points(stage.com),
             via=None if stage.via is None else transform.poses(stage.via), duration=stage.min_duration,
+            on_toes=frozenset(contact.effector for contact in stage.tilted),
         )
         for stage in plan.stages
     ]  # fmt: skip

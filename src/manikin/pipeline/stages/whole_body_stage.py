@@ -293,7 +293,7 @@ def follow_centre_of_mass(
     result = plan_whole_body(
         context.body, context.scene, trajectory, rng=rng, settings=context.settings,
         padded=context.padded, waypoints=plan.postures,
-        known=_known_postures(context, plan, trajectory.schedule.instants),
+        known=_known_postures(context, plan, trajectory.schedule),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     if result.trajectory is not trajectory:
@@ -313,14 +313,14 @@ def _slowed(report: Report, plan: KeyedPlan, trajectory: CentroidalTrajectory) -
     return _reported(report, Eligibility(centroidal, trajectory, postures, plan.replans, None))
 
 
-def _known_postures(context: RunContext, plan: KeyedPlan, instants: FloatArray) -> Guide | None:
-    """Postures of the contact plan at (n,) key instants [s]; those on the CoM of a body that passes them."""
+def _known_postures(context: RunContext, plan: KeyedPlan, schedule: ContactSchedule) -> Guide | None:
+    """Postures of the contact plan in a schedule; those on the CoM of a body that passes them."""
     if context.plan is None:
         return None
     if context.resting is None or plan.postures is None:
-        times, postures = context.plan.keys(instants)
+        times, postures = context.plan.keys(schedule)
     else:
-        times, postures = instants, np.array([item.q for item in plan.postures.postures])
+        times, postures = schedule.instants, np.array([item.q for item in plan.postures.postures])
     return Guide(times, align_quaternions(postures), ())
 
 
@@ -331,7 +331,7 @@ def _planned_postures(context: RunContext, schedule: ContactSchedule) -> FloatAr
     """
     if context.plan is None or len(context.plan.postures) >= len(schedule.instants):
         return None if context.plan is None else context.plan.postures
-    begins = [*schedule.sequence.changes, len(schedule.sequence)]
+    begins = [*context.plan.begins(schedule), len(schedule.sequence)]
     postures = align_quaternions(context.plan.postures)
     return Guide(schedule.instants[begins], postures, ()).at(schedule.instants)
 

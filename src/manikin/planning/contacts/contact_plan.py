@@ -108,6 +108,7 @@ def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
     return turned
 
 
+TILTING = 0.35  # share of a phase in which a foot that leaves or lands on its toes tilts; our choice
 COM_ROOM = (0.06, 0.06, 0.03)  # way of the centre of mass off its posture when a phase begins [m]; our choice
 HINGE_PACE, COM_PACE = 1.3, 0.4  # see Paces; our choice
 
@@ -152,6 +153,8 @@ class Stage:
             where the plan has none.
         momentum: Motion with which the phase begins, where its contacts could not carry the body at rest;
             None where they can.
+        tilted: Contacts that end or begin with the phase, with the parts that touch in its first posture: of
+            feet on their toes.
     """
 
     contacts: Contacts
@@ -161,19 +164,20 @@ class Stage:
     com_room: tuple[float, float, float] = COM_ROOM
     via: FloatArray | None = None
     momentum: Momentum | None = None
+    tilted: tuple[Contact, ...] = ()
 
     @classmethod
     def of(
         cls, body: BodyModel, contacts: Contacts, q: FloatArray, min_duration: float,
         com_room: tuple[float, float, float] = COM_ROOM, via: FloatArray | None = None,
-        momentum: Momentum | None = None,
+        momentum: Momentum | None = None, tilted: tuple[Contact, ...] = (),
     ) -> "Stage":  # fmt: skip
         """Stage with the centre of mass of its posture."""
         com = frozen_array(Configuration(body, q).com, "com [m]", (3,))
         kept = MappingProxyType(dict(contacts))
         between = None if via is None else frozen_array(via, "posture between", (body.nq,))
         posture = frozen_array(q, "posture", (body.nq,))
-        return cls(kept, posture, com, min_duration, com_room, between, momentum)
+        return cls(kept, posture, com, min_duration, com_room, between, momentum, tilted)
 
     @property
     def stance(self) -> Stance:
@@ -211,16 +215,27 @@ class ContactPlan:
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
 
     def schedule(self, model: ContactModel) -> ContactSchedule:
-        """The stances with a contact model in time, each as short as it may be, from zero on."""
-        phases = [
-            Phase(Stance(list(stage.contacts.values()), model=model), stage.min_duration)
-            for stage in self.stages
-        ]
+        """The stances with a contact model in time, each as short as it may be, from zero on.
+
+        A foot that leaves or lands on its toes tilts in a share of the stage before or after.
+        """
+        phases = list[Phase]()
+        for stage, after in zip(self.stages, [*self.stages[1:], None], strict=True):
+            landed, leaving = (
+                {item.effector: item for item in tilted if item.effector in stage.contacts}
+                for tilted in (stage.tilted, () if after is None else after.tilted)
+            )
+            flat = 1.0 - TILTING * (bool(landed) + bool(leaving))
+            for tilted, share in ((landed, TILTING), ({}, flat), (leaving, TILTING)):
+                if tilted or share == flat:
+                    contacts = [tilted.get(name, held) for name, held in stage.contacts.items()]
+                    phases.append(Phase(Stance(contacts, model=model), share * stage.min_duration))
         ends = np.cumsum([phase.min_duration for phase in phases])
         return ContactSchedule(StanceSequence(phases), np.concatenate([[0.0], ends]))
 
-    def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Key times (k,) [s] and configurations (k, nq): at (n + 1,) changes and, if any, in between."""
+    def keys(self, schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
+        """Key times (k,) [s] and configurations (k, nq): where stages begin and, if any, in between."""
+        instants = schedule.instants[[*self.begins(schedule), -1]]
         times, keys = [float(instants[0])], [self.stages[0].q]
         spans = pairwise(instants.tolist())
         for stage, end, (begin, stop) in zip(self.stages, self.postures[1:], spans, strict=True):
@@ -230,6 +245,11 @@ class ContactPlan:
             times.append(stop)
             keys.append(end)
         return np.array(times), np.array(keys)
+
+    def begins(self, schedule: ContactSchedule) -> Sequence[int]:
+        """Phase of a schedule with which each stage begins: feet that roll divide a stage."""
+        whole = len(self.stages) == len(schedule.sequence)
+        return range(len(self.stages)) if whole else schedule.sequence.changes
 
     @property
     def postures(self) -> FloatArray:

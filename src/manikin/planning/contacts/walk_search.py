@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
-from manikin.contact import Contact
+from manikin.body.limbs import hinge_line
+from manikin.contact import Contact, SolePart, sole_part
 from manikin.kinematics.step_reach import StepReach
 from manikin.kinematics.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.numerics.spatial import FloatArray
@@ -39,9 +40,6 @@ HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it,
 HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
 HAND_TRIES = 4  # ways that feet alone do not make after which hands may join at any step
 HOLDS = 6  # most places of hands that are tried at a step
-LANDING_INSETS = (0.03, 0.015)
-"""Distances of the centre of mass to the edge of where it may rest as a foot comes down a long way [m], tried
-where the usual one fails: that foot carries at once."""
 
 
 @dataclass(frozen=True)
@@ -137,8 +135,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         first = goal.contacts[FEET[0]]
         steepest = min(math.radians(30.0), math.atan(0.8 * friction))
         self._footholds = Footholds(body, scene, (first.length, first.width), steepest)
-        self._contact = cache(self._made)
-        self._postures: dict[tuple[frozenset[Contact], frozenset[str], int, float | None], Posed] = {}
+        self._contact, self._on_toes = cache(self._made), cache(self._tilted)
+        self._postures: dict[tuple[frozenset[Contact], frozenset[str], int], Posed] = {}
         self._near: dict[tuple[int, ...], list[Contact]] = {}
         radius, low, high = (scale * value for value in COLUMN)
         ends = feet_of(start.contacts), feet_of(goal.contacts)
@@ -178,6 +176,12 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             return (self.start if number < 2 else self.goal).contacts[foot]
         return self._footholds.contact(foot, self.search.holds[number], self.friction)
 
+    def _tilted(self, foot: Contact) -> Contact:
+        """The toes of a contact of a foot, the contact itself where they do not lie on a surface."""
+        hinge = hinge_line(self.poser.body, foot.effector)
+        rises = hinge is not None and foot.rises_on_toes(hinge)
+        return sole_part(foot, SolePart.TOES, hinge) if rises and hinge is not None else foot
+
     def _planned(self, way: list[int]) -> ContactPlan | None:
         stages = list(self._risen)
         self._moves = [None] * len(stages)
@@ -195,14 +199,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if leaving.same_place(landing):
                 continue
             before, after = (replace(places[j], trunk=trunks[j]) for j in (k, k + 1))
-            changes, held, start, landed = self._moved((leaving, standing, landing), before, after, hands, q)
-            if start is None or landed.q is None:
-                first = k if start is None else k + 1
+            changes, held, made, landed = self._moved((leaving, standing, landing), before, after, hands, q)
+            if landed.q is None:
+                first = k + len(made)
                 return self._refuse(way[first], way[first + 1], landed.reason, too_hard=landed.too_hard)
-            flight = self.settings.flight(leaving, landing)
-            lifted = Stage.of(body, {standing.effector: standing, **held}, start, flight)
-            both = {standing.effector: standing, landing.effector: landing, **held}
-            stages += [*changes, lifted, Stage.of(body, both, landed.q, self.settings.shift_duration)]
+            stages += [*changes, *made]
             self._moves += [(way[k + 1], way[k + 2])] * (2 + len(changes))
             q, hands = landed.q, held
         if hands:
@@ -249,18 +250,18 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _moved(
         self, feet: Sequence[Contact], before: _Stand, after: _Stand, hands: dict[str, Contact], q: FloatArray
-    ) -> tuple[list[Stage], dict[str, Contact], FloatArray | None, Posed]:
+    ) -> tuple[list[Stage], dict[str, Contact], list[Stage], Posed]:
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
-        failed: tuple[FloatArray | None, Posed] | None = None
+        failed: tuple[list[Stage], Posed] | None = None
         for lenient in (False, True) if self.replanned >= STRONG_TRIES else (False,):
             self._lenient = lenient
             for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
-                lifted, landed = self._step(feet, before, after, start, held)
+                made, landed = self._step(feet, before, after, start, held)
                 if landed.q is not None:
-                    return changes, held, lifted, landed
-                failed = failed or (lifted, landed)
-        lifted, landed = failed or (None, Posed(None, f"{' and '.join(hands)} cannot be left"))
-        return [], hands, lifted, landed
+                    return changes, held, made, landed
+                failed = failed or (made, landed)
+        made, landed = failed or ([], Posed(None, f"{' and '.join(hands)} cannot be left"))
+        return [], hands, made, landed
 
     def _hands_before(
         self, feet: Sequence[Contact], before: _Stand, after: _Stand, hands: dict[str, Contact], q: FloatArray
@@ -309,32 +310,54 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
 
     def _step(
         self, feet: Sequence[Contact], before: _Stand, after: _Stand, q: FloatArray, hands: Contacts
-    ) -> tuple[FloatArray | None, Posed]:
-        """Postures in which a foot leaves one place and lands on another, the other one stands."""
+    ) -> tuple[list[Stage], Posed]:
+        """Stages in which a foot has left one place and is on another, the other one stands.
+
+        With the posture that was looked for last: one without, and fewer stages, where there is none.
+        """
         leaving, standing, landing = feet
         carrying = {standing.effector: standing, **hands}
-        lifted = self._posed({leaving.effector: leaving, **carrying}, carrying, before, q)
+        off = abs(float(leaving.position[2] - standing.position[2])) > HIGH * self._scale
+        last, lifted = self._footed(leaving, carrying, before, q, tilts=off)
         if lifted.q is None:
-            return None, replace(lifted, reason=f"{leaving.effector} cannot be lifted: {lifted.reason}")
-        held = {**carrying, landing.effector: landing}
-        landed = self._posed(held, carrying, after, lifted.q)
-        if float(standing.position[2] - landing.position[2]) > HIGHEST * self._scale:
-            for inset in LANDING_INSETS:
-                landed = self._posed(held, carrying, after, lifted.q, inset) if landed.q is None else landed
-        return lifted.q, replace(landed, reason=f"{landing.effector} cannot be put down: {landed.reason}")
+            return [], replace(lifted, reason=f"{leaving.effector} cannot be lifted: {lifted.reason}")
+        body, flight = self.poser.body, self.settings.flight(leaving, landing)
+        stages = [Stage.of(body, carrying, lifted.q, flight, tilted=() if last is leaving else (last,))]
+        down = float(standing.position[2] - landing.position[2]) > HIGH * self._scale
+        first, landed = self._footed(landing, carrying, after, lifted.q, tilts=down)
+        if landed.q is None:
+            return stages, replace(landed, reason=f"{landing.effector} cannot be put down: {landed.reason}")
+        both, shift = {**carrying, landing.effector: landing}, self.settings.shift_duration
+        tilted = () if first is landing else (first,)
+        return [*stages, Stage.of(body, both, landed.q, shift, tilted=tilted)], landed
+
+    def _footed(
+        self, foot: Contact, carrying: Contacts, place: _Stand, q: FloatArray, *, tilts: bool
+    ) -> tuple[Contact, Posed]:
+        """What a foot touches with that does not carry, and the posture: its toes where it cannot lie flat.
+
+        Args:
+            tilts: Whether its toes may touch alone.
+        """
+        for foot_or_toes in (foot, self._on_toes(foot)) if tilts else (foot,):
+            held = {**carrying, foot.effector: foot_or_toes}
+            posed = self._posed(held, carrying, place, q, thorough=not tilts)
+            if posed.q is not None:
+                return foot_or_toes, posed
+        return foot, posed
 
     def _posed(
-        self, held: Contacts, carrying: Contacts, place: _Stand, q: FloatArray, inset: float | None = None
+        self, held: Contacts, carrying: Contacts, place: _Stand, q: FloatArray, *, thorough: bool = True
     ) -> Posed:
-        """Posture that holds contacts and rests on some; looked for once with each trunk and inset."""
-        key = frozenset(held.values()), frozenset(carrying), place.trunk, inset
+        """Posture that holds contacts and rests on some; looked for once with each trunk."""
+        key = frozenset(held.values()), frozenset(carrying), place.trunk
         if key in self._postures:
             return self._strong(self._postures[key])
         guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
-        posed = self.poser.pose(held, carrying, q, guide, inset=inset)
-        if posed.q is None and (feet_alone or len(held) > 2):
+        posed = self.poser.pose(held, carrying, q, guide)
+        if posed.q is None and (feet_alone or len(held) > 2) and thorough:
             start = np.concatenate([guide, q[len(guide) :]])
-            posed = self.poser.pose(held, carrying, start, guide, inset=inset, restarts=feet_alone)
+            posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone)
         self._postures[key] = self.poser.eased(posed, held, carrying)
         return self._strong(self._postures[key])
 

@@ -8,14 +8,14 @@ landing, and in flight a point that moves from one to the other along the swing'
 timing are our own choice.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BPoly
 
-from manikin.body import BodyModel
+from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import toe_hinge
 from manikin.contact import ContactSchedule, SolePart, Swing
 from manikin.numerics.signals import least_jerk
@@ -31,6 +31,9 @@ BALL_PITCH = float(np.deg2rad(20.0))
 HIGHEST_PITCH, HIGH_STEP = float(np.deg2rad(48.0)), 0.22
 """Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature: with the
 heel down no leg bends far enough for the body to be over the lower foot."""
+
+LEAST_PITCH = 1.0e-3
+"""Least pitch of a foot on its toes [rad]."""
 
 MOST_EXTENSION = float(np.deg2rad(64.0))
 """Extension of the toes in flight, their range being 70 degrees [rad]."""
@@ -166,6 +169,32 @@ def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootR
         PUSH_OFF_PITCH + float(np.clip(drop, 0.0, 1.0)) * (HIGHEST_PITCH - PUSH_OFF_PITCH),
         BALL_PITCH if end.part is SolePart.TOES else -HEEL_STRIKE_PITCH,
     )  # fmt: skip
+
+
+def rolls_through(
+    body: BodyModel, schedule: ContactSchedule, postures: Callable[[float], FloatArray]
+) -> Rolls:
+    """Rolls of all flights of a schedule; feet leave and land on their toes with the pitch of a posture.
+
+    Args:
+        postures: (nq,) configuration at a time [s].
+    """
+    found = list[tuple[str, FootRoll]]()
+    for swing in schedule.sequence.swings():
+        roll = foot_roll(body, schedule, swing)
+        if roll is None:
+            continue
+        up, off, land, flat = roll.instants.tolist()
+        for key, time, pose, tilts in (
+            ("push_off", off, roll.start, off > up), ("touch", land, roll.end, flat > land)
+        ):  # fmt: skip
+            if tilts:
+                turned, _ = Configuration(body, postures(time)).effector_placement(swing.effector)
+                turn = pose.rotation.T @ turned
+                pitch = max(LEAST_PITCH, float(np.arctan2(turn[0, 2], turn[0, 0])))
+                roll = replace(roll, **{key: pitch})
+        found.append((swing.effector, roll))
+    return found
 
 
 def _held(curve: BPoly, ends: FloatArray, time: FloatArray) -> FloatArray:

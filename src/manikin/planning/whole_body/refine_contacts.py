@@ -24,6 +24,7 @@ from manikin.motion.configuration_spline import TurnDerivatives
 from manikin.motion.dynamics import MotionSamples
 from manikin.numerics.spatial import FloatArray, skew
 from manikin.planning.whole_body.fit_targets import ALMOST, GRASP_ROTATION_WEIGHT, EffectorTarget
+from manikin.planning.whole_body.foot_roll import Rolls
 from manikin.planning.whole_body.refine_input import KeyPath
 
 LEAST = 0.1
@@ -114,7 +115,11 @@ def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, 
 
 
 def contact_targets(
-    schedule: ContactSchedule, time: FloatArray, variables: dict[str, FloatArray], approach: float
+    schedule: ContactSchedule,
+    time: FloatArray,
+    variables: dict[str, FloatArray],
+    approach: float,
+    rolls: Rolls = (),
 ) -> dict[str, EffectorTarget]:
     """Targets of every effector at times (n,) [s] by the contact variables.
 
@@ -124,6 +129,7 @@ def contact_targets(
         variables: Those of :func:`contact_variables`.
         approach: Weight of the distance to a contact's normal in flight, relative to that of a held
             contact, at a variable of 1.
+        rolls: Of feet that leave from their toes.
     """
     targets = {name: EffectorTarget.free(len(time)) for name in schedule.sequence.effectors}
     for swing in schedule.sequence.swings():
@@ -144,6 +150,15 @@ def contact_targets(
             target.put(rows, contact)
             target.weight[rows], target.rotation_weight[rows] = 1.0, _turn_weight(contact)
             target.along[rows] = np.eye(3)
+    for name, roll in rolls:
+        target, (up, *flight, flat) = targets[name], roll.instants.tolist()
+        middle = 0.5 * sum(flight)
+        for pivot, first, last in zip(roll.pivots, (up, middle), (middle, flat), strict=True):
+            rows = (time > first) & (time < last)
+            count = int(rows.sum())
+            target.position[rows], target.rotation[rows] = roll.pose(
+                np.tile(pivot.position, (count, 1)), np.tile(pivot.rotation, (count, 1, 1)), time[rows]
+            )
     return targets
 
 

@@ -84,7 +84,7 @@ def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> No
 
     Raises:
         InputError: If the configurations are not the body's or the times differ.
-        ContactError: If the body has no such effector or a part of a sole is asked for.
+        ContactError: If the body has no such effector or another part of a sole than its toes is asked for.
     """
     if (count := path.q.shape[1]) != body.nq:
         raise InputError(f"key configurations have {count} columns; valid: {body.nq} of {body.name!r}")
@@ -99,8 +99,8 @@ def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> No
             name, part = contact.effector, contact.part
             if name not in body.effectors:
                 raise ContactError(f"phase {number} holds {name!r}; valid: {', '.join(body.effectors)}")
-            if part is not SolePart.FULL:
-                raise ContactError(f"phase {number} holds the {part} of {name!r}; valid: full soles")
+            if part not in (SolePart.FULL, SolePart.TOES):
+                raise ContactError(f"phase {number} holds the {part} of {name!r}; valid: full soles and toes")
 
 
 def retime(

@@ -28,7 +28,8 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.contact_variables import Variables
 from manikin.planning.whole_body.fit_objective import FitLinearisation, MotionObjective, to_raw
 from manikin.planning.whole_body.fit_scales import MotionScales, RefineScales
-from manikin.planning.whole_body.fit_targets import FitTargets
+from manikin.planning.whole_body.fit_targets import FitTargets, lay_toes_flat, toe_angles
+from manikin.planning.whole_body.foot_roll import rolls_through
 from manikin.planning.whole_body.refine_contacts import (
     LEAST,
     LimbDirections,
@@ -80,12 +81,14 @@ def refine_targets(
                 variables[name][phases == number] *= own[name]
                 load[phases == number, column] *= np.sqrt(own[name])
     obstacles, n = RefineObstacles(body, scene, schedule, time, padded), len(time)
-    reference, guide = path.at(time), np.full(body.nv, scales.guide)
-    guide[:3] = np.inf
+    reference, guide = path.at(time), np.full((n, body.nv), scales.guide)
+    guide[:, :3] = np.inf
     for joint in sole_toes(body, schedule):
-        reference[:, 7 + joint], guide[6 + joint] = 0.0, scales.toes
+        reference[:, 7 + joint], guide[:, 6 + joint] = 0.0, scales.toes
+    rolls = rolls_through(body, schedule, lambda when: path.at(np.array([when]))[0])
+    lay_toes_flat(toe_angles(body, rolls, time), reference, guide)
     return RefineTargets(
-        time, contact_targets(schedule, time, variables, scales.position / scales.approach),
+        time, contact_targets(schedule, time, variables, scales.position / scales.approach, rolls),
         com=np.zeros((n, 3)), com_weight=np.zeros(n), com_acceleration=np.zeros((n, 3)), margin=np.zeros(n),
         reference=reference, reference_scale=guide, ignored=obstacles.ignored, variables=variables, load=load,
         limbs=limb_directions(body, path, schedule, time, task), obstacles=obstacles, schedule=schedule,
