@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration
+from manikin.body.limbs import toe_hinge
 from manikin.contact import point, sole
 from manikin.errors import ContactError, ScenarioError
+from manikin.kinematics import Placement, PostureProblem, generate_posture
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene.obstacle import Box, Cylinder, Obstacle
 from manikin.verification import check_contact_plan, load_contact_plan, parse_contact_plan
@@ -188,6 +190,41 @@ def test_a_broken_plan_is_refused_with_the_true_cause(rising, spoil):
     assert broken is not None
     assert broken.key == BREAKS[spoil]
     assert broken.measured == pytest.approx(MEASURED.get(spoil, broken.measured), abs=1e-6)
+
+
+def test_a_foot_may_leave_from_its_toes():
+    """The left heel is up by 0.3 rad: held where the plan says so and the toes lie flat."""
+    scenario, plan = load_contact_plan(DATA / "stairs.json")
+    body, stages = scenario.build_body(), list(plan.stages)
+    number = next(k for k, s in enumerate(stages) if set(s.contacts) == {"right_foot"})
+    stage, foot = stages[number], stages[number - 1].contacts["left_foot"]
+    hinge, flat = toe_hinge(body, "left_foot"), foot.rotation_contact_to_world
+    turned = flat @ rotation_from_rpy(0.0, 0.3, 0.0)
+    place = Placement(foot.position + flat @ hinge - turned @ hinge, turned)
+    com = Configuration(body, stage.posture).com
+    standing = tuple(stage.contacts.values())
+    found = generate_posture(PostureProblem(body, standing, {"left_foot": place}, com=com), stage.posture)
+    assert found.succeeded
+    verdicts = {}
+    for names, angle in (((), 0.3), (("left_foot",), 0.3), (("left_foot",), 0.32)):
+        q = found.q.copy()
+        q[7 + body.joint_names.index("left_toe_extension")] = angle
+        stages[number] = replace(stage, posture=q, com=None, on_toes=frozenset(names))
+        tilted_plan = replace(plan, stages=tuple(stages))
+        content = tilted_plan.to_dict(body, scenario)
+        assert content["stages"][number].get("on_toes", []) == list(names)
+        again = parse_contact_plan(content, "a plan", scenario)[1]
+        assert again.stages[number].on_toes == frozenset(names)
+        broken = check_contact_plan(scenario, tilted_plan).requirements.first_broken
+        verdicts[names, angle] = broken and (broken.key, broken.measured)
+    key, missed = verdicts[(), 0.3]
+    assert key == "max_contact_error_m"
+    # The middle of the sole is on a circle about the hinge.
+    assert missed == pytest.approx(2.0 * np.sin(0.15) * np.linalg.norm(hinge[[0, 2]]), abs=1e-4)
+    assert verdicts[("left_foot",), 0.3] is None
+    key, missed = verdicts[("left_foot",), 0.32]
+    assert key == "max_contact_error_m"
+    assert missed == pytest.approx(0.02 * (0.5 * foot.length - hinge[0]), rel=0.1)
 
 
 def test_numbers_that_are_none_are_refused(rising):

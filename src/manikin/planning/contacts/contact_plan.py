@@ -1,7 +1,7 @@
 """A sequence of contacts with a posture for every change, as the searches find it."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
@@ -219,19 +219,23 @@ class ContactPlan:
 
         A foot that leaves or lands on its toes tilts in a share of the stage before or after.
         """
-        phases = list[Phase]()
-        for stage, after in zip(self.stages, [*self.stages[1:], None], strict=True):
-            landed, leaving = (
-                {item.effector: item for item in tilted if item.effector in stage.contacts}
-                for tilted in (stage.tilted, () if after is None else after.tilted)
-            )
-            flat = 1.0 - TILTING * (bool(landed) + bool(leaving))
-            for tilted, share in ((landed, TILTING), ({}, flat), (leaving, TILTING)):
-                if tilted or share == flat:
-                    contacts = [tilted.get(name, held) for name, held in stage.contacts.items()]
-                    phases.append(Phase(Stance(contacts, model=model), share * stage.min_duration))
+        phases = [
+            Phase(Stance([part.get(name, held) for name, held in stage.contacts.items()], model=model), time)
+            for stage, parts in zip(self.stages, self._parts(), strict=True) for part, time in parts
+        ]  # fmt: skip
         ends = np.cumsum([phase.min_duration for phase in phases])
         return ContactSchedule(StanceSequence(phases), np.concatenate([[0.0], ends]))
+
+    def _parts(self) -> Iterator[list[tuple[Contacts, float]]]:
+        """Parts of each stage with their durations [s]: what touches on its toes as it begins, and ends."""
+        for stage, tilted in zip(self.stages, [*(s.tilted for s in self.stages[1:]), ()], strict=True):
+            landed, leaving = (
+                {item.effector: item for item in items if item.effector in stage.contacts}
+                for items in (stage.tilted, tilted)
+            )
+            flat = 1.0 - TILTING * (bool(landed) + bool(leaving))
+            parts = ((landed, TILTING * bool(landed)), ({}, flat), (leaving, TILTING * bool(leaving)))
+            yield [(part, share * stage.min_duration) for part, share in parts if share > 0.0]
 
     def keys(self, schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
         """Key times (k,) [s] and configurations (k, nq): where stages begin and, if any, in between."""
@@ -248,8 +252,10 @@ class ContactPlan:
 
     def begins(self, schedule: ContactSchedule) -> Sequence[int]:
         """Phase of a schedule with which each stage begins: feet that roll divide a stage."""
-        whole = len(self.stages) == len(schedule.sequence)
-        return range(len(self.stages)) if whole else schedule.sequence.changes
+        parts = [len(of_stage) for of_stage in self._parts()]
+        counts = [1] * len(parts) if len(parts) == len(schedule.sequence) else parts
+        own = sum(counts) == len(schedule.sequence)
+        return [0, *np.cumsum(counts[:-1]).tolist()] if own else schedule.sequence.changes
 
     @property
     def postures(self) -> FloatArray:
