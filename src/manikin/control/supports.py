@@ -196,12 +196,10 @@ class SupportSwitch:
             memory.landed = None
         if memory.landed is not None:
             since = time - max(memory.landed, interval.start)
-            # A seat takes the weight as soon as it is touched.
-            rising = 1.0 if interval.contact.settle > 0.0 else since / self._settings.load_time
             falling = (interval.end - time) / self._settings.unload_time
             return SupportState(
                 name, SupportMode.STANCE, interval.contact_at(time),
-                load_share=float(np.clip(rising, _FIRST_SHARE, 1.0)),
+                load_share=self._load_share(interval.contact, since),
                 unload_share=float(np.clip(falling, 0.0, 1.0)), planned=planned,
                 fades=self._fades(interval, time), settling=settling,
             )  # fmt: skip
@@ -212,6 +210,14 @@ class SupportSwitch:
         way, rate = self._settings.descent(part, time - max(interval.start, memory.touched))
         press = min(self._settings.press_depth, way - height)
         return SupportState(name, SupportMode.LANDING, part, press=press, press_rate=rate, settling=settling)
+
+    def _load_share(self, contact: Contact, since: float) -> float:
+        """Share of the force limits at a time since the touch-down [s]; toes are light, and would dig in."""
+        if contact.settle > 0.0:  # a seat takes the weight as soon as it is touched
+            return 1.0
+        rolls = contact.part is SolePart.TOES
+        rising = since / (self._settings.rolling_load_time if rolls else self._settings.load_time)
+        return float(np.clip(rising, _FIRST_SHARE, 1.0)) ** (2 if rolls else 1)
 
     def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""
