@@ -242,10 +242,10 @@ def test_a_step_that_no_leg_can_make_is_explained():
 
 
 def test_a_hand_joins_where_feet_alone_do_not_make_a_step(checked):
-    """Up a block of 0.65 m beside a rail: each change is of one contact, and rest is within the strength."""
+    """Up a block of 0.75 m beside a rail: each change is of one contact, and rest is within the strength."""
     scene = Scene([
-        Obstacle("block", Box((0.9, 1.0, 0.65)), translation=(0.9, 0.0, 0.325)),
-        Obstacle("rail", Cylinder(0.02, 2.0), rotation=ALONG_X, translation=(0.6, 0.45, 1.1)),
+        Obstacle("block", Box((0.9, 1.0, 0.75)), translation=(0.9, 0.0, 0.375)),
+        Obstacle("rail", Cylinder(0.02, 2.0), rotation=ALONG_X, translation=(0.6, 0.45, 1.2)),
     ])  # fmt: skip
     found, _, _ = planned(scene, (0.95, 0.0))
     assert found.failure is None
