@@ -246,3 +246,12 @@ def test_a_foot_in_flight_keeps_off_what_it_leaves_and_reaches_in_the_middle_of_
     np.testing.assert_allclose(wanted[2, :2], LOW)
     np.testing.assert_allclose([wanted[1, 0], wanted[3, 1]], -TOUCHING, atol=1e-9)
     np.testing.assert_allclose([wanted[1, 1], wanted[3, 0]], LOW)
+
+
+def test_a_foot_keeps_its_whole_distance_while_its_knee_carries():
+    """It is in the air for a whole crawl; led by the middle of that flight, toes came 5 mm near the floor."""
+    knee = point("right_knee", (0.3, -0.1, 0.0), friction=0.6)
+    held = [[LEFT, RIGHT], [LEFT], [LEFT, knee], [LEFT], [LEFT, RIGHT]]
+    sequence = StanceSequence([Phase(Stance(contacts, 1500.0)) for contacts in held])
+    schedule = ContactSchedule(sequence, np.arange(6.0))
+    assert LowFlights.of(BODY, SCENE, schedule, np.linspace(0.0, 5.0, 6)) is None

@@ -339,6 +339,8 @@ class LowFlights:
                 continue
             if {swing.start.kind, swing.end.kind} != {ContactKind.SOLE}:
                 continue
+            if carries_elsewhere(body, schedule, swing):  # its knee carries; it keeps off like anything else
+                continue
             start, end = schedule.swing_interval(swing)
             for contact, gone in ((swing.start, time - start), (swing.end, end - time)):
                 share = np.clip(gone / (RISING * (end - start)), 0.0, 1.0)
