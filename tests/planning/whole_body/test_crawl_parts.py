@@ -120,30 +120,23 @@ def test_a_part_that_fails_is_given_more_time_and_what_follows_comes_later(stand
     assert result.guide.time[-1] == pytest.approx(result.trajectory.duration)
 
 
-def test_a_part_that_fails_begins_in_the_known_posture_instead(standing, monkeypatch):
-    """The one before is planned again to that posture; any other is refused as if a thigh were in the way."""
-    known = standing.copy()
-    known[7 + BODY.joint_index("left_forearm_pronation")] += 0.3  # it moves no centre of mass
-    guide = Guide(INSTANTS, np.array([standing, known, known]), ())
-    planner = _Planner(
-        BODY, Scene([]), still(standing), np.random.default_rng(0), WholeBodySettings(),
-        known=guide.resting(INSTANTS),
-    )  # fmt: skip
-    run = _Planner.run
+def test_a_motion_ends_with_the_part_that_fails(standing, monkeypatch):
+    """What follows would only take time: its failure is the motion's, which lasts as long as it is known."""
+    known = Guide(INSTANTS, np.array([standing] * 3), ())
+    rng = np.random.default_rng(0)
+    planner = _Planner(BODY, Scene([]), still(standing), rng, WholeBodySettings(), known=known)
+    run, begins = _Planner.run, []
 
-    def caught(self, *args):
-        result, start = run(self, *args), self.ends[0]
-        if start is None or np.allclose(start, known, atol=1e-6):
-            return result
-        return replace(result, failure=WholeBodyFailure("caught", self.instants[0], ""))
+    def refused(self, *args):
+        begins.append(self.instants[0])
+        return replace(run(self, *args), failure=WholeBodyFailure("refused", self.instants[0], ""))
 
-    monkeypatch.setattr(_Planner, "run", caught)
+    monkeypatch.setattr(_Planner, "run", refused)
     result = _in_parts(planner, [0, 1, 2], 0.0, lambda _: None)
-    assert result.succeeded, result.failure
-    np.testing.assert_allclose(result.trajectory.schedule.instants, INSTANTS)
-    meeting = result.spline.evaluate(INSTANTS[1:2])
-    np.testing.assert_allclose(meeting.q[0, 7:], known[7:], atol=1e-6)
-    np.testing.assert_allclose(meeting.v, 0.0, atol=1e-6)
+    assert result.failure is not None
+    assert result.failure.reason == "refused"
+    assert begins == [0.0] * (1 + len(SLOWER))
+    assert result.motion.time[-1] == pytest.approx(INSTANTS[1])
 
 
 def test_a_guide_through_another_posture_has_it_at_that_time_and_rests_there_still(standing):

@@ -135,6 +135,7 @@ def test_a_thigh_that_kneels_is_kept_clear_of_where_the_posture_has_it():
     )
     planner = FlightPlanner(body, Scene(), trajectory, SwingLimits(), np.random.default_rng(0), lambda _: q)
     (swing,) = planner.flights
+    assert planner._pitch(swing, 1.0) == 0.0  # a shank needs no turn, unlike a foot left as far behind
     clearance, pose = planner._clearance(swing), Pose.of(held["left_knee"])
     beside = Pose(pose.position + np.array([0.25, -0.02, 0.08]), pose.rotation)
     room = [clearance(time, beside) for time in (1.0, 1.5, 2.0)]

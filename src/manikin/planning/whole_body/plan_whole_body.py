@@ -480,28 +480,27 @@ def _in_parts(planner: _Planner, keys: Sequence[int], began: float, progress: Pr
     """Plan a motion in parts from rest to rest, and join them.
 
     A fit takes or leaves a step for the whole of its motion, and its repairs weigh all of it anew. A part
-    ends in any posture of its contacts; where the next one fails from there, it is planned to the known one.
+    ends in any posture of its contacts. The motion ends with a part that fails, as the failure is known.
     """
-    parts, spans = list[WholeBodyResult](), list(pairwise(keys))
-    for number, span in enumerate(spans):
-        progress(0.2 + 0.8 * number / len(spans))
-        later, part = _with_time(planner, span, (_end_of(parts), None), began)
-        if parts and not part.succeeded:
-            mended = _from_known(planner, spans[number - 1 : number + 1], _end_of(parts[:-1]), began)
-            if mended is not None:
-                later, parts[-1], part = mended
-        planner = later
+    parts, last = list[WholeBodyResult](), 0
+    for first, last in pairwise(keys):
+        progress(0.2 + 0.8 * first / keys[-1])
+        planner, part = _with_time(planner, (first, last), (_end_of(parts), None), began)
         parts.append(part)
+        if not part.succeeded:
+            break
     spline = ConfigurationSpline.joined([part.spline for part in parts])
     guide = Guide.joined([part.guide for part in parts])
     flights = [item for part in parts for item in part.swings]
     # A flight near the end of a part is one of the next part, too.
     swings = {(one.swing.effector, one.swing.first_phase, one.swing.start is None): one for one in flights}
-    goal = _Goal(planner, tuple(swings.values()), guide, planner.settings.manner, True)
+    whole = planner.part(keys[0], last, (None, None))
+    goal = _Goal(whole, tuple(swings.values()), guide, planner.settings.manner, True)
     motion, certificate = goal.measure(spline)
+    failure = goal.failure(certificate) or parts[-1].failure
     progress(1.0)
     return WholeBodyResult(
-        planner.trajectory, motion, spline, certificate, goal.swings, guide, goal.failure(certificate),
+        planner.trajectory, motion, spline, certificate, goal.swings, guide, failure,
         sum(part.iterations for part in parts), clock.perf_counter() - began,
     )  # fmt: skip
 
@@ -509,23 +508,6 @@ def _in_parts(planner: _Planner, keys: Sequence[int], began: float, progress: Pr
 def _end_of(parts: Sequence[WholeBodyResult]) -> FloatArray | None:
     """Posture (nq,) in which the last part ends; None without parts."""
     return parts[-1].spline.control_points[-1] if parts else None
-
-
-def _from_known(
-    planner: _Planner, spans: Sequence[tuple[int, int]], start: FloatArray | None, began: float
-) -> tuple[_Planner, WholeBodyResult, WholeBodyResult] | None:
-    """Plan two parts that meet in the posture that is known there, after a ``start`` (nq,).
-
-    Returns:
-        The job at their timing and both parts; None where one fails.
-    """
-    assert planner.known is not None  # parts meet only where postures are known
-    meeting = planner.known.at(planner.instants[[spans[0][1]]])[0]
-    planner, before = _with_time(planner, spans[0], (start, meeting), began)
-    if not before.succeeded:
-        return None
-    planner, after = _with_time(planner, spans[1], (meeting, None), began)
-    return (planner, before, after) if after.succeeded else None
 
 
 def _with_time(

@@ -334,8 +334,13 @@ class FlightPlanner:
         return tuple(lateral for lateral in LATERALS if lateral == 0.0 or least < 2.0 * lateral < most)
 
     def _pitch(self, swing: Swing, lift_off: float) -> float:
-        """Turn the toes down where the foot is left far behind: a level foot has no posture there [rad]."""
+        """Turn the toes down where the foot is left far behind: a level foot has no posture there [rad].
+
+        A knee or wrist is left as it is: it turns as it likes.
+        """
         assert swing.start is not None
+        if rolls_on_point(swing.start):
+            return 0.0
         yaw, away = swing.start.yaw, self._trajectory.position(lift_off) - swing.start.position
         behind = float(np.cos(yaw) * away[0] + np.sin(yaw) * away[1])
         # Toes turn down [rad/m] where the foot is further behind the centre of mass than 0.08 m.
