@@ -34,6 +34,17 @@ def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
     return children[0] if leaf else None
 
 
+def stature_of(body: BodyModel) -> float:
+    """Stature of a body that stands on feet [m].
+
+    Raises:
+        BodyError: If the body has none, as creatures have.
+    """
+    if body.stature is None:
+        raise BodyError(f"body {body.name!r} has no stature; valid: a human")
+    return body.stature
+
+
 def hangs(body: BodyModel, effector: str) -> bool:
     """Whether an effector is at the end of a limb, so that it can reach by itself."""
     return body.effector(effector).segment != body.segments[0].name

@@ -172,6 +172,18 @@ def rotation_from_normal(normal: ArrayLike, yaw: float = 0.0) -> FloatArray:
     return tilt @ rotation_from_yaw(yaw)
 
 
+def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
+    """(3, 3) rotation turned by the shortest way so that its z axis is the unit normal exactly."""
+    across = skew(normal) @ rotation[:, 0]
+    length = math.sqrt(across @ across)
+    if length < 1e-9:
+        across, length = np.array(rotation[:, 1]), 1.0
+    y = across / length
+    turned = np.empty((3, 3))
+    turned[:, 0], turned[:, 1], turned[:, 2] = skew(y) @ normal, y, normal
+    return turned
+
+
 def yaw_about_normal(rotation: FloatArray) -> float:
     """Yaw [rad] with which :func:`rotation_from_normal` gives a rotation (3, 3) for its z axis."""
     x, y, _ = rotation_from_normal(rotation[:, 2]).T @ rotation[:, 0]

@@ -27,7 +27,6 @@ from manikin.planning.contacts import (
     Hindrance,
     Random,
     Situation,
-    SurfaceTable,
     find_candidates,
 )
 from manikin.planning.contacts.contact_plan import footprint
@@ -37,6 +36,7 @@ from manikin.scenarios import load_scenario
 from manikin.scenarios.world import contact_rules, start_posture
 from manikin.scene import Box, Capsule, Cylinder, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
 from manikin.scene.collision import pair_meter
+from manikin.scene.surface_table import SurfaceTable
 
 UP = Task((0.0, 0.0, 1.0))
 PUSH = Task((1.0, 0.0, 0.0), {"left_arm", "right_arm"})
@@ -512,7 +512,7 @@ def test_candidates_are_all_samples_near_a_surface(person, person_samples):
     state = Configuration(person, person.standing_posture())
     situation = Situation.of(state, samples.limb, np.array([0.0, 0.0, 1.0]))
     table = SurfaceTable(surfaces)
-    near = table.within_reach(situation, samples, 0.03)
+    near = table.within_reach(situation.rotation, situation.origin, *samples.hull, 0.03)
     found = find_candidates(
         table, near, situation, samples, tolerance=0.03, max_tilt=0.7, footprint=np.zeros((1, 3))
     )

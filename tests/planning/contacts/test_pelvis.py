@@ -21,13 +21,13 @@ from manikin.planning.contacts import (
     Hindrance,
     Situation,
     StrongEfort,
-    SurfaceTable,
     find_candidates,
 )
 from manikin.planning.contacts.contact_plan import footprint
 from manikin.planning.guide import NO_MARGINS, Condition, ReachabilityChecker, abstraction_of
 from manikin.scenarios import load_scenario
 from manikin.scene import Box, Obstacle, Scene
+from manikin.scene.surface_table import SurfaceTable
 
 BODY = with_further_contacts(human(), ("pelvis",))
 SAMPLES = sample_limbs(BODY, np.random.default_rng(0), 400)
@@ -110,7 +110,7 @@ def test_every_heuristic_scores_a_pelvis():
     q = sitting(0.0)
     situation = Situation.of(Configuration(BODY, q), limb, UP.direction)
     table = SurfaceTable(scene.surfaces)
-    near = table.within_reach(situation, SAMPLES["pelvis"], 0.03)
+    near = table.within_reach(situation.rotation, situation.origin, *SAMPLES["pelvis"].hull, 0.03)
     found = find_candidates(
         table, near, situation, SAMPLES["pelvis"], tolerance=0.03, max_tilt=0.5,
         footprint=footprint(BODY, limb, ContactKind.SOLE),

@@ -1,7 +1,7 @@
 """Contacts found on their own: the searches for feet and limbs, and the request for one contact."""
 
 from manikin.planning.contacts.best_first import Extension, heading_of
-from manikin.planning.contacts.candidates import Candidates, Situation, SurfaceTable, find_candidates
+from manikin.planning.contacts.candidates import Candidates, Situation, find_candidates
 from manikin.planning.contacts.contact_plan import ContactPlan, ContactRules, Stage
 from manikin.planning.contacts.crawl_search import CrawlSearch
 from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
@@ -38,6 +38,6 @@ __all__ = [
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance",
     "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability",
     "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage", "StrongEfort",
-    "SurfaceTable", "WalkSearch", "WalkSettings", "WeightedSum", "duration",
+    "WalkSearch", "WalkSettings", "WeightedSum", "duration",
     "find_candidates", "heading_of", "leave_seat", "limb_holds", "starts_on_limbs", "take_seat",
 ]  # fmt: skip

@@ -23,7 +23,7 @@ from manikin.contact import (
     sole,
 )
 from manikin.errors import ContactError
-from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.numerics.spatial import FloatArray, frozen_array
 
 Contacts = Mapping[str, Contact]
 """Contacts by their effectors."""
@@ -94,18 +94,6 @@ def make_contact(
     if rules.patch is None or limb.patch is not None:
         return whole
     return replace(whole, points=frozen_array(footprint(body, limb, kind, rules), "sole's patch [m]", (4, 3)))
-
-
-def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
-    """(3, 3) rotation turned by the shortest way so that its z axis is the unit normal exactly."""
-    across = skew(normal) @ rotation[:, 0]
-    length = math.sqrt(across @ across)
-    if length < 1e-9:
-        across, length = np.array(rotation[:, 1]), 1.0
-    y = across / length
-    turned = np.empty((3, 3))
-    turned[:, 0], turned[:, 1], turned[:, 2] = skew(y) @ normal, y, normal
-    return turned
 
 
 TILTING = 0.35  # share of a phase in which a foot that leaves or lands on its toes tilts; our choice

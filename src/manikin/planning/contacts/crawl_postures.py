@@ -11,12 +11,11 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import of_both_sides
+from manikin.body.limbs import of_both_sides, stature_of
 from manikin.contact import Contact, point
 from manikin.kinematics import Placement, Preferences
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
 from manikin.planning.contacts.contact_plan import Contacts
-from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
 from manikin.scene import Box, Obstacle, Scene
 

@@ -14,15 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import stature_of
 from manikin.contact import Contact, point
-from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray, onto_normal, rotation_from_yaw
 from manikin.planning.contacts.best_first import Extension
-from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage, onto_normal
+from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.crawl_postures import APART, CRAWLERS, CrawlPostures, fingers_out
 from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
-from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
 

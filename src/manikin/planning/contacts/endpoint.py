@@ -12,11 +12,11 @@ from itertools import chain, product
 import numpy as np
 
 from manikin.body import Configuration
+from manikin.body.limbs import stature_of
 from manikin.contact import Contact
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
 from manikin.planning.contacts.footholds import FEET, Footholds
-from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.limb_search import LimbHolds
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.seat import Sitter, Sitting, hand_supports, leave_seat
@@ -148,13 +148,10 @@ class Endpoints:
                 if not low <= level - floor <= high:
                     continue
                 bare = list(sitter.sittings(np.array([*at, level]), heading, seat, floor))
-                hands = ((self._hands_beside(held["buttocks"]), held, guess) for held, guess in bare)
-                pushing = (({**held, **beside}, guess) for beside, held, guess in hands if beside)
+                rest = self._stature, self._friction, self._footholds.steepest
+                hands = ((hand_supports(self._scene, on["buttocks"], *rest), on, guess) for on, guess in bare)
+                pushing = (({**on, **beside}, guess) for beside, on, guess in hands if beside)
                 yield from chain(pushing, bare) if self._hands else chain(bare, pushing)
-
-    def _hands_beside(self, buttocks: Contact) -> dict[str, Contact]:
-        scene, steepest = self._scene, self._footholds.steepest
-        return hand_supports(scene, buttocks, self._stature, self._friction, steepest)
 
     def _levels(self, at: FloatArray, height: float | None) -> list[float]:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""

@@ -18,17 +18,13 @@ from manikin.kinematics.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Ali
 from manikin.kinematics.efort import Task, efort
 from manikin.kinematics.limb_collisions import DeepSamples, LimbCollisions
 from manikin.kinematics.limb_samples import LimbSamples
-from manikin.numerics.spatial import FloatArray
-from manikin.planning.contacts.candidates import (
-    Candidates,
-    IntArray,
-    Situation,
-    SurfaceTable,
-    find_candidates,
-)
-from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
+from manikin.numerics.spatial import FloatArray, onto_normal
+from manikin.planning.contacts.candidates import Candidates, Situation, find_candidates
+from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact
 from manikin.planning.contacts.heuristics import Efort, Heuristic
 from manikin.scene import Scene
+from manikin.scene.mesh import IntArray
+from manikin.scene.surface_table import SurfaceTable
 
 _GROWTH = 0.15  # how much longer each step down the order is than the one before
 _STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
@@ -202,7 +198,8 @@ class ContactGenerator:
         tools = self._tools[limb]
         touch = kind or tools.limb.kind
         situation = Situation.of(self._state.update(q), tools.limb, _NO_DIRECTION)
-        near = self._table.within_reach(situation, tools.samples, self.settings.tolerance)
+        place = situation.rotation, situation.origin
+        near = self._table.within_reach(*place, *tools.samples.hull, self.settings.tolerance)
         if touch is not ContactKind.GRASP:
             near = near[near < self._faces]  # on what is round only a palm can lie
         if not len(near):

@@ -11,11 +11,11 @@ from itertools import islice
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.limbs import stature_of
 from manikin.contact import Contact, grasp, point
-from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray, onto_normal, rotation_from_yaw
 from manikin.planning.contacts.best_first import heading_of
-from manikin.planning.contacts.contact_plan import onto_normal
-from manikin.planning.contacts.limb_places import PALM_ROOM, stature_of
+from manikin.planning.contacts.limb_places import PALM_ROOM
 from manikin.scene import Scene
 
 HANDS = ("left_hand", "right_hand")

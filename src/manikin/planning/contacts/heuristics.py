@@ -15,9 +15,9 @@ from manikin.errors import InputError
 from manikin.kinematics import LimbKinematics, ReachVolume
 from manikin.kinematics.efort import efort
 from manikin.kinematics.limb_samples import LimbSamples
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, onto_normal
 from manikin.planning.contacts.candidates import Candidates, Situation
-from manikin.planning.contacts.contact_plan import ContactRules, make_contact, onto_normal
+from manikin.planning.contacts.contact_plan import ContactRules, make_contact
 
 
 def cached_score(

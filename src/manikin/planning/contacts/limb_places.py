@@ -11,25 +11,12 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration, Limb
 from manikin.contact import Contact, ContactKind
-from manikin.errors import BodyError
 from manikin.kinematics.limb_samples import LimbSamples
-from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray, frozen_array, onto_normal, rotation_from_yaw
 from manikin.planning.contacts.best_first import heading_of
-from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
+from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact
 from manikin.planning.contacts.limb_search import LimbHolds
 from manikin.scene import GraspLine, Scene, Surface
-
-
-def stature_of(body: BodyModel) -> float:
-    """Stature of a body that stands on feet [m].
-
-    Raises:
-        BodyError: If the body has none, as creatures have.
-    """
-    if body.stature is None:
-        raise BodyError(f"body {body.name!r} has no stature; valid: a human")
-    return body.stature
-
 
 TOE_ROOM = 0.02  # distance of the toes to the end of the hold that carries them [m]; our choice
 TURN_OUT = float(np.deg2rad(25.0))  # angle by which a foot may stand turned out [rad]; our choice

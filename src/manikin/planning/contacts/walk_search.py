@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
-from manikin.body.limbs import hinge_line
+from manikin.body.limbs import hinge_line, stature_of
 from manikin.contact import Contact, SolePart, sole_part
 from manikin.kinematics.step_reach import StepReach
 from manikin.kinematics.trunk_postures import TrunkClearance, TrunkPostures
@@ -25,7 +25,6 @@ from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces,
 from manikin.planning.contacts.footholds import FEET, Foothold, Footholds, feet_of
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
-from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.seat import leave_seat
 from manikin.scene import Scene

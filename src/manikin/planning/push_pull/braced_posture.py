@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import stature_of
 from manikin.contact import Contact, FrictionModel, grasp
 from manikin.kinematics import Preferences
 from manikin.kinematics.efort import Task
@@ -26,7 +27,6 @@ from manikin.planning.contacts import (
     WeightedSum,
 )
 from manikin.planning.contacts.contact_plan import COM_ROOM
-from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
 from manikin.planning.push_pull.stance_heuristics import (
     LEVEL,
