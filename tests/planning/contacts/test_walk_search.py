@@ -24,6 +24,8 @@ from manikin.planning.contacts import (
 )
 from manikin.planning.contacts.footholds import Foothold
 from manikin.planning.contacts.handholds import Handholds
+from manikin.planning.contacts.posture_finder import Posed
+from manikin.planning.contacts.walk_search import STRONG_TRIES
 from manikin.scene import Box, Capsule, Cylinder, Obstacle, Proximity, Scene
 from manikin.scene.collision import collision_parts, column_is_free
 
@@ -405,3 +407,22 @@ def test_ends_that_do_not_exist_say_why():
     below = Endpoints(PostureFinder(BODY, low), 0.7).find(np.zeros(2), 0.0, Habit.STANDING, 0.0)
     assert below.stage is None
     assert "no posture standing at" in below.failure
+
+
+@pytest.mark.parametrize(("replanned", "passes"), [(0, False), (STRONG_TRIES, True)])
+def test_hands_left_at_the_end_are_judged_like_a_step(replanned, passes, monkeypatch):
+    """Whatever counted at the step before: too hard a posture passes only when steps may have such ones."""
+    found, start, goal = planned(Scene(), (0.3, 0.0))
+    search = WalkSearch(PostureFinder(BODY, Scene()), start, goal)
+    way, q = search._best(), found.plan.goal
+    search.replanned = replanned
+    hold = point("right_hand", (0.4, -0.4, 1.0), friction=0.7)
+    monkeypatch.setattr(search, "_posed", lambda *_, **__: search._strong(Posed(q, "hard", too_hard=True)))
+    for last in (False, True):
+
+        def moved(*_, last=last):
+            search._lenient = last
+            return [], {"right_hand": hold}, q, Posed(q)
+
+        monkeypatch.setattr(search, "_moved", moved)
+        assert (search._planned(way) is not None) is passes

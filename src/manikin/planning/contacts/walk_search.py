@@ -206,7 +206,9 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             self._moves += [(way[k + 1], way[k + 2])] * (2 + len(changes))
             q, hands = landed.q, held
         if hands:
-            left = self._left(stages[-1].contacts, places[-1], hands, q)
+            left = None
+            for _ in self._leniencies():
+                left = self._left(stages[-1].contacts, places[-1], hands, q) if left is None else left
             if left is None:
                 return self._refuse(way[-2], way[-1], f"{' and '.join(hands)} cannot be left")
             stages += left
@@ -252,8 +254,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
     ) -> tuple[list[Stage], dict[str, Contact], list[Stage], Posed]:
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
         failed: tuple[list[Stage], Posed] | None = None
-        for lenient in (False, True) if self.replanned >= STRONG_TRIES else (False,):
-            self._lenient = lenient
+        for _ in self._leniencies():
             for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
                 made, landed = self._step(feet, before, after, start, held)
                 if landed.q is not None:
@@ -359,6 +360,12 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone)
         self._postures[key] = self.poser.eased(posed, held, carrying)
         return self._strong(self._postures[key])
+
+    def _leniencies(self) -> Iterator[None]:
+        """Try without postures that are too hard at rest, then, after many ways, with them."""
+        for lenient in (False, True) if self.replanned >= STRONG_TRIES else (False,):
+            self._lenient = lenient
+            yield
 
     def _strong(self, posed: Posed) -> Posed:
         """The posture, or none where the joints are too weak for it and that counts."""
