@@ -266,6 +266,21 @@ def inset_polygon(polygon: FloatArray, distance: float) -> FloatArray:
     return polygon_of_halfplanes(out, offsets - distance)
 
 
+def rectangles_apart(
+    ahead: FloatArray, aside: FloatArray, turned: FloatArray, size: tuple[float, float]
+) -> FloatArray:
+    """(k,) widest gap between two rectangles of a size along the edges of one of them [m]; negative: overlap.
+
+    The middle of the second one is ahead and aside (k,) of that of the first [m], and turned (k,) [rad].
+    """
+    c, s = np.cos(turned), np.sin(turned)
+    half, width = 0.5 * size[0], 0.5 * size[1]
+    along, across = half * np.abs(c) + width * np.abs(s), half * np.abs(s) + width * np.abs(c)
+    ways = np.abs(np.array([ahead, aside, c * ahead + s * aside, c * aside - s * ahead]))
+    reach = np.array([half + along, width + across, along + half, across + width])
+    return np.asarray((ways - reach).max(axis=0))
+
+
 def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
     """(...) distance to the boundary of a convex polygon, positive inside, negative outside [m].
 

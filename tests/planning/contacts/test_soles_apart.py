@@ -3,8 +3,8 @@
 import coal
 import numpy as np
 
+from manikin.numerics.polytope import rectangles_apart
 from manikin.numerics.spatial import rotation_from_yaw
-from manikin.planning.contacts.footsteps import _soles_apart
 
 
 def test_the_gap_of_two_soles_is_no_more_than_their_distance():
@@ -15,7 +15,7 @@ def test_the_gap_of_two_soles_is_no_more_than_their_distance():
     rng, size = np.random.default_rng(0), (0.28, 0.11)
     ahead, aside = rng.uniform(-0.5, 0.5, 300), rng.uniform(0.0, 0.4, 300)
     turned = rng.uniform(-0.8, 1.1, 300)
-    gaps = _soles_apart(ahead, aside, turned, size)
+    gaps = rectangles_apart(ahead, aside, turned, size)
     box, here = coal.Box(*size, 1.0), coal.Transform3s.Identity()
     exact = 0
     for x, y, turn, gap in zip(ahead, aside, turned, gaps, strict=True):

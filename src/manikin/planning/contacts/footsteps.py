@@ -21,8 +21,10 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from manikin.kinematics.step_reach import StepReach
+from manikin.numerics.graph_search import Graph
+from manikin.numerics.polytope import rectangles_apart
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
-from manikin.planning.contacts.best_first import Graph, Refused
+from manikin.planning.contacts.best_first import Refused
 from manikin.planning.contacts.footholds import Feet, Foothold, Footholds
 from manikin.scene import Scene
 from manikin.scene.collision import column_is_free
@@ -257,28 +259,13 @@ class FootstepSearch:
         made = self._reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
         made &= (rise <= self._highest * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size
-        made &= _soles_apart(ahead, aside, turned, self._footholds.size) >= SOLES_APART
+        made &= rectangles_apart(ahead, aside, turned, self._footholds.size) >= SOLES_APART
         cost = STEP * (1.0 + (way / (EASY * self._stride * size)) ** 4)
         steep = 8.0 * np.maximum(0.0, rise - 0.2 * size)
         cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + 3.0 * (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
         cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
         return np.where(made, cost, np.inf)
-
-
-def _soles_apart(
-    ahead: FloatArray, aside: FloatArray, turned: FloatArray, size: tuple[float, float]
-) -> FloatArray:
-    """(k,) widest gap between two soles of a size along the edges of one of them [m]; negative: overlap.
-
-    The middle of the second one is ahead and aside (k,) of that of the first [m], and turned (k,) [rad].
-    """
-    c, s = np.cos(turned), np.sin(turned)
-    half, width = 0.5 * size[0], 0.5 * size[1]
-    along, across = half * np.abs(c) + width * np.abs(s), half * np.abs(s) + width * np.abs(c)
-    ways = np.abs(np.array([ahead, aside, c * ahead + s * aside, c * aside - s * ahead]))
-    reach = np.array([half + along, width + across, along + half, across + width])
-    return np.asarray((ways - reach).max(axis=0))
 
 
 def _offsets(scale: float) -> tuple[FloatArray, FloatArray, FloatArray]:

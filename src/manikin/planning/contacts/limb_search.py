@@ -25,9 +25,10 @@ from manikin.body.limbs import limb_placement, limb_slots
 from manikin.contact import Contact, ContactKind
 from manikin.kinematics import Placement
 from manikin.kinematics.limb_samples import LimbSamples
+from manikin.numerics.graph_search import Graph
 from manikin.numerics.polytope import convex_polygon, signed_distance
 from manikin.numerics.spatial import FloatArray, quaternions, rotation_from_yaw, rotations
-from manikin.planning.contacts.best_first import Graph, PosedSearch, Refused, heading_of
+from manikin.planning.contacts.best_first import PosedSearch, Refused, heading_of
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.heuristics import duration
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
