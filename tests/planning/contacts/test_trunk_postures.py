@@ -139,11 +139,11 @@ def test_body_bends_before_a_bar_and_not_below_it(postures: TrunkPostures) -> No
 
 
 def test_body_is_on_hands_and_knees_under_less_than_0_6_m() -> None:
-    """Knees carry on the flesh of thigh and shank; both may touch the floor, the rest keeps its distance."""
+    """Knees carry on the flesh of thigh and shank, hands on their heels, which may touch the floor."""
     body = with_further_contacts(human(), ("knees",))
     roof = Obstacle("roof", Box((3.0, 2.0, 0.3)), translation=(0.0, 0.0, 0.75))
-    places = {"left_knee": (-0.25, 0.1), "right_knee": (-0.25, -0.1), "left_hand": (0.5, 0.14),
-              "right_hand": (0.5, -0.14)}  # fmt: skip
+    places = {"left_knee": (-0.25, 0.1), "right_knee": (-0.25, -0.1), "left_wrist": (0.5, 0.14),
+              "right_wrist": (0.5, -0.14)}  # fmt: skip
     held = {name: point(name, (*place, 0.0), friction=0.7) for name, place in places.items()}
     bent = {"hip_flexion": 1.6, "knee_flexion": 1.7, "shoulder_flexion": 1.5, "ankle_dorsiflexion": -0.8}
     q = body.posture({f"{side}_{name}": angle for side in ("left", "right") for name, angle in bent.items()})
