@@ -17,10 +17,11 @@ from manikin.planning.contacts import (
     PostureFinderSettings,
     WalkSearch,
 )
-from manikin.planning.contacts.crawl_postures import CRAWLERS, on_all_fours
+from manikin.planning.contacts.crawl_postures import CRAWLERS, STYLES, on_all_fours
 from manikin.scene import Box, Obstacle, Scene
 
 BODY = human(1.75, 75.0, "male")
+HANDS = {"left_wrist", "right_wrist"}
 
 
 def tunnel(height, length=0.2, side=0.45, yaw=0.0):
@@ -55,6 +56,8 @@ def test_a_tunnel_is_crawled_through_whatever_its_heading(checked):
     assert held[0] == held[-1] == {"left_foot", "right_foot"}
     assert all(len(a ^ b) == 1 for a, b in pairwise(held))
     assert checked(BODY, scene, found.plan).verdict == "certified"
+    kneeling = [stage.q[7:] for stage, names in zip(found.plan.stages, held, strict=True) if names & HANDS]
+    assert np.abs(np.diff(kneeling, axis=0)).max() < np.radians(100.0)  # no arm turns over
     # The weight passes from three limbs to other three with little swaying, and nobody gets up on stiff legs.
     across = rotation_from_yaw(0.6)[:2, 1]
     crawled = [stage for stage in found.plan.stages if stage.contacts.keys() <= set(CRAWLERS)]
@@ -77,6 +80,37 @@ def test_hands_under_nearly_straight_arms_carry_with_little_strength(body):
     assert np.abs([contact.position[2] for contact in held]).max() < 1e-3
     assert RestingTorques(body, q, Stance(held)).share < 0.3
     assert q[7 + body.joint_index("left_elbow_flexion")] < np.radians(70.0)
+
+
+@pytest.mark.parametrize(
+    "body", [BODY, human(1.55, 50.0, "female"), human(1.9, 100.0, "male")], ids=["mean", "small", "tall"]
+)
+def test_a_lower_way_to_crawl_has_sloped_thighs_a_lower_pelvis_and_is_not_too_hard(body):
+    """Thighs make the height of a pelvis on knees; the arms then carry more, within their strength."""
+    pelvis, hips = [], []
+    for style in STYLES:
+        q = on_all_fours(body, PostureFinderSettings(), style).q
+        state = Configuration(body, q)
+        held = [point(name, state.effector_placement(name)[1], friction=0.7) for name in CRAWLERS]
+        assert RestingTorques(body, q, Stance(held)).share < 0.9
+        pelvis.append(q[2])
+        hips.append(q[7 + body.joint_index("left_hip_flexion")])
+    assert (np.diff(pelvis) < -0.03).all()
+    assert (np.diff(hips) < np.radians(-5.0)).all()
+
+
+@pytest.mark.parametrize(("height", "first"), [(0.65, 0), (0.58, 1), (0.52, 2)])
+def test_the_ways_to_crawl_that_have_room_are_tried_first(monkeypatch, height, first):
+    tried = []
+
+    def none(_self, _way, _down, _up, style, _gait):
+        tried.append(style)
+        return "refused"
+
+    monkeypatch.setattr(CrawlSearch, "_on_hands_and_knees", none)
+    found = searched(tunnel(height), 1.9)
+    assert found.failure == "refused"
+    assert list(dict.fromkeys(tried)) == [*STYLES[first:], *STYLES[:first]]
 
 
 def test_a_tunnel_that_is_too_low_is_told_at_once():

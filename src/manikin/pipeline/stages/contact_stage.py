@@ -97,7 +97,7 @@ class _FootSearch(_ContactSearch):
         found = walk.run()
         if found.plan is None and walk.search.walled_off() is not None:
             self._search, crawl = None, self._crawl(walk, start, goal)
-            found = replace(crawl, failure=f"{found.failure}; {crawl.failure}")
+            found = replace(crawl, failure=f"on hands and knees: {crawl.failure}; on feet: {found.failure}")
         return self._result(found)
 
     def _crawl(self, walk: WalkSearch, start: Stage, goal: Stage) -> Extension:

@@ -6,6 +6,8 @@ quarter of their strength at rest.  Wrists bend back by 70 degrees at most, so e
 
 import math
 from collections.abc import Mapping
+from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -20,13 +22,8 @@ from manikin.planning.contacts.posture_finder import Posed, PostureFinder, Postu
 from manikin.scene import Box, Obstacle, Scene
 
 CRAWLERS = ("right_knee", "right_wrist", "left_knee", "left_wrist")  # in the order in which they go
-APART = {"knee": 0.08, "wrist": 0.20}  # distance of limbs to the middle of the way, at 1.75 m [m]; our choice
-WHEELBASE = {"knee": -0.55, "wrist": 0.55}  # place of limbs along the way, of a body of 1.75 m, twice [m]
-# Shares of the way from knees to wrists at which the body rests, and its distance there to the edges of where
-# it may rest, at 1.75 m [m]: a shift of the weight from three limbs to other three is twice that at least.
-RESTING, RESTING_INSET = (0.36, 0.42, 0.3), 0.02
+RESTING_INSET = 0.02  # distance to the edges of where the body may rest, at 1.75 m; shifts are twice that [m]
 EASE = 0.9  # largest share of the strength for which a posture at rest may ask; the motion asks for more
-ROOM = 0.72  # height below which the body is on all fours where nothing is lower, of a body of 1.75 m [m]
 OUTWARDS = math.radians(30.0)  # angle of the fingers from the way
 # Distance from a place that is wished for that costs half a unit, and that of a hand from what it left [m].
 MISSED, OFF = 0.05, 0.03
@@ -35,6 +32,7 @@ _ON_ALL_FOURS = {
     "hip_flexion": 90.0, "knee_flexion": 85.0, "ankle_dorsiflexion": -45.0, "shoulder_flexion": 66.0,
     "elbow_flexion": 48.0, "forearm_pronation": 65.0, "wrist_flexion": -62.0, "neck_flexion": -30.0,
 }  # fmt: skip
+_BENT = {"hip_flexion": 55.0, "knee_flexion": 60.0, "shoulder_flexion": 30.0, "elbow_flexion": 100.0}
 _SQUATTING = {
     "hip_flexion": 126.0, "knee_flexion": 96.0, "ankle_dorsiflexion": 28.0, "lumbar_flexion": 20.0,
     "shoulder_flexion": 70.0, "elbow_flexion": 20.0,
@@ -43,43 +41,50 @@ _CRAWLING_PITCH, _SQUATTING_PITCH = math.radians(84.0), math.radians(58.0)
 _PREFERENCES = Preferences(pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 
 
-def on_all_fours(body: BodyModel, settings: PostureFinderSettings) -> Posed:
+class CrawlStyle(NamedTuple):
+    """How a body is on all fours: the farther back its knees, the lower; lengths at 1.75 m [m]."""
+
+    base: float  # distance of the hands before the knees
+    room: float  # height below which all of it is
+    needs: float  # height that has to be free
+    apart: tuple[float, float]  # distances of knees and hands to the middle of the way
+    resting: tuple[float, ...]  # shares of the way from knees to hands at which it rests, tried in turn
+    gaits: tuple[tuple[float, float], ...]  # strides with distances of the hands before the knees, in turn
+
+
+_GAITS = (0.42, 0.50), (0.42, 0.60), (0.28, 0.50), (0.28, 0.60)
+UPRIGHT = CrawlStyle(0.55, 0.72, 0.61, (0.08, 0.20), (0.36, 0.42, 0.30), _GAITS)
+LOW = CrawlStyle(0.70, 0.60, 0.55, (0.12, 0.17), (0.45, 0.50, 0.40), ((0.30, 0.70), (0.22, 0.70)))
+LOWEST = CrawlStyle(0.80, 0.58, 0.45, (0.14, 0.17), (0.50, 0.46, 0.54), ((0.20, 0.80), (0.25, 0.80)))
+STYLES = UPRIGHT, LOW, LOWEST
+
+
+def on_all_fours(body: BodyModel, settings: PostureFinderSettings, style: CrawlStyle = UPRIGHT) -> Posed:
     """Posture on hands and knees on a level floor, the middle between them at the origin."""
-    q = _bent(body, _ON_ALL_FOURS, 0.0, _CRAWLING_PITCH)
+    q = _bent(body, {**_ON_ALL_FOURS, **(_BENT if style is not UPRIGHT else {})}, 0.0, _CRAWLING_PITCH)
     q[2] = -Configuration(body, q).effector_placement(CRAWLERS[0])[1][2]
     size, held = stature_of(body) / 1.75, dict[str, Contact]()
     for name in CRAWLERS:
         side, _, part = name.partition("_")
-        place = size * np.array([0.5 * WHEELBASE[part], (1.0 if side == "left" else -1.0) * APART[part], 0.0])
+        ahead, out = style.base * ((part == "wrist") - 0.5), style.apart[part == "wrist"]
+        place = size * np.array([ahead, out if side == "left" else -out, 0.0])
         held[name] = point(name, place, friction=1.0, rotation=fingers_out(name))
-    ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * ROOM + 0.5))
+    ceiling = Obstacle("ceiling", Box((4.0, 4.0, 1.0)), translation=(0.0, 0.0, size * style.room + 0.5))
     finder = PostureFinder(body, Scene([ceiling]), q, settings)
     return finder.pose(held, held, q, place=np.zeros(2), preferences=_PREFERENCES)
 
 
 class CrawlPostures:
-    """Finds postures of a body on all fours, and on the way there from its feet; see :class:`PostureFinder`.
-
-    Attributes:
-        fault: Why the body has no posture on all fours; empty where it has one.
-    """
+    """Postures of a body on all fours, and on the way there from its feet, by a :class:`PostureFinder`."""
 
     def __init__(self, body: BodyModel, scene: Scene, settings: PostureFinderSettings) -> None:
-        crawling = on_all_fours(body, settings)
-        self.fault = f"no posture on all fours: {crawling.reason}" if crawling.q is None else ""
-        self._body = body
-        self._reference = body.standing_posture() if crawling.q is None else crawling.q
-        self._finder = PostureFinder(body, scene, self._reference, settings)
+        self._body, self._posed = body, cache(partial(on_all_fours, body, settings))
+        self.finder = PostureFinder(body, scene, self._posed(UPRIGHT).q, settings)
         self._inset = RESTING_INSET * stature_of(body) / 1.75
-
-    @property
-    def searches(self) -> int:
-        """Postures looked for so far."""
-        return self._finder.searches
 
     def pose(
         self, held: Contacts, carrying: Contacts, start: FloatArray, guide: FloatArray | None = None,
-        near: Contacts | None = None,
+        near: Contacts | None = None, style: CrawlStyle = UPRIGHT,
     ) -> Posed:  # fmt: skip
         """A posture that the strength can hold, hands flat and shanks level as far as they can be.
 
@@ -87,22 +92,21 @@ class CrawlPostures:
         like a guide (nq,), limbs just off what they left ``near``. The other arguments are those of
         :meth:`PostureFinder.pose`.
         """
-        first, crawls = None, held.keys() <= set(CRAWLERS)
+        posed, crawls = Posed(None), held.keys() <= set(CRAWLERS)
         wishes = {name: _wished(item.position + OFF * item.normal) for name, item in (near or {}).items()}
-        for share in RESTING if crawls else (0.0,):
+        for share in style.resting if crawls else (0.0,):
             place = None
             if crawls:
                 knees, wrists = (middle[:2] for middle in _middles(held))
-                place = self._finder.resting_place(carrying, knees + share * (wrists - knees), self._inset)
-            posed = self._finder.pose(
-                held, carrying, start, self.over(held) if crawls else guide, place=place,
+                place = self.finder.resting_place(carrying, knees + share * (wrists - knees), self._inset)
+            posed = self.finder.pose(
+                held, carrying, start, self.over(held, style) if crawls else guide, place=place,
                 placements=wishes, preferences=_PREFERENCES, restarts=not crawls,
             )  # fmt: skip
             posed = self._held_easily(posed, held, carrying)
             if posed.q is not None:
-                return posed
-            first = first or posed
-        return first or Posed(None)
+                break
+        return posed
 
     def between(
         self, staying: Contacts, name: str, middle: FloatArray, postures: tuple[FloatArray, FloatArray]
@@ -111,14 +115,13 @@ class CrawlPostures:
         start = 0.5 * (postures[0] + postures[1])
         start[3:7] = postures[1][3:7]
         wishes = {name: _wished(middle)}
-        return self._finder.pose(
-            staying, staying, start, start, placements=wishes, preferences=_PREFERENCES
-        ).q
+        return self.finder.pose(staying, staying, start, start, placements=wishes, preferences=_PREFERENCES).q
 
-    def over(self, contacts: Contacts) -> FloatArray:
+    def over(self, contacts: Contacts, style: CrawlStyle = UPRIGHT) -> FloatArray:
         """(nq,) the posture on all fours over contacts, turned and pitched as they lie."""
         knees, hands = _middles(contacts)
-        ahead, q = hands - knees, np.array(self._reference)
+        ahead, posed = hands - knees, self._posed(style)
+        q = np.array(self._body.standing_posture() if posed.q is None else posed.q)
         yaw = math.atan2(ahead[1], ahead[0])
         pitch = -math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
         turn = rotations(np.array(yaw), np.array(pitch), np.array(0.0))
@@ -137,15 +140,15 @@ class CrawlPostures:
 
     def _held_easily(self, posed: Posed, held: Contacts, carrying: Contacts) -> Posed:
         """The posture, or that a hand is not level in it, or that it asks for too much of the strength."""
-        if posed.q is not None:
-            state = Configuration(self._body, posed.q)
-            for name, contact in held.items():
-                up = state.effector_placement(name)[0][:, 2]
-                if name.endswith("wrist") and np.linalg.norm(np.cross(up, contact.normal)) > TILT:
-                    return Posed(None, f"{name} is not level")
-            why = self._finder.strained(posed.q, carrying, EASE)
-            return Posed(None, why) if why else posed
-        return posed
+        if posed.q is None:
+            return posed
+        state = Configuration(self._body, posed.q)
+        for name, contact in held.items():
+            up = state.effector_placement(name)[0][:, 2]
+            if name.endswith("wrist") and np.linalg.norm(np.cross(up, contact.normal)) > TILT:
+                return Posed(None, f"{name} is not level")
+        why = self.finder.strained(posed.q, carrying, EASE)
+        return Posed(None, why) if why else posed
 
 
 def fingers_out(name: str) -> FloatArray:

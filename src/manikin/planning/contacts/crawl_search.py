@@ -8,6 +8,7 @@ same backwards, as every posture at rest is at rest backwards as well.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import chain, product
 from typing import NamedTuple
 
@@ -19,18 +20,17 @@ from manikin.contact import Contact, point
 from manikin.numerics.spatial import FloatArray, onto_normal, rotation_from_yaw
 from manikin.planning.contacts.best_first import Extension
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
-from manikin.planning.contacts.crawl_postures import APART, CRAWLERS, CrawlPostures, fingers_out
+from manikin.planning.contacts.crawl_postures import CRAWLERS, STYLES, CrawlPostures, CrawlStyle, fingers_out
 from manikin.planning.contacts.endpoint import Endpoints, Habit
 from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
+from manikin.scene.collision import column_is_free
 
 HANDS = ("left_wrist", "right_wrist")
 CRAWLING = (0.2, 0.05, 0.45)  # radius, lowest and highest end of what is free to crawl, at 1.75 m [m]
-# Tried in turn, at 1.75 m [m]: strides with distances of hands before knees; to kneel down and get up,
-# those distances with those of knees before the feet; shares of a limb's step with ways outwards.
-GAITS = ((0.42, 0.50), (0.42, 0.60), (0.28, 0.50), (0.28, 0.60))
+# Tried, at 1.75 m [m]: hands before knees with knees before feet, to kneel; shares of a step with ways out.
 KNEELING = tuple(product((0.60, 0.50), (-0.20, -0.30, -0.12)))
 NEARBY = ((1.0, 0.0), (0.6, 0.0), (1.0, -0.05), (1.0, 0.05), (0.6, -0.05))
 BEFORE, BEHIND = 0.85, 0.45  # ways from the feet to what is low when a body kneels, gets up, at 1.75 m [m]
@@ -39,10 +39,11 @@ TURNED = math.radians(25.0)  # angle up to which it does so with feet as they ar
 STEEPEST = math.radians(30.0)  # largest slope of a surface for hands and knees
 INSET = 0.03  # distance of hands and knees to the edges of what they are on [m]
 LIFT, STEP = 0.05, 0.1  # heights of a limb in flight, and of a foot between its knee's place and its own [m]
-# On all fours; our choice.
 PACES = Paces(swing_duration=0.4, swing_speed=1.5, shift_duration=0.15, hinge_pace=3.0, com_pace=0.5)
 ON_FOURS_ROOM = (0.02, 0.02, 0.01)  # way of the centre of mass off a posture on all fours [m]; our choice
-TURNING = 1.0  # time in which a leg goes from its knee onto its foot or back [s]
+CLEARANCE = 0.024  # distance to obstacles on all fours: motions take some of it; our choice [m]
+# Time in which a leg goes from its knee onto its foot or back [s], and largest turn of a hinge as it does.
+TURNING, WIDEST = 1.0, math.radians(100.0)
 
 
 class _Way(NamedTuple):
@@ -77,17 +78,17 @@ class CrawlSearch:
         """
         self._body, self._scene = poser.body, poser.scene
         self._postures = CrawlPostures(self._body, self._scene, poser.settings)
-        self._endpoints, self._walk = endpoints, walk
-        self._start, self._goal, self._friction = start, goal, friction
-        self._settings = settings or WalkSettings()
+        self._crawling = CrawlPostures(self._body, self._scene, replace(poser.settings, clearance=CLEARANCE))
+        self._start, self._goal, self._friction, self._walk = start, goal, friction, walk
+        self._endpoints, self._settings = endpoints, settings or WalkSettings()
         self._size = stature_of(self._body) / 1.75
         self._surfaces = self._scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
 
     def run(self) -> Extension:
         """The plan, or why there is none."""
-        found = self._postures.fault or self._planned()
+        found = self._planned()
         plan, failure = (None, found) if isinstance(found, str) else (found, None)
-        return Extension(plan, self._postures.searches, 0, failure)
+        return Extension(plan, self._postures.finder.searches + self._crawling.finder.searches, 0, failure)
 
     def _planned(self) -> ContactPlan | str:
         ends = feet_of(self._start.contacts), feet_of(self._goal.contacts)
@@ -111,12 +112,12 @@ class CrawlSearch:
         down, up = self._risen(way, before), self._risen(way, behind)
         if isinstance(down, str) or isinstance(up, str):
             return down if isinstance(down, str) else str(up)
-        reason = ""
-        for gait in GAITS:
-            crawl = self._on_hands_and_knees(way, down, up, gait)
+        reason, columns = "", {style: (*low[:2], self._size * style.needs) for style in STYLES}
+        order = sorted(STYLES, key=lambda x: not column_is_free(self._scene, way.places, columns[x]).all())
+        for style, gait in ((each, gait) for each in order for gait in each.gaits):
+            crawl = self._on_hands_and_knees(way, down, up, style, gait)
             if not isinstance(crawl, str):
-                # The crawl begins with the stage that kneeling down ends with.
-                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages[1:]]
+                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages[1:]]  # kneeling has crawl[0]
                 return self._joined(before, crawled, behind)
             reason = reason or crawl
         return reason
@@ -170,28 +171,28 @@ class CrawlSearch:
     def _got_up(self, held: dict[str, Contact], feet: Contacts, lead: str) -> list[Stage] | str:
         """From four contacts onto two feet, the leading one first."""
         other = "left" if lead == "right" else "right"
-        posed, stages = self._postures.pose(held, held, self._postures.over(held)), list[Stage]()
-        if posed.q is not None:
-            stages = [Stage.of(self._body, held, posed.q, self._settings.shift_duration)]
+        posed = self._postures.pose(held, held, self._postures.over(held))
+        if posed.q is None:
+            return f"there is no posture on hands and knees: {posed.reason}"
         changes = [
             (f"{lead}_knee", None), (None, f"{lead}_foot"), (f"{other}_knee", None), (None, f"{other}_foot"),
             *((hand, None) for hand in HANDS),
         ]  # fmt: skip
-        contacts = dict(held)
+        contacts, stages = dict(held), [Stage.of(self._body, held, posed.q, self._settings.shift_duration)]
         for leaving, landing in changes:
             after = {name: contact for name, contact in contacts.items() if name != leaving}
             if landing is not None:
                 after[landing] = feet[landing]
             both = {**contacts, **after}
             staying = {name: contact for name, contact in after.items() if name in contacts}
-            before = posed.q
-            if before is not None:
-                # Hands leave one after the other, the first of them staying near.
-                near = {name: held[name] for name in HANDS if name not in both}
-                guide = self._postures.squatting(feet) if all(foot in both for foot in FEET) else None
-                posed = self._postures.pose(both, staying, before, guide, near)
-            if before is None or posed.q is None:
+            # Hands leave one after the other, the first of them staying near.
+            near = {name: held[name] for name in HANDS if name not in both}
+            guide = self._postures.squatting(feet) if all(foot in both for foot in FEET) else None
+            before, posed = posed.q, self._postures.pose(both, staying, posed.q, guide, near)
+            if posed.q is None:
                 return f"{leaving or landing} cannot {'be put down' if landing else 'leave'}: {posed.reason}"
+            if np.abs(posed.q - before)[7:].max() > WIDEST:
+                return f"a joint turns too far as {leaving or landing} {'lands' if landing else 'leaves'}"
             if landing is not None:
                 start = Configuration(self._body, before).effector_placement(landing)[1]
                 middle = 0.5 * (start + feet[landing].position) + STEP * feet[landing].normal
@@ -206,7 +207,7 @@ class CrawlSearch:
     # --- on hands and knees -----------------------------------------------------------------------
 
     def _on_hands_and_knees(
-        self, way: _Way, down: "_Rise", up: "_Rise", gait: tuple[float, float]
+        self, way: _Way, down: "_Rise", up: "_Rise", style: CrawlStyle, gait: tuple[float, float]
     ) -> list[Stage] | str:
         """Stages from one place on hands and knees to another, or why there are none."""
         stride, base = (self._size * value for value in gait)
@@ -221,7 +222,8 @@ class CrawlSearch:
             ahead = begin[part] + 0.25 * (number + 1) * stride
             target = goal[name] if ahead >= end[part] else None
             if contacts[name] is not target:
-                step = self._stepped(way, name, (reached[name], min(ahead, end[part])), target, contacts, q)
+                ends = reached[name], min(ahead, end[part])
+                step = self._stepped(way, name, ends, target, contacts, q, style)
                 if isinstance(step, str):
                     return step
                 reached[name], *made = step
@@ -233,26 +235,26 @@ class CrawlSearch:
 
     def _stepped(
         self, way: _Way, name: str, ends: tuple[float, float], target: Contact | None,
-        contacts: Contacts, q: FloatArray,
+        contacts: Contacts, q: FloatArray, style: CrawlStyle,
     ) -> tuple[float, Stage, Stage] | str:  # fmt: skip
         """New place and stages of a limb that goes to a contact, where the way has it, or near there."""
         staying = {other: contact for other, contact in contacts.items() if other != name}
-        lifted = self._postures.pose(contacts, staying, q)
+        lifted = self._crawling.pose(contacts, staying, q, style=style)
         if lifted.q is None:
             return f"{name} cannot leave {_text(contacts[name].position)}: {lifted.reason}"
         reason = f"there is nothing to put {name} on beyond {_text(contacts[name].position)}"
         spots = ((ends[0] + share * (ends[1] - ends[0]), out) for share, out in NEARBY)
-        offers = ((along, self._contact(way, name, along, out)) for along, out in spots)
+        offers = ((along, self._contact(way, name, along, style, out)) for along, out in spots)
         for along, contact in chain([(ends[1], target)], offers):
             if contact is None:
                 continue
             landed = {**staying, name: contact}
-            landing = self._postures.pose(landed, staying, lifted.q)
+            landing = self._crawling.pose(landed, staying, lifted.q, style=style)
             if landing.q is None:
                 reason = f"{name} cannot be put down at {_text(contact.position)}: {landing.reason}"
                 continue
             middle = 0.5 * (contacts[name].position + contact.position) + LIFT * contact.normal
-            via = self._postures.between(staying, name, middle, (lifted.q, landing.q))
+            via = self._crawling.between(staying, name, middle, (lifted.q, landing.q))
             if via is None:
                 reason = f"{name} finds no way to {_text(contact.position)}"
                 continue
@@ -267,18 +269,19 @@ class CrawlSearch:
         """Knees and hands at two places along the way."""
         found: dict[str, Contact] = {}
         for name in CRAWLERS:
-            contact = self._contact(way, name, ends[name.endswith("wrist")])
+            contact = self._contact(way, name, ends[name.endswith("wrist")], STYLES[0], 0.0)
             if contact is None:
                 return f"there is nothing for {name} at {_text(way.at(ends[0])[0])}"
             found[name] = contact
         return found
 
-    def _contact(self, way: _Way, name: str, along: float, out: float = 0.0) -> Contact | None:
+    def _contact(self, way: _Way, name: str, along: float, style: CrawlStyle, out: float) -> Contact | None:
         """Contact of a limb beside the way, on the surface that is nearest to its height."""
         place, heading = way.at(along)
         side, _, part = name.partition("_")
         turn = rotation_from_yaw(heading)
-        wanted = place + (1.0 if side == "left" else -1.0) * (APART[part] * self._size + out) * turn[:, 1]
+        beside = style.apart[part == "wrist"] * self._size + out
+        wanted = place + (beside if side == "left" else -beside) * turn[:, 1]
         best: Contact | None = None
         least = 0.25 * self._size
         for surface in self._surfaces:

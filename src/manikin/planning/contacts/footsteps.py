@@ -195,9 +195,8 @@ class FootstepSearch:
         return bool(np.isfinite(self._step_costs(stand, out, *place)[0]))
 
     def _is_refused(self, stand: int, step: int) -> bool:
-        if self._too_hard and self._harder(self._shape(stand, step)):
-            return True
-        return self._refused.alike(self._at(stand, step)) > 0
+        hard = bool(self._too_hard) and self._harder(self._shape(stand, step))
+        return hard or self._refused.alike(self._at(stand, step)) > 0
 
     def _steps(self, node: _Node) -> list[tuple[_Node, float]]:
         """The other foot on footholds to which it may go, with the cost of the step alone."""

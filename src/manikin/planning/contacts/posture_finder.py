@@ -39,7 +39,7 @@ class PostureFinderSettings:
     """Requirements on the postures of a contact plan; the values are our choice.
 
     Attributes:
-        clearance: Distance to obstacles and between body parts [m].
+        clearance, self_clearance: Distances to obstacles and between body parts [m].
         range_margin: Angle to the ends of the joint ranges [rad].
         natural: Whether hips and shoulders of a human keep to their learnt volumes as well.
         inset: Distance of the centre of mass to the edges of the region where it may rest [m].
@@ -52,6 +52,7 @@ class PostureFinderSettings:
     """
 
     clearance: float = 0.014
+    self_clearance: float = 0.014
     range_margin: float = 0.05
     natural: bool = False
     inset: float = 0.045
@@ -65,8 +66,8 @@ class PostureFinderSettings:
     def scaled(self, factor: float) -> "PostureFinderSettings":
         """Settings for a body of another size: lengths times a factor."""
         return replace(
-            self, clearance=factor * self.clearance, inset=factor * self.inset,
-            root_weight=self.root_weight / factor**2,
+            self, clearance=factor * self.clearance, self_clearance=factor * self.self_clearance,
+            inset=factor * self.inset, root_weight=self.root_weight / factor**2,
         )  # fmt: skip
 
 
@@ -92,16 +93,6 @@ class Posed:
 
 UPRIGHT = {"knee": 1.0, "wrist": 6.0}
 """Weights with which shanks on knees and hands on their heels are level, other points 0.05 [1/rad^2]."""
-
-
-def _upright_points(held: Contacts) -> dict[str, Placement]:
-    """Wishes for what touches at a point to stand upright on its surface, by effector."""
-    return {
-        name: Placement(
-            None, contact.rotation_contact_to_world, UPRIGHT.get(name.partition("_")[2], 0.05)
-        )
-        for name, contact in held.items() if contact.kind is ContactKind.POINT
-    }  # fmt: skip
 
 
 class PostureFinder:
@@ -156,12 +147,16 @@ class PostureFinder:
         settings, led = self.settings, {} if guide is None else self.led(guide[:ROOT])
         whole = guide is not None and len(guide) > ROOT
         ignore, beside, sinking = self._near(held)
+        points = {
+            name: Placement(None, item.rotation_contact_to_world, UPRIGHT.get(name.partition("_")[2], 0.05))
+            for name, item in held.items() if upright and item.kind is ContactKind.POINT
+        }  # fmt: skip
         problem = PostureProblem(
             self.body, tuple(held.values()),
-            {**led, **(_upright_points(held) if upright else {}), **(placements or {})},
+            {**led, **points, **(placements or {})},
             com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
-            self_clearance=settings.clearance, ignore=ignore, beside=beside, sinking=sinking,
+            self_clearance=settings.self_clearance, ignore=ignore, beside=beside, sinking=sinking,
             range_margin=settings.range_margin, learnt_margin=LEARNT_MARGIN if settings.natural else None,
             reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
