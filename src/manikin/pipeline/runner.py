@@ -164,7 +164,7 @@ def failed_stage(
     failure: StageFailure | None, schedule: ContactSchedule | None, plan: ContactPlan | None
 ) -> int | None:
     """Index of the stage of a contact plan in which a later stage failed, or None where it is not known."""
-    if failure is None or plan is None:
+    if failure is None:
         return None
     if (named := re.match(r"phase (\d+)", failure.where)) is not None:
         phase = int(named[1])
@@ -172,7 +172,9 @@ def failed_stage(
         phase = int(schedule.phase_at(failure.time_s))
     else:
         return None
-    return phase if schedule is None else bisect.bisect_right(plan.begins(schedule), phase) - 1
+    if schedule is None or plan is None:
+        return phase
+    return bisect.bisect_right(plan.begins(schedule), phase) - 1
 
 
 def _refined(
