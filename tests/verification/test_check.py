@@ -227,6 +227,23 @@ def test_a_foot_may_leave_from_its_toes():
     assert missed == pytest.approx(0.02 * (0.5 * foot.length - hinge[0]), rel=0.1)
 
 
+def test_feet_on_their_toes_leave_or_land():
+    """A plan file may name a foot as it leaves and as it lands, but not one that stays."""
+    scenario, plan = load_contact_plan(DATA / "stairs.json")
+    content, last = plan.to_dict(scenario.build_body(), scenario), {"left_foot", "right_foot"}
+    for stage in content["stages"]:
+        changed = sorted(last ^ set(stage["contacts"]))
+        last = set(stage["contacts"])
+        stage["on_toes"] = changed
+    again = parse_contact_plan(content, "a plan", scenario)[1]
+    assert [sorted(stage.on_toes) for stage in again.stages] == [s["on_toes"] for s in content["stages"]]
+    assert max(len(stage.on_toes) for stage in again.stages) == 1
+    staying = (set(content["stages"][0]["contacts"]) & set(content["stages"][1]["contacts"])).pop()
+    content["stages"][1]["on_toes"] = [staying]
+    with pytest.raises(ScenarioError, match=f"on_toes names '{staying}'; valid: feet that leave or land"):
+        parse_contact_plan(content, "a plan", scenario)
+
+
 def test_numbers_that_are_none_are_refused(rising):
     """A plan made in memory is held to finite numbers as a file is."""
     contact = last_foot(rising[1])

@@ -89,7 +89,7 @@ class StageSection(Section):
     )
     duration_s: Duration | None = optional("how long it lasts [s]; of a dynamic stage required")
     on_toes: list[Text] = preset(
-        [], "feet that end with the stage before and are on their toes in the posture, the heel up"
+        [], "feet that leave or land as the stage begins and are on their toes in the posture, the heel up"
     )
 
     @model_validator(mode="after")
@@ -146,7 +146,7 @@ class PlannedStage:
         via: (nq,) posture in its middle, or None.
         dynamic: Whether the body moves through it without a place of rest.
         duration: How long it lasts [s], or None.
-        on_toes: Feet that leave as it begins, on their toes in the posture.
+        on_toes: Feet that leave or land as it begins, on their toes in the posture.
     """
 
     contacts: Mapping[str, Contact]
@@ -260,10 +260,12 @@ def parse_contact_plan(
         com, velocity = _array(section.com), np.array(section.com_velocity_m_s)
         via, dynamic = _posture(section.via, body, f"{where}.via"), section.dynamic
         on_toes = frozenset(section.on_toes)
-        feet = {name for name in before.keys() - contacts.keys() if hinge_line(body, name) is not None}
+        feet = {name for name in before.keys() ^ contacts.keys() if hinge_line(body, name) is not None}
         if unknown := sorted(on_toes - feet):
             valid = ", ".join(sorted(feet)) or "none here"
-            raise ScenarioError(f"{where}.on_toes names {unknown[0]!r}; valid: feet that end, {valid}")
+            raise ScenarioError(
+                f"{where}.on_toes names {unknown[0]!r}; valid: feet that leave or land, {valid}"
+            )
         stages.append(
             PlannedStage(contacts, posture, com, velocity, via, dynamic, section.duration_s, on_toes)
         )
