@@ -7,6 +7,7 @@ import pytest
 
 from manikin.balance import StaticRegion, static_torque_share
 from manikin.body import Configuration, human
+from manikin.contact import Stance
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import IDENTITY
 from manikin.pipeline.stages.contact_stage import find_supports
@@ -52,7 +53,7 @@ def test_the_pelvis_rolls_so_that_the_spine_need_not_bend():
     """The weight is 4.5 cm inside the feet with less than half of the bend that lumbar and thorax have."""
     found = planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
     body, off = human(1.75, 75.0, "male"), next(s for s in found.plan.stages if "buttocks" not in s.contacts)
-    region = StaticRegion.of(off.stance, body.mass)
+    region = StaticRegion.of(Stance(list(off.contacts.values())), body.mass)
     assert signed_distance(off.com[:2], region.polygon) > 0.044
     bend = {name: angle for name, angle in zip(body.joint_names, off.q[7:], strict=True) if "flexion" in name}
     assert bend["lumbar_flexion"] < 0.5
@@ -92,7 +93,7 @@ def test_a_seat_that_cannot_be_left_at_rest_is_left_in_motion():
     heel = off.contacts["left_foot"].position[0] - 0.5 * off.contacts["left_foot"].length
     assert off.com[0] < heel
     assert 0.1 <= off.momentum.velocity[0] <= 0.6
-    on_feet = off.stance
+    on_feet = Stance(list(off.contacts.values()))
     assert static_torque_share(body, off.q, on_feet) == np.inf
     assert static_torque_share(body, off.q, on_feet, off.momentum.acceleration) < 1.0
     assert off.com == pytest.approx(Configuration(body, off.q).com)
@@ -116,7 +117,7 @@ def test_hands_push_until_the_weight_is_over_the_feet():
     off, _, free = leaving.stages[-4:-1]
     assert set(off.contacts) == {"left_foot", "right_foot", "left_wrist", "right_wrist"}
     assert set(free.contacts) == {"left_foot", "right_foot"}
-    assert static_torque_share(body, off.q, off.stance) <= 0.95
+    assert static_torque_share(body, off.q, Stance(list(off.contacts.values()))) <= 0.95
     assert off.contacts["left_wrist"].position[2] == pytest.approx(0.66)
 
 

@@ -15,12 +15,14 @@ from manikin.kinematics.posture_terms import SINKING
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.contacts import (
+    FEET,
     Endpoints,
     Footholds,
     Habit,
     PostureFinder,
     WalkSearch,
     WalkSettings,
+    leave_seat,
 )
 from manikin.planning.contacts.footholds import Foothold
 from manikin.planning.contacts.handholds import Handholds
@@ -262,6 +264,32 @@ def test_a_hand_joins_where_feet_alone_do_not_make_a_step(checked):
     assert set(found.plan.stages[-1].contacts) == {"left_foot", "right_foot"}
 
 
+def test_a_step_deeper_than_legs_is_made_facing_the_block_with_a_hand_on_it(checked):
+    """0.485 of the stature down: behind the foot that stays, which looks at the block.
+
+    A hand on the block carries with that foot, and rest is within the strength.
+    """
+    body, height = BODY, 0.485 * 1.75
+    block = Scene([Obstacle("block", Box((1.6, 1.6, height)), translation=(0.3, 0.0, 0.5 * height))])
+    found, _, _ = planned(block, (1.9, 0.0), body=body)
+    assert found.failure is None
+    landings = [
+        (name, before, after) for before, after in pairwise(found.plan.stages)
+        for name in set(after.contacts) - set(before.contacts)
+        if name.endswith("foot") and after.contacts[name].position[2] < 0.01
+        and max(contact.position[2] for contact in before.contacts.values()) > 0.9 * height
+    ]  # fmt: skip
+    assert landings
+    foot, before, after = landings[0]
+    feet, hands = ({n: c for n, c in before.contacts.items() if n.endswith(e)} for e in ("foot", "wrist"))
+    upper = next(iter(feet.values()))
+    behind = (after.contacts[foot].position - upper.position) @ rotation_from_yaw(upper.yaw)[:, 0]
+    assert behind < -0.5 * body.sole_length
+    assert hands
+    assert all(abs(contact.position[2] - height) < 1e-6 for contact in hands.values())
+    assert checked(body, block, found.plan).requirements.value("max_torque_share") <= 1.0
+
+
 def test_holds_are_in_reach_and_on_what_a_hand_can_hold_or_lean_on():
     """A bar at the left is grasped; a table at the right carries the heel of a hand at one point."""
     scene = Scene([
@@ -393,7 +421,7 @@ def test_a_seated_start_touches_seat_and_floor(seat):
     state = Configuration(BODY, stage.q)
     for name, contact in stage.contacts.items():
         assert np.linalg.norm(state.effector_placement(name)[1] - contact.position) < 3e-4
-    risen = ends.risen(stage).stage
+    risen = leave_seat(PostureFinder(BODY, scene), stage, frozenset(FEET)).stages[-1]
     assert set(risen.contacts) == {"left_foot", "right_foot"}
     assert risen.com[2] > stage.com[2] + 0.15
 

@@ -89,10 +89,8 @@ class _FootSearch(_ContactSearch):
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
         if "buttocks" in goal.contacts:
-            self._seat, before = goal, self._places.risen(goal)
-            if before.stage is None:
-                return self._tally.failed(f"the goal: {before.failure}", "goal")
-            goal = before.stage
+            self._seat, rising = goal, contacts.leave_seat(self._poser, goal, frozenset(contacts.FEET))
+            goal = rising.stages[-1]
         walk = self._search = self._searched(start, goal)
         found = walk.run()
         if found.plan is None and walk.search.walled_off() is not None:

@@ -167,11 +167,6 @@ class Stage:
         posture = frozen_array(q, "posture", (body.nq,))
         return cls(kept, posture, com, min_duration, com_room, between, momentum, tilted)
 
-    @property
-    def stance(self) -> Stance:
-        """The contacts as a stance."""
-        return Stance(list(self.contacts.values()))
-
 
 @dataclass(frozen=True, eq=False)
 class ContactPlan:

@@ -83,14 +83,6 @@ class Endpoints:
         why = reasons[0] if reasons else "there is no surface with room for both feet"
         return Endpoint(None, f"no posture {habit} at {np.round(at, 3).tolist()} m: {why}")
 
-    def risen(self, stage: Stage) -> Endpoint:
-        """Where a body is when it has left all contacts of a start but those of its feet."""
-        feet = {name: contact for name, contact in stage.contacts.items() if name.endswith("foot")}
-        posed = self._poser.pose(feet, feet, stage.q, restarts=True)
-        if posed.q is None:
-            return Endpoint(None, f"no posture on {', '.join(feet) or 'feet'} alone: {posed.reason}")
-        return Endpoint(Stage.of(self._body, feet, posed.q, 0.3))
-
     def _standing(
         self, at: FloatArray, heading: float, habit: Habit, height: float | None
     ) -> Iterator[tuple[dict[str, Contact], FloatArray]]:

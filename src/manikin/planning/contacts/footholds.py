@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.contact import Contact, sole
 from manikin.errors import ContactError
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.scene import Scene
 from manikin.scene.collision import CollisionPart, collision_parts, column_is_clear
 from manikin.scene.footing import WHOLE, FootingTable, Places
@@ -119,6 +119,13 @@ class Footholds:
         put = self._point.under(places, np.zeros(len(places)))
         on = self._point.place(put.numbers, put.positions, put.rotations).share > 0.5
         return put.rows[on], put.positions[on, 2]
+
+    def faces(self, one: Foothold, other: Foothold) -> bool:
+        """Whether what the higher of two is on goes on beside it, so that the lower one is behind it."""
+        low, high = sorted((one, other), key=lambda hold: float(hold.position[2]))
+        aside = rotation_from_yaw(high.yaw)[:, 1]
+        beside = high.position + ((low.position - high.position) @ aside) * aside
+        return bool((np.abs(self.levels(beside[None, :2])[1] - beside[2]) < ON_PLANE).any())
 
     def lay(self, places: FloatArray, yaws: FloatArray, level: float, rise: float) -> Laid:
         """Footholds at or near candidates.

@@ -34,10 +34,13 @@ EASY = 3.0**0.25  # way at twice the cost of a short step, over that of the chea
 REACH_MARGIN = 0.02  # distance that steps keep to the end of what the body reaches [m]; our choice
 HIGHEST = 0.48  # largest difference in height of two soles, of a body of 1.75 m [m]
 HELD_HIGHEST = 0.80  # the same of a body that has something to hold on to or lean on [m]
+FACED_HIGHEST = 0.86  # the same of one that faces what is higher, where its hands are [m]
+FACED = (0.34, 0.27)  # least way of the lower foot behind the higher one then, most way aside [m]
+ON_TOES = 0.04  # way beyond the reach of flat soles then, as the lower foot is on its toes [m]
 HELD_COST = 4.0 * STEP  # cost of a step that is higher than HIGHEST: hands come and go [s]
 NARROWEST = 0.115  # least distance of the middles of two soles across, of a body of 1.75 m [m]
 SOLES_APART = 0.016  # least distance of two soles seen from above: a little more than postures keep [m]
-ALONG = (-0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
+ALONG = (-0.4, -0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
 ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
 TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
 """Steps that are tried from a foot: ahead and to its side [m], and turned outwards [rad]."""
@@ -80,7 +83,7 @@ class FootstepSearch:
     def __init__(
         self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet, scale: float, reach: StepReach,
         pair_cost: Callable[[Foothold, Foothold], float], column: tuple[float, float, float], stride: float,
-        highest: float,
+        held: bool,
     ) -> None:  # fmt: skip
         """Prepare a search.
 
@@ -90,10 +93,10 @@ class FootstepSearch:
             pair_cost: Cost of the body between two footholds, left and right [s]; infinite without room.
             column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
             stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
-            highest: Largest difference in height of two soles, of a body of 1.75 m [m].
+            held: Whether there may be something to hold on to.
         """
         self._footholds, self._scale, self._reach, self._pair_cost = footholds, scale, reach, pair_cost
-        self._stride, self._highest, self.expanded = stride, highest, 0
+        self._stride, self._highest, self.expanded = stride, FACED_HIGHEST if held else HIGHEST, 0
         self.holds = [*start, *goal]
         self._keys: dict[int, int] = {}
         self._is_free = cache(lambda number: number < 4 or footholds.is_free(self.holds[number]))
@@ -104,7 +107,7 @@ class FootstepSearch:
         self._refused = Refused(ALIKE)
         self._too_hard: list[FloatArray] = []
         self._offsets = _offsets(scale)
-        heights = HIGHEST * scale, highest * scale
+        heights = HIGHEST * scale, self._highest * scale
         self._field = _Field(scene, footholds, start, goal, column, stride * scale, heights)
         places = np.array([hold.position for hold in self.holds])
         yaws = np.array([hold.yaw for hold in self.holds])
@@ -171,8 +174,7 @@ class FootstepSearch:
 
     def walled_off(self) -> str | None:
         """Why no way over the ground leads from the start to the goal; None where one does."""
-        free = math.isfinite(min(self._ahead[:2]))
-        return None if free else self._field.walled_off(self.holds[0].position)
+        return None if min(self._ahead[:2]) < math.inf else self._field.walled_off(self.holds[0].position)
 
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
@@ -180,7 +182,8 @@ class FootstepSearch:
     def _tested(self, before: _Node | None, parent: _Node, node: _Node) -> float:
         """Cost of the body's room at a step; infinite where the foot, its flight or the body has none."""
         pair = parent.hold, node.hold
-        if pair in self._closed or self._is_refused(*pair):
+        hard = bool(self._too_hard) and self._harder(self._shape(*pair))
+        if hard or pair in self._closed or self._refused.alike(self._at(*pair)) > 0:
             return math.inf
         if pair not in self._pairs:
             stand, step = self.holds[parent.hold], self.holds[node.hold]
@@ -192,11 +195,9 @@ class FootstepSearch:
     def _is_made(self, stand: Foothold, step: Foothold, out: int) -> bool:
         """Whether a body makes a step: its place may stand for one close by, for which that is known."""
         place = step.position[None], np.array([step.yaw]), np.array([step.share])
-        return bool(np.isfinite(self._step_costs(stand, out, *place)[0]))
-
-    def _is_refused(self, stand: int, step: int) -> bool:
-        hard = bool(self._too_hard) and self._harder(self._shape(stand, step))
-        return hard or self._refused.alike(self._at(stand, step)) > 0
+        made = bool(np.isfinite(self._step_costs(stand, out, *place)[0]))
+        deep = abs(float(step.position[2] - stand.position[2])) > HELD_HIGHEST * self._scale
+        return made and (not deep or self._footholds.faces(stand, step))
 
     def _steps(self, node: _Node) -> list[tuple[_Node, float]]:
         """The other foot on footholds to which it may go, with the cost of the step alone."""
@@ -255,7 +256,11 @@ class FootstepSearch:
         rise, size = np.abs(away[:, 2]), self._scale
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
         apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
-        made = self._reach.contains(apart, "left_foot" if out > 0 else "right_foot", REACH_MARGIN)
+        room = self._reach.room(apart, "left_foot" if out > 0 else "right_foot")
+        deep = rise > HELD_HIGHEST * size
+        made = room >= np.where(deep, -ON_TOES * size, REACH_MARGIN)
+        faced = (ahead * np.sign(away[:, 2]) >= FACED[0] * size) & (aside <= FACED[1] * size)
+        made &= np.where(deep, faced, ahead >= -FACED[0] * size)
         made &= (rise <= self._highest * size) & (turned >= -0.8) & (turned <= 1.1)
         made &= aside >= NARROWEST * size
         made &= rectangles_apart(ahead, aside, turned, self._footholds.size) >= SOLES_APART
@@ -325,12 +330,19 @@ class _Field:
         self._before, (first, last) = before, (hold.yaw for hold in goal)
         self._yaw = math.atan2(math.sin(first) + math.sin(last), math.cos(first) + math.cos(last))
         # Where the way leads from each cell, and how far it is.
-        ahead = np.arange(size)
-        for _ in range(LOOK):
-            ahead = np.where(before[ahead] >= 0, before[ahead], ahead)
+        onward = ahead = np.where(before >= 0, before, np.arange(size))
+        for _ in range(LOOK - 1):
+            ahead = onward[ahead]
         way = points[ahead, :2] - points[:, :2]
         self._heading = np.arctan2(way[:, 1], way[:, 0])
-        self._way = np.linalg.norm(points[:, :2] - middle[:2], axis=1)
+        # The next place on it where a body goes so far down that it faces where it comes from; or the end.
+        down = points[:, 2] - points[onward, 2] > HELD_HIGHEST / HIGHEST * easy
+        faced = np.where(down, np.arange(size), onward)
+        while (faced != faced[faced]).any():
+            faced = faced[faced]
+        self._then = np.where(down[faced], self._heading[faced] + math.pi, self._yaw)
+        ends = np.where(down[faced, None], points[faced, :2], middle[:2])
+        self._way = np.linalg.norm(points[:, :2] - ends, axis=1)
 
     def _is_open(self, scene: Scene, pairs: np.ndarray, column: tuple[float, float, float]) -> np.ndarray:
         """(k,) whether the column passes between pairs (k, 2) of cells over what has no ground."""
@@ -375,11 +387,11 @@ class _Field:
         costs = self._cost[rows] + self._pace * gap
         pick = np.arange(len(places)), np.argmin(costs, axis=1)
         row = rows[pick]
-        there, here = self._heading[row], np.asarray(yaws)
+        here, there, then = np.asarray(yaws), self._heading[row], self._then[row]
         # To turn to where the way leads and back, or to go as one stands: aside or backwards is slower.
-        straight = _angle(here - there) + _angle(there - self._yaw)
-        across = _angle(here - self._yaw) + self._way[row] / TURN_WAY * (1.0 - np.cos(here - there))
-        return costs[pick] + TURN_COST * np.minimum(straight, across)
+        straight = _angle(here - there) + _angle(there - then)
+        across = _angle(here - then) + self._way[row] / TURN_WAY * (1.0 - np.cos(here - there))
+        return costs[pick] + TURN_COST * (np.minimum(straight, across) + _angle(then - self._yaw))
 
 
 def low_way(

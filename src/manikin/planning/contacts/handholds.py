@@ -23,7 +23,7 @@ HANDS = ("left_hand", "right_hand")
 HEIGHTS = (0.5, 1.35)  # lowest and greatest height of a hold above the lower foot [m]
 WANTED = (0.30, 0.30, 0.0)  # where a hand is best: ahead of the root, to its side, and above it [m]
 SHOULDER, ARM = (0.05, 0.19, 0.45), 0.66  # shoulder from the root, and reach from there with some lean [m]
-STOOP = 0.45  # how far shoulders go down to a hold that is low [m]
+STOOP = (0.45, 1.0)  # how far shoulders go down to a hold that is low, of a body that squats then [m]
 APART = 0.15  # distance between two places that are offered [m]
 PALM = 0.05  # half the size of what has to be level below a palm [m]
 LEVEL = math.radians(20.0)  # largest slope of a surface to lean on [rad]
@@ -42,10 +42,10 @@ class Handholds:
         heights = [float(item.polygon[:, 2].max()) for item in self._level]
         self.exist = bool(self._bars) or max(heights, default=0.0) - min(heights, default=0.0) >= HEIGHTS[0]
 
-    def near(self, roots: Sequence[FloatArray], ground: float, most: int) -> list[Contact]:
+    def near(self, roots: Sequence[FloatArray], ground: float, most: int, low: bool = False) -> list[Contact]:
         """Holds of both hands that are in reach from all of some (7,) poses of the root, the best first.
 
-        There are ``most`` of them at most; the height of the lower foot is ``ground`` [m].
+        There are ``most`` at most, ``low`` ones if it may squat; the lower foot is at height ``ground`` [m].
         """
         size, offers = self._size, list[tuple[float, Contact]]()
         for hand, side in zip(HANDS, (1.0, -1.0), strict=True):
@@ -58,7 +58,7 @@ class Handholds:
             for contact in self._around(hand, wanted.mean(axis=0), frames[0], ground):
                 place = contact.position
                 away = shoulders - place
-                away[:, 2] -= np.clip(away[:, 2], 0.0, STOOP * size)
+                away[:, 2] -= np.clip(away[:, 2], 0.0, STOOP[low] * size)
                 far = np.linalg.norm(away, axis=1).max()
                 if self._in_height(place, ground) and far <= ARM * size:
                     offers.append((float(np.linalg.norm(wanted - place, axis=1).max()), contact))

@@ -231,7 +231,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
     def _walled_off(self) -> str:
         """Why no chain of places leads from the start to the goal; empty where one does."""
         shared = {id(item.positions): item.positions for item in self.holds}
-        places = np.vstack([self._at((0,) * len(self.holds)), *shared.values()])
+        places = np.vstack([self._at([(0,) * len(self.holds)])[0], *shared.values()])
         there, enough = self.goal[:3], GOAL_REACH * self.size
         # Hands alone carry nobody for long: what stands has to have places there.
         standing = [item for k, item in enumerate(self.holds) if not self._grasps[k]] or self.holds
@@ -260,18 +260,14 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     # --- the cheap search ---------------------------------------------------------------------
 
-    def _at(self, state: State) -> FloatArray:
-        """(n, 3) places of a state [m]."""
-        return np.array([places[row] for places, row in zip(self._places, state, strict=True)])
-
-    def _all_at(self, states: Sequence[State]) -> FloatArray:
+    def _at(self, states: Sequence[State]) -> FloatArray:
         """(k, n, 3) places of k states [m]."""
         rows = np.array(states)
         return np.stack([places[rows[:, k]] for k, places in enumerate(self._places)], axis=1)
 
     def _frames(self, states: Sequence[State]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Roots (k, 3) [m], headings and pitches (k,) [rad] that suit the contacts of k states best."""
-        places, share = self._all_at(states), self._shares(states)
+        places, share = self._at(states), self._shares(states)
         middle, mean = (share[..., None] * places).sum(axis=1), share @ self._wanted
         away = share[..., None] * (places - middle[:, None])
         if self.settings.turns:
@@ -296,7 +292,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
 
     def _frame_costs(self, states: Sequence[State]) -> FloatArray:
         """Costs (k,) of how far limbs are from where they should be, infinite out of reach."""
-        places, held = self._all_at(states), self._shares(states) > 0.0
+        places, held = self._at(states), self._shares(states) > 0.0
         roots, yaw, pitch = self._frames(states)
         turn = rotations(yaw, pitch, np.zeros(len(yaw)))
         local = np.einsum("kji,knj->kni", turn, places - roots[:, None])
@@ -417,7 +413,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         staying = [j for j in range(len(self.holds)) if j != k and self._held(j, before[j])]
         if any(self._grasps[j] for j in staying):
             return None, 0.0
-        at = self._at(before)[staying, :2]
+        at = self._at([before])[0, staying, :2]
         middle, hull = at.mean(axis=0), convex_polygon(at)
         cost = self._stretched(before, middle, hull)
         if all(self._tips[j] for j in staying):
@@ -437,7 +433,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         if rooms[0] < -self.settings.sway * self.size:
             return math.inf
         shifted = np.append(ways[int(np.argmax(rooms >= min(REST * self.size, rooms[-1])))], root[2])
-        local = (self._at(state) - shifted) @ turn
+        local = (self._at([state])[0] - shifted) @ turn
         beyond = [-float(item.room(local[j])) for j, item in enumerate(self.holds) if self._held(j, state[j])]
         return OVERREACH * max(0.0, *beyond) / self.size
 

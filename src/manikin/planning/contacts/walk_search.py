@@ -38,6 +38,7 @@ NEAR_TRIES = 12  # ways after which a pair without a posture closes all that are
 HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]
 HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
 HAND_TRIES = 4  # ways that feet alone do not make after which hands may join at any step
+DEEP_INSET = 0.02  # of the centre of mass as a body that turned round carries on a hand, at 1.75 m [m]
 HOLDS = 6  # most places of hands that are tried at a step
 
 
@@ -141,7 +142,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         ends = feet_of(start.contacts), feet_of(goal.contacts)
         self.search = FootstepSearch(
             scene, self._footholds, *ends, scale, StepReach.of(body), self._pair_cost, (radius, low, high),
-            self.settings.stride, HELD_HIGHEST if self._handholds.exist else HIGHEST,
+            self.settings.stride, self._handholds.exist,
         )  # fmt: skip
         self._risen: tuple[Stage, ...] = ()
         self._lenient = False  # whether postures count that are too hard at rest
@@ -245,8 +246,9 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         key = *map(id, holds), before.trunk, after.trunk
         if key not in self._near:
             roots = [self._room.guide(place)[:7] for place in (before, after)]
-            ground = min(float(hold.position[2]) for hold in holds)
-            self._near[key] = self._handholds.near(roots, ground, HOLDS)
+            heights = [float(hold.position[2]) for hold in holds]
+            deep = max(heights) - min(heights) > HELD_HIGHEST * self._scale
+            self._near[key] = self._handholds.near(roots, min(heights), HOLDS, low=deep)
         return self._near[key]
 
     def _moved(
@@ -270,26 +272,28 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         standing = {foot.effector: foot for foot in feet}
         bare = self._left({**standing, **hands}, before, hands, q)
         start = bare[-1].q if bare else q
-        if bare is not None:
+        rise = np.ptp([hold.position[2] for place in (before, after) for hold in (place.left, place.right)])
+        deep = bool(rise > HELD_HIGHEST * self._scale)  # where a hand carries if one can
+        if bare is not None and not deep:
             yield bare, {}, start
         if hands:
             yield [], hands, q
-        rise = np.ptp([hold.position[2] for place in (before, after) for hold in (place.left, place.right)])
         if bare is None or (rise < HIGH * self._scale and self.replanned < HAND_TRIES):
             return
         holds = self._holds_near(before, after)
         pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector[0] != b.effector[0]]
-        for contacts in [*((hold,) for hold in holds), *pairs[:2]]:
+        for contacts in [*((hold,) for hold in holds), *pairs[:2], *[()] * deep]:
             stages, held, at = list(bare), dict[str, Contact](), start
             for contact in contacts:
                 carrying = {**standing, **held}
                 held[contact.effector] = contact
-                posed = self._posed({**standing, **held}, carrying, before, at)
+                both = {**standing, **held}
+                posed = self._posed(both, carrying, before, at)
                 if posed.q is None:
                     self.reasons[f"{contact.effector} cannot be put down: {posed.reason}"] += 1
                     break
                 at = posed.q
-                stages.append(self._reached({**standing, **held}, at))
+                stages.append(Stage.of(self.poser.body, both, at, self.settings.reach_duration))
             else:
                 yield stages, held, at
 
@@ -302,11 +306,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
             if posed.q is None:
                 return None
             q, held = posed.q, carrying
-            stages.append(self._reached(held, q))
+            stages.append(Stage.of(self.poser.body, held, q, self.settings.reach_duration))
         return stages
-
-    def _reached(self, contacts: Contacts, q: FloatArray) -> Stage:
-        return Stage.of(self.poser.body, contacts, q, self.settings.reach_duration)
 
     def _step(
         self, feet: Sequence[Contact], before: _Stand, after: _Stand, q: FloatArray, hands: Contacts
@@ -317,14 +318,14 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         """
         leaving, standing, landing = feet
         carrying = {standing.effector: standing, **hands}
-        off = abs(float(leaving.position[2] - standing.position[2])) > HIGH * self._scale
-        last, lifted = self._footed(leaving, carrying, before, q, tilts=off)
+        off = abs(float(leaving.position[2] - standing.position[2]))
+        last, lifted = self._footed(leaving, carrying, before, q, off)
         if lifted.q is None:
             return [], replace(lifted, reason=f"{leaving.effector} cannot be lifted: {lifted.reason}")
         body, flight = self.poser.body, self.settings.flight(leaving, landing)
         stages = [Stage.of(body, carrying, lifted.q, flight, tilted=() if last is leaving else (last,))]
-        down = float(standing.position[2] - landing.position[2]) > HIGH * self._scale
-        first, landed = self._footed(landing, carrying, after, lifted.q, tilts=down)
+        down = float(standing.position[2] - landing.position[2])
+        first, landed = self._footed(landing, carrying, after, lifted.q, down)
         if landed.q is None:
             return stages, replace(landed, reason=f"{landing.effector} cannot be put down: {landed.reason}")
         both, shift = {**carrying, landing.effector: landing}, self.settings.shift_duration
@@ -332,30 +333,27 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         return [*stages, Stage.of(body, both, landed.q, shift, tilted=tilted)], landed
 
     def _footed(
-        self, foot: Contact, carrying: Contacts, place: _Stand, q: FloatArray, *, tilts: bool
+        self, foot: Contact, carrying: Contacts, place: _Stand, q: FloatArray, high: float
     ) -> tuple[Contact, Posed]:
-        """What a foot touches with that does not carry, and the posture: its toes where it cannot lie flat.
-
-        Args:
-            tilts: Whether its toes may touch alone.
-        """
-        for foot_or_toes in (foot, self._on_toes(foot)) if tilts else (foot,):
+        """What a foot touches with that does not carry, and the posture: its toes if so ``high`` it must."""
+        for foot_or_toes in (foot, self._on_toes(foot)) if high > HIGH * self._scale else (foot,):
             held = {**carrying, foot.effector: foot_or_toes}
-            posed = self._posed(held, carrying, place, q, thorough=not tilts)
+            posed = self._posed(held, carrying, place, q, high)
             if posed.q is not None:
                 return foot_or_toes, posed
         return foot, posed
 
     def _posed(
-        self, held: Contacts, carrying: Contacts, place: _Stand, q: FloatArray, *, thorough: bool = True
+        self, held: Contacts, carrying: Contacts, place: _Stand, q: FloatArray, high: float = 0.0
     ) -> Posed:
         """Posture that holds contacts and rests on some; looked for once with each trunk."""
         key = frozenset(held.values()), frozenset(carrying), place.trunk
         if key in self._postures:
             return self._strong(self._postures[key])
         guide, feet_alone = self._room.guide(place), set(held) <= set(FEET)
-        posed = self.poser.pose(held, carrying, q, guide)
-        if posed.q is None and (feet_alone or len(held) > 2) and thorough:
+        inset = None if feet_alone or high <= HELD_HIGHEST * self._scale else DEEP_INSET * self._scale
+        posed = self.poser.pose(held, carrying, q, guide, inset=inset)
+        if posed.q is None and (feet_alone or len(held) > 2) and high <= HIGH * self._scale:
             start = np.concatenate([guide, q[len(guide) :]])
             posed = self.poser.pose(held, carrying, start, guide, restarts=feet_alone)
         self._postures[key] = self.poser.eased(posed, held, carrying)
