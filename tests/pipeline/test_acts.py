@@ -30,6 +30,23 @@ def test_a_way_ends_with_both_hands_on_the_object(rope):
     assert found.scenario.file.task.act.force_N == 200.0
 
 
+def test_a_posture_that_a_later_stage_refuses_is_followed_by_the_next_best(rope):
+    """The last change of contacts is of no way: the hands or feet that act are elsewhere in the next plan."""
+    found, _ = rope
+    again = found.again(len(found.plan.stages) - 1, "it fails")
+    assert again.failure is None
+    before, after = (plan.stages[-1].contacts for plan in (found.plan, again.plan))
+    assert before.keys() == after.keys()
+    assert not all(contact.same_place(after[name]) for name, contact in before.items())
+
+
+def test_a_tall_person_gets_to_where_only_a_posture_that_leans_back_has_room():
+    """None of the trunk's postures is free with a bar 0.1 m before the feet; that of the goal is known."""
+    scenario = load_scenario("pull-rope", "wall").with_body(stature_m=1.88)
+    found = find_supports(scenario, scenario.build_body(), scenario.build_scene(), np.random.default_rng(0))
+    assert found.failure is None
+
+
 def test_an_object_out_of_reach_ends_in_an_explained_failure():
     result = runner.run("push-cupboard", variant="out-of-reach")
     assert not result.succeeded

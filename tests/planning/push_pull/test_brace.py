@@ -34,6 +34,7 @@ def test_a_push_is_braced_free_and_within_strength(body, scene, brace):
 def test_the_same_request_has_the_same_answer(body, scene, samples, push, brace):
     again = find_braced_posture(body, scene, samples, push, np.zeros(2), settings=FEW)
     np.testing.assert_array_equal(again.brace.q, brace.q)
+    assert all(other.forces.torque_share >= brace.forces.torque_share for other in again.others)
 
 
 def test_efort_needs_less_of_the_joints_strength_than_the_closest_contacts(body, scene, samples, push, brace):

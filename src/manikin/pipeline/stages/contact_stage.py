@@ -79,6 +79,8 @@ class _FootSearch(_ContactSearch):
         self._poser = contacts.PostureFinder(body, scene, self._reference, asked)
         self._places = self._endpoints(self._poser)
         self._brace: Brace | None = None
+        self._braces: list[Brace] = []
+        self._start: Stage | None = None
         self._seat: Stage | None = None
 
     def run(self) -> ContactSearch:
@@ -91,9 +93,9 @@ class _FootSearch(_ContactSearch):
         if "buttocks" in goal.contacts:
             self._seat, rising = goal, contacts.leave_seat(self._poser, goal, frozenset(contacts.FEET))
             goal = rising.stages[-1]
-        walk = self._search = self._searched(start, goal)
-        found = walk.run()
-        if found.plan is None and walk.search.walled_off() is not None:
+        self._start, found = start, self._walked(start, goal)
+        walk = self._search
+        if found.plan is None and isinstance(walk, WalkSearch) and walk.search.walled_off() is not None:
             self._search, crawl = None, self._crawl(walk, start, goal)
             found = replace(crawl, failure=f"on hands and knees: {crawl.failure}; on feet: {found.failure}")
         return self._result(found)
@@ -133,8 +135,29 @@ class _FootSearch(_ContactSearch):
         self._tally.summary["act_places"] = result.tried
         if result.brace is None:
             return result.failure or ""
-        self._brace = result.brace
-        return arrival(result.brace)
+        self._braces = [result.brace, *result.others]
+        return self._next_act()
+
+    def _next_act(self) -> Stage:
+        """Goal of the way to the next best posture that acts."""
+        self._brace = self._braces.pop(0)
+        return arrival(self._brace)
+
+    def _walked(self, start: Stage, goal: Stage) -> Extension:
+        """The way to a goal, at an act to the first posture that acts to which there is one."""
+        while True:
+            walk = self._search = self._searched(start, goal)
+            found = walk.run()
+            if found.plan is not None or not self._braces:
+                return found
+            goal = self._next_act()
+
+    def _again(self, phase: int, reason: str) -> ContactSearch:
+        """Another way, or another posture that acts where the phase comes after the way."""
+        walked = self._search is not None and self._search.refuse(phase)
+        if walked or not self._braces or self._start is None:
+            return super()._again(phase, reason)
+        return self._result(self._walked(self._start, self._next_act()))
 
 
 STANDING_HEIGHT = 0.92

@@ -101,7 +101,7 @@ class FootstepSearch:
         self._keys: dict[int, int] = {}
         self._is_free = cache(lambda number: number < 4 or footholds.is_free(self.holds[number]))
         self._passes = cache(lambda *numbers: footholds.passes(*(self.holds[number] for number in numbers)))
-        self._pairs: dict[tuple[int, int], float] = {}
+        self._pairs = dict.fromkeys(((0, 1), (1, 0), (2, 3), (3, 2)), 0.0)  # postures are known at the ends
         self._next: dict[tuple[int, int], list[tuple[_Node, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
         self._refused = Refused(ALIKE)

@@ -133,14 +133,17 @@ class BraceResult:
     """A posture that acts, or why there is none.
 
     Attributes:
+        brace: The one that takes the least share of the strength.
         tried: Places of the trunk.
         strongest: Largest force of any balanced posture that was found [N]; 0 without one.
+        others: Further ones, the next best first.
     """
 
     brace: Brace | None
     tried: int
     strongest: float
     failure: str | None = None
+    others: tuple[Brace, ...] = ()
 
 
 def find_braced_posture(
@@ -196,8 +199,8 @@ class _BraceSearch:
                 break
         else:
             return BraceResult(None, self._tried, self._strongest, self._why())
-        best = min(braces, key=lambda item: item.forces.torque_share)
-        return BraceResult(best, self._tried, self._strongest)
+        best, *others = sorted(braces, key=lambda item: item.forces.torque_share)
+        return BraceResult(best, self._tried, self._strongest, others=tuple(others))
 
     def _trunks(self, faces: list[Surface], near: FloatArray) -> Iterator[FloatArray]:
         """Postures before the nearest face, the trunk at the settings' places."""
