@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from manikin.body import human
-from manikin.kinematics.step_reach import FILE, HEELS, STATURE, StepReach
+from manikin.kinematics.step_reach import FILE, SHIPPED, STATURE, StepReach
 
 ROUNDS = 300
 """Rounds of sampling outwards."""
@@ -20,10 +20,10 @@ def main(path: Path) -> None:
     table: dict[str, np.ndarray] = {}
     for sex in ("male", "female"):
         body = human(STATURE, 22.0 * STATURE**2, sex)
-        for heels in HEELS:
-            reach = StepReach.sampled(body, heels, rounds=ROUNDS)
-            table[f"{sex}/{heels}/A"] = reach.A.astype(np.float32)
-            table[f"{sex}/{heels}/b"] = reach.b.astype(np.float32)
+        for heels, rest in SHIPPED:
+            reach = StepReach.sampled(body, heels, rest, rounds=ROUNDS)
+            table[f"{sex}/{heels}/{rest}/A"] = reach.A.astype(np.float32)
+            table[f"{sex}/{heels}/{rest}/b"] = reach.b.astype(np.float32)
     np.savez_compressed(path, allow_pickle=False, **table)
 
 

@@ -1,8 +1,8 @@
 """Places of one foot relative to the other for which one posture of the body holds both.
 
 The set is sampled like a region of the centre of mass (:mod:`manikin.kinematics.reach_sampler`), the place of
-the second foot being one more unknown. Of humans it scales with the stature; the sets of both sexes with the
-centre of mass anywhere are shipped, and ``docs/step_reach.py`` makes the file.
+the second foot being one more unknown. Of humans it scales with the stature; the sets of both sexes in
+:data:`SHIPPED` are read, and ``docs/step_reach.py`` makes the file.
 """
 
 from collections.abc import Sequence
@@ -40,8 +40,13 @@ leaves; or anywhere."""
 REST_INSET = 0.035
 """Distance of a resting centre of mass from the sole's edges [m], of a body of 1.75 m; our choice."""
 
+SHIPPED: tuple[tuple[Heels, Rest], ...] = (
+    *((heels, "anywhere") for heels in HEELS), ("down", "standing"), ("down", "moved"),
+)  # fmt: skip
+"""Sets that are shipped, of a man and a woman of :data:`STATURE`."""
+
 FILE = Path(__file__).with_name("step_reach.npz")
-"""Shipped sets of a man and a woman of :data:`STATURE`."""
+"""File with them."""
 
 STATURE = 1.75
 """Stature of the bodies whose sets are shipped [m]."""
@@ -76,7 +81,7 @@ class StepReach:
     @staticmethod
     @lru_cache(maxsize=64)
     def of(body: BodyModel, heels: Heels = "down", rest: Rest = "anywhere") -> "StepReach":
-        """The set of a body, computed once; anywhere, a human of usual proportions has the shipped one.
+        """The set of a body, computed once; a human of usual proportions has the shipped one, if there is.
 
         Args:
             heels: Which feet may stand on their toes: none, the standing one, or both.
@@ -86,14 +91,22 @@ class StepReach:
         Raises:
             BodyError: If the body has no legs like those of a human.
         """
-        if body.stature is None or body.sex is None or body.lengths or rest != "anywhere":
+        if body.stature is None or body.sex is None or body.lengths or (heels, rest) not in SHIPPED:
             return StepReach.sampled(body, heels, rest)
         scale = body.stature / STATURE
         with np.load(FILE, allow_pickle=False) as table:
-            A, b = table[f"{body.sex}/{heels}/A"], table[f"{body.sex}/{heels}/b"]
+            A, b = (table[f"{body.sex}/{heels}/{rest}/{part}"] for part in "Ab")
         # Lengths grow with the body and turns do not.
         A = frozen_array(A.astype(np.float64) * [1.0, 1.0, 1.0, scale], "A")
         return StepReach(A, frozen_array(scale * b.astype(np.float64), "b"))
+
+    @staticmethod
+    @lru_cache(maxsize=64)
+    def at_rest(body: BodyModel) -> "StepReach":
+        """Places at which the body can rest on either foot, on flat soles."""
+        ends = [StepReach.of(body, "down", rest) for rest in ("standing", "moved")]
+        A, b = np.vstack([end.A for end in ends]), np.concatenate([end.b for end in ends])
+        return StepReach(frozen_array(A, "A"), frozen_array(b, "b"))
 
     def room(self, places: ArrayLike, foot: str = "right_foot") -> FloatArray:
         """(k,) least distance of places (k, 4) of a foot to the end of the set [m]; negative outside."""

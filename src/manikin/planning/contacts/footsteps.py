@@ -38,6 +38,8 @@ FACED_HIGHEST = 0.86  # the same of one that faces what is higher, where its han
 FACED = (0.34, 0.27)  # least way of the lower foot behind the higher one then, most way aside [m]
 ON_TOES = 0.04  # way beyond the reach of flat soles then, as the lower foot is on its toes [m]
 HELD_COST = 4.0 * STEP  # cost of a step that is higher than HIGHEST: hands come and go [s]
+FLAT = 0.3  # largest difference in height at which both soles lie flat at rest, of a body of 1.75 m [m]
+UNREST_COST = 10.0  # cost of a step at which the body cannot rest on either foot, by how much [s/m]
 NARROWEST = 0.115  # least distance of the middles of two soles across, of a body of 1.75 m [m]
 SOLES_APART = 0.016  # least distance of two soles seen from above: a little more than postures keep [m]
 ALONG = (-0.4, -0.25, 0.0, 0.15, 0.28, 0.38, 0.48, 0.58, 0.70)
@@ -81,21 +83,22 @@ class FootstepSearch:
     """
 
     def __init__(
-        self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet, scale: float, reach: StepReach,
-        pair_cost: Callable[[Foothold, Foothold], float], column: tuple[float, float, float], stride: float,
-        held: bool,
+        self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet, scale: float,
+        reach: tuple[StepReach, StepReach], pair_cost: Callable[[Foothold, Foothold], float],
+        column: tuple[float, float, float], stride: float, held: bool,
     ) -> None:  # fmt: skip
         """Prepare a search.
 
         Args:
             scale: Size of the body relative to one of 1.75 m.
-            reach: Places of one foot relative to the other that the body reaches.
+            reach: Places of one foot relative to the other that the body reaches, and where it rests on either.
             pair_cost: Cost of the body between two footholds, left and right [s]; infinite without room.
             column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
             stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
             held: Whether there may be something to hold on to.
         """
-        self._footholds, self._scale, self._reach, self._pair_cost = footholds, scale, reach, pair_cost
+        self._footholds, self._scale, self._pair_cost = footholds, scale, pair_cost
+        self._reach, self._rest = reach
         self._stride, self._highest, self.expanded = stride, FACED_HIGHEST if held else HIGHEST, 0
         self.holds = [*start, *goal]
         self._keys: dict[int, int] = {}
@@ -104,7 +107,7 @@ class FootstepSearch:
         self._pairs = dict.fromkeys(((0, 1), (1, 0), (2, 3), (3, 2)), 0.0)  # postures are known at the ends
         self._next: dict[tuple[int, int], list[tuple[_Node, float]]] = {}
         self._closed: set[tuple[int, int]] = set()
-        self._refused = Refused(ALIKE)
+        self._refused, self._missing = Refused(ALIKE), Refused(ALIKE)
         self._too_hard: list[FloatArray] = []
         self._offsets = _offsets(scale)
         heights = HIGHEST * scale, self._highest * scale
@@ -115,9 +118,11 @@ class FootstepSearch:
         # With the first factor nearly all footholds about a far way would be expanded before its end.
         self._first_greed, self._ways = int(min(self._ahead[:2]) > FAR), 0
 
-    def close(self, stand: int, step: int) -> None:
-        """Close a pair of footholds, which has no posture."""
+    def close(self, stand: int, step: int) -> int:
+        """Close a pair of footholds, which has no posture, and count those much like it that were closed."""
         self._closed.add((stand, step))
+        self._missing.places.append(self._at(stand, step))
+        return self._missing.alike(self._at(stand, step))
 
     def refuse(self, stand: int, step: int) -> None:
         """Close all steps that are much like one, with which a later stage failed."""
@@ -256,9 +261,9 @@ class FootstepSearch:
         rise, size = np.abs(away[:, 2]), self._scale
         way = np.hypot(ahead, np.maximum(0.0, aside - 0.19 * size))
         apart = np.column_stack([ahead, out * aside, away[:, 2], out * turned])
-        room = self._reach.room(apart, "left_foot" if out > 0 else "right_foot")
+        foot = "left_foot" if out > 0 else "right_foot"
         deep = rise > HELD_HIGHEST * size
-        made = room >= np.where(deep, -ON_TOES * size, REACH_MARGIN)
+        made = self._reach.room(apart, foot) >= np.where(deep, -ON_TOES * size, REACH_MARGIN)
         faced = (ahead * np.sign(away[:, 2]) >= FACED[0] * size) & (aside <= FACED[1] * size)
         made &= np.where(deep, faced, ahead >= -FACED[0] * size)
         made &= (rise <= self._highest * size) & (turned >= -0.8) & (turned <= 1.1)
@@ -269,6 +274,8 @@ class FootstepSearch:
         cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + 3.0 * (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
         cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
+        flat = made & (rise < FLAT * size)
+        cost[flat] += UNREST_COST * np.maximum(0.0, -self._rest.room(apart[flat], foot))
         return np.where(made, cost, np.inf)
 
 

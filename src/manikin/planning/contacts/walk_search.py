@@ -35,6 +35,7 @@ STRONG_TRIES = 16
 as a motion may need less than its postures at rest, whose knees and trunk are not bent for least torque."""
 
 NEAR_TRIES = 12  # ways after which a pair without a posture closes all that are much like it
+ALIKE_TRIES = 3  # pairs without a posture and much like each other, which close all that are
 HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it, of a body of 1.75 m [m]
 HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
 HAND_TRIES = 4  # ways that feet alone do not make after which hands may join at any step
@@ -141,8 +142,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         radius, low, high = (scale * value for value in COLUMN)
         ends = feet_of(start.contacts), feet_of(goal.contacts)
         self.search = FootstepSearch(
-            scene, self._footholds, *ends, scale, StepReach.of(body), self._pair_cost, (radius, low, high),
-            self.settings.stride, self._handholds.exist,
+            scene, self._footholds, *ends, scale, (StepReach.of(body), StepReach.at_rest(body)),
+            self._pair_cost, (radius, low, high), self.settings.stride, self._handholds.exist,
         )  # fmt: skip
         self._risen: tuple[Stage, ...] = ()
         self._lenient = False  # whether postures count that are too hard at rest
@@ -227,9 +228,9 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         rise = abs(float(self.search.holds[stand].position[2] - self.search.holds[step].position[2]))
         if too_hard:
             self.search.refuse_everywhere(stand, step)
-        elif self.replanned < (NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES):
-            self.search.close(stand, step)
-        else:
+            return
+        most = NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES
+        if self.search.close(stand, step) >= ALIKE_TRIES or self.replanned >= most:
             self.search.refuse(stand, step)
 
     def _pair_cost(self, left: Foothold, right: Foothold) -> float:
@@ -257,7 +258,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         """What hands do before a step, what they hold then, and the step: the first that has postures."""
         failed: tuple[list[Stage], Posed] | None = None
         for _ in self._leniencies():
-            for changes, held, start in self._hands_before(feet[:2], before, after, hands, q):
+            for changes, held, start in self._hands_before(feet, before, after, hands, q):
                 made, landed = self._step(feet, before, after, start, held)
                 if landed.q is not None:
                     return changes, held, made, landed
@@ -269,7 +270,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         self, feet: Sequence[Contact], before: _Stand, after: _Stand, hands: dict[str, Contact], q: FloatArray
     ) -> Iterator[tuple[list[Stage], dict[str, Contact], FloatArray]]:
         """What hands may hold at a step: nothing, the same, or something new, with the stages to there."""
-        standing = {foot.effector: foot for foot in feet}
+        standing = {foot.effector: foot for foot in feet[:2]}
         bare = self._left({**standing, **hands}, before, hands, q)
         start = bare[-1].q if bare else q
         rise = np.ptp([hold.position[2] for place in (before, after) for hold in (place.left, place.right)])
@@ -284,6 +285,10 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         pairs = [(a, b) for a, b in combinations(holds[: HOLDS // 2], 2) if a.effector[0] != b.effector[0]]
         for contacts in [*((hold,) for hold in holds), *pairs[:2], *[()] * deep]:
             stages, held, at = list(bare), dict[str, Contact](), start
+            carrying = {feet[1].effector: feet[1], **{contact.effector: contact for contact in contacts}}
+            down = float(feet[1].position[2] - feet[2].position[2])
+            if self._footed(feet[2], carrying, after, start, down)[1].q is None:
+                continue  # without a posture at the end of the step, whatever comes before
             for contact in contacts:
                 carrying = {**standing, **held}
                 held[contact.effector] = contact
