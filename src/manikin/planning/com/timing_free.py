@@ -171,6 +171,9 @@ MAX_ROUNDS = 6
 NEGLIGIBLE = 0.02
 """Share of the margin by which left-out facets may lower it without another round."""
 
+LOST = 0.3
+"""Distance out of reach from which on a trajectory is no start for the next round [m]; our choice."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CentroidalResult(Displayed):
@@ -429,7 +432,10 @@ def _rounds(
             return  # a violation that is more than an effect of sampling stays
         if enough:
             targets = targets.grown(problem, attempt.certificate)
-        facets, faces, bezier, durations = more_facets, more_faces, attempt.bezier, attempt.durations
+        facets, faces = more_facets, more_faces
+        # The solver does not come back from far outside of the faces that were not imposed.
+        if attempt.certificate["reach"].value <= LOST:
+            bezier, durations = attempt.bezier, attempt.durations
 
 
 def limiting_at(

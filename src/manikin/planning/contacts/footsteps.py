@@ -32,7 +32,7 @@ from manikin.scene.collision import column_is_free
 STEP = 0.7  # time of a short step [s]; our choice, as the next ones
 EASY = 3.0**0.25  # way at twice the cost of a short step, over that of the cheapest gait: of a quartic
 REACH_MARGIN = 0.02  # distance that steps keep to the end of what the body reaches [m]; our choice
-HIGHEST = 0.48  # largest difference in height of two soles, of a body of 1.75 m [m]
+HIGHEST = 0.53  # largest difference in height of two soles, of a body of 1.75 m [m]
 HELD_HIGHEST = 0.80  # the same of a body that has something to hold on to or lean on [m]
 FACED_HIGHEST = 0.86  # the same of one that faces what is higher, where its hands are [m]
 FACED = (0.34, 0.27)  # least way of the lower foot behind the higher one then, most way aside [m]
