@@ -9,6 +9,7 @@ from manikin.contact import point, sole
 from manikin.kinematics import PostureProblem, SolverSettings, generate_posture
 from manikin.kinematics.com_reach import NORMALS, ComReach
 from manikin.kinematics.step_reach import StepReach
+from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.scene import Proximity, Scene
 
 
@@ -148,3 +149,31 @@ def test_a_high_step_down_needs_the_rear_heel():
     flat, raised = (StepReach.sampled(body, heels, "moved", rounds=100) for heels in ("down", "standing up"))
     assert flat.room(place)[0] < -0.1
     assert raised.contains(place)[0]
+
+
+@pytest.mark.parametrize(("ahead", "rests"), [(0.35, True), (0.80, False)])
+def test_steps_at_rest_are_shorter_than_those_that_legs_reach(ahead, rests):
+    """A posture on flat soles over the rear foot exists 0.35 m ahead, and not 0.80 m, which legs reach."""
+    body = human(1.75, 70.0, "male")
+    left, right = feet(body, (0.0, 0.1, 0.0, 0.0), (ahead, -0.1, 0.0, 0.0))
+    place = np.array([[ahead, -0.2, 0.0, 0.0]])
+    assert StepReach.of(body).contains(place)[0]
+    assert StepReach.at_rest(body).contains(place)[0] == rests
+    held = {contact.effector: contact for contact in (left, right)}
+    found = PostureFinder(body, Scene([], 0.0)).pose(
+        held, {"left_foot": left}, np.array(body.standing_posture()), restarts=True
+    )
+    assert (found.q is not None) == rests
+
+
+def test_shipped_sets_at_rest_are_those_that_sampling_finds():
+    """Places that few rounds of sampling reach are at most 5 cm beyond the sets of either foot.
+
+    Hulls of a hundred extreme places each leave out that much where these are far apart.
+    """
+    body = human(1.75, 70.0, "female")
+    places = np.random.default_rng(3).uniform([-0.8, -0.7, -0.5, -0.8], [0.8, 0.0, 0.5, 0.8], (2000, 4))
+    for rest in ("standing", "moved"):
+        inside = StepReach.sampled(body, rest=rest, rounds=60).contains(places)
+        assert inside.sum() > 20
+        assert StepReach.of(body, rest=rest).room(places[inside]).min() > -0.05

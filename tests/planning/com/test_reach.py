@@ -8,8 +8,9 @@ import pytest
 from manikin.body import human
 from manikin.contact import Phase, Stance, StanceSequence, sole
 from manikin.kinematics.com_reach import ComReach
-from manikin.planning.com import CentroidalProblem, plan_com
-from manikin.planning.com.com_certificate import phase_times
+from manikin.planning.com import CentroidalProblem, plan_com, timing_free
+from manikin.planning.com.com_certificate import measure, phase_times
+from manikin.planning.com.optimise import trajectory_of
 
 LENGTH = 0.85
 
@@ -49,6 +50,28 @@ def test_a_long_stride_is_planned_within_reach(body):
     assert beyond(problem, freely.trajectory) > 0.005
     assert kept.succeeded, kept.failure
     assert beyond(problem, kept.trajectory) <= 1e-6
+
+
+def test_a_round_that_leaves_the_reach_far_behind_is_no_start_for_the_next(body, monkeypatch):
+    """The first solution is moved up by more than that: the second round begins where the first one did."""
+    optimise, starts = timing_free.optimise, []
+
+    def lost_at_first(problem, polytopes, facets, targets, bezier, durations, faces):
+        found = optimise(problem, polytopes, facets, targets, bezier, durations, faces)
+        starts.append(bezier)
+        if len(starts) > 1:
+            return found
+        away = found.bezier + np.array([0.0, 0.0, 2.0 * timing_free.LOST])
+        trajectory = trajectory_of(problem, away, found.durations)
+        certificate = measure(problem, trajectory, polytopes)
+        return replace(found, bezier=away, trajectory=trajectory, certificate=certificate)
+
+    monkeypatch.setattr(timing_free, "optimise", lost_at_first)
+    problem = stride(body)
+    kept = plan_com(problem)
+    assert kept.succeeded, kept.failure
+    assert beyond(problem, kept.trajectory) <= 1e-6
+    np.testing.assert_array_equal(starts[1], starts[0])
 
 
 def test_ends_out_of_reach_are_named_with_their_contacts(body):

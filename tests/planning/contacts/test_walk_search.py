@@ -308,6 +308,28 @@ def test_holds_are_in_reach_and_on_what_a_hand_can_hold_or_lean_on():
         assert np.linalg.norm(item.position - root[:3]) < 1.0
 
 
+def test_a_hand_reaches_down_to_what_is_beside_the_feet():
+    """Who steps down from a block leans on a table 8 cm higher than the block, and on the block itself."""
+    scene = Scene([
+        Obstacle("block", Box((1.0, 0.6, 0.69)), translation=(0.0, 0.0, 0.345)),
+        Obstacle("table", Box((1.5, 0.7, 0.04)), translation=(0.0, -0.66, 0.75)),
+    ])  # fmt: skip
+    upper = np.array(BODY.standing_posture())[:7]
+    upper[2] += 0.69
+    lower = upper + np.array([0.3, 0.0, -0.4, 0.0, 0.0, 0.0, 0.0])
+    found = Handholds(BODY, scene, 0.7).near([upper, lower], 0.0, 20)
+    assert {scene.touched_obstacles(item) for item in found} == {("table",), ("block",)}
+    for item in found:
+        assert item.position[2] >= 0.69
+
+
+def test_the_feet_of_small_people_make_a_step_of_three_tenths_of_their_stature():
+    """0.45 m up by feet alone, at 1.53 m: the way over the ground is not walled off."""
+    step = Scene([Obstacle("step", Box((1.2, 1.5, 0.45)), translation=(0.95, 0.0, 0.225))], 0.0)
+    found, _, _ = planned(step, (0.95, 0.0), body=human(1.53, 54.0, "female"), searches=1)
+    assert "walled off" not in (found.failure or "")
+
+
 @pytest.mark.parametrize("low", [0.0, 0.85])
 @pytest.mark.parametrize(("effector", "accepted"), [("right_wrist", True), ("right_hand", False)])
 def test_a_hand_is_on_a_table_and_not_in_it(effector, low, accepted):

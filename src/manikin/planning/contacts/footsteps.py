@@ -91,7 +91,8 @@ class FootstepSearch:
 
         Args:
             scale: Size of the body relative to one of 1.75 m.
-            reach: Places of one foot relative to the other that the body reaches, and where it rests on either.
+            reach: Places of one foot relative to the other that the body reaches, and those at which it rests
+                on either foot.
             pair_cost: Cost of the body between two footholds, left and right [s]; infinite without room.
             column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
             stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
