@@ -43,7 +43,7 @@ def random_way(make, seed):
     yaw, at = rng.uniform(-np.pi, np.pi), rng.uniform(-3.0, 3.0, 2)
     turn = rotation_from_yaw(yaw)
     scene, goal, turned = make(rng, lambda x, z: turn @ [x, 0.0, z] + [*at, 0.0], turn)
-    ends = Endpoints(body, scene, 0.7)
+    ends = Endpoints(PostureFinder(body, scene), 0.7)
     start = ends.find(at, yaw, Habit.STANDING).stage
     return body, scene, start, ends.find(goal[:2], yaw + turned, Habit.STANDING).stage
 

@@ -434,7 +434,7 @@ def _rounds(
             targets = targets.grown(problem, attempt.certificate)
         facets, faces = more_facets, more_faces
         # The solver does not come back from far outside of the faces that were not imposed.
-        if attempt.certificate["reach"].value <= LOST:
+        if not problem.regions or attempt.certificate["reach"].value <= LOST:
             bezier, durations = attempt.bezier, attempt.durations
 
 
