@@ -497,7 +497,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             if lifted.q is None:
                 self._stuck.add((before, k))
                 return self._refused(before, after, f"{name} cannot leave its contact: {lifted.reason}")
-            old, new, q = held.get(name), landed.get(name), lifted.q
+            old, new, q, postures = held.get(name), landed.get(name), lifted.q, [stages[-1].q, lifted.q]
             if new is not None:
                 guesses = self._guesses(self._guide(after), q, (self.holds[k], new))
                 landing = self._posed(landed, staying, guesses, (after, k, True))
@@ -507,6 +507,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 via = None
                 if old is not None or self.settings.retreats:
                     via = self._between(staying, lifted.q, q, (old or new, new), (before, after))
+                postures += [q] if via is None else [via, q]
                 if old is None:
                     # The limb is free already: it reaches its contact while the phase before lasts.
                     longest = max(stages[-1].min_duration, self.settings.swing_duration)
@@ -515,6 +516,8 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                     if via is None:
                         return self._refused(before, after, f"{name} finds no way around")
                     stages.append(Stage.of(body, staying, lifted.q, self.settings.flight(old, new), via=via))
+            if crossed := self.poser.crossing(*postures):
+                return self._refused(before, after, f"{crossed} pass through each other as {name} moves")
             stages.append(Stage.of(body, landed, q, self.settings.shift_duration))
             self._moves += [(before, after)] * (len(stages) - len(self._moves))
         contacts = stages[-1].contacts

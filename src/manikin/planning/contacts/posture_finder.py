@@ -3,7 +3,8 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +32,9 @@ EASING_MOVES, EASING_TURN = 8, (0.3, 0.03)
 EASY, EASY_ENOUGH = 0.9, 0.98  # shares of the strength at which they aim, and with which they end
 LIKE_BEFORE = Preferences(hinges={}, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 """What is wished for where a posture is near another one: that all its hinges stay."""
+BETWEEN, CROSSED = (0.25, 0.5, 0.75), 0.005
+"""Shares of a way between postures at which parts of the body are tested, and how deep they may be in each
+other there, as a motion bends round a little [m]; our choice."""
 LEARNT_MARGIN = 0.01  # angle that such postures keep to the surface of a learnt volume [rad]; our choice
 
 
@@ -171,6 +175,18 @@ class PostureFinder:
                 return Posed(result.q)
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
+
+    def crossing(self, *postures: FloatArray) -> str:
+        """Parts of the body that straight ways from posture to posture take through each other; or empty."""
+        model = self.body.pinocchio
+        ways = [pin.interpolate(model, *pair, share) for pair in pairwise(postures) for share in BETWEEN]
+        found = self._own.minimum_over(np.array(ways), tolerance=1e-3)
+        return " and ".join(found.pair or ()) if found.distance < -CROSSED else ""
+
+    @cached_property
+    def _own(self) -> Proximity:
+        """Distances between parts of the body alone."""
+        return Proximity(self.body, Scene((), None))
 
     def eased(
         self, posed: Posed, held: Contacts, carrying: Contacts,
