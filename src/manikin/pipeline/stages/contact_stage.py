@@ -92,6 +92,8 @@ class _FootSearch(_ContactSearch):
             return self._tally.failed(goal, "goal")
         if "buttocks" in goal.contacts:
             self._seat, rising = goal, contacts.leave_seat(self._poser, goal, frozenset(contacts.FEET))
+            if rising.failure is not None:
+                return self._tally.failed(f"the goal: {rising.failure}", "goal")
             goal = rising.stages[-1]
         self._start, found = start, self._walked(start, goal)
         walk = self._search
