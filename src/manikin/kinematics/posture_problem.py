@@ -138,8 +138,8 @@ class PostureProblem:
         clearance: Distance to keep to obstacles [m].
         self_clearance: Distance to keep between body parts [m].
         ignore: Pairs (segment, obstacle) or (segment, segment) that may touch.
-        beside: Pairs (segment, obstacle) that may be as near as touching, but no nearer.
-        sinking: Pairs (segment, obstacle) that may touch, and be 4 mm deep in each other, but no deeper.
+        touching: Distances to keep of pairs (segment, obstacle) that may touch, negative inside [m]; they
+            count before what is ignored.
         range_margin: Angle to keep from the ends of the hinge ranges [rad].
         learnt_margin: Angle to keep to the surface of the learnt volumes of hips and shoulders, inside [rad];
             None where the ranges of their hinges are all that counts.
@@ -157,8 +157,7 @@ class PostureProblem:
     clearance: float = 0.02
     self_clearance: float = 0.005
     ignore: Ignored = NOTHING
-    beside: Ignored = NOTHING
-    sinking: Ignored = NOTHING
+    touching: Mapping[tuple[str, str], float] = field(default_factory=dict)
     range_margin: float = 0.0
     learnt_margin: float | None = None
     reference: FloatArray | None = None

@@ -186,7 +186,7 @@ class PostureSolver:
         self._limits = LimitTerm(problem.body, problem.range_margin)
         self._clearances = None if problem.proximity is None else ClearanceTerm(
             problem.proximity, problem.clearance, problem.self_clearance, settings.activation,
-            problem.ignore - problem.beside - problem.sinking, problem.beside, problem.sinking,
+            problem.ignore - set(problem.touching), problem.touching,
         )  # fmt: skip
         wishes = problem.wishes()
         self._wishes = tuple(term for _, term in wishes)

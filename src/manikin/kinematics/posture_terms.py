@@ -5,7 +5,8 @@ Jacobian ``J`` (m, nv): ``r(q + v) = r(q) + J v`` to first order, ``v`` tangent 
 ``integrate``.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -15,7 +16,7 @@ import pinocchio as pin
 from manikin.body.configuration import Configuration
 from manikin.body.model import BodyModel
 from manikin.numerics.spatial import FloatArray, skew
-from manikin.scene.distance import NOTHING, Ignored, Pair, Proximity, segment_of
+from manikin.scene.distance import Ignored, Pair, Proximity, segment_of
 from manikin.scene.spheres import SphereProximity
 
 UP: FloatArray = np.array([0.0, 0.0, 1.0])
@@ -209,8 +210,11 @@ class LimitTerm:
 BESIDE = 5e-4
 """Distance of what may be as near as touching; more than the solver's tolerance [m]."""
 
-SINKING = 4e-3
-"""Depth to which what touches at a point may be in what it touches [m]: 1 mm less than a check allows."""
+SINKING = -4e-3
+"""Distance of what touches at a point from what it touches [m]: 1 mm less deep than a check allows."""
+
+GRASPING = -0.055
+"""Distance of an open hand from what its fingers close round [m]: 5 mm less deep than a check allows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,8 +227,7 @@ class ClearanceTerm:
         self_safety: Distance to keep between body parts [m].
         activation: Pairs farther apart than the safety distance plus this are left out [m].
         ignore: Pairs of names that may touch.
-        beside: Pairs (segment, obstacle) that may be as near as touching.
-        sinking: Pairs (segment, obstacle) that may be :data:`SINKING` deep, but no deeper.
+        touching: Distances that pairs (segment, obstacle) keep which may touch, negative inside [m].
     """
 
     proximity: Proximity | SphereProximity
@@ -232,8 +235,7 @@ class ClearanceTerm:
     self_safety: float
     activation: float
     ignore: Ignored
-    beside: Ignored = NOTHING
-    sinking: Ignored = NOTHING
+    touching: Mapping[Pair, float] = field(default_factory=dict)
 
     def evaluate(self, configuration: Configuration) -> tuple[Linearised, tuple[Pair, ...]]:
         """Distances beyond the safety distance [m] of the pairs of shapes that are close."""
@@ -254,7 +256,4 @@ class ClearanceTerm:
         """Distance that a pair has to keep [m]."""
         if "/" in other:
             return self.self_safety
-        pair = segment_of(shape), other
-        if pair in self.beside:
-            return min(BESIDE, self.safety)
-        return -SINKING if pair in self.sinking else self.safety
+        return min(self.touching.get((segment_of(shape), other), np.inf), self.safety)

@@ -5,10 +5,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from manikin.body import Configuration
+from manikin.body import Configuration, human
+from manikin.body.limbs import limb_named
+from manikin.contact import ContactKind, grasp, sole
+from manikin.kinematics.limb_samples import sample_limbs
+from manikin.kinematics.posture_terms import GRASPING
 from manikin.pipeline.stages import RunContext
 from manikin.pipeline.stages.contact_stage import HOLDING_ACCELERATION, find_supports
+from manikin.planning.contacts import ContactRules, PostureFinder, limb_holds
+from manikin.planning.contacts.limb_places import RUNG_SPACING
 from manikin.scenarios.families import FAMILIES, draw_scene
+from manikin.scene import Cylinder, Obstacle, Proximity, Scene
+from manikin.verification.holding import GRASPED
 
 
 @pytest.fixture(scope="module")
@@ -43,3 +51,42 @@ def test_changes_take_the_time_of_a_gentle_motion(plan):
     ways = np.linalg.norm(np.diff(com, axis=0), axis=1)
     for stage, way in zip(found.stages, ways, strict=True):
         assert 10.0 / np.sqrt(3.0) * way / stage.min_duration**2 <= HOLDING_ACCELERATION + 1e-9
+
+
+@pytest.mark.parametrize("place", [(0.5, -0.1), (0.6, -0.1), (0.6, 0.0)])
+def test_a_hand_is_round_a_stile_and_not_through_it(place):
+    """The open hand that stands for closed fingers is no deeper than the check allows; it was 56 to 57 mm."""
+    body, palm = human(1.75, 75.0), np.array([*place, 1.8])
+    stile = Scene([Obstacle("stile", Cylinder(0.02, 2.4), translation=(*place, 1.25))])
+    feet = {
+        foot: sole(foot, (0.0, y, 0.0), length=0.28, width=0.12, friction=0.7)
+        for foot, y in (("left_foot", 0.1), ("right_foot", -0.1))
+    }
+    hand = grasp("right_hand", palm - [0.03, 0.0, 0.0], max_force=300.0)
+    posed = PostureFinder(body, stile).pose({**feet, "right_hand": hand}, feet, body.standing_posture())
+    assert posed.q is not None, posed.reason
+    near = Proximity(body, stile).evaluate(posed.q, 0.1)
+    depths = [d for (_, other), d in zip(near.pairs, near.distance, strict=True) if other == "stile"]
+    assert -GRASPED < GRASPING <= min(depths) < 0.0
+
+
+def test_places_of_a_foot_on_a_rung_are_close():
+    """Two soles fit side by side between the stiles of any ladder; steps of 9 cm were too far."""
+    body = human(1.57, 75.0, "female")
+    limb = limb_named(body, "left_leg")
+    samples = sample_limbs(body, np.random.default_rng(0), count=50)
+    reference = np.array(body.standing_posture())
+    ends = np.array([reference[:7], reference[:7]])
+    for width in np.arange(0.35, 0.46, 0.01):
+        rung = Obstacle(
+            "rung", Cylinder(0.016, width), translation=(0.0, 0.0, 0.3),
+            rotation=[[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+        )  # fmt: skip
+        rules = ContactRules(stiff=0.1)
+        (holds,) = limb_holds(
+            body, Scene([rung], None), [limb], {limb.name: ContactKind.SOLE}, rules, reference, samples, ends,
+            1.0,
+        )  # fmt: skip
+        aside = np.unique(holds.positions[:, 1].round(6))
+        assert np.diff(aside).max() <= RUNG_SPACING + 1e-5
+        assert np.ptp(aside) > 0.1

@@ -36,7 +36,7 @@ LARGE = 4.0  # half the width of a large surface, in steps of its grid; our choi
 SHANK_UP, SHANK_ROOM = 0.35, 0.1
 """Height above the middle of a sole on the ground at which nothing may be nearer than the second, by the
 reach: toes below the first rung of a ladder keep a shank from getting past it; our choice."""
-RUNG_SPACING = 0.045  # distance of neighbouring places of a foot along a rung [m]; our choice
+RUNG_SPACING = 0.045  # largest distance of neighbouring places of a foot along a rung [m]; our choice
 _SQUARE = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
 
 
@@ -191,7 +191,7 @@ class _Grid:
         front = stiff - half
         for middle in (front, 0.0) if front > RUNG_APART else (front,):
             on = np.array([middle, 0.0, 0.0]) + np.array([half, side, 0.0]) * _SQUARE
-            for share in np.linspace(-1.0, 1.0, 2 * max(1, int(room / RUNG_SPACING)) + 1):
+            for share in np.linspace(-1.0, 1.0, 2 * int(np.ceil(room / RUNG_SPACING)) + 1):
                 place = surface.centre - middle * ahead + share * room * frame[:, 1]
                 if self._inside(place[None])[0]:
                     yield _Place(place, frame, on)

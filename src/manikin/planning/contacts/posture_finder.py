@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +21,7 @@ from manikin.kinematics import (
     pairs_beside,
     touching_pairs,
 )
+from manikin.kinematics.posture_terms import BESIDE, GRASPING, SINKING
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
@@ -150,7 +151,7 @@ class PostureFinder:
         self.searches += 1
         settings, led = self.settings, {} if guide is None else self.led(guide[:ROOT])
         whole = guide is not None and len(guide) > ROOT
-        ignore, beside, sinking = self._near(held)
+        ignore, touching = self._near(held)
         points = {
             name: Placement(None, item.rotation_contact_to_world, UPRIGHT.get(name.partition("_")[2], 0.05))
             for name, item in held.items() if upright and item.kind is ContactKind.POINT
@@ -160,7 +161,7 @@ class PostureFinder:
             {**led, **points, **(placements or {})},
             com=np.array([*place, np.nan]),
             com_weight=com_weight, proximity=self._proximity, clearance=settings.clearance,
-            self_clearance=settings.self_clearance, ignore=ignore, beside=beside, sinking=sinking,
+            self_clearance=settings.self_clearance, ignore=ignore, touching=touching,
             range_margin=settings.range_margin, learnt_margin=LEARNT_MARGIN if settings.natural else None,
             reference=guide if whole else self._reference, preferences=preferences or Preferences(),
         )  # fmt: skip
@@ -256,16 +257,25 @@ class PostureFinder:
         wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
         return {self._root: wish}
 
-    def _near(self, held: Contacts) -> tuple[Ignored, Ignored, Ignored]:
-        """Pairs that touch; those, and forearms at what is held, that are as near at most; or hardly deep."""
+    def _near(self, held: Contacts) -> tuple[Ignored, dict[tuple[str, str], float]]:
+        """Pairs that touch, and distances of those of which it is limited [m]."""
         touched = [(name, obstacle) for name, item in held.items() for obstacle in self._touched(item)]
-        points = [pair for pair in touched if held[pair[0]].kind is ContactKind.POINT]
-        wrists = {
-            (self.body.segment(self.body.effector(name).segment).parent or "", obstacle)
-            for name, obstacle in touched if held[name].kind is ContactKind.GRASP
-        }  # fmt: skip
-        beside = pairs_beside(self.body, touched) | (wrists if self.settings.forearms_beside else set())
-        return touching_pairs(self.body, touched), beside, touching_pairs(self.body, points) - beside
+        points, grasps = (
+            [pair for pair in touched if held[pair[0]].kind is kind]
+            for kind in (ContactKind.POINT, ContactKind.GRASP)
+        )  # fmt: skip
+        beside = pairs_beside(self.body, touched)
+        if self.settings.forearms_beside:
+            beside |= {(parent, obstacle) for name, obstacle in grasps if (parent := self._parent(name))}
+        limited = (
+            *product(touching_pairs(self.body, points), (SINKING,)),
+            *product(touching_pairs(self.body, grasps), (GRASPING,)), *product(beside, (BESIDE,)),
+        )  # fmt: skip
+        return touching_pairs(self.body, touched), dict(limited)
+
+    def _parent(self, effector: str) -> str | None:
+        """Segment on which that of an effector hangs."""
+        return self.body.segment(self.body.effector(effector).segment).parent
 
 
 def _strained(carrying: Contacts, share: float, most: float) -> str:
