@@ -226,13 +226,17 @@ def column_is_clear(
     length = max(top - bottom - 2.0 * radius, 1e-3)
     shape, middle = coal.Capsule(radius, length), np.array([0.0, 0.0, 0.5 * (bottom + top)])
     free = np.ones(len(places), dtype=bool)
+    side = int(np.argmax(np.ptp(places[:, :2], axis=0))) if len(places) else 0
+    order = np.argsort(places[:, side], kind="stable")
+    along = places[order, side]
     for part in parts:
         # The distance of the capsule's axis to the box about the part is that of their extents along the
         # sides of the box where the axis is along one of them, and no less than it elsewhere.
-        half, rows = 0.5 * length * np.abs(part.rotation[2]), np.flatnonzero(free)
-        low, high = part.world_bounds
-        inside = (places[rows] >= low - radius) & (places[rows] <= high + radius)
-        rows = rows[inside[:, 0] & inside[:, 1]]
+        half, (low, high) = 0.5 * length * np.abs(part.rotation[2]), part.world_bounds
+        first, last = low[side] - radius, high[side] + radius
+        rows = order[np.searchsorted(along, first) : np.searchsorted(along, last, "right")]
+        other = places[rows, 1 - side]
+        rows = rows[free[rows] & (other >= low[1 - side] - radius) & (other <= high[1 - side] + radius)]
         centres = (places[rows] + (middle - part.translation)) @ part.rotation
         gaps = np.maximum(np.maximum(part.low - half - centres, centres - half - part.high), 0.0)
         near = rows[np.einsum("ki,ki->k", gaps, gaps) <= radius**2]
