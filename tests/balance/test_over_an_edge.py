@@ -1,5 +1,7 @@
 """Soles of which only a part lies on a surface: limits, margins and shares against independent programs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -104,6 +106,44 @@ def test_a_sole_over_an_edge_lands_and_leaves_flat():
     assert any(part.get("right_foot") is SolePart.TOES for part in parts)
     with pytest.raises(ContactError, match="hangs over an edge"):
         sole_part(hanging, SolePart.HEEL, 0.06)
+
+
+def test_soles_of_any_size_over_an_edge_roll_in_the_same_phases():
+    """Random cuts of a sole, and what is drawn together about its middle, as planning balances on it.
+
+    Taken alone, some soles of one size rise onto their toes and those of the other do not.
+    """
+    whole = sole("right_foot", (0, 0, 0), friction=0.7, **SIZE)
+    corners = whole.points[np.argsort(np.arctan2(whole.points[:, 1], whole.points[:, 0])), :2]
+    rng, alone = np.random.default_rng(0), 0
+    for _ in range(300):
+        turn, offset = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 0.14)
+        edge = np.array([np.cos(turn), np.sin(turn)])
+        polygon = cut(corners, edge, offset)
+        if len(polygon) < 3:
+            continue
+        hanging = sole("left_foot", (0, 0.2, 0), polygon=polygon, friction=0.7, **SIZE)
+        points = hanging.centre + [0.8, 0.5, 1.0] * (hanging.points - hanging.centre)
+        less = replace(hanging, points=points)
+        one, other = (
+            StanceSequence([Phase(Stance(held), 0.6) for held in ([sole_], [sole_, whole], [whole])])
+            for sole_ in (hanging, less)
+        )
+        assert len(roll_feet(one, 0.06, other)) == len(roll_feet(other, 0.06, one))
+        alone += len(roll_feet(one, 0.06)) != len(roll_feet(other, 0.06))
+    assert alone > 0
+
+
+def cut(corners, edge, offset):
+    """Corners (k, 2) of what of a convex polygon, counter-clockwise, is below a line."""
+    kept = []
+    for here, there in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        first, second = here @ edge - offset, there @ edge - offset
+        if first <= 0.0:
+            kept.append(here)
+        if first * second < 0.0:
+            kept.append(here + first / (first - second) * (there - here))
+    return kept
 
 
 @pytest.mark.parametrize(

@@ -200,7 +200,8 @@ class Contact(Displayed):
             return False
         x, y = convex_polygon(toes).T
         area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-        return area >= LEAST_TOES * (0.5 * self.length - hinge) * self.width
+        tip = max(0.5 * self.length, float(toes[:, 0].max()))  # of what is cut off at the heel the toes are whole
+        return area >= LEAST_TOES * (tip - hinge) * self.width
 
     @property
     def centre(self) -> FloatArray:
@@ -370,7 +371,8 @@ def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
     if contact.hangs_over and not (part is SolePart.TOES and contact.rises_on_toes(hinge)):
         raise ContactError(f"{where} is taken from a sole that hangs over an edge there; valid: a whole one")
     x, y = contact.length / 2, contact.width / 2
-    line = finite_number(hinge, f"{where} hinge [m]", above=-x, at_most=x, error=ContactError)
+    back, front = (float(end(contact.points[:, 0])) for end in (np.min, np.max))
+    line = finite_number(hinge, f"{where} hinge [m]", above=back, at_most=front, error=ContactError)
     corners = [[-x, -y, 0.0], [-x, y, 0.0]]
     if part is SolePart.TOES:
         corners = [[x, y, 0.0], [x, -y, 0.0], [line, -y, 0.0], [line, y, 0.0]]

@@ -286,7 +286,7 @@ BALL_STEP = 0.25
 """Depth below the other one from which on a foot lands on its ball [m]; our choice."""
 
 
-def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
+def roll_feet(sequence: StanceSequence, hinge: float, like: StanceSequence | None = None) -> StanceSequence:
     """Split every phase in which a foot lands or leaves beside another full contact.
 
     The parts' shares are taken from the split phase's least duration, which is never shortened. Soles are
@@ -294,10 +294,19 @@ def roll_feet(sequence: StanceSequence, hinge: float) -> StanceSequence:
     step, lands flat, and deep below the other one on its ball, which is reached with the other knee bent
     less. One that is left above the other rises onto its toes as soon as that has landed: flat, its ankle
     would have to bend farther than it can.  Soles that hang over an edge land flat, and leave flat where
-    their toes have nothing below them.
+    their toes have nothing below them, in these stances or in those ``like`` them with soles of another size.
     """
+    pairs = zip(sequence, sequence if like is None else like, strict=True)
+    rises = [
+        {
+            name
+            for name in one.stance.effectors
+            if all(x.stance[name].rises_on_toes(hinge) for x in (one, other))
+        }
+        for one, other in pairs
+    ]
     flat = {(swing.last_phase + 1, swing.effector) for swing in sequence.swings() if _lands_flat(swing)}
-    parts = (_split(sequence, index, hinge, flat) for index in range(len(sequence)))
+    parts = (_split(sequence, index, hinge, flat, rises[index]) for index in range(len(sequence)))
     return StanceSequence([phase for split in parts for phase in split])
 
 
@@ -310,15 +319,16 @@ def _lands_flat(swing: Swing) -> bool:
 
 
 def _split(
-    sequence: StanceSequence, index: int, hinge: float, flat: Collection[tuple[int, str]]
-) -> Iterator[Phase]:
+    sequence: StanceSequence, index: int, hinge: float, flat: Collection[tuple[int, str]],
+    rises: Collection[str],
+) -> Iterator[Phase]:  # fmt: skip
     phase = sequence[index]
     stance = phase.stance
     landing = _changing(stance, sequence[index - 1].stance) if index > 0 else ()
-    balls = tuple(name for name in landing if stance[name].rises_on_toes(hinge))
+    balls = tuple(name for name in landing if name in rises)
     landing = tuple(name for name in landing if (index, name) not in flat and not stance[name].hangs_over)
     leaving = _changing(stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
-    leaving = tuple(name for name in leaving if stance[name].rises_on_toes(hinge))
+    leaving = tuple(name for name in leaving if name in rises)
     if balls and not landing and _depth(stance, balls) > BALL_STEP:
         yield _on_part(phase, balls, SolePart.TOES, hinge, ON_BALL)
         least = max(phase.min_duration - ON_BALL, ON_TOES)

@@ -123,7 +123,8 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
     if supports.foot != "rolling":
         return sequence
     with values.refusing(("supports", "foot")):
-        return roll_feet(sequence, (TOE_HINGE_FROM_HEEL - 0.5) * supports.sole.length_m)
+        other = flat_sequence(values, planning=not planning)
+        return roll_feet(sequence, (TOE_HINGE_FROM_HEEL - 0.5) * supports.sole.length_m, other)
 
 
 def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
