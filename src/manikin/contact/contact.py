@@ -200,7 +200,8 @@ class Contact(Displayed):
             return False
         x, y = convex_polygon(toes).T
         area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-        tip = max(0.5 * self.length, float(toes[:, 0].max()))  # of what is cut off at the heel the toes are whole
+        # Where the heel is cut off, the toes are whole.
+        tip = max(0.5 * self.length, float(toes[:, 0].max()))
         return area >= LEAST_TOES * (tip - hinge) * self.width
 
     @property
