@@ -323,6 +323,16 @@ def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_mot
     assert found.time_s == certificate[key].time_s
 
 
+@pytest.mark.parametrize(("depth", "key"), [(0.03, "min_clearance_m"), (0.001, "max_support_error_m")])
+def test_the_cause_of_a_caught_motion_is_what_is_caught(step_motion, depth, key):
+    """It also misses its contact by 0.1 mm more than allowed; that is the cause where nothing is caught."""
+    certificate = with_value(step_motion.certificate, "max_support_error_m", 1.1e-3, 0.5)
+    certificate = with_value(certificate, "min_clearance_m", -depth, 0.4)
+    cause = certificate.cause
+    assert cause is not None
+    assert cause.key == key
+
+
 @given(st.lists(st.floats(0.02, 1.0), min_size=1, max_size=6), st.floats(0.02, 0.2))
 def test_refined_knots_keep_the_old_ones_and_halve_the_spans_at_key_instants(durations, spacing):
     """The spline space grows: whatever was fitted before can still be fitted."""

@@ -152,10 +152,24 @@ class MotionCertificate(RequirementTable):
     impacts: tuple[Impact, ...] = ()
 
     @property
+    def is_caught(self) -> bool:
+        """Whether a part of the body is on the wrong side of another or of an obstacle."""
+        return self.value("min_clearance_m") < -CAUGHT
+
+    @property
+    def cause(self) -> Requirement | None:
+        """The broken requirement that says why there is no motion: what is caught, else the first one."""
+        return self["min_clearance_m"] if self.is_caught else self.first_broken
+
+    @property
     def required(self) -> RequirementTable:
         """The quantities that have a limit here: margins on stances with a volume, contacts met at speed."""
         idle = ("max_meeting_error_m", 0.0), ("min_margin", np.inf)
         return requirement_table(row for row in self if (row.key, row.measured) not in idle)
+
+
+CAUGHT = 0.02
+"""Depth from which on a part of the body is on the wrong side of another or of an obstacle [m]; our choice."""
 
 
 def certify(

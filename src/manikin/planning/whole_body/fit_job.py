@@ -122,7 +122,7 @@ class FitAttempt(Generic[G]):
 
         No small step leads out: the fit begins again from its first guess, with more weight on clearance.
         """
-        return self.certificate.value("min_clearance_m") < -0.02
+        return self.certificate.is_caught
 
 
 @dataclass(eq=False)

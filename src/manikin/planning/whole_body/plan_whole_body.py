@@ -222,7 +222,7 @@ class _Goal:
 
     def failure(self, certificate: MotionCertificate) -> WholeBodyFailure | None:
         """Reason why a motion to this goal is no success, or None."""
-        broken = certificate.first_broken
+        broken = certificate.cause
         if broken is None:
             return None
         reason, time = broken.reason, broken.time_s or 0.0

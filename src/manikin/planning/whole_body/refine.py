@@ -25,6 +25,7 @@ from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.whole_body.certificate import (
+    CAUGHT,
     MotionCertificate,
     RefineRequirements,
     WholeBodyFailure,
@@ -65,11 +66,10 @@ from manikin.scene import Proximity, Scene
 REPAIRS = 5
 """Most fits that follow a failed one with other weights, knots or timing."""
 
-CAUGHT = 0.02
-"""Penetration from which on a part counts as caught [m]."""
-
-_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})
-"""Broken requirements that a slower motion may keep."""
+_SLOWED = MappingProxyType({
+    "max_velocity_share": 1.3, "max_physics_violation": 1.3, "min_margin": 1.3, "max_torque_share": 1.6,
+})  # fmt: skip
+"""Broken requirements that a slower motion may keep, and by how much longer its phase gets."""
 
 _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
 """Broken requirements that a spline with more knots may keep."""
@@ -314,7 +314,9 @@ class Refinement:
             return job.restart(replace(last, goal=goal), last.fine)
         scales = job.updated(last.scales, broken)
         weak = "max_torque_share" in broken
-        slower = number > 0 and self.settings.retime and not weak and bool(broken & _SLOWED)
+        # Weights may find the strength with forces that are held; where they do not, time does.
+        waits = weak and (number < 2 or last.goal.forces is None)
+        slower = number > 0 and self.settings.retime and not waits and bool(broken & _SLOWED.keys())
         # How often the spline's knots near the key instants are doubled at most.
         fine = last.fine + (last.fine < 2 and bool(broken & _EXACT))
         if not weak and not slower and fine == last.fine:
@@ -358,11 +360,10 @@ class Refinement:
     def _slower(self, last: FitAttempt[_RefineGoal]) -> _RefineGoal:
         """Give the worst phase more time."""
         path, schedule = last.goal.path, last.goal.schedule
-        for name in sorted(last.broken & _SLOWED):
+        for name in sorted(last.broken & _SLOWED.keys()):
             worst = last.certificate[name].time_s or 0.0
             when = float(np.interp(worst, last.goal.schedule.instants, schedule.instants))
-            # Factor by which a phase gets longer in which balance or speed is missed again.
-            path, schedule = stretched_around(path, schedule, when, 1.3, last.goal.span)
+            path, schedule = stretched_around(path, schedule, when, _SLOWED[name], last.goal.span)
         return replace(last.goal, path=path, schedule=schedule, forces=None)
 
     def _result(
@@ -404,7 +405,7 @@ class Refinement:
         )  # fmt: skip
         table = RequirementTable((*certificate.required, room))
         # What a part broke that ends before its limb is there, that alone.
-        broken, failure = parts[-1].certificate.first_broken or table.first_broken, None
+        broken, failure = parts[-1].certificate.cause or table.first_broken, None
         if broken is not None:
             failure = WholeBodyFailure.at(schedule, broken.time_s or 0.0, broken.reason)
         released = tuple(
