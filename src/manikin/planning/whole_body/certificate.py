@@ -169,7 +169,7 @@ class MotionCertificate(RequirementTable):
 
 
 CAUGHT = 0.02
-"""Depth from which on a part of the body is on the wrong side of another or of an obstacle [m]; our choice."""
+"""Depth from which on a part of the body is on the wrong side of another or of an obstacle [m]; ours."""
 
 
 def certify(
