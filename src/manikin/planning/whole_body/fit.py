@@ -9,6 +9,7 @@ Contacts and a required centre of mass are constraints. Penalties show the way t
 the best one that meets their linearisation, and a last one restores what its curvature left.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,10 @@ step that only restores the contacts, and the largest one."""
 HELD, AT_REST = 1.0e15, 3
 """Damping of control points that stay, and their number at an end at rest in a given posture: velocity and
 acceleration are zero there."""
+
+FURTHER_DECREASE = 3.0e-4
+"""Relative decrease of the objective below which constrained steps that go on from a solution stop: what it
+breaks is a small part of its objective."""
 
 LENGTHS, REFUSED = (1.0, 0.5, 0.25), 4
 """Shares of a constrained step that are tried, until one makes the objective less, and constrained steps in a
@@ -64,18 +69,31 @@ class MotionFit:
 
         Args:
             final: Scales of the last stage.
-            further: Go on from an earlier solution at its multipliers, with that stage alone.
+            further: Go on from an earlier solution at its multipliers, with that stage alone. Penalties come
+                first only where no step that meets the contacts is better: they would lead off them.
         """
         points, iterations = self._with_ends(np.array(start.control_points)), 0
+        scales = final.loosened(final.stages[-1])
+        if further:
+            patient = replace(scales, constrained_decrease=FURTHER_DECREASE)
+            state = self._objective.linearise(points, scales, self._multiplier)
+            moved, state, iterations = self._constrain(points, state, patient)
+            if moved is not points:
+                return self._exact(moved, state, scales, iterations)
         for factor in final.stages[-1:] if further else final.stages:
             scales = final.loosened(factor)
             state = self._objective.linearise(points, scales, self._multiplier)
             points, state, taken = self._descend(points, state, scales)
             iterations += taken
         points, state, constrained = self._constrain(points, state, scales)
+        return self._exact(points, state, scales, iterations + constrained)
+
+    def _exact(
+        self, points: FloatArray, state: FitLinearisation, scales: MotionScales, iterations: int
+    ) -> FitResult:
+        """The result after a number of iterations, contacts and centre of mass restored."""
         points, restored = self._restore(points, state, scales)
-        spline = ConfigurationSpline(self._knots, points, DEGREE)
-        return FitResult(spline, iterations + constrained + restored)
+        return FitResult(ConfigurationSpline(self._knots, points, DEGREE), iterations + restored)
 
     def _with_ends(self, points: FloatArray) -> FloatArray:
         """Control points (k, nq) with those of given ends in place."""
