@@ -88,6 +88,9 @@ _RAMP, _SUDDEN_RAMP = 0.08, 0.02
 TORQUE_SHARES = (0.85, 0.98)
 """Shares of the strength for which forces are shared where the least ones take more than the first: it leaves
 control some in reserve; the other is for where it does not suffice."""
+SHARE_COST, MOST_SHARE = 1.0e3, 10.0
+"""Cost of the square of the least share relative to the square of all forces, and where it is no longer looked
+for: forces beyond any strength say nothing."""
 _MISSING_COST = 1.0e-6
 """Square of the cost of force relative to that of missing the wrench."""
 
@@ -182,11 +185,11 @@ def plan_forces(
         over = np.any(body.torque_share(tau[rows, 6:]) > TORQUE_SHARES[0], axis=1)
         for k in np.flatnonzero(over | np.any(magnitude > generators.upper, axis=1)):
             joint_map = _joint_map(part.jacobians[k], generators)
+            strength = body.torque_lower, body.torque_upper
             others = (
                 _share_within_limits(
-                    generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
-                    most * body.torque_lower, most * body.torque_upper,
-                ) for most in TORQUE_SHARES
+                    generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:], strength, most
+                ) for most in (*TORQUE_SHARES, None)
             )  # fmt: skip
             other = next((found for found in others if found is not None), None)
             if other is not None:
@@ -267,21 +270,32 @@ def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
 
 def _share_within_limits(
     generators: _Generators, matrix: FloatArray, target: FloatArray, cost: FloatArray, needed: FloatArray,
-    joint_map: FloatArray, torque_lower: FloatArray, torque_upper: FloatArray,
+    joint_map: FloatArray, strength: tuple[FloatArray, FloatArray], most: float | None,
 ) -> FloatArray | None:  # fmt: skip
     """Magnitudes (g,) that keep the joints' torques and the grasps' forces within their limits, or None.
 
     The generators' wrenches (6, g) supply the target (6,); the torques are those without contacts, (nv - 6,)
-    [N.m], less what ``joint_map`` (nv - 6, g) takes per unit magnitude.
+    [N.m], less what ``joint_map`` (nv - 6, g) takes per unit magnitude. They take ``most`` of the strength;
+    where that is None, the least share of it that is possible.
     """
     cost, count = cost**2, len(cost)
     limit = np.where(np.isfinite(generators.upper), generators.upper, 1e6)
+    hessian, rows, (weakest, strongest) = cost / cost.mean(), np.vstack([matrix, joint_map]), strength
+    highest = np.full(len(needed), np.inf)
+    if most is not None:
+        lower, upper = needed - most * strongest, needed - most * weakest
+        bounds = np.zeros(count), limit
+    else:  # The share is one more unknown.
+        share_cost = SHARE_COST * float(target @ target)
+        hessian, bounds = np.append(hessian, share_cost), (np.zeros(count + 1), np.append(limit, MOST_SHARE))
+        column = np.concatenate([np.zeros(6), strongest, -weakest])
+        rows = np.column_stack([np.vstack([rows, -joint_map]), column])
+        lower, upper = np.concatenate([needed, -needed]), np.concatenate([highest, highest])
     solution = solve_qp(
-        np.diag(cost / cost.mean()), np.zeros(count), np.vstack([matrix, joint_map]),
-        np.concatenate([target, needed - torque_upper]), np.concatenate([target, needed - torque_lower]),
-        (np.zeros(count), limit), equalities=6,
+        np.diag(hessian), np.zeros(len(hessian)), rows, np.concatenate([target, lower]),
+        np.concatenate([target, upper]), bounds, equalities=6,
     )  # fmt: skip
-    return np.maximum(solution.x, 0.0) if solution.solved else None
+    return np.maximum(solution.x[:count], 0.0) if solution.solved else None
 
 
 def _joint_map(jacobians: FloatArray, generators: _Generators) -> FloatArray:

@@ -210,6 +210,9 @@ class LimitTerm:
 BESIDE = 5e-4
 """Distance of what may be as near as touching; more than the solver's tolerance [m]."""
 
+NEARBY = 3.5e-3
+"""Distance of forearms from what their hands hold [m]: 1.5 mm more than a refined motion has to keep."""
+
 SINKING = -4e-3
 """Distance of what touches at a point from what it touches [m]: 1 mm less deep than a check allows."""
 

@@ -21,7 +21,7 @@ from manikin.kinematics import (
     pairs_beside,
     touching_pairs,
 )
-from manikin.kinematics.posture_terms import BESIDE, GRASPING, SINKING
+from manikin.kinematics.posture_terms import BESIDE, GRASPING, NEARBY, SINKING
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
@@ -53,7 +53,7 @@ class PostureFinderSettings:
         tolerance: Largest residual of a contact [m, rad].
         iterations: Iterations of each search.
         friction_model: Friction model of the stances on which the body has to be able to rest.
-        forearms_beside: Whether forearms may be as near as touching to what their hands hold.
+        forearms_beside: Whether forearms may come as near as 3.5 mm to what their hands hold.
     """
 
     clearance: float = 0.014
@@ -264,12 +264,12 @@ class PostureFinder:
             [pair for pair in touched if held[pair[0]].kind is kind]
             for kind in (ContactKind.POINT, ContactKind.GRASP)
         )  # fmt: skip
-        beside = pairs_beside(self.body, touched)
-        if self.settings.forearms_beside:
-            beside |= {(parent, obstacle) for name, obstacle in grasps if (parent := self._parent(name))}
+        forearms = {(parent, obstacle) for name, obstacle in grasps if (parent := self._parent(name))}
         limited = (
             *product(touching_pairs(self.body, points), (SINKING,)),
-            *product(touching_pairs(self.body, grasps), (GRASPING,)), *product(beside, (BESIDE,)),
+            *product(touching_pairs(self.body, grasps), (GRASPING,)),
+            *product(pairs_beside(self.body, touched), (BESIDE,)),
+            *product(forearms if self.settings.forearms_beside else (), (NEARBY,)),
         )  # fmt: skip
         return touching_pairs(self.body, touched), dict(limited)
 

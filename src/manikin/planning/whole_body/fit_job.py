@@ -205,19 +205,19 @@ class FitJob:
         Returns:
             The best attempt, with the scales and the fineness of the last one.
         """
-        best = last = first
+        best, last, vain = first, first, 0
         for number in range(most):
             if not last.broken or (self.gives_up and last.excess > MOST_EXCESS):
                 break
             following = remedy(number, last)
             if following is None:
                 break
-            # Another repair is in vain where one changed the excess so little, or made it worse.
-            share = A_LOT if following.excess > MUCH_EXCESS else 1.0
-            hopeless = self.gives_up and following.excess > share * last.excess
+            # A repair is in vain that changes the excess so little, or makes it worse.
+            much = following.excess > MUCH_EXCESS
+            vain = vain + 1 if following.excess > (A_LOT if much else 1.0) * last.excess else 0
             last = following
             best = self.better(best, last)
-            if hopeless:
+            if self.gives_up and vain > 0 and (much or vain > 1):
                 break
             same = best.goal.schedule.sequence is last.goal.schedule.sequence
             if self.by_count and last.continued and best is not last and same:

@@ -383,7 +383,7 @@ class _Planner:
                 break
             first = first or attempt
         assert first is not None  # the first way is always tried
-        return self.job.repair(first, self._remedy, 3)  # most fits with other weights
+        return self.job.repair(first, self._remedy, 5)  # most fits with other weights
 
     def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal] | None:
         """The next fit after one that breaks requirements; None where contacts stay out of reach."""

@@ -93,7 +93,8 @@ class RefineSettings:
         knot_spacing: Largest distance of the spline's knots [s].
         sampling: Spacing of the finished motion's samples, at which it is certified [s].
         retime: Whether the motion may be slowed down.
-        friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
+        friction_share, sole_share: Shares of the friction, and of the soles' length and width, with which the
+            margin is wanted; the certificate has all of them.
         contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
             are let go; else all contacts of the sequence are held.
         speed_share: Share of the velocity limits up to which phases are shortened, as far as every
@@ -107,6 +108,7 @@ class RefineSettings:
     requirements: WholeBodyRequirements = field(default_factory=RefineRequirements)
     retime: bool = True
     friction_share: float = 0.8
+    sole_share: float = 0.8
     contact_variables: bool = True
     speed_share: float | None = None
 
@@ -192,7 +194,7 @@ class _RefineGoal:
         targets = replace(targets, ends=self.ends)
         if self.forces is not None:
             targets = replace(targets, forces=HeldForces.of(job.body, self.schedule, self.forces, time))
-        wanted = job.rooms(self.schedule.sequence, job.settings.friction_share)
+        wanted = job.rooms(self.schedule.sequence, job.settings.friction_share, job.settings.sole_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
     def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
@@ -227,7 +229,7 @@ class Refinement:
 
     Attributes:
         variables: Of each phase, the contact variables of its effectors, as chosen last.
-        rooms: Wrench polytopes of a sequence with a share of the friction, see :func:`.rooms_of`.
+        rooms: Wrench polytopes of a sequence with shares of friction and soles, see :func:`.rooms_of`.
     """
 
     def __init__(

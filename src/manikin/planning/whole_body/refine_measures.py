@@ -195,14 +195,20 @@ def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray
     return missing
 
 
-def rooms_of(sequence: StanceSequence, friction_share: float = 1.0) -> tuple[MarginCost, ...]:
-    """Wrench polytope of each phase, with a share of the friction."""
-    return tuple(room_of(phase.stance, friction_share) for phase in sequence)
+def rooms_of(
+    sequence: StanceSequence, friction_share: float = 1.0, sole_share: float = 1.0
+) -> tuple[MarginCost, ...]:
+    """Wrench polytope of each phase, with shares of the friction and of the soles' length and width."""
+    return tuple(room_of(phase.stance, friction_share, sole_share) for phase in sequence)
 
 
-def room_of(stance: Stance, friction_share: float = 1.0) -> MarginCost:
-    """Wrench polytope of a stance, with a share of the friction."""
-    contacts = [replace(contact, friction=friction_share * contact.friction) for contact in stance]
+def room_of(stance: Stance, friction_share: float = 1.0, sole_share: float = 1.0) -> MarginCost:
+    """Wrench polytope of a stance, with shares of the friction and of the soles' length and width."""
+    contacts = []
+    for contact in stance:
+        middle, kept = contact.points.mean(axis=0), sole_share if contact.kind is ContactKind.SOLE else 1.0
+        points = middle + kept * (contact.points - middle)
+        contacts.append(replace(contact, points=points, friction=friction_share * contact.friction))
     return MarginCost(stance.with_contacts(contacts))
 
 
