@@ -89,8 +89,8 @@ TORQUE_SHARES = (0.85, 0.98)
 """Shares of the strength for which forces are shared where the least ones take more than the first: it leaves
 control some in reserve; the other is for where it does not suffice."""
 SHARE_COST, MOST_SHARE = 1.0e3, 10.0
-"""Cost of the square of the least share relative to the square of all forces, and where it is no longer looked
-for: forces beyond any strength say nothing."""
+"""Cost of the square of the least share of the strength relative to the square of all forces, and the largest
+one that is looked for."""
 _MISSING_COST = 1.0e-6
 """Square of the cost of force relative to that of missing the wrench."""
 

@@ -286,9 +286,18 @@ def test_what_is_too_near_decides_what_is_tried(
     assert not result.succeeded
 
 
-@pytest.mark.parametrize(("shares", "tried"), [((1.2, 1.1, 1.05, 1.02), 3), ((1.2, 1.3), 1), ((12.0,), 0)])
+@pytest.mark.parametrize(
+    ("shares", "tried"),
+    [
+        ((1.2, 1.1, 1.05, 1.02), 3),
+        ((1.2, 1.3, 1.1, 1.05), 3),
+        ((1.2, 1.3, 1.35), 2),
+        ((6.0, 6.5), 1),
+        ((12.0,), 0),
+    ],
+)
 def test_repairs_end_where_they_make_nothing_better(step_attempt, shares, tried):
-    """A repair follows only one that helped; the attempt that misses least is the result."""
+    """Two repairs in a row that make it worse are the last; the attempt that misses least is the result."""
     attempts = [blocked(step_attempt, "max_torque_share", share) for share in shares]
     left = iter(attempts[1:])
     job = FitJob(0.05, gives_up=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments, hangs
-from manikin.contact import Contact, ContactKind, ContactSchedule, Stance, Swing
+from manikin.contact import Contact, ContactKind, ContactSchedule, Swing
 from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -124,7 +124,7 @@ class _Guided:
             time = curve.start_time + share * curve.duration
             guess = path.at(np.array([time]))[0]
             passes = share in BETWEEN and self.is_clear(time, Pose.in_posture(self.body, guess, effector))
-            if not steady and passes and self.proximity.minimum_over(guess[None], (self.beside,)).distance > 0.0:
+            if passes and not steady and self.proximity.minimum(guess, self.beside).distance > 0.0:
                 continue
             q = self._posture_at(time, guess, near if steady else guess)
             if q is not None:
