@@ -14,7 +14,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments, hangs
-from manikin.contact import Contact, ContactKind, ContactSchedule, Swing
+from manikin.contact import Contact, ContactKind, ContactSchedule, Stance, Swing
 from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
@@ -31,13 +31,6 @@ from manikin.scene import Proximity, Scene
 SHARES, BETWEEN = (0.25, 0.5, 0.75), (0.125, 0.375, 0.625, 0.875)
 """Shares of a flight at which a posture is looked for, and those at which one is where the way between two of
 them is not clear; our choice."""
-
-STEADY = tuple(sorted((*SHARES, *BETWEEN)))
-"""Shares at which postures are looked for one from the other."""
-
-PASSED_THROUGH, WAYS = 0.02, 41
-"""How deep a straight way between such postures may be in something, as a motion bends round it [m], and the
-samples of a flight at which that is measured; our choice."""
 
 KEPT = (0.75, 0.25)
 """Shares of the wanted distance that they keep from everything that is not touched, tried in turn."""
@@ -64,95 +57,47 @@ def with_mid_flights(
     proximity = Proximity(body, scene)
     # Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion.
     limits = SwingLimits(clearance=RefineScales.of(body).safe_distance, time_step=0.02)
-    leaning = leaning_pairs(body, padded)
     for swing in schedule.sequence.swings():
         flight = _clear_flight(body, scene, schedule, path, swing, limits)
         if flight is None:
             continue
+        curve, is_clear = flight
         standing, ends = standing_during(schedule, swing), filter(None, (swing.start, swing.end))
         touched, beside = (
-            leaning.union(*(touch_pairs(body, scene, item) for item in contacts))
+            leaning_pairs(body, padded).union(*(touch_pairs(body, scene, item) for item in contacts))
             for contacts in (standing, (*standing, *ends))
         )
-        guided = _Guided(body, proximity, schedule, swing, *flight, touched, beside, dense=dense)
-        path = guided.through(path)
+        for share in (*SHARES, *BETWEEN) if dense else SHARES:
+            time = curve.start_time + share * curve.duration
+            guess = path.at(np.array([time]))[0]
+            passes = share in BETWEEN and is_clear(time, Pose.in_posture(body, guess, swing.effector))
+            if passes and proximity.minimum_over(guess[None], (beside,)).distance > 0.0:
+                continue
+            stance, effector = schedule.stance_at(time), swing.effector
+            kept = KEPT if dense else KEPT[:1]
+            q = _posture_on(body, proximity, curve.at(time), effector, stance, guess, touched, kept)
+            path = path if q is None else path.through(time, q)
     return path
 
 
-@dataclass(frozen=True)
-class _Guided:
-    """A flight along a curve, and the postures that lead it.
-
-    Attributes:
-        is_clear: Whether the effector is clear at a time and pose.
-        touched, beside: Pairs that may touch in flight, and those near it.
-        dense: Whether more postures are added where the way between two is not clear.
-    """
-
-    body: BodyModel
-    proximity: Proximity
-    schedule: ContactSchedule
-    swing: Swing
-    curve: SwingCurve
-    is_clear: ClearFlight
-    touched: frozenset[tuple[str, str]]
-    beside: frozenset[tuple[str, str]]
-    dense: bool
-
-    def through(self, path: KeyPath) -> KeyPath:
-        """The path with postures in the flight.
-
-        Found one by one a limb may be before a bar in one of them and behind it in the next.  Such postures
-        are looked for once more, each from that before it, or each from that after it.
-        """
-        orders = ((*SHARES, *BETWEEN), STEADY, STEADY[::-1]) if self.dense else (SHARES,)
-        best, deepest = path, -np.inf
-        for number, order in enumerate(orders):
-            led = self._led(path, order, steady=number > 0)
-            depth = self._depth(led) if self.dense else 0.0
-            if depth > deepest:
-                best, deepest = led, depth
-            if deepest > -PASSED_THROUGH:
-                break
-        return best
-
-    def _led(self, path: KeyPath, order: Sequence[float], *, steady: bool) -> KeyPath:
-        """The path with postures at shares of the flight, looked for in an order."""
-        curve, effector = self.curve, self.swing.effector
-        near = path.at(np.array([curve.start_time + (order[0] > order[-1]) * curve.duration]))[0]
-        for share in order:
-            time = curve.start_time + share * curve.duration
-            guess = path.at(np.array([time]))[0]
-            passes = share in BETWEEN and self.is_clear(time, Pose.in_posture(self.body, guess, effector))
-            if passes and not steady and self.proximity.minimum(guess, self.beside).distance > 0.0:
-                continue
-            q = self._posture_at(time, guess, near if steady else guess)
-            if q is not None:
-                path, near = path.through(time, q), q
-        return path
-
-    def _depth(self, path: KeyPath) -> float:
-        """Least distance on the straight ways between the postures of the flight [m]."""
-        time = self.curve.start_time + np.linspace(0.0, 1.0, WAYS) * self.curve.duration
-        return self.proximity.minimum_over(path.at(time), (self.beside,) * WAYS).distance
-
-    def _posture_at(self, time: float, guess: FloatArray, start: FloatArray) -> FloatArray | None:
-        """(nq,) posture like a guess with the effector near its place at a time, or None."""
-        com, distance = Configuration(self.body, guess).com, RefineScales.of(self.body).safe_distance
-        pose = self.curve.at(time)
-        for kept in KEPT if self.dense else KEPT[:1]:
-            problem = PostureProblem(
-                self.body, tuple(self.schedule.stance_at(time)),
-                {self.swing.effector: Placement(pose.position, pose.rotation, 0.3)},
-                # The effector's attitude and a centre of mass between those at both ends are wished.
-                com=np.array([com[0], com[1], np.nan]), com_weight=30.0, proximity=self.proximity,
-                clearance=kept * distance, ignore=self.touched, reference=guess,
-            )  # fmt: skip
-            # A flight without such a posture needs no reason, and a guess no exact contacts.
-            found = generate_posture(problem, start, settings=SolverSettings(tolerance=1e-3, explain=False))
-            if found.succeeded:
-                return found.q
-        return None
+def _posture_on(
+    body: BodyModel, proximity: Proximity, pose: Pose, effector: str, stance: Stance, guess: FloatArray,
+    touched: frozenset[tuple[str, str]], shares: Sequence[float],
+) -> FloatArray | None:  # fmt: skip
+    """(nq,) posture with an effector in flight near a pose on its curve, or None."""
+    com, distance = Configuration(body, guess).com, RefineScales.of(body).safe_distance
+    for kept in shares:
+        problem = PostureProblem(
+            body, tuple(stance), {effector: Placement(pose.position, pose.rotation, 0.3)},
+            # The effector's attitude and a centre of mass between those at both ends are wished.
+            com=np.array([com[0], com[1], np.nan]), com_weight=30.0,
+            proximity=proximity, clearance=kept * distance, ignore=touched, reference=guess,
+        )  # fmt: skip
+        # A flight without such a posture needs no reason, and a guess no exact contacts.
+        found = generate_posture(problem, guess, settings=SolverSettings(tolerance=1e-3, explain=False))
+        if found.succeeded:
+            return found.q
+    return None
 
 
 def _clear_flight(
