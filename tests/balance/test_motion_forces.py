@@ -7,11 +7,13 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 from manikin.balance import motion_forces
 from manikin.balance.motion_forces import TORQUE_SHARES, plan_forces
 from manikin.body import human
 from manikin.contact import ContactKind, ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
+from manikin.motion.dynamics import FreeDynamics
 from manikin.numerics.spatial import GRAVITY_VECTOR
 
 BODY = human()
@@ -91,8 +93,38 @@ def test_forces_are_shared_within_the_strength_of_the_joints(monkeypatch, effect
     )
 
 
-def test_a_wrench_that_no_sharing_can_bear_is_still_supplied():
-    """Where every sharing overloads a joint, the least forces stay, and the torques tell."""
+def least_strain(schedule, q, a):
+    """The least share of the strength with which contact forces can supply a motion, by a linear program."""
+    stance = schedule.stance_at(0.5)
+    generators = motion_forces._generators(BODY, stance, stance.effectors)
+    dynamics = FreeDynamics.of(BODY, q[None], np.zeros((1, BODY.nv)), a[None])
+    gives = motion_forces._joint_map(dynamics.jacobians[0], generators)
+    needed, count = dynamics.needed[0], gives.shape[1]
+    most = np.where(np.isfinite(generators.upper), generators.upper, None)
+    return linprog(
+        np.append(np.zeros(count), 1.0),
+        A_ub=np.block([
+            [-gives[6:], -BODY.torque_upper[:, None]], [gives[6:], BODY.torque_lower[:, None]],
+        ]),
+        b_ub=np.concatenate([-needed[6:], needed[6:]]),
+        A_eq=np.column_stack([gives[:6], np.zeros(6)]), b_eq=needed[:6],
+        bounds=[*((0.0, limit) for limit in most), (0.0, None)],
+    ).fun  # fmt: skip
+
+
+@pytest.mark.parametrize("acceleration", [(-2.0, -1.0, 0.0), (-2.5, -1.5, 0.0), (-3.0, 1.0, 0.0)])
+def test_a_wrench_that_overloads_a_joint_is_supplied_with_the_least_strain(acceleration):
+    """Where every sharing overloads a joint, the shared forces ask for what a linear program finds least."""
+    effectors, q, a = ("right_foot", "right_hand"), posture(), accelerated(*acceleration)
+    found, _ = shared(effectors, q, np.zeros(BODY.nv), a)
+    least = least_strain(held(q, effectors, GRASP_FORCE), q, a)
+    assert least > 1.0
+    assert strain(found) == pytest.approx(least, rel=1e-6)
+    assert found.missing[0] < 1e-6
+
+
+def test_a_wrench_beyond_the_limit_of_a_grasp_is_still_supplied():
+    """Where no forces within the grasp's limit supply it, the least forces stay, and the torques tell."""
     found, _ = shared(
         ("right_foot", "right_hand"), posture(), np.zeros(BODY.nv), accelerated(-3.0, -2.0, 0.0)
     )

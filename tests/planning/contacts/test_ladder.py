@@ -14,19 +14,25 @@ from manikin.pipeline.stages import RunContext
 from manikin.pipeline.stages.contact_stage import HOLDING_ACCELERATION, find_supports
 from manikin.planning.contacts import ContactRules, PostureFinder, limb_holds
 from manikin.planning.contacts.limb_places import RUNG_SPACING
+from manikin.planning.whole_body.certificate import RefineRequirements
 from manikin.scenarios.families import FAMILIES, draw_scene
 from manikin.scene import Cylinder, Obstacle, Proximity, Scene
 from manikin.verification.holding import GRASPED
 
 
+def planned(seed):
+    """Task of a drawn ladder, and contacts for it."""
+    context = RunContext.of(draw_scene(FAMILIES["ladders"], seed), None)
+    found = find_supports(context.scenario, context.body, context.scene, np.random.default_rng(0))
+    assert found.plan is not None, found.failure
+    return context, found.plan
+
+
 @pytest.fixture(scope="module")
 def plan():
     """Down from the second rung of a ladder of round rungs."""
-    scenario = draw_scene(FAMILIES["ladders"], 1310)
-    context = RunContext.of(scenario, None)
-    found = find_supports(context.scenario, context.body, context.scene, np.random.default_rng(0))
-    assert found.plan is not None, found.failure
-    return context.body, found.plan
+    context, found = planned(1310)
+    return context.body, found
 
 
 def test_a_climber_does_not_swing_back_to_move_a_hand(plan):
@@ -66,8 +72,19 @@ def test_a_hand_is_round_a_stile_and_not_through_it(place):
     posed = PostureFinder(body, stile).pose({**feet, "right_hand": hand}, feet, body.standing_posture())
     assert posed.q is not None, posed.reason
     near = Proximity(body, stile).evaluate(posed.q, 0.1)
-    depths = [d for (_, other), d in zip(near.pairs, near.distance, strict=True) if other == "stile"]
-    assert -GRASPED < GRASPING <= min(depths) < 0.0
+    depths = {one: d for (one, other), d in zip(near.pairs, near.distance, strict=True) if other == "stile"}
+    assert -GRASPED < GRASPING <= min(depths.values()) < 0.0
+
+
+def test_forearms_are_as_far_from_stiles_as_a_refined_motion_has_to_keep_them():
+    """Its parts end in these postures; one with a forearm 1 mm beside a stile could not be kept."""
+    context, found = planned(2418)
+    near = Proximity(context.body, context.scene)
+    rows = [near.evaluate(stage.q, 0.05) for stage in found.stages]
+    pairs = [pair for row in rows for pair in zip(row.pairs, row.distance, strict=True)]
+    arms = [d for (part, other), d in pairs if "forearm" in part and "stile" in other]
+    assert arms
+    assert min(arms) >= RefineRequirements().clearance
 
 
 def test_places_of_a_foot_on_a_rung_are_close():

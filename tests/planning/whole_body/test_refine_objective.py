@@ -8,7 +8,16 @@ from scipy.optimize import lsq_linear, minimize
 
 from manikin.balance import wrench_polytope
 from manikin.balance.contact_forces import ContactGenerators, friction_share
-from manikin.contact import FRICTION_MODELS, ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
+from manikin.contact import (
+    FRICTION_MODELS,
+    ContactKind,
+    ContactSchedule,
+    Phase,
+    Stance,
+    StanceSequence,
+    grasp,
+    sole,
+)
 from manikin.kinematics.efort import Task, efort
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.numerics.spatial import rotation_from_yaw, wrench_map
@@ -16,7 +25,7 @@ from manikin.planning.whole_body.fit_job import phase_knots, sample_times
 from manikin.planning.whole_body.fit_scales import RefineScales
 from manikin.planning.whole_body.refine_contacts import LimbDirections, efort_with_derivative
 from manikin.planning.whole_body.refine_input import KeyPath
-from manikin.planning.whole_body.refine_measures import physics_violation
+from manikin.planning.whole_body.refine_measures import physics_violation, room_of
 from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
 from manikin.planning.whole_body.refine_physics import MarginCost, RefinedForces, centre_of
 from manikin.scene import Box, Obstacle, Proximity, Scene
@@ -222,3 +231,13 @@ def test_cost_of_balance_does_not_depend_on_where_the_scene_stands(stance):
     here = first.cost(wrench, com, wanted, 1.0, 3.0)
     moved = second.cost(wrench_there, com_there, wanted, 1.0, 3.0)
     np.testing.assert_allclose(moved.value, here.value, rtol=1e-6)
+
+
+def test_the_wanted_room_is_that_of_smaller_soles(stance):
+    """A share of the soles' length and width is kept about their middles; what else is held stays."""
+    smaller = room_of(stance, 0.8, 0.7)
+    for contact, kept in zip(stance, smaller.polytope.stance, strict=True):
+        assert kept.friction == pytest.approx(0.8 * contact.friction)
+        assert kept.centre == pytest.approx(contact.centre)
+        size = 0.7 if contact.kind is ContactKind.SOLE else 1.0
+        assert np.ptp(kept.points, axis=0) == pytest.approx(size * np.ptp(contact.points, axis=0))
