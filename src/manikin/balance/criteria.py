@@ -212,13 +212,18 @@ class RestingTorques:
         jacobians = [self._state.effector_jacobian(contact.effector) for contact in stance]
         pairs = zip(self._generators.contact, self._wrenches, strict=True)
         self._columns = np.column_stack([jacobians[number].T @ wrench for number, wrench in pairs])
-        count = len(self._wrenches)
+        count, (level, most) = len(self._wrenches), _level_limits(stance, self._generators)
+        # Rows of the forces that are bounded from above: those of grasps, and the sum of the normal ones.
+        self._bounded, self._most = (
+            np.vstack([level, self._generators.normal]),
+            np.append(most, _cap(stance, body.mass)),
+        )
         above = np.column_stack([self._columns[6:], body.torque_lower])
         below = np.column_stack([-self._columns[6:], -body.torque_upper])
         solution = linprog(
             np.append(np.zeros(count), 1.0),
-            A_ub=np.vstack([above, below, np.append(self._generators.normal, 0.0)]),
-            b_ub=np.concatenate([self._gravity[6:], -self._gravity[6:], [_cap(stance, body.mass)]]),
+            A_ub=np.vstack([above, below, np.column_stack([self._bounded, np.zeros(len(self._most))])]),
+            b_ub=np.concatenate([self._gravity[6:], -self._gravity[6:], self._most]),
             A_eq=np.column_stack([self._columns[:6], np.zeros(6)]), b_eq=self._gravity[:6],
             bounds=[*((0.0, limit) for limit in self._generators.upper), (0.0, None)], method="highs",
         )  # fmt: skip
@@ -256,8 +261,9 @@ class RestingTorques:
         for limit in (body.torque_upper, body.torque_lower):  # torques over their limits, one side at a time
             rows.append(np.column_stack([torques[6:] / limit[:, None], -np.ones(len(limit))]))
             upper.append(wanted - gravity[6:] / limit)
-        rows.append(np.concatenate([np.zeros(body.nv), self._generators.normal, [0.0]])[None])
-        upper.append(np.array([_cap(self._stance, body.mass) / weight]))
+        number = len(self._most)
+        rows.append(np.column_stack([np.zeros((number, body.nv)), self._bounded, np.zeros(number)]))
+        upper.append(self._most / weight)
         weights = np.repeat([1.0, FORCE_WEIGHT, SHARE_WEIGHT], [body.nv, count, 1])
         towards = np.concatenate([np.zeros(body.nv), -FORCE_WEIGHT * self._forces / weight, [SHARE_PRICE]])
         low = np.concatenate([bounds[0], np.zeros(count + 1)])
@@ -280,6 +286,24 @@ class RestingTorques:
             wrench = turn.actInv(pin.Force(self._forces[mine] @ self._wrenches[mine]))
             forces[frame.parentJoint] += frame.placement.act(wrench)
         return pin.computeStaticTorqueDerivatives(model, model.createData(), self._q, forces)
+
+
+SIDES = 8
+"""Sides of the prism, in the cylinder of the largest force, in which level forces of a grasp are."""
+
+
+def _level_limits(stance: Stance, generators: ContactGenerators) -> tuple[FloatArray, FloatArray]:
+    """Rows (m, g) and limits (m,) by which level forces of grasps are in a circle of their largest force.
+
+    What a posture asks for is then possible in the grasp's box of forces however that is turned about the
+    vertical, and the scene with the world.
+    """
+    turn = (np.arange(SIDES) + 0.5) * 2.0 * np.pi / SIDES
+    sides = np.column_stack([np.cos(turn), np.sin(turn)]) @ generators.force[:, :2].T
+    held = [number for number, contact in enumerate(stance) if contact.kind is ContactKind.GRASP]
+    rows = [np.where(generators.contact == number, sides, 0.0) for number in held]
+    limits = [np.cos(np.pi / SIDES) * stance.contacts[number].max_force for number in held]
+    return np.vstack([np.zeros((0, len(generators.contact))), *rows]), np.repeat(limits, SIDES)
 
 
 def _cap(stance: Stance, mass: float) -> float:

@@ -201,7 +201,7 @@ class PostureFinder:
         """
         if posed.q is None:
             return posed
-        body, stance, margin = self.body, self._stance(carrying), self.settings.range_margin
+        body, stance, margin = self.body, self._held_by(carrying), self.settings.range_margin
         now, turn, best = RestingTorques(body, posed.q, stance), EASING_TURN[0], posed.q
         for _ in range(EASING_MOVES if now.share > 1.0 else 0):
             state, wide = Configuration(body, best), np.full(body.nv, turn)
@@ -235,8 +235,12 @@ class PostureFinder:
 
         The body rests in it on contacts, or has an acceleration (3,) there [m/s^2].
         """
-        share = static_torque_share(self.body, q, self._stance(carrying), acceleration)
+        share = static_torque_share(self.body, q, self._held_by(carrying), acceleration)
         return _strained(carrying, share, most)
+
+    def _held_by(self, carrying: Contacts) -> Stance:
+        """Contacts with friction inside Coulomb's cone: no posture is held by forces outside of it."""
+        return Stance(tuple(carrying.values()), model=replace(self.model, friction="inner"))
 
     def _stance(self, carrying: Contacts) -> Stance:
         return Stance(tuple(carrying.values()), model=self.model)
