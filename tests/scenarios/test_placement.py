@@ -22,6 +22,7 @@ OF_THE_BODY_OR_SHAPE = {
     ("ObstacleSection", "plane"), ("ObstacleSection", "half_space"), ("PushSection", "direction_deg"),
     ("BodySection", "standing_deg"), ("PhaseSection", "com_within_m"), ("ContactSection", "polygon"),
     ("WeightsSection", "velocity"), ("WeightsSection", "acceleration"), ("WeightsSection", "jerk"),
+    ("UncertaintySection", "angle_noise_deg"), ("UncertaintySection", "joints_deg"),
 }  # fmt: skip
 """Vectors and angles of a file that are not measured in the world."""
 

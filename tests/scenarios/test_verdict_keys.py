@@ -28,13 +28,31 @@ def test_only_what_has_joints_and_is_planned_to_move_is_executed():
 def test_a_plan_alone_may_be_asked_for(tmp_path):
     job = loaded(tmp_path, "extends: platform\nname: mine\nexecution: none\n")
     assert not job.execution_required
-    assert yaml.safe_load(job.to_yaml())["execution"] == "none"
+    assert yaml.safe_load(job.to_yaml())["execution"]["required"] is False
+
+
+def test_trials_may_be_asked_for_and_set(tmp_path):
+    """A mapping, a single value that is set, and the words of before mean the same execution."""
+    job = loaded(tmp_path, "extends: platform\nname: mine\nexecution: {trials: 3}\n")
+    assert (job.execution_required, job.file.execution.trials) == (True, 3)
+    other = load_scenario("platform", overrides=["execution.trials=3", "execution.uncertainty.factor=2"])
+    assert other.file.execution.model_copy(update={"uncertainty": job.file.execution.uncertainty}) == (
+        job.file.execution
+    )
+    assert other.file.execution.uncertainty.factor == 2.0
+    assert loaded(tmp_path, "extends: platform\nname: mine\nexecution: required\n").file.execution.trials == 0
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("extends: platform\nname: mine\nexecution: attempted\n", "valid: 'required' or 'none'"),
+        ("extends: platform\nname: mine\nexecution: attempted\n", "valid: required, none, or a mapping"),
+        ("extends: platform\nname: mine\nexecution: {trials: -1}\n", "trials"),
+        ("extends: platform\nname: mine\nexecution: {required: false, trials: 2}\n", "with required true"),
+        (
+            "extends: platform\nname: mine\nexecution: {uncertainty: {mass_share: 1.5}}\n",
+            "uncertainty.mass_share is 1.5; valid: 0 to 0.9",
+        ),
         ("extends: walls\nname: mine\nexecution: required\n", "valid: none for a point mass"),
         ("extends: goal-left\nname: mine\nexecution: required\n", "valid: none for a recorded walk"),
         ("extends: push-right-200\nname: mine\nexecution: none\n", "valid: required beside recovery"),

@@ -26,6 +26,8 @@ RESULTS = "results.json"
 
 _SCENARIO = "Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them."
 _SET = "Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable."
+_TRIALS = "Execute a proved motion in N other worlds, too: masses, friction, heights, delay, noise, a push."
+_UNCERTAINTY = "How far these worlds are from the believed one, relative to the default; with --trials."
 _MOVED = "Move the scenario's origin to X Y [m], turned [deg]."
 
 
@@ -45,6 +47,8 @@ def run(
     variant: Annotated[str | None, option("V", "One of the scenario's variants; also NAME@V.")] = None,
     overrides: Annotated[list[str] | None, option("KEY=VALUE", _SET, "--set")] = None,
     moved: Annotated[tuple[float, float, float] | None, option("X Y YAW_DEG", _MOVED)] = None,
+    trials: Annotated[int | None, option("N", _TRIALS, min=1)] = None,
+    uncertainty: Annotated[float | None, option("X", _UNCERTAINTY, min=0.0)] = None,
     figures: FiguresOption = True,
     jobs: JobsOption = None,
 ) -> int:
@@ -54,6 +58,7 @@ def run(
         console.refuse(variant is not None, "--variant", "every variant is run")
         console.refuse(bool(overrides), "--set", "it belongs to one scenario")
         console.refuse(moved is not None, "--moved", "it belongs to one scenario")
+        console.refuse(trials is not None, "--trials", "it belongs to one scenario")
         loaded = load_kg is not None or load_hand is not None
         console.refuse(loaded, "--load-kg", "it belongs to one scenario")
         return _run_all(out, seed, body, context.obj, draw=figures, workers=jobs, json=json)
@@ -67,6 +72,11 @@ def run(
         job = job.with_seed(seed)
     if moved is not None:
         job = job.moved(*moved)
+    console.refuse(uncertainty is not None and trials is None, "--uncertainty", "it needs --trials")
+    if trials is not None:
+        settings = [f"execution.trials={trials}"]
+        settings += [] if uncertainty is None else [f"execution.uncertainty.factor={uncertainty}"]
+        job = job.with_overrides(settings)
     return console.run_job(job, out, context.obj, draw=figures, json=json)
 
 

@@ -84,7 +84,15 @@ YES_OR_NO = {"fell": ("no", "yes"), "at_rest": ("no", "yes")}
 
 def verdict_lines(summary: Mapping[str, Any]) -> list[str]:
     """Verdict of a run in one line, then every requirement; broken ones are marked."""
-    return [verdict_line(summary), about_line(summary), *requirement_lines(summary["requirements"])]
+    lines = [verdict_line(summary), about_line(summary), *requirement_lines(summary["requirements"])]
+    return lines if (trials := summary.get("trials")) is None else [*lines, trials_line(trials)]
+
+
+def trials_line(trials: Mapping[str, Any]) -> str:
+    """Shares of the worlds in which the body stood and arrived, and what failed first in the others."""
+    shares = f"stood in {trials['stood_share']:.0%}, arrived in {trials['arrived_share']:.0%}"
+    failures = "".join(f"; {count} x {what}" for what, count in trials["first_failures"].items())
+    return f"trials: {trials['worlds']} other worlds, {shares}{failures}"
 
 
 def requirement_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

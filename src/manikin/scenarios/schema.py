@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from operator import attrgetter
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from manikin.scenarios.sections.planning_sections import (
@@ -17,6 +17,7 @@ from manikin.scenarios.sections.planning_sections import (
 )
 from manikin.scenarios.sections.support_sections import EFFECTORS, MASSLESS_FEET, SupportsSection
 from manikin.scenarios.sections.task_sections import (
+    ExecutionSection,
     Expectation,
     ExpectSection,
     ObstacleSection,
@@ -37,7 +38,25 @@ from manikin.scenarios.validation import (
     refuse_if,
     refuse_repeated,
     required,
+    rule_error,
 )
+
+
+def _words_of_execution(value: Any) -> Any:
+    """The mapping that the word "required" or "none" stands for."""
+    if isinstance(value, str):
+        if value not in ("required", "none"):
+            raise rule_error("required, none, or a mapping with trials")
+        return {"required": value == "required"}
+    return value
+
+
+Execution = Annotated[
+    ExecutionSection,
+    BeforeValidator(
+        _words_of_execution, json_schema_input_type=ExecutionSection | Literal["required", "none"]
+    ),
+]
 
 
 class ScenarioFile(Section):
@@ -74,11 +93,9 @@ class ScenarioFile(Section):
     )
     planning: PlanningSection = preset(PlanningSection(), "options of the planner")
     wholebody: WholebodySection = preset(WholebodySection(), "how the whole body's motion is found")
-    execution: Literal["required", "none"] = preset(
-        "required",
-        "required: a run succeeds only if the planned motion is also executed and keeps every "
-        "requirement (proved); none: it is not executed, and succeeds if its plan keeps every requirement "
-        "(planned), the default of a point mass and of a recorded walk, which cannot be executed",
+    execution: Execution = preset(
+        ExecutionSection(),
+        "required, none (not executed), or a mapping: how the planned motion is executed, and tried",
     )
     manner: Literal["ready", "walking", "close", "hanging", "climbing"] = preset(
         "ready",
@@ -157,7 +174,7 @@ class ScenarioFile(Section):
 
     def _check_execution(self) -> None:
         """Refuse an execution of what cannot be executed, and none of what is nothing else."""
-        if self.execution == "required":
+        if self.execution.required:
             recorded = self.walking is not None and not self.walking.is_planned(self.supports)
             problem = "is required; valid: none for"
             point_mass = self.body.model == "point_mass"

@@ -86,7 +86,7 @@ class ScenarioValues:
     @property
     def execution_required(self) -> bool:
         """Whether the planned motion has to be executed for the run to succeed."""
-        return self.file.execution == "required"
+        return self.file.execution.required
 
     @property
     def stature_scale(self) -> float:

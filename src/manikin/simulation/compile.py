@@ -16,7 +16,7 @@ world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocch
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -68,6 +68,15 @@ class PhysicsOptions:
             finite_number(value, f"physics friction of {segment}", above=0.0)
         for name in ("joint_damping", "armature"):
             finite_number(getattr(self, name), f"physics {name}", at_least=0.0)
+
+    def with_friction(self, factor: float) -> "PhysicsOptions":
+        """The same with all friction by a factor."""
+        contact, segment = (
+            tuple((name, factor * value) for name, value in pairs)
+            for pairs in (self.contact_friction, self.segment_friction)
+        )
+        friction = factor * self.friction
+        return replace(self, friction=friction, contact_friction=contact, segment_friction=segment)
 
 
 _TURNING_FRICTION = (0.005, 0.0001)

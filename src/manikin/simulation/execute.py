@@ -1,6 +1,7 @@
 """Execute a planned motion: the controller drives the body in the physics engine."""
 
 import time as clock
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,12 +16,13 @@ from manikin.control.supports import SupportInterval, support_intervals
 from manikin.errors import InputError
 from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
-from manikin.numerics.spatial import finite_number
-from manikin.scene import Scene
+from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.scene import Proximity, Scene
 from manikin.simulation.compile import PhysicsOptions, compile_model, is_narrow
 from manikin.simulation.execution import Execution, push_outcome
 from manikin.simulation.push_force import Push
 from manikin.simulation.recorder import SWITCHING, Recorder, near
+from manikin.simulation.uncertainty import TrueWorld
 from manikin.simulation.world import Grip, World
 
 JOINT_DAMPING = 0.1
@@ -81,7 +83,7 @@ def execute(
     body: BodyModel, scene: Scene, motion: Motion, schedule: ContactSchedule, *,
     settings: ControlSettings | None = None, physics: PhysicsOptions | None = None, hold: float = 1.0,
     pushes: Sequence[Push] = (), padded: Sequence[str] = (), wishes: Sequence[ForceWish] = (),
-    progress: Callable[[float], None] | None = None,
+    truth: TrueWorld | None = None, progress: Callable[[float], None] | None = None,
 ) -> Execution:  # fmt: skip
     """Execute a planned motion and stand for a while after its end.
 
@@ -94,6 +96,8 @@ def execute(
             from then on a touch of the body with itself is no failure.
         padded: Obstacles that any part of the body may lean on, such as a backrest.
         wishes: Forces that effectors in contact should feel.
+        truth: The world, where it is not as body and scene say, which are what control believes; its pushes
+            come beside those that are given.
         progress: Called with the share done, in [0, 1], after every control step.
 
     Returns:
@@ -104,7 +108,8 @@ def execute(
         ContactError: If a support does not lie on a surface of the scene.
     """
     finite_number(hold, "hold [s]", at_least=0.0)
-    return _Run(body, scene, motion, schedule, settings, physics, pushes, padded, wishes).run(hold, progress)
+    job = _Run(body, scene, motion, schedule, settings, physics, pushes, padded, wishes, truth)
+    return job.run(hold, progress)
 
 
 class _Run:
@@ -113,9 +118,9 @@ class _Run:
     def __init__(
         self, body: BodyModel, scene: Scene, motion: Motion, schedule: ContactSchedule,
         settings: ControlSettings | None, physics: PhysicsOptions | None, pushes: Sequence[Push],
-        padded: Sequence[str], wishes: Sequence[ForceWish],
+        padded: Sequence[str], wishes: Sequence[ForceWish], truth: TrueWorld | None,
     ) -> None:  # fmt: skip
-        self.body, self.plan, self.schedule = body, motion, schedule
+        self.body, self.scene, self.plan, self.schedule, self.truth = body, scene, motion, schedule, truth
         settings = settings or ControlSettings()
         physics = physics or replace(default_physics(body, schedule), crossed=_crossed(scene, schedule))
         self.period = settings.period
@@ -132,10 +137,16 @@ class _Run:
                 self.holds.append(_Hold(lying, interval, scene.touched_obstacles(interval.contact)))
         every = (contact for phase in schedule.sequence for contact in phase.stance)
         points = sorted({contact.effector for contact in every if contact.kind is ContactKind.POINT})
-        self.world = World(compile_model(with_round_tips(body, points), scene, physics), padded)
-        self.pushes = tuple(pushes)
-        for push in pushes:
+        self.pushes, true = tuple(pushes), (body, scene, physics)
+        if truth is not None:
+            self.pushes += truth.pushes
+            true = truth.body, truth.scene, physics.with_friction(truth.friction)
+        self.world = World(compile_model(with_round_tips(true[0], points), *true[1:]), padded)
+        for push in self.pushes:
             self.world.apply_push(push)
+        delay = 0 if truth is None else round(truth.delay / step)
+        self._commands = deque[FloatArray](maxlen=delay + 1)
+        self._noise = np.random.default_rng(0 if truth is None else truth.seed)
         self._segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, self._segments)
         self.failure, self.failure_time = "", None
@@ -149,7 +160,7 @@ class _Run:
         # None when the motion begins at speed.
         at_rest = float(np.abs(self.plan.v[0]).max()) < _AT_REST
         settle = round(SETTLING / self.period) if at_rest else 0
-        self.world.reset(self.plan.q[0], self.plan.v[0], start - settle * self.period)
+        self.world.reset(self._first_posture(), self.plan.v[0], start - settle * self.period)
         count = round((self.plan.duration + hold) / self.period) + 1
         if hold == 0.0 and np.abs(self.plan.v[-1]).max() >= _AT_REST:
             count = max(count - 1, 1)  # At its end, a motion that ends at speed would be stopped dead.
@@ -159,13 +170,13 @@ class _Run:
             plan_time = self.controller.clock.at(time)
             self._switch(plan_time)
             before = clock.perf_counter()
-            output = self.controller.step(time, self.world.q, self.world.v, self._touching(plan_time))
+            output = self.controller.step(time, *self._told(), self._touching(plan_time))
             control += clock.perf_counter() - before
             if number == 0:
                 self.world.forget()
-            self.world.advance(output.tau, 1)
+            self._advance(output.tau, 1)
             sensed = self.world.sense()
-            self.world.advance(output.tau, self.substeps - 1)
+            self._advance(output.tau, self.substeps - 1)
             carried = self.world.carried()
             if number >= 0:
                 self.recorder.record(sensed, output, self.world.mean_wrench(), carried)
@@ -175,6 +186,34 @@ class _Run:
             if number > 0 and progress is not None:
                 progress(min(number / count, 1.0))
         return self._report(clock.perf_counter() - began, control)
+
+    def _first_posture(self) -> FloatArray:
+        """(nq,) true posture at the beginning, as far above the true scene as planned above the other."""
+        planned, truth = self.plan.q[0], self.truth
+        if truth is None:
+            return planned
+        q = np.array(planned)
+        q[7:] = np.clip(q[7:] + truth.joints, self.body.lower, self.body.upper)
+        near, there = (
+            Proximity(body, scene, self_collision=False).minimum(posture).distance
+            for body, scene, posture in ((self.body, self.scene, planned), (truth.body, truth.scene, q))
+        )
+        q[2] += max(near - there, 0.0) if np.isfinite(near) else 0.0
+        return q
+
+    def _told(self) -> tuple[FloatArray, FloatArray]:
+        """Configuration and velocity as control is told them."""
+        q, v = self.world.q, self.world.v
+        return (q, v) if self.truth is None else self.truth.noise.told(self.body, q, v, self._noise)
+
+    def _advance(self, tau: FloatArray, steps: int) -> None:
+        """Command torques for a number of engine steps; they act after the true delay."""
+        if self._commands.maxlen == 1:
+            self.world.advance(tau, steps)
+            return
+        for _ in range(steps):
+            self._commands.append(tau)
+            self.world.advance(self._commands[0], 1)
 
     def _switch(self, time: float) -> None:
         """Set the touches planned at a time of the plan, and hold on to grasps."""
@@ -251,6 +290,7 @@ class _Run:
             control_ms=1e3 * control / len(recorder.samples), touches=world.touches, counted_touches=touches,
             fallbacks=tuple(fallbacks), max_slip_m=recorder.max_slip, friction=recorder.friction_use(),
             push=push_outcome(self.pushes, recorder, self.failure), schedule=recorder.delayed_schedule(),
+            final_foot_error_m=recorder.last_effector_error(),
         )  # fmt: skip
 
 

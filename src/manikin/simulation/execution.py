@@ -97,6 +97,7 @@ class Execution(Displayed):
         schedule: When the planned contacts were due, later where the plan waited; None where it did not.
         min_force_at_com_N: Smallest force at the CoM that would have ended balance; None where none does [N].
         min_zmp_distance_m: Least distance of the ZMP to the edge of what carries, < 0 outside; or None [m].
+        final_foot_error_m: Largest distance of an effector from its plan at the end of the hold [m].
     """
 
     motion: Motion
@@ -126,6 +127,7 @@ class Execution(Displayed):
     friction: FrictionUse | None = None
     min_force_at_com_N: float | None = None
     min_zmp_distance_m: float | None = None
+    final_foot_error_m: float = 0.0
 
     @property
     def succeeded(self) -> bool:

@@ -273,7 +273,7 @@ class Report:
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "verdict": "failed", "planned": False, "proved": False, "succeeded": False, "failure": None,
             "requirements": [], "contacts": None, "centroidal": None, "wholebody": None, "act": None,
-            "execution": None, "push": None, "walk": None, "wall_s": 0.0,
+            "execution": None, "trials": None, "push": None, "walk": None, "wall_s": 0.0,
         }  # fmt: skip
 
     @property

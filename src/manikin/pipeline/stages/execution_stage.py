@@ -3,10 +3,11 @@
 The act at the end of a motion is certified and appended to it before, and measured afterwards.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from joblib import cpu_count
 
 from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import ContactKind, ContactSchedule, FrictionModel
@@ -19,6 +20,8 @@ from manikin.runtime.requirement import Requirement, RequirementTable, requireme
 from manikin.scenarios import Scenario
 from manikin.simulation import Execution, Push, execute, push_on_the_way
 from manikin.simulation.execution import BACK
+from manikin.simulation.trials import TrialTask, run_trials
+from manikin.simulation.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True)
@@ -202,10 +205,10 @@ def execute_motion(
     supports = SupportSettings(friction_share=scenario.friction_share)
     returning = None if scenario.file.push is None else ReturnSettings()
     settings = ControlSettings(supports=supports, returning=returning)
+    pushes, wishes = _pushes(scenario, planned.motion), () if act is None else tuple(act.wishes)
     result = execute(
         context.body, context.scene, planned.motion, planned.schedule,
-        pushes=_pushes(scenario, planned.motion), padded=context.padded, settings=settings,
-        wishes=() if act is None else act.wishes,
+        pushes=pushes, padded=context.padded, settings=settings, wishes=wishes,
         progress=lambda share: report.progress("execution", share),
     )  # fmt: skip
     table = requirements.table(result, scenario.seated_from is not None)
@@ -225,7 +228,26 @@ def execute_motion(
     if failure is not None:
         report.fail(failure.stage, failure.reason, failure.time_s, failure.where)
     report.keep_motions(planned.schedule, planned.motion, result.motion)
+    if failure is None and scenario.file.execution.trials > 0:
+        ready = replace(settings, returning=ReturnSettings())
+        task = TrialTask(
+            context.body, context.scene, planned.motion, planned.schedule, ready, tuple(context.padded),
+            wishes, pushes,
+        )  # fmt: skip
+        report.finish("trials", _trials(scenario, task, report))
     return result
+
+
+def _trials(scenario: Scenario, task: TrialTask, report: Report) -> dict[str, Any]:
+    """The "trials" block: the motion in other worlds, by a body that is ready to be pushed."""
+    section = scenario.file.execution
+    given = section.uncertainty.model_dump(exclude_none=True)
+    uncertainty = replace(Uncertainty().scaled(given.pop("factor")), **given)
+    outcome = run_trials(
+        task, section.trials, uncertainty=uncertainty, seed=scenario.seed, workers=cpu_count(),
+        progress=lambda share: report.progress("trials", share),
+    )  # fmt: skip
+    return outcome.summary() | {"uncertainty": asdict(uncertainty)}
 
 
 def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTable) -> StageFailure | None:

@@ -34,6 +34,59 @@ LARGEST_FREQUENCY = 100.0
 Force = Annotated[float, bounded(gt=0, le=LARGEST_FORCE)]
 
 
+class UncertaintySection(Section):
+    """How far the worlds of trials are from the believed one; what is left out has its default."""
+
+    factor: NonNegative = preset(1.0, "by which all of them that are left out are larger than by default")
+    mass_share: NonNegative | None = optional("largest deviation of each segment's mass (default: 0.05)")
+    com_m: NonNegative | None = optional(
+        "largest deviation of the centre of mass along each axis, standing [m] (default: 0.01)"
+    )
+    friction_share: NonNegative | None = optional("largest missing share of the friction (default: 0.2)")
+    height_m: NonNegative | None = optional(
+        "largest deviation of each obstacle's height [m] (default: 0.005)"
+    )
+    delay_s: NonNegative | None = optional("longest delay of the torques [s] (default: 0.015)")
+    angle_noise_deg: NonNegative | None = optional(
+        "standard deviation of the angles that control is told [deg] (default: 0.1)"
+    )
+    position_noise_m: NonNegative | None = optional("the same of the root's position [m] (default: 0.001)")
+    velocity_noise_m_s: NonNegative | None = optional("the same of its velocity [m/s] (default: 0.005)")
+    joints_deg: NonNegative | None = optional(
+        "largest error of each hinge at the beginning [deg] (default: 1)"
+    )
+    push_N: Force | None = optional("force of a push on the trunk at any time [N] (default: 50)")
+    push_s: NonNegative | None = optional("how long it lasts [s] (default: 0.1)")
+
+
+class ExecutionSection(Section):
+    """Execution of the planned motion in the physics engine, and trials of it in other worlds."""
+
+    required: bool = preset(
+        True,
+        "true: a run succeeds only if the planned motion is also executed and keeps every requirement "
+        "(proved); false: it is not executed, and succeeds if its plan keeps every requirement (planned), "
+        "the default of a point mass and of a recorded walk, which cannot be executed",
+    )
+    trials: Annotated[int, Field(strict=True, ge=0, le=10_000)] = preset(
+        0, "worlds, drawn from the uncertainty, in which a proved motion is executed as well"
+    )
+    uncertainty: UncertaintySection = preset(UncertaintySection(), "how far they are from the believed one")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("mass_share", "friction_share"):
+            share = getattr(self.uncertainty, key)
+            refuse_if(share is not None and share > LARGEST_SHARE, f"uncertainty.{key}",
+                      f"is {share}; valid: 0 to {LARGEST_SHARE:g}")  # fmt: skip
+        refuse_if(self.trials > 0 and not self.required, "trials", "are asked for; valid: with required true")
+        return self
+
+
+LARGEST_SHARE = 0.9
+"""Largest uncertainty of a mass or of a friction, relative to it."""
+
+
 class PushSection(Section):
     """A push on the trunk: of the thorax during an execution, near the centre of mass in a recovery."""
 
