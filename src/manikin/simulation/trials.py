@@ -19,7 +19,7 @@ from manikin.simulation.execute import execute
 from manikin.simulation.push_force import Push
 from manikin.simulation.uncertainty import Uncertainty
 
-ARRIVED = 0.05
+ARRIVED = 0.1
 """A body arrives whose centre of mass and effectors are near their plan at the end [m]; our choice."""
 
 
