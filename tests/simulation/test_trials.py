@@ -27,8 +27,8 @@ NOTHING = STATED.scaled(0.0)
 
 @pytest.fixture(scope="module")
 def still(stand):
-    """A quarter of a second of standing."""
-    return stand(0.25)
+    """A tenth of a second of standing."""
+    return stand(0.1)
 
 
 @pytest.fixture(scope="module")

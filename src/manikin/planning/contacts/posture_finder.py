@@ -240,7 +240,7 @@ class PostureFinder:
 
     def _held_by(self, carrying: Contacts) -> Stance:
         """Contacts with friction inside Coulomb's cone: no posture is held by forces outside of it."""
-        return Stance(tuple(carrying.values()), model=replace(self.model, friction="inner"))
+        return Stance(tuple(carrying.values()), model=replace(self.model, friction="cone"))
 
     def _stance(self, carrying: Contacts) -> Stance:
         return Stance(tuple(carrying.values()), model=self.model)
