@@ -49,6 +49,8 @@ def test_trials_may_be_asked_for_and_set(tmp_path):
         ("extends: platform\nname: mine\nexecution: attempted\n", "valid: required, none, or a mapping"),
         ("extends: platform\nname: mine\nexecution: {trials: -1}\n", "trials"),
         ("extends: platform\nname: mine\nexecution: {required: false, trials: 2}\n", "with required true"),
+        ("extends: platform\nname: mine\nexecution: {uncertainty: {factor: 9.0}}\n", "factor is 9.0"),
+        ("extends: push-right-200\nname: mine\nexecution: {trials: 2}\n", "beside recovery; valid: 0"),
         (
             "extends: platform\nname: mine\nexecution: {uncertainty: {mass_share: 1.5}}\n",
             "uncertainty.mass_share is 1.5; valid: 0 to 0.9",

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from manikin.body import Configuration
+from manikin.body import Configuration, quadruped
 from manikin.control import ControlSettings, ReturnSettings
 from manikin.errors import InputError
 from manikin.pipeline.stages.execution_stage import _trials
@@ -156,3 +156,10 @@ def test_a_run_tells_its_trials_and_their_uncertainty(body, still):
     assert block["uncertainty"]["push_s"] == STATED.push_s
     line = trials_line(block | {"first_failures": {"fell in phase 2 on right_foot": 3}})
     assert line == "trials: 1 other worlds, stood in 100%, arrived in 100%; 3 x fell in phase 2 on right_foot"
+
+
+def test_a_creature_is_pushed_on_its_root(still):
+    """It has no thorax; its worlds are drawn like a person's."""
+    creature = quadruped()
+    truth = STATED.draw(creature, Scene(), still.motion, 0)
+    assert truth.pushes[0].segment == creature.segments[0].name

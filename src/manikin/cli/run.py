@@ -48,7 +48,7 @@ def run(
     overrides: Annotated[list[str] | None, option("KEY=VALUE", _SET, "--set")] = None,
     moved: Annotated[tuple[float, float, float] | None, option("X Y YAW_DEG", _MOVED)] = None,
     trials: Annotated[int | None, option("N", _TRIALS, min=1)] = None,
-    uncertainty: Annotated[float | None, option("X", _UNCERTAINTY, min=0.0)] = None,
+    uncertainty: Annotated[float | None, option("X", _UNCERTAINTY, min=0.0, max=4.0)] = None,
     figures: FiguresOption = True,
     jobs: JobsOption = None,
 ) -> int:

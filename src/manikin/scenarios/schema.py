@@ -199,6 +199,7 @@ class ScenarioFile(Section):
             given = value not in (None, 0.0, "standing")
             refuse_if(given, f"task.start.{key}", f"is {value}; valid in a recovery: leave it out")
         self._refuse_given(("task.act",), "is given beside recovery; valid: one of them")
+        refuse_if(self.execution.trials > 0, "execution.trials", "are asked for beside recovery; valid: 0")
         floor, steps, apart = self.floor_height_m, recovery.steps, recovery.feet_apart_m
         refuse_if(floor != 0.0, "floor_height_m", f"is {floor}; valid in a recovery: 0")
         held, single = recovery.feet == "held", recovery.support != "both"

@@ -81,7 +81,8 @@ class Uncertainty:
         position_noise_m: The same of the root's position [m].
         velocity_noise_m_s: The same of its velocity [m/s].
         joints_deg: Largest error of each hinge at the beginning [deg].
-        push_N: Force of a push on the trunk, in any level direction at any time [N].
+        push_N: Force of a push on the thorax, or on the root of a body without one, in any level direction
+            at any time [N].
         push_s: How long it lasts [s].
     """
 
@@ -118,7 +119,11 @@ class Uncertainty:
         latest = max(float(motion.duration) - self.push_s, 0.0)
         way, start = rng.uniform(-180.0, 180.0), float(motion.time[0]) + latest * rng.uniform()
         pushed = self.push_N > 0.0 and self.push_s > 0.0
-        pushes = (push_on_the_way(motion, self.push_N, way, start, self.push_s),) if pushed else ()
+        push = push_on_the_way(motion, self.push_N, way, start, self.push_s)
+        names = [segment.name for segment in body.segments]
+        if push.segment not in names:  # a creature is pushed on its root
+            push = replace(push, segment=names[0])
+        pushes = (push,) if pushed else ()
         true, raised = self._weighed(body, rng), self._raised(scene, rng)
         return TrueWorld(true, raised, rub, delay, noise, joints, pushes, seed)
 

@@ -34,10 +34,17 @@ LARGEST_FREQUENCY = 100.0
 Force = Annotated[float, bounded(gt=0, le=LARGEST_FORCE)]
 
 
+LARGEST_SHARE, LARGEST_FACTOR = 0.9, 4.0
+"""Largest uncertainty of a mass or of a friction, relative to it; and of all, relative to the defaults, with
+which that of the friction is 0.8."""
+
+
 class UncertaintySection(Section):
     """How far the worlds of trials are from the believed one; what is left out has its default."""
 
-    factor: NonNegative = preset(1.0, "by which all of them that are left out are larger than by default")
+    factor: Annotated[NonNegative, Field(le=LARGEST_FACTOR)] = preset(
+        1.0, "by which all of them that are left out are larger than by default"
+    )
     mass_share: NonNegative | None = optional("largest deviation of each segment's mass (default: 0.05)")
     com_m: NonNegative | None = optional(
         "largest deviation of the centre of mass along each axis, standing [m] (default: 0.01)"
@@ -81,10 +88,6 @@ class ExecutionSection(Section):
                       f"is {share}; valid: 0 to {LARGEST_SHARE:g}")  # fmt: skip
         refuse_if(self.trials > 0 and not self.required, "trials", "are asked for; valid: with required true")
         return self
-
-
-LARGEST_SHARE = 0.9
-"""Largest uncertainty of a mass or of a friction, relative to it."""
 
 
 class PushSection(Section):
