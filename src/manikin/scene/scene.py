@@ -1,6 +1,6 @@
 """A scene: named obstacles and a floor."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -153,6 +153,11 @@ class Scene(Displayed):
             raise SceneError("scene is empty, so nothing is nearest; valid: at least one obstacle")
         distance, name = self._distances(point)[0]
         return name, distance
+
+    def distance_beside(self, point: ArrayLike, obstacles: Collection[str]) -> float:
+        """Signed distance of a (3,) world point to the nearest other obstacle; infinite without any [m]."""
+        others = (distance for distance, name in self._distances(point) if name not in obstacles)
+        return next(others, np.inf)
 
     def touched_obstacles(self, contact: Contact, tolerance: float = 0.005) -> tuple[str, ...]:
         """Names of the obstacles that a contact touches; ContactError if there is none.

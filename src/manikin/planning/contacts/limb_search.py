@@ -202,11 +202,12 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         self._trees = [cKDTree(item.positions) if len(item.positions) else None for item in holds]
         self._wanted = np.array([item.wanted for item in holds])
         # Each of these is asked again and again.
-        self._contact, self._has_room = cache(self._made), cache(lambda k, row: holds[k].is_free(row - 1))
+        self._contact, self._has_room = cache(self._made), cache(self._roomy)
         self._beyond, self._resting = cache(self._overreached), cache(self._rest_without)
         kinds = [self._contact(k, 1).kind if len(item.positions) else None for k, item in enumerate(holds)]
         self._grasps = [kind is ContactKind.GRASP for kind in kinds]
         self._tips = [kind is ContactKind.POINT for kind in kinds]
+        self._on_tips = all(self._tips)
         self._next: dict[State, list[tuple[State, float]]] = {}
         self._later: dict[State, list[tuple[State, float]]] = {}
         self._ahead: dict[State, float] = {}
@@ -474,6 +475,12 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             return self.start.contacts[self.holds[k].effector]
         return replace(self.holds[k].contact(row - 1), oriented=False)
 
+    def _roomy(self, k: int, row: int) -> bool:
+        """Whether there is room for the end of limb k at a place, and for a tip beside what it touches."""
+        if not self.holds[k].is_free(row - 1):
+            return False
+        return not self._tips[k] or self.poser.clears(self._contact(k, row))
+
     def _contacts_of(self, state: State) -> dict[str, Contact]:
         return {
             item.effector: self._contact(k, row)
@@ -589,16 +596,34 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         """
         if key not in self._postures:
             posed = Posed(None)
-            for guide, start, near in guesses:
-                place = None
-                if self.settings.retreats:
-                    near = self._over_feet(carrying, guide[:2] if near is None else near)
-                    place = self.poser.resting_place(carrying, near, self.poser.settings.inset)
-                posed = self.poser.pose(held, carrying, start, guide, place=place, placements=wishes)
+            attempts = (
+                (guide, start, place)
+                for guide, start, near in guesses for place in self._resting_places(carrying, guide, near)
+            )  # fmt: skip
+            for guide, start, place in attempts:
+                posed = self.poser.pose(
+                    held, carrying, start, guide, place=place, placements=wishes, through=self._on_tips
+                )
                 if posed.q is not None:
                     break
             self._postures[key] = self.poser.eased(posed, held, carrying, wishes).at_rest
         return self._postures[key]
+
+    def _resting_places(
+        self, carrying: Contacts, guide: FloatArray, near: FloatArray | None
+    ) -> Iterator[FloatArray | None]:
+        """(2,) places of the centre of mass to try, None for the one nearest to a guide [m].
+
+        A creature's legs reach farther over a support that is narrow if it rests away from its edge.
+        """
+        if self.settings.retreats:
+            near = self._over_feet(carrying, guide[:2] if near is None else near)
+            yield self.poser.resting_place(carrying, near, self.poser.settings.inset)
+            return
+        yield None
+        inner = self.poser.inner_place(carrying, guide) if self._on_tips else None
+        if inner is not None:
+            yield inner
 
     def _over_feet(self, carrying: Contacts, near: FloatArray) -> FloatArray:
         """(2,) place beside another that is over the middle of the feet that carry, seen from behind [m].

@@ -123,7 +123,7 @@ class PostureFinder:
         guide: FloatArray | None = None, *, place: FloatArray | None = None, inset: float | None = None,
         com_weight: float | None = None, restarts: bool = False,
         placements: Mapping[str, Placement] | None = None, preferences: Preferences | None = None,
-        upright: bool = True,
+        upright: bool = True, through: bool = False,
     ) -> Posed:  # fmt: skip
         """Find a posture that holds contacts, points upright, and rests on some of them alone.
 
@@ -139,12 +139,10 @@ class PostureFinder:
             placements: Where further effectors should be, by name.
             preferences: Weights of what is not required; the default ones when omitted.
             upright: Whether points are wished upright on their surfaces.
+            through: Whether to come to the contacts through the obstacles, where there is no other way.
         """
         if place is None:
-            if guide is None or len(guide) > ROOT:
-                near = np.asarray(Configuration(self.body, start if guide is None else guide).com[:2])
-            else:  # over the root of a person, and over what a creature has ahead of its root
-                near = guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
+            near = self._com_at(start if guide is None else guide)
             place = self.resting_place(carrying, near, self.settings.inset if inset is None else inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
@@ -175,7 +173,17 @@ class PostureFinder:
             if result.succeeded:
                 return Posed(result.q)
         result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
+        if through and not result.succeeded:
+            there = start if guide is None or whole else np.concatenate([guide, start[ROOT:]])
+            free = generate_posture(replace(problem, proximity=None), there, settings=once)
+            result = generate_posture(problem, free.q, settings=once) if free.succeeded else result
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
+
+    def clears(self, contact: Contact) -> bool:
+        """Whether the end of a limb keeps the clearance at a contact to what it does not touch."""
+        shape = self.body.segment(self.body.effector(contact.effector).segment).shapes[-1]
+        least = self.settings.clearance + shape.size[0]
+        return bool(self.scene.distance_beside(contact.position, self._touched(contact)) >= least)
 
     def crossing(self, *postures: FloatArray) -> str:
         """Parts of the body that straight ways from posture to posture take through each other; or empty."""
@@ -254,6 +262,19 @@ class PostureFinder:
         if key not in self._regions:
             self._regions[key] = StaticRegion.of(self._stance(carrying), self.body.mass)
         return self._regions[key].nearest(near, inset)
+
+    def inner_place(self, carrying: Contacts, guide: FloatArray) -> FloatArray | None:
+        """(2,) place halfway from where a posture near (7,) pose rests to the middle of its contacts."""
+        place = self.resting_place(carrying, self._com_at(guide), self.settings.inset)
+        middle = np.mean([item.position[:2] for item in carrying.values()], axis=0)
+        return None if place is None else self.resting_place(carrying, 0.5 * (place + middle), 0.0)
+
+    def _com_at(self, posture: FloatArray) -> FloatArray:
+        """(2,) centre of mass of an (nq,) posture, or about where it is with its root at a (7,) pose [m]."""
+        if len(posture) > ROOT:
+            return np.asarray(Configuration(self.body, posture).com[:2])
+        # Over the root of a person, and over what a creature has ahead of its root.
+        return np.asarray(posture[:2] + (pin.XYZQUATToSE3(posture).rotation @ self._ahead)[:2])
 
     def led(self, guide: FloatArray) -> dict[str, Placement]:
         """Wish for the root to be near a (7,) pose, by the root's effector."""
