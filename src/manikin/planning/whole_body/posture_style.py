@@ -223,13 +223,14 @@ def _degrees(**angles: float) -> Mapping[str, float]:
 
 
 READY = PostureStyle(
-    "ready", _degrees(shoulder_flexion=20.0, shoulder_abduction=25.0, elbow_flexion=60.0),
+    "ready", _degrees(shoulder_flexion=8.0, shoulder_abduction=10.0, elbow_flexion=25.0),
     MappingProxyType({
         "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.35, "thorax": 0.35, "neck": 0.25,
-        "shoulder": 0.35, "elbow": 0.35, "wrist": 0.1,
+        "shoulder": 0.25, "elbow": 0.25, "wrist": 0.1,
     }),
+    preferences=Preferences(arms=0.3),
 )  # fmt: skip
-"""Arms of a person who steps over something: slightly raised and bent, clear of the thighs."""
+"""Arms that hang, elbows bent by 20 degrees, and come up where balance or a thigh asks for it."""
 
 WALKING = PostureStyle(
     "walking", _degrees(shoulder_flexion=3.0, elbow_flexion=22.0),
@@ -271,7 +272,7 @@ LADDER = PostureStyle(
         shoulder_flexion=40.0, shoulder_abduction=10.0, elbow_flexion=75.0, hip_flexion=12.0,
         knee_flexion=20.0, ankle_dorsiflexion=8.0,
     ),
-    READY.scales,
+    MappingProxyType({**READY.scales, "shoulder": 0.35, "elbow": 0.35}),
 )  # fmt: skip
 """Hands before the chest and slightly bent legs of a person on a ladder."""
 
