@@ -9,6 +9,7 @@ from manikin.ergonomics import lowest_margin
 from manikin.motion.file import read_motions
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import ExecutionRequirements
+from manikin.scenarios import load_scenario
 
 KEYS = {
     "centroidal": {
@@ -19,6 +20,7 @@ KEYS = {
         "max_support_error_m", "max_meeting_error_m", "max_com_error_m", "min_clearance_m", "max_scuff_m",
         "closest_pair",
         "max_joint_limit_violation_rad", "seed_matters", "lowest_com_m", "head_clearance_m", "wall_s",
+        "naturalness",
         "min_margin", "min_force_at_com_N", "min_zmp_distance_m",
     },
     "execution": {
@@ -61,6 +63,18 @@ def test_the_body_stands_for_a_second_after_the_end(platform):
     rest = executed.time > planned.time[-1] + 0.5
     np.testing.assert_allclose(executed.com[rest], planned.com[-1] * np.ones((rest.sum(), 1)), atol=5e-3)
     assert np.all(executed.support[rest])
+
+
+@pytest.mark.slow
+def test_arms_hang_at_rest(platform):
+    """Elbows are bent by 10 to 30 degrees before the motion and after it, as those of people who stand."""
+    motion, body = platform.executed, load_scenario("platform").build_body()
+    for side in ("left", "right"):
+        elbow = np.rad2deg(motion.q[:, 7 + body.joint_index(f"{side}_elbow_flexion")])
+        shoulder = np.rad2deg(motion.q[:, 7 + body.joint_index(f"{side}_shoulder_flexion")])
+        for row in (0, -1):
+            assert 10.0 <= elbow[row] <= 30.0
+            assert abs(shoulder[row]) <= 30.0
 
 
 @pytest.mark.slow

@@ -99,9 +99,10 @@ class ScenarioFile(Section):
     )
     manner: Literal["ready", "walking", "close", "hanging", "climbing"] = preset(
         "ready",
-        "how the body carries itself where the task leaves freedom: ready, arms raised and bent, "
-        "clear of the thighs; walking, upright with arms that swing against the legs; close, arms bent close "
-        "to the body; hanging, arms that hang; climbing, arms raised and legs bent and spread",
+        "how the body carries itself where the task leaves freedom: ready, hanging arms that "
+        "come up where balance asks for it; walking, upright with arms that swing against the legs; close, "
+        "arms bent close to the body; hanging, arms that stay down; climbing, arms raised and legs bent and "
+        "spread",
     )
     push: PushSection | None = optional("disturbance during the execution")
     recovery: RecoverySection | None = optional(

@@ -17,7 +17,8 @@ from manikin.contact import Contact, ContactSchedule, Stance, StanceSequence
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
-from manikin.motion.passage import Passage, measure_passage
+from manikin.motion.naturalness import measure_naturalness
+from manikin.motion.passage import measure_passage
 from manikin.numerics.spatial import IDENTITY, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, SCENARIO, STAGES, SUMMARY, RunDirectory
@@ -196,9 +197,11 @@ class RunContext:
         """Names of the obstacles that any part of the body may lean on."""
         return self.scenario.padded
 
-    def passage(self, schedule: ContactSchedule, motion: Motion) -> Passage:
-        """Lowest height of the body, and least distance of its head from the scene."""
-        return measure_passage(self.body, self.scene, schedule, motion, self.padded)
+    def measured(self, schedule: ContactSchedule, motion: Motion) -> dict[str, Any]:
+        """Lowest height of the body, distance of its head from the scene, and a person's naturalness."""
+        passage = measure_passage(self.body, self.scene, schedule, motion, self.padded).summary()
+        natural = measure_naturalness(self.body, motion)
+        return {**passage, "naturalness": None if natural is None else natural.summary()}
 
 
 Progress = Callable[[str, float], None]

@@ -221,7 +221,7 @@ def execute_motion(
         push["direction_deg"] = report.transform.turned(push["direction_deg"])
     block = {
         "required": True, "failure": None if failure is None else asdict(failure), **summary,
-        **context.passage(result.schedule or planned.schedule, result.motion).summary(),
+        **context.measured(result.schedule or planned.schedule, result.motion),
     }  # fmt: skip
     report.finish("execution", block)
     report.proved = failure is None

@@ -342,9 +342,9 @@ def report_whole_body(
 ) -> None:  # fmt: skip
     """Take a motion of all joints into the report; ``block`` is what its method says of it."""
     motion = result.motion
-    passage = context.passage(schedule, motion).summary()
+    measured = context.measured(schedule, motion)
     friction = friction_use(schedule, motion.time, motion.contact_names, motion.contact_force)
-    report.finish("wholebody", block | passage | {"friction": friction.summary()})
+    report.finish("wholebody", block | measured | {"friction": friction.summary()})
     report.require("wholebody", result.requirements)
     report.planned = result.succeeded
     if result.failure is not None:

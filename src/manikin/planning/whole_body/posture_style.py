@@ -230,7 +230,7 @@ READY = PostureStyle(
     }),
     preferences=Preferences(arms=0.3),
 )  # fmt: skip
-"""Arms that hang, elbows bent by 20 degrees, and come up where balance or a thigh asks for it."""
+"""Arms that hang, elbows bent by 25 degrees, and come up where balance or a thigh asks for it."""
 
 WALKING = PostureStyle(
     "walking", _degrees(shoulder_flexion=3.0, elbow_flexion=22.0),
