@@ -223,7 +223,7 @@ def _degrees(**angles: float) -> Mapping[str, float]:
 
 
 READY = PostureStyle(
-    "ready", _degrees(shoulder_flexion=8.0, shoulder_abduction=10.0, elbow_flexion=25.0),
+    "ready", _degrees(shoulder_flexion=8.0, shoulder_abduction=18.0, elbow_flexion=25.0),
     MappingProxyType({
         "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.35, "thorax": 0.35, "neck": 0.25,
         "shoulder": 0.25, "elbow": 0.25, "wrist": 0.1,
