@@ -13,7 +13,7 @@ from manikin.scene import Proximity
 @pytest.fixture(scope="module")
 def beside_a_rail(tmp_path_factory):
     """Onto a block, or down, with a hand on a rail; the motion alone."""
-    scenario = draw_scene(FAMILIES["blocks"], 1300, tmp_path_factory.mktemp("scene"))
+    scenario = draw_scene(FAMILIES["blocks"], 1306, tmp_path_factory.mktemp("scene"))
     scenario = scenario.with_overrides(["execution=none"])
     return scenario, runner.run(scenario)
 
