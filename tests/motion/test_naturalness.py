@@ -68,7 +68,7 @@ def test_a_mirrored_posture_has_mirrored_directions():
 
 
 def test_a_distance_is_the_root_mean_square_of_the_parts():
-    """Both forearms turned away from the nearest posture by a chord c add 2 c^2 to eleven squares at most."""
+    """As an exhaustive search over all recorded postures finds it, of standing, which is natural."""
     known, limit = recorded_postures()
     assert known.data.shape[1] == 3 * len(PARTS)
     assert 0.2 < limit < 0.6
