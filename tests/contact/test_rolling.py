@@ -58,6 +58,24 @@ def parts_of(*stances):
     return rolled, [{c.effector: c.part for c in phase.stance} for phase in rolled]
 
 
+def test_a_brief_phase_on_both_feet_has_no_flat_part():
+    """The heel that leaves rises as the other foot has come down; bounds of the phase are kept."""
+    right, ahead = foot("right_foot", (0.0, -0.1, 0.0), 0.0), foot(place=(0.4, 0.1, 0.0), yaw=0.0)
+    phases = [
+        Phase(Stance(held, 1500.0), *bounds)
+        for held, bounds in (([right], (0.4, 0.8)), ([right, ahead], (0.18, 0.8)), ([ahead], (0.4, 0.8)))
+    ]  # fmt: skip
+    rolled = roll_feet(StanceSequence(phases), HINGE)
+    held = [{c.effector: c.part for c in phase.stance} for phase in rolled]
+    assert held[1:-1] == [
+        {"right_foot": SolePart.FULL, "left_foot": SolePart.HEEL},
+        {"right_foot": SolePart.TOES, "left_foot": SolePart.FULL},
+    ]
+    brief = rolled.phases[1:-1]
+    assert sum(phase.min_duration for phase in brief) == pytest.approx(0.18)
+    assert brief[1].max_duration == pytest.approx(0.8 - brief[0].min_duration)
+
+
 def test_a_foot_above_the_other_rises_onto_its_toes_as_that_lands():
     """The phase on both feet keeps its bounds: on a flat upper foot no time is spent."""
     upper, lower = foot("right_foot", (0.0, -0.1, 0.2), 0.0), foot("left_foot", (0.4, 0.1, 0.0), 0.0)

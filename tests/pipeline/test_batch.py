@@ -80,7 +80,8 @@ def test_every_expected_failure_of_a_stage_gives_its_reason(built_in):
     staged = [job for job in built_in if job.stage is not None]
     assert {"beam-H2C2@S2", "beam-H2C3@S2"} <= {job.name for job in staged}
     for job in staged:
-        assert job.expected == "failure" and job.because, job.name
+        assert job.expected == "failure", job.name
+        assert job.because, job.name
         assert job.stage in ("contacts", "centroidal", "wholebody", "execution"), job.name
 
 

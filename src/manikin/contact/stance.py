@@ -273,7 +273,7 @@ class ContactSchedule(Displayed):
 
 ON_HEEL, FLAT, ON_TOES, ON_BALL = 0.08, 0.04, 0.14, 0.2
 """Least times of a rolling foot on the heel's edge, with both feet flat, on its toes before it leaves, and on
-the ball of the foot after it has landed there [s]."""
+the ball of the foot after it has landed there [s]. A phase too brief for the first three has no flat part."""
 
 STRETCH = 1.5
 """The phases on heel or toes last at most this many times their least time."""
@@ -337,6 +337,14 @@ def _split(
     if leaving and not landing and _height(stance, leaving) > STEP:
         toes = _on_part(phase, leaving, SolePart.TOES, hinge, ON_TOES)
         yield replace(phase, stance=toes.stance)
+        return
+    if landing and leaving and phase.min_duration < ON_HEEL + FLAT + ON_TOES:
+        # In a brief one the heel that leaves rises as soon as the other foot has come down.
+        yield _on_part(phase, landing, SolePart.HEEL, hinge, ON_HEEL)
+        toes = _on_part(phase, leaving, SolePart.TOES, hinge, ON_TOES)
+        least = max(phase.min_duration - ON_HEEL, FLAT)
+        most = None if phase.max_duration is None else max(phase.max_duration - ON_HEEL, least)
+        yield replace(toes, min_duration=least, max_duration=most)
         return
     # Without a landing on the heel there is more time for a rise onto the toes.
     rise = ON_TOES if landing else min(max(phase.min_duration - FLAT, ON_TOES), ON_TOES + ON_HEEL)

@@ -33,7 +33,6 @@ from manikin.pipeline.stages.whole_body_stage import (
     with_rolling_feet,
     with_stricter_key_postures,
 )
-from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import WholeBodySettings
 from manikin.scenarios import Scenario, load_scenario
 
@@ -98,14 +97,16 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         centroidal = plan_centre_of_mass(with_contacts, report)
         return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
     result, schedule = _planned(with_contacts, report, requirements)
-    while (other := slower(with_contacts, report)) is not None:
+    while (
+        other := slower(with_contacts, report, failed_stage(report.failure, schedule, with_contacts))
+    ) is not None:
         with_contacts = other
         result, schedule = _planned(with_contacts, report, requirements)
     if (rolling := with_rolling_feet(with_contacts, report)) is not None:
         again = _planned(rolling, report, requirements)
         result, schedule = (result, schedule) if report.prefer_earlier() else again
     for _ in range(1, context.scenario.contacts.attempts):
-        stage = failed_stage(report.failure, schedule, with_contacts.plan)
+        stage = failed_stage(report.failure, schedule, with_contacts)
         other = None if stage is None else plan_contacts_again(with_contacts, report, stage)
         if other is None:
             break
@@ -161,20 +162,22 @@ def _followed(
 
 
 def failed_stage(
-    failure: StageFailure | None, schedule: ContactSchedule | None, plan: ContactPlan | None
+    failure: StageFailure | None, schedule: ContactSchedule | None, context: RunContext
 ) -> int | None:
-    """Index of the stage of a contact plan in which a later stage failed, or None where it is not known."""
+    """Index of the stage of the contact plan in which a later stage failed, or None where it is not known."""
     if failure is None:
         return None
+    problem = None if schedule is not None or context.plan is None else context.problem
+    sequence = schedule.sequence if schedule is not None else None if problem is None else problem.sequence
     if (named := re.match(r"phase (\d+)", failure.where)) is not None:
         phase = int(named[1])
     elif schedule is not None:
         phase = int(schedule.phase_at(failure.time_s))
     else:
         return None
-    if schedule is None or plan is None:
+    if sequence is None or context.plan is None:
         return phase
-    return bisect.bisect_right(plan.begins(schedule), phase) - 1
+    return bisect.bisect_right(context.plan.begins(sequence), phase) - 1
 
 
 def _refined(

@@ -7,6 +7,7 @@ balance asks for, within bounds by people's step times.
 
 import math
 from collections.abc import Mapping, Sequence
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -52,18 +53,18 @@ SEATED_LONGER = 1.5
 """Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
 
 
-SWING, DOUBLE = 0.45, 0.15
+SWING, DOUBLE = 0.4, 0.15
 """Least duration of a flight and of a support on both feet of a body that does not rest in between [s]: less
 than people's, whose steps at 0.5 m/s take 0.78 s, and at 1.2 m/s 0.51 s, 0.4 s of both in flight (Fukuchi et
 al., PeerJ 6:e4640, 2018)."""
 SWING_SPEED = 2.0
 """Mean speed of a foot in a longer flight [m/s]; our choice."""
-CLIMBING_SPEED = 1.2
+CLIMBING_SPEED = 4.0
 """Mean speed upwards or downwards in what a phase lasts longer for a rise [m/s]; our choice."""
 PASSED_OVER, PASSED_STEP = 0.5, 0.02
 """Greatest height above the higher end of a flight of what the foot passes over and not below, and distance
 of the places that are asked for it [m]; our choice."""
-ROLLED = 0.3
+ROLLED = 0.18
 """Least duration of a support on both feet, one landing on its heel, the other leaving from its toes [s]."""
 LONGEST = 0.8
 """Longest duration of a phase, or 1.5 times its least: a person's step at 0.5 m/s; without it the programme
@@ -74,8 +75,10 @@ SLOPED = 0.1
 """Way of the centre of mass from which on a plane above it is inclined [m]; our choice."""
 LEVEL = 0.94
 """Least upward part of the normal of a sole on which a body steps without rest; our choice."""
-SLOWER = 1.4
-"""Factor on the least durations of flights of a walk that failed without it; our choice."""
+PACES: Mapping[str, float] = {"slow": 1.5, "comfortable": 1.0, "brisk": 0.85}
+"""Factors on the least durations of phases at the paces of a task; our choice."""
+UNHURRIED = 1.5
+"""Factor on the least durations of phases in which a walk failed at its first pace; our choice."""
 MILD = 0.48
 """Largest difference in height of such soles, of a body of 1.75 m [m]: what feet alone make."""
 WALKING_MARGIN = 6.0
@@ -97,21 +100,38 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     return _supported(scenario, plan, [False] * (len(plan.stages) + 1))
 
 
-def without_rests(scenario: Scenario, plan: ContactPlan, flight: float = 1.0) -> Scenario | None:
+class Pace(IntEnum):
+    """How a body goes through a phase of its contacts."""
+
+    PASSING = 0  # as fast as people step
+    UNHURRIED = 1  # passing on, too, but with more time
+    RESTING = 2  # at rest when the phase begins, and when it ends
+
+
+def without_rests(
+    scenario: Scenario, plan: ContactPlan, paces: Sequence[Pace] | None = None
+) -> Scenario | None:
     """The same for a body that passes from foot to foot without a rest where the ground is mild.
 
     There the centre of mass may be wherever the body reaches, and phases last as long as balance asks for.
     None where the body rests at every change, where anything but feet carries, and before an act.
 
     Args:
-        flight: Factor on the least durations of flights.
+        paces: One for each stage of the plan; as fast as people step when omitted.
     """
     carriers = {name for stage in plan.stages for name in stage.contacts}
     if scenario.file.task.act is not None or not carriers <= set(FEET):
         return None
+    paces = paces or [Pace.PASSING] * len(plan.stages)
+    moving = [pace is not Pace.RESTING for pace in paces]
     inner = range(1, len(plan.stages))
-    passed = [_is_mild(plan.stages[key - 1 : key + 2], scenario) for key in inner]
-    return _supported(scenario, plan, [True, *passed, True], flight) if any(passed) else None
+    passed = [
+        moving[key - 1] and moving[key] and _is_mild(plan.stages[key - 1 : key + 2], scenario)
+        for key in inner
+    ]  # fmt: skip
+    if not any(passed):
+        return None
+    return _supported(scenario, plan, [moving[0], *passed, moving[-1]], paces)
 
 
 def _is_mild(stages: Sequence[Stage], scenario: Scenario) -> bool:
@@ -168,7 +188,7 @@ def _walking_time(plan: ContactPlan, number: int, ground: Footholds, *, rolls: b
 
 
 def _supported(
-    scenario: Scenario, plan: ContactPlan, passed: Sequence[bool], flight: float = 1.0
+    scenario: Scenario, plan: ContactPlan, passed: Sequence[bool], paces: Sequence[Pace] = ()
 ) -> Scenario:
     """The scenario with supports; at each key instant, of start and goal too, the body rests or passes."""
     friction = scenario.contacts.friction
@@ -184,11 +204,14 @@ def _supported(
             name: "same" if before.get(name) is contact else _entry(contact, friction)
             for name, contact in stage.contacts.items()
         }
-        phase["min_duration_s"] = stage.min_duration
+        # Who sits rises and sinks as fast as the seat is left or met.
+        pace = 1.0 if rises or sits else PACES[scenario.file.task.pace]
+        phase["min_duration_s"] = pace * stage.min_duration
         if ground is not None and passed[number] and passed[number + 1]:
-            phase["min_duration_s"] = least = _walking_time(plan, number, ground, rolls=rolls)
-            if len(stage.contacts) == 1:
-                phase["min_duration_s"] = least = flight * least
+            least = pace * _walking_time(plan, number, ground, rolls=rolls)
+            if paces[number] is Pace.UNHURRIED:
+                least *= UNHURRIED
+            phase["min_duration_s"] = least
             phase["max_duration_s"] = max(LONGEST, 1.5 * least)
         if rises and "buttocks" in stage.contacts:
             phase["max_duration_s"] = SEATED_LONGER * stage.min_duration

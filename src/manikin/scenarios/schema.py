@@ -156,6 +156,8 @@ class ScenarioFile(Section):
             self._check_planned()
         else:
             refuse_if(self.contacts is not None, "contacts", "is given beside supports; valid: one of them")
+            own = "is given beside supports, whose phases have their durations; valid: without supports"
+            refuse_if(self.task.pace != "comfortable", "task.pace", own)
         for key in type(self.com_constraints[0])._keys() if self.com_constraints else ():
             count = sum(getattr(c, key) is not None for c in self.com_constraints)
             refuse_if(count > 1, "com_constraints", f"holds {key} twice; valid: at most once")

@@ -17,7 +17,7 @@ from manikin.contact import ContactKind
 from manikin.kinematics.limb_samples import sample_limbs
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.contact_guides import ContactSearch, SearchTally, guide_root, stage_at
-from manikin.pipeline.stages.context import Report, RunContext
+from manikin.pipeline.stages.context import Passing, Report, RunContext
 from manikin.pipeline.stages.execution_stage import act_of
 from manikin.pipeline.stages.refinement_stage import HOLDING_ACCELERATION, HOLDING_PACE
 from manikin.planning import contacts, guide
@@ -25,7 +25,7 @@ from manikin.planning.contacts import ContactPlan, Endpoint, Endpoints, Extensio
 from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
 from manikin.planning.whole_body.posture_style import LADDER, posture_style_of
 from manikin.scenarios import Scenario
-from manikin.scenarios.found_supports import SLOWER, with_supports, without_rests
+from manikin.scenarios.found_supports import Pace, with_supports, without_rests
 from manikin.scenarios.sections.task_sections import StateSection
 from manikin.scenarios.world import CLIMBING, carried_to, contact_rules
 from manikin.scene import Scene
@@ -162,6 +162,8 @@ class _FootSearch(_ContactSearch):
         return self._result(self._walked(self._start, self._next_act()))
 
 
+REPAIRS = 2
+"""Times that paces are eased before a body rests at all changes of contact; our choice."""
 STANDING_HEIGHT = 0.92
 """Height of the root of a standing person of 1.75 m, the unit in which bodies are compared [m]."""
 SMALLEST = 0.3
@@ -371,21 +373,44 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     planned = _with_contacts(context, report, result)
     if planned is None or result.plan is None or scenario.contact_limbs is not None or scenario.refines:
         return planned
-    for flight in (SLOWER, 1.0):
-        walking = without_rests(scenario, result.plan, flight)
-        if walking is not None:
-            report.keep_scenario(walking)
-            planned = replace(planned.with_supports(walking), resting=planned)
-    return planned
+    paces = (Pace.PASSING,) * len(result.plan.stages)
+    return _passed(report, planned, Passing(scenario, planned, paces)) or planned
 
 
-def slower(context: RunContext, report: Report) -> RunContext | None:
-    """The walk with longer flights, or with rests, after a later stage failed without; None otherwise."""
-    if report.failure is None or context.resting is None:
+def _passed(report: Report, context: RunContext, passing: Passing) -> RunContext | None:
+    """The task of a body that passes changes of contact; None where it rests at all of them."""
+    if context.plan is None:
         return None
+    walking = without_rests(passing.asked, context.plan, passing.paces)
+    if walking is None:
+        return None
+    report.keep_scenario(walking)
+    return replace(passing.resting.with_supports(walking), passing=passing)
+
+
+def slower(context: RunContext, report: Report, stage: int | None) -> RunContext | None:
+    """The walk after a failure: slower around the stage where it was, then with rests there, then everywhere.
+
+    A plan of the centre of mass that fails has rests there at once, and one that fails again, or a posture
+    that is missing on feet that roll, has them everywhere, on flat feet. None where the body rests at all
+    changes, and after a success.
+    """
+    passing, failure = context.passing, report.failure
+    if failure is None or passing is None:
+        return None
+    unplanned = failure.stage == "centroidal"
+    ease = Pace.RESTING if unplanned else Pace.UNHURRIED
+    near = range(len(passing.paces)) if stage is None else range(stage - 1, stage + 2)
+    eased = [Pace(min(pace + ease * (k in near), Pace.RESTING)) for k, pace in enumerate(passing.paces)]
+    moved = report.summary["wholebody"] is not None
+    repairs = 1 if unplanned else REPAIRS if moved else 0
+    more = passing.repairs < repairs and tuple(eased) != passing.paces
     report.try_again()
-    report.keep_scenario(context.resting.scenario)
-    return context.resting
+    other = replace(passing, paces=tuple(eased), repairs=passing.repairs + 1)
+    walking = _passed(report, context, other) if more else None
+    if walking is None:
+        report.keep_scenario(passing.resting.scenario)
+    return walking or passing.resting
 
 
 def plan_contacts_again(context: RunContext, report: Report, phase: int) -> RunContext | None:

@@ -29,6 +29,7 @@ from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBody
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
+from manikin.scenarios.found_supports import Pace
 from manikin.scene import Scene
 from manikin.simulation import Execution, Recovery
 from manikin.verification import PlannedContacts, PlannedStage
@@ -122,6 +123,23 @@ def reason_in_world(reason: str, transform_task_to_world: PlanarTransform) -> st
 
 
 @dataclass(frozen=True, eq=False)
+class Passing:
+    """Way of a body through changes of contact, some of them without a rest.
+
+    Attributes:
+        asked: The scenario before supports were found.
+        resting: The task with rests at all changes.
+        paces: Of the stages of the contact plan.
+        repairs: Failures after which paces were eased.
+    """
+
+    asked: Scenario
+    resting: "RunContext"
+    paces: tuple[Pace, ...]
+    repairs: int = 0
+
+
+@dataclass(frozen=True, eq=False)
 class RunContext:
     """One job, in the frame of its task.
 
@@ -133,8 +151,7 @@ class RunContext:
         settings: Options of the whole-body stage.
         plan: The contacts that were found from start and goal, or None.
         search_again: Searches on for other contacts without the change of a phase, which failed for a reason.
-        resting: The task with longer flights, or with rests at all changes of contact, where this one passes
-            some without; or None.
+        passing: How the body passes changes of contact without rests; None where it rests at all of them.
     """
 
     given: Scenario
@@ -146,7 +163,12 @@ class RunContext:
     settings: WholeBodySettings
     plan: ContactPlan | None = None
     search_again: Callable[[int, str], ContactSearch] | None = None
-    resting: "RunContext | None" = None
+    passing: "Passing | None" = None
+
+    @property
+    def resting(self) -> "RunContext | None":
+        """The task with rests at all changes of contact, where this one passes some without; or None."""
+        return None if self.passing is None else self.passing.resting
 
     @classmethod
     def of(cls, scenario: Scenario, settings: WholeBodySettings | None = None) -> "RunContext":

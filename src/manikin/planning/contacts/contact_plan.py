@@ -222,7 +222,7 @@ class ContactPlan:
 
     def keys(self, schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
         """Key times (k,) [s] and configurations (k, nq): where stages begin and, if any, in between."""
-        instants = schedule.instants[[*self.begins(schedule), -1]]
+        instants = schedule.instants[[*self.begins(schedule.sequence), -1]]
         times, keys = [float(instants[0])], [self.stages[0].q]
         spans = pairwise(instants.tolist())
         for stage, end, (begin, stop) in zip(self.stages, self.postures[1:], spans, strict=True):
@@ -233,12 +233,12 @@ class ContactPlan:
             keys.append(end)
         return np.array(times), np.array(keys)
 
-    def begins(self, schedule: ContactSchedule) -> Sequence[int]:
-        """Phase of a schedule with which each stage begins: feet that roll divide a stage."""
+    def begins(self, sequence: StanceSequence) -> Sequence[int]:
+        """Phase of a sequence with which each stage begins: feet that roll divide a stage."""
         parts = [len(of_stage) for of_stage in self._parts()]
-        counts = [1] * len(parts) if len(parts) == len(schedule.sequence) else parts
-        own = sum(counts) == len(schedule.sequence)
-        return [0, *np.cumsum(counts[:-1]).tolist()] if own else schedule.sequence.changes
+        counts = [1] * len(parts) if len(parts) == len(sequence) else parts
+        own = sum(counts) == len(sequence)
+        return [0, *np.cumsum(counts[:-1]).tolist()] if own else sequence.changes
 
     @property
     def postures(self) -> FloatArray:

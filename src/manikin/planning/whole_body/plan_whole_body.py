@@ -333,7 +333,8 @@ class _Planner:
         searched = self._search_again(swings, best)
         if searched is not None:
             best = self.job.better(best, self._attempt(searched, manner, progress))
-        best = self.job.with_reserve(best, replace(best.goal, forces=best.motion))
+        if best.goal.forces is None:  # else the strength has been fitted to
+            best = self.job.with_reserve(best, replace(best.goal, forces=best.motion))
         progress(1.0)
         goal, failure = best.goal, best.goal.failure(best.certificate)
         return WholeBodyResult(

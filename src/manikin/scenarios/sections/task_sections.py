@@ -380,6 +380,9 @@ class TaskSection(Section):
     act: ActSection | None = optional(
         "what the hands do to an object at the end; where to stand for it is found"
     )
+    pace: Literal["slow", "comfortable", "brisk"] = preset(
+        "comfortable", "how fast a body goes on its feet between contacts that are found"
+    )
 
     @model_validator(mode="before")
     @classmethod
