@@ -57,7 +57,7 @@ SWING, DOUBLE = 0.4, 0.15
 """Least duration of a flight and of a support on both feet of a body that does not rest in between [s]: less
 than people's, whose steps at 0.5 m/s take 0.78 s, and at 1.2 m/s 0.51 s, 0.4 s of both in flight (Fukuchi et
 al., PeerJ 6:e4640, 2018)."""
-SWING_SPEED = 2.0
+SWING_SPEED = 3.0
 """Mean speed of a foot in a longer flight [m/s]; our choice."""
 CLIMBING_SPEED = 4.0
 """Mean speed upwards or downwards in what a phase lasts longer for a rise [m/s]; our choice."""
