@@ -161,8 +161,8 @@ def test_a_walk_without_a_plan_of_the_centre_of_mass_rests_there_then_everywhere
     assert slower(there, report, 3) is there.resting
 
 
-def test_the_body_rests_everywhere_where_a_posture_is_missing(tmp_path):
-    """More time is no help then, and at rest it stands on flat feet."""
+def test_where_a_posture_is_missing_feet_are_flat_before_the_body_rests_everywhere(tmp_path):
+    """More time is no help then."""
     walking, report = paced(tmp_path)
     resting = walking.resting
     # Of supports with and without rests the centre of mass is mostly planned on one: none is posed before.
@@ -170,9 +170,14 @@ def test_the_body_rests_everywhere_where_a_posture_is_missing(tmp_path):
     assert walking.problem.regions != resting.problem.regions
     assert slower(walking, report, None) is None  # nothing has failed
     report.fail("wholebody", "no posture at T_2", 1.0, "phase 2")
-    assert slower(walking, report, 2) is resting
+    flat = slower(walking, report, 2)
+    assert walking.scenario.file.supports.foot == "rolling"
+    assert flat.scenario.file.supports.foot is None
+    assert not rests(flat)
+    report.fail("wholebody", "no posture at T_2", 1.0, "phase 2")
+    assert slower(flat, report, 2) is resting
     assert report.failure is None
-    assert [item["stage"] for item in report.refused] == ["wholebody"]
+    assert [item["stage"] for item in report.refused] == ["wholebody", "wholebody"]
 
 
 def test_a_flight_lasts_longer_over_a_sill(tmp_path):

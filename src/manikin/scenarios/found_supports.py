@@ -109,7 +109,7 @@ class Pace(IntEnum):
 
 
 def without_rests(
-    scenario: Scenario, plan: ContactPlan, paces: Sequence[Pace] | None = None
+    scenario: Scenario, plan: ContactPlan, paces: Sequence[Pace] | None = None, *, rolls: bool = True
 ) -> Scenario | None:
     """The same for a body that passes from foot to foot without a rest where the ground is mild.
 
@@ -118,6 +118,7 @@ def without_rests(
 
     Args:
         paces: One for each stage of the plan; as fast as people step when omitted.
+        rolls: Whether feet may roll over heels and toes.
     """
     carriers = {name for stage in plan.stages for name in stage.contacts}
     if scenario.file.task.act is not None or not carriers <= set(FEET):
@@ -131,7 +132,7 @@ def without_rests(
     ]  # fmt: skip
     if not any(passed):
         return None
-    return _supported(scenario, plan, [moving[0], *passed, moving[-1]], paces)
+    return _supported(scenario, plan, [moving[0], *passed, moving[-1]], paces, rolls=rolls)
 
 
 def _is_mild(stages: Sequence[Stage], scenario: Scenario) -> bool:
@@ -188,14 +189,15 @@ def _walking_time(plan: ContactPlan, number: int, ground: Footholds, *, rolls: b
 
 
 def _supported(
-    scenario: Scenario, plan: ContactPlan, passed: Sequence[bool], paces: Sequence[Pace] = ()
-) -> Scenario:
+    scenario: Scenario, plan: ContactPlan, passed: Sequence[bool], paces: Sequence[Pace] = (), *,
+    rolls: bool = False,
+) -> Scenario:  # fmt: skip
     """The scenario with supports; at each key instant, of start and goal too, the body rests or passes."""
     friction = scenario.contacts.friction
     # Rising legs are soon at full length: there is less room above such postures than below them.
     rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
     below = any(passed) and _passes_below(plan, scenario)
-    rolls = any(passed) and not below
+    rolls = rolls and not below
     ground = Footholds(build_body(scenario), build_scene(scenario)) if any(passed) else None
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []

@@ -378,11 +378,11 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
 
 
 def _passed(report: Report, context: RunContext, passing: Passing) -> RunContext | None:
-    """The task of a body that passes changes of contact; None where it rests at all of them."""
+    """The task of a body that passes changes of contact; None where it rests at all of them, or as before."""
     if context.plan is None:
         return None
-    walking = without_rests(passing.asked, context.plan, passing.paces)
-    if walking is None:
+    walking = without_rests(passing.asked, context.plan, passing.paces, rolls=passing.rolls)
+    if walking is None or walking.file == context.scenario.file:
         return None
     report.keep_scenario(walking)
     return replace(passing.resting.with_supports(walking), passing=passing)
@@ -391,23 +391,25 @@ def _passed(report: Report, context: RunContext, passing: Passing) -> RunContext
 def slower(context: RunContext, report: Report, stage: int | None) -> RunContext | None:
     """The walk after a failure: slower around the stage where it was, then with rests there, then everywhere.
 
-    A plan of the centre of mass that fails has rests there at once, and one that fails again, or a posture
-    that is missing on feet that roll, has them everywhere, on flat feet. None where the body rests at all
-    changes, and after a success.
+    A plan of the centre of mass that fails has rests there at once, and one that fails again has them
+    everywhere. A posture that is missing on feet that roll is sought on flat ones before. None where the body
+    rests at all changes, and after a success.
     """
     passing, failure = context.passing, report.failure
     if failure is None or passing is None:
         return None
-    unplanned = failure.stage == "centroidal"
-    ease = Pace.RESTING if unplanned else Pace.UNHURRIED
-    near = range(len(passing.paces)) if stage is None else range(stage - 1, stage + 2)
-    eased = [Pace(min(pace + ease * (k in near), Pace.RESTING)) for k, pace in enumerate(passing.paces)]
-    moved = report.summary["wholebody"] is not None
-    repairs = 1 if unplanned else REPAIRS if moved else 0
-    more = passing.repairs < repairs and tuple(eased) != passing.paces
+    unplanned, moved = failure.stage == "centroidal", report.summary["wholebody"] is not None
     report.try_again()
-    other = replace(passing, paces=tuple(eased), repairs=passing.repairs + 1)
-    walking = _passed(report, context, other) if more else None
+    walking = None
+    if unplanned or moved:
+        ease = Pace.RESTING if unplanned else Pace.UNHURRIED
+        near = range(len(passing.paces)) if stage is None else range(stage - 1, stage + 2)
+        eased = [Pace(min(pace + ease * (k in near), Pace.RESTING)) for k, pace in enumerate(passing.paces)]
+        if passing.repairs < (1 if unplanned else REPAIRS) and tuple(eased) != passing.paces:
+            other = replace(passing, paces=tuple(eased), repairs=passing.repairs + 1)
+            walking = _passed(report, context, other)
+    elif passing.rolls:
+        walking = _passed(report, context, replace(passing, rolls=False))
     if walking is None:
         report.keep_scenario(passing.resting.scenario)
     return walking or passing.resting
