@@ -7,6 +7,7 @@ balance asks for, within bounds by people's step times.
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -53,19 +54,33 @@ SEATED_LONGER = 1.5
 """Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
 
 
-SWING, DOUBLE = 0.4, 0.15
-"""Least duration of a flight and of a support on both feet of a body that does not rest in between [s]: less
-than people's, whose steps at 0.5 m/s take 0.78 s, and at 1.2 m/s 0.51 s, 0.4 s of both in flight (Fukuchi et
+@dataclass(frozen=True)
+class StepTimes:
+    """Least times of steps of a body that does not rest in between; our choice.
+
+    Attributes:
+        swing: Of a flight [s].
+        double: Of a support on both feet [s].
+        rolled: The same, one landing on its heel, the other leaving from its toes [s].
+        speed: Mean speed of a foot in a longer flight [m/s].
+        climbing: Mean speed upwards or downwards in what a phase lasts longer for a rise [m/s].
+    """
+
+    swing: float
+    double: float
+    rolled: float
+    speed: float
+    climbing: float
+
+
+QUICK = StepTimes(0.4, 0.15, 0.18, 3.0, 4.0)
+"""As people's, whose steps take 0.78 s at 0.5 m/s and 0.51 s at 1.2 m/s, 0.4 s of both in flight (Fukuchi et
 al., PeerJ 6:e4640, 2018)."""
-SWING_SPEED = 3.0
-"""Mean speed of a foot in a longer flight [m/s]; our choice."""
-CLIMBING_SPEED = 4.0
-"""Mean speed upwards or downwards in what a phase lasts longer for a rise [m/s]; our choice."""
+EASY = StepTimes(0.45, 0.15, 0.3, 2.0, 1.2)
+"""After a walk has failed at those."""
 PASSED_OVER, PASSED_STEP = 0.5, 0.02
 """Greatest height above the higher end of a flight of what the foot passes over and not below, and distance
 of the places that are asked for it [m]; our choice."""
-ROLLED = 0.18
-"""Least duration of a support on both feet, one landing on its heel, the other leaving from its toes [s]."""
 LONGEST = 0.8
 """Longest duration of a phase, or 1.5 times its least: a person's step at 0.5 m/s; without it the programme
 often diverges [s]."""
@@ -77,8 +92,6 @@ LEVEL = 0.94
 """Least upward part of the normal of a sole on which a body steps without rest; our choice."""
 PACES: Mapping[str, float] = {"slow": 1.5, "comfortable": 1.0, "brisk": 0.85}
 """Factors on the least durations of phases at the paces of a task; our choice."""
-UNHURRIED = 1.5
-"""Factor on the least durations of phases in which a walk failed at its first pace; our choice."""
 MILD = 0.48
 """Largest difference in height of such soles, of a body of 1.75 m [m]: what feet alone make."""
 WALKING_MARGIN = 6.0
@@ -103,8 +116,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
 class Pace(IntEnum):
     """How a body goes through a phase of its contacts."""
 
-    PASSING = 0  # as fast as people step
-    UNHURRIED = 1  # passing on, too, but with more time
+    PASSING = 0  # as fast as people step: QUICK
+    UNHURRIED = 1  # passing on, too, but with more time: EASY
     RESTING = 2  # at rest when the phase begins, and when it ends
 
 
@@ -168,15 +181,17 @@ def _ceiling(plan: ContactPlan, number: int) -> dict[str, Any]:
     return {"position": top.tolist(), "normal": [-slope * x, -slope * y, 1.0]}
 
 
-def _walking_time(plan: ContactPlan, number: int, ground: Footholds, *, rolls: bool) -> float:
+def _walking_time(
+    plan: ContactPlan, number: int, ground: Footholds, times: StepTimes, *, rolls: bool
+) -> float:
     """Least duration of a phase of a body that does not rest before or after it [s].
 
     A foot climbs to the highest surface below its straight way, and from there.
     """
     held, last = plan.stages[number].contacts, len(plan.stages) - 1
     if len(held) > 1:
-        both = STANDING if number in (0, last) else ROLLED if rolls else DOUBLE
-        return both + float(np.ptp([contact.position[2] for contact in held.values()])) / CLIMBING_SPEED
+        both = STANDING if number in (0, last) else times.rolled if rolls else times.double
+        return both + float(np.ptp([contact.position[2] for contact in held.values()])) / times.climbing
     before, after = plan.stages[number - 1].contacts, plan.stages[number + 1].contacts
     ends = np.array([[of[foot].position for of in (before, after)] for foot in set(before) & set(after)])
     start, end = ends[np.argmax(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))]
@@ -185,7 +200,7 @@ def _walking_time(plan: ContactPlan, number: int, ground: Footholds, *, rolls: b
     levels = ground.levels(places[:, :2])[1]
     top = float(levels[levels < higher + PASSED_OVER].max(initial=higher))
     climbed = 2.0 * top - float(start[2]) - float(end[2])
-    return max(SWING, way / SWING_SPEED) + climbed / CLIMBING_SPEED
+    return max(times.swing, way / times.speed) + climbed / times.climbing
 
 
 def _supported(
@@ -210,9 +225,8 @@ def _supported(
         pace = 1.0 if rises or sits else PACES[scenario.file.task.pace]
         phase["min_duration_s"] = pace * stage.min_duration
         if ground is not None and passed[number] and passed[number + 1]:
-            least = pace * _walking_time(plan, number, ground, rolls=rolls)
-            if paces[number] is Pace.UNHURRIED:
-                least *= UNHURRIED
+            times = EASY if paces[number] is Pace.UNHURRIED else QUICK
+            least = pace * _walking_time(plan, number, ground, times, rolls=rolls)
             phase["min_duration_s"] = least
             phase["max_duration_s"] = max(LONGEST, 1.5 * least)
         if rises and "buttocks" in stage.contacts:

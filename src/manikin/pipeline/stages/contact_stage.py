@@ -162,8 +162,6 @@ class _FootSearch(_ContactSearch):
         return self._result(self._walked(self._start, self._next_act()))
 
 
-REPAIRS = 2
-"""Times that paces are eased before a body rests at all changes of contact; our choice."""
 STANDING_HEIGHT = 0.92
 """Height of the root of a standing person of 1.75 m, the unit in which bodies are compared [m]."""
 SMALLEST = 0.3
@@ -389,7 +387,7 @@ def _passed(report: Report, context: RunContext, passing: Passing) -> RunContext
 
 
 def slower(context: RunContext, report: Report, stage: int | None) -> RunContext | None:
-    """The walk after a failure: slower around the stage where it was, then with rests there, then everywhere.
+    """The walk after a failure: with more time, then with rests around the stage of it, then everywhere.
 
     A plan of the centre of mass that fails has rests there at once, and one that fails again has them
     everywhere. A posture that is missing on feet that roll is sought on flat ones before. None where the body
@@ -400,15 +398,15 @@ def slower(context: RunContext, report: Report, stage: int | None) -> RunContext
         return None
     unplanned, moved = failure.stage == "centroidal", report.summary["wholebody"] is not None
     report.try_again()
-    walking = None
-    if unplanned or moved:
-        ease = Pace.RESTING if unplanned else Pace.UNHURRIED
-        near = range(len(passing.paces)) if stage is None else range(stage - 1, stage + 2)
-        eased = [Pace(min(pace + ease * (k in near), Pace.RESTING)) for k, pace in enumerate(passing.paces)]
-        if passing.repairs < (1 if unplanned else REPAIRS) and tuple(eased) != passing.paces:
-            other = replace(passing, paces=tuple(eased), repairs=passing.repairs + 1)
-            walking = _passed(report, context, other)
-    elif passing.rolls:
+    paces, walking = passing.paces, None
+    if moved and Pace.PASSING in paces:
+        paces = tuple(max(pace, Pace.UNHURRIED) for pace in paces)
+    elif (moved or unplanned) and stage is not None and Pace.RESTING not in paces:
+        there = range(stage - 1, stage + 2)
+        paces = tuple(Pace.RESTING if k in there else pace for k, pace in enumerate(paces))
+    if paces != passing.paces:
+        walking = _passed(report, context, replace(passing, paces=paces))
+    elif passing.rolls and not moved and not unplanned:
         walking = _passed(report, context, replace(passing, rolls=False))
     if walking is None:
         report.keep_scenario(passing.resting.scenario)

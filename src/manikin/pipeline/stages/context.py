@@ -131,14 +131,12 @@ class Passing:
         resting: The task with rests at all changes.
         paces: Of the stages of the contact plan.
         rolls: Whether its feet may roll over heels and toes.
-        repairs: Failures after which paces were eased.
     """
 
     asked: Scenario
     resting: "RunContext"
     paces: tuple[Pace, ...]
     rolls: bool = True
-    repairs: int = 0
 
 
 @dataclass(frozen=True, eq=False)
