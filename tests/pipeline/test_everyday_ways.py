@@ -200,7 +200,7 @@ def test_a_walk_round_a_box_takes_as_long_as_a_slow_walk_of_people():
 def test_a_step_that_a_later_stage_could_not_make_goes_back_to_the_search(monkeypatch):
     """The next contacts avoid it by 8 cm or more; the summary tells stage, phase and reason of it.
 
-    Before that the same contacts are tried slower around that step, with rests there, with a rest at each
+    Before that the same contacts are tried with more time, with rests around that step, with a rest at each
     change, and are refined from rest to rest.
     """
     plans = []
