@@ -81,7 +81,7 @@ def test_a_foot_above_the_other_rises_onto_its_toes_as_that_lands():
     upper, lower = foot("right_foot", (0.0, -0.1, 0.2), 0.0), foot("left_foot", (0.4, 0.1, 0.0), 0.0)
     beside = foot("left_foot", (0.0, 0.1, 0.2), 0.0)
     rolled, parts = parts_of([beside, upper], [upper], [lower, upper], [lower])
-    landed, left = rolled.changes[2:]
+    landed, left = rolled.begins[2:]
     assert left == landed + 1
     assert parts[landed] == {"left_foot": SolePart.FULL, "right_foot": SolePart.TOES}
     assert (rolled[landed].min_duration, rolled[landed].max_duration) == (0.3, 0.8)
@@ -92,7 +92,7 @@ def test_a_foot_deep_below_the_other_lands_on_its_ball():
     upper, lower = foot("right_foot", (0.0, -0.1, 0.3), 0.0), foot("left_foot", (0.3, 0.1, 0.0), 0.0)
     beside = foot("left_foot", (0.0, 0.1, 0.3), 0.0)
     rolled, parts = parts_of([beside, upper], [upper], [lower, upper], [lower])
-    landed, left = rolled.changes[2:]
+    landed, left = rolled.begins[2:]
     assert parts[landed:left] == [
         {"left_foot": SolePart.TOES, "right_foot": SolePart.FULL},
         {"left_foot": SolePart.FULL, "right_foot": SolePart.TOES},

@@ -235,7 +235,7 @@ def test_places_of_the_centre_of_mass_stay_where_phases_of_the_file_begin(tmp_pa
     rests = [k for k, phase in enumerate(supports.phases) if phase.com_near is not None]
     assert rests
     assert len(problem.sequence) > len(supports.phases)
-    assert len(problem.sequence.changes) == len(supports.phases)
-    assert {plane.key for plane in problem.key_planes} == {problem.sequence.changes[k] for k in rests}
+    assert len(problem.sequence.begins) == len(supports.phases)
+    assert {plane.key for plane in problem.key_planes} == {problem.sequence.begins[k] for k in rests}
     held = [set(problem.sequence[plane.key].stance.effectors) for plane in problem.key_planes]
     assert {frozenset(names) for names in held} == {frozenset(found.plan.stages[k].contacts) for k in rests}

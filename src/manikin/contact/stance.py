@@ -130,12 +130,14 @@ class Phase:
         min_duration: Lower bound [s], > 0.
         max_duration: Upper bound [s], or None.
         load: What is carried during the phase and is no part of the body, or None.
+        continues: Whether it is a further part of the phase before, which a rolling foot divides.
     """
 
     stance: Stance
     min_duration: float = 0.1
     max_duration: float | None = None
     load: CarriedLoad | None = None
+    continues: bool = False
 
     def __post_init__(self) -> None:
         least, most = self.min_duration, self.max_duration
@@ -196,10 +198,9 @@ class StanceSequence(Displayed):
         return tuple(dict.fromkeys(name for phase in self.phases for name in phase.stance.effectors))
 
     @property
-    def changes(self) -> tuple[int, ...]:
-        """Indices of the first phase and of those on other effectors than the phase before."""
-        held = [phase.stance.effectors for phase in self.phases]
-        return (0, *(k for k in range(1, len(held)) if held[k] != held[k - 1]))
+    def begins(self) -> tuple[int, ...]:
+        """Indices of the phases that are no further parts of those before: rolling feet divide some."""
+        return tuple(number for number, phase in enumerate(self.phases) if not phase.continues)
 
     def swings(self) -> tuple[Swing, ...]:
         """Every flight of every effector, ordered by its first phase."""
@@ -307,7 +308,9 @@ def roll_feet(sequence: StanceSequence, hinge: float, like: StanceSequence | Non
     ]
     flat = {(swing.last_phase + 1, swing.effector) for swing in sequence.swings() if _lands_flat(swing)}
     parts = (_split(sequence, index, hinge, flat, rises[index]) for index in range(len(sequence)))
-    return StanceSequence([phase for split in parts for phase in split])
+    return StanceSequence([
+        replace(phase, continues=number > 0) for split in parts for number, phase in enumerate(split)
+    ])  # fmt: skip
 
 
 def _lands_flat(swing: Swing) -> bool:

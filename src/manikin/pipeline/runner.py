@@ -177,7 +177,7 @@ def failed_stage(
         return None
     if sequence is None or context.plan is None:
         return phase
-    return bisect.bisect_right(context.plan.begins(sequence), phase) - 1
+    return bisect.bisect_right(sequence.begins, phase) - 1
 
 
 def _refined(

@@ -17,7 +17,7 @@ import pinocchio as pin
 from manikin.balance.capturability import MARGIN as RISING_MARGIN
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import yaw_about_normal
-from manikin.planning.contacts import ContactPlan, Footholds, Stage
+from manikin.planning.contacts import ContactPlan, Footholds, Stage, rising_times
 from manikin.scenarios.planned import STANDING, STATURE, WEIGHTS, walk_margin
 from manikin.scenarios.problems import overhead_constraints
 from manikin.scenarios.scenario import Scenario
@@ -52,6 +52,8 @@ PLANNING_RISING: Mapping[str, Any] = {
 """Options of the planner of a body that leaves a seat, likewise: a seated trunk cannot follow any path."""
 SEATED_LONGER = 1.5
 """Longest duration of the phases on a seat that is left, relative to their shortest one; our choice."""
+EASY_RISE = 1.3
+"""Least times of a rise after a quick one has failed, relative to its own; our choice."""
 
 
 @dataclass(frozen=True)
@@ -133,17 +135,18 @@ def without_rests(
         paces: One for each stage of the plan; as fast as people step when omitted.
         rolls: Whether feet may roll over heels and toes.
     """
-    carriers = {name for stage in plan.stages for name in stage.contacts}
+    rise = len(rising_times(plan.stages))
+    carriers = {name for stage in plan.stages[rise:] for name in stage.contacts}
     if scenario.file.task.act is not None or not carriers <= set(FEET):
         return None
     paces = paces or [Pace.PASSING] * len(plan.stages)
     moving = [pace is not Pace.RESTING for pace in paces]
     inner = range(1, len(plan.stages))
     passed = [
-        moving[key - 1] and moving[key] and _is_mild(plan.stages[key - 1 : key + 2], scenario)
+        key > rise and moving[key - 1] and moving[key] and _is_mild(plan.stages[key - 1 : key + 2], scenario)
         for key in inner
     ]  # fmt: skip
-    if not any(passed):
+    if not any(passed) and not (rise and all(moving[: rise + 1])):
         return None
     return _supported(scenario, plan, [moving[0], *passed, moving[-1]], paces, rolls=rolls)
 
@@ -214,6 +217,9 @@ def _supported(
     below = any(passed) and _passes_below(plan, scenario)
     rolls = rolls and not below
     ground = Footholds(build_body(scenario), build_scene(scenario)) if any(passed) else None
+    quick = rising_times(plan.stages) if paces else []
+    if Pace.RESTING in paces[: len(quick) + 1]:
+        quick = []
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -221,16 +227,20 @@ def _supported(
             name: "same" if before.get(name) is contact else _entry(contact, friction)
             for name, contact in stage.contacts.items()
         }
-        # Who sits rises and sinks as fast as the seat is left or met.
-        pace = 1.0 if rises or sits else PACES[scenario.file.task.pace]
+        # Who sits down, or rests on the way, is as fast as the seat is met or left.
+        pace = 1.0 if sits or (rises and not quick) else PACES[scenario.file.task.pace]
         phase["min_duration_s"] = pace * stage.min_duration
         if ground is not None and passed[number] and passed[number + 1]:
             times = EASY if paces[number] is Pace.UNHURRIED else QUICK
             least = pace * _walking_time(plan, number, ground, times, rolls=rolls)
             phase["min_duration_s"] = least
             phase["max_duration_s"] = max(LONGEST, 1.5 * least)
+        elif number < len(quick):
+            phase["min_duration_s"] = pace * quick[number] * (EASY_RISE if paces[number] else 1.0)
+        elif 0 < number == len(quick) < len(plan.stages) - 1:
+            phase["min_duration_s"] = pace * STANDING
         if rises and "buttocks" in stage.contacts:
-            phase["max_duration_s"] = SEATED_LONGER * stage.min_duration
+            phase["max_duration_s"] = SEATED_LONGER * phase["min_duration_s"]
         if below:
             phase["com_below"] = _ceiling(plan, number)
         if number and not passed[number]:
@@ -238,7 +248,8 @@ def _supported(
             drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
             phase["com_near"] = [x, y, z - drop]
             phase["com_within_m"] = list(stage.com_room)
-            if "buttocks" in before and "buttocks" not in stage.contacts and stage.momentum is None:
+            leaves = "buttocks" in before and "buttocks" not in stage.contacts
+            if leaves and stage.momentum is None and not quick:
                 phase["com_lead_s"] = LEAD
         before = dict(stage.contacts)
         phases.append(phase)

@@ -256,29 +256,13 @@ def _standing(values: ScenarioValues, *, planning: bool = False) -> StanceSequen
     return StanceSequence(sequence.phases[: values.seated_from])
 
 
-def _begins(values: ScenarioValues, sequence: StanceSequence) -> list[int]:
-    """Phase of a sequence in which each phase of the file begins; feet that roll divide some.
-
-    Raises:
-        ScenarioError: If feet roll and a phase of the file changes no contact: it would begin anywhere.
-    """
-    phases = values.explicit_supports().phases[: values.seated_from]
-    if len(phases) == len(sequence):
-        return [*range(len(phases))]
-    begins = [*sequence.changes]
-    if len(begins) != len(phases):
-        problem = "changes no contact, and feet roll; valid: phases on other contacts than the one before"
-        raise values.error(("supports", "phases"), problem)
-    return begins
-
-
 def _key_planes(values: ScenarioValues, sequence: StanceSequence) -> tuple[KeyPlane, ...]:
     """Faces of the boxes in which phases want the centre of mass to be when they begin."""
     planes: list[KeyPlane] = []
     phases = values.explicit_supports().phases[: values.seated_from]
     if all(phase.com_near is None for phase in phases):
         return ()
-    for key, phase in zip(_begins(values, sequence), phases, strict=True):
+    for key, phase in zip(sequence.begins, phases, strict=True):
         if phase.com_near is not None:
             sides = zip(np.eye(3), phase.com_near, phase.com_within_m, strict=True)
             for lead, side, sign in itertools.product(sorted({0.0, phase.com_lead_s}), sides, (1.0, -1.0)):
@@ -292,7 +276,7 @@ def _rests(values: ScenarioValues, sequence: StanceSequence) -> tuple[FloatArray
     phases = values.explicit_supports().phases[: values.seated_from]
     rests: list[FloatArray | None] = [None] * len(sequence)
     if any(phase.com_near is not None for phase in phases):
-        for key, phase in zip(_begins(values, sequence), phases, strict=True):
+        for key, phase in zip(sequence.begins, phases, strict=True):
             rests[key] = None if phase.com_near is None else np.array(phase.com_near)
     return tuple(rests)
 
@@ -311,7 +295,7 @@ def _regions(
     given = [phase.com_below for phase in values.explicit_supports().phases[: values.seated_from]]
     planes = [None] * len(sequence)
     if any(given):
-        lasts = np.diff([*_begins(values, sequence), len(sequence)])
+        lasts = np.diff([*sequence.begins, len(sequence)])
         planes = [plane for plane, parts in zip(given, lasts, strict=True) for _ in range(parts)]
     free = ComRegion.everywhere()
     if values.is_point_mass or values.max_support_distance is not None:

@@ -331,7 +331,7 @@ def _planned_postures(context: RunContext, schedule: ContactSchedule) -> FloatAr
     """
     if context.plan is None or len(context.plan.postures) >= len(schedule.instants):
         return None if context.plan is None else context.plan.postures
-    begins = [*context.plan.begins(schedule.sequence), len(schedule.sequence)]
+    begins = [*schedule.sequence.begins, len(schedule.sequence)]
     postures = align_quaternions(context.plan.postures)
     return Guide(schedule.instants[begins], postures, ()).at(schedule.instants)
 

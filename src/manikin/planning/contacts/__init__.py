@@ -29,7 +29,7 @@ from manikin.planning.contacts.heuristics import (
 from manikin.planning.contacts.limb_places import limb_holds
 from manikin.planning.contacts.limb_search import LimbHolds, LimbSearch, LimbSettings
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.seat import leave_seat, take_seat
+from manikin.planning.contacts.seat import leave_seat, rising_times, take_seat
 from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
 __all__ = [

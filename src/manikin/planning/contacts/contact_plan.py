@@ -203,8 +203,12 @@ class ContactPlan:
         A foot that leaves or lands on its toes tilts in a share of the stage before or after.
         """
         phases = [
-            Phase(Stance([part.get(name, held) for name, held in stage.contacts.items()], model=model), time)
-            for stage, parts in zip(self.stages, self._parts(), strict=True) for part, time in parts
+            Phase(
+                Stance([part.get(name, held) for name, held in stage.contacts.items()], model=model), time,
+                continues=number > 0,
+            )
+            for stage, parts in zip(self.stages, self._parts(), strict=True)
+            for number, (part, time) in enumerate(parts)
         ]  # fmt: skip
         ends = np.cumsum([phase.min_duration for phase in phases])
         return ContactSchedule(StanceSequence(phases), np.concatenate([[0.0], ends]))
@@ -222,7 +226,7 @@ class ContactPlan:
 
     def keys(self, schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
         """Key times (k,) [s] and configurations (k, nq): where stages begin and, if any, in between."""
-        instants = schedule.instants[[*self.begins(schedule.sequence), -1]]
+        instants = schedule.instants[[*schedule.sequence.begins, -1]]
         times, keys = [float(instants[0])], [self.stages[0].q]
         spans = pairwise(instants.tolist())
         for stage, end, (begin, stop) in zip(self.stages, self.postures[1:], spans, strict=True):
@@ -232,13 +236,6 @@ class ContactPlan:
             times.append(stop)
             keys.append(end)
         return np.array(times), np.array(keys)
-
-    def begins(self, sequence: StanceSequence) -> Sequence[int]:
-        """Phase of a sequence with which each stage begins: feet that roll divide a stage."""
-        parts = [len(of_stage) for of_stage in self._parts()]
-        counts = [1] * len(parts) if len(parts) == len(sequence) else parts
-        own = sum(counts) == len(sequence)
-        return [0, *np.cumsum(counts[:-1]).tolist()] if own else sequence.changes
 
     @property
     def postures(self) -> FloatArray:

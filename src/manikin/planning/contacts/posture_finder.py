@@ -179,6 +179,11 @@ class PostureFinder:
             result = generate_posture(problem, free.q, settings=once) if free.succeeded else result
         return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
 
+    def standing_at(self, root: FloatArray) -> FloatArray:
+        """(nq,) the reference posture, or a standing one, with the root at a pose (7,)."""
+        whole = self.body.standing_posture() if self._reference is None else self._reference
+        return np.concatenate([root[:ROOT], whole[ROOT:]])
+
     def clears(self, contact: Contact) -> bool:
         """Whether the end of a limb keeps the clearance at a contact to what it does not touch."""
         shape = self.body.segment(self.body.effector(contact.effector).segment).shapes[-1]

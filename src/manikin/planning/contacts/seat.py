@@ -176,6 +176,9 @@ BEHIND = (0.0, 0.02, 0.04)  # ways behind where the centre of mass could rest as
 LEAN_WEIGHT = 300.0  # of the centre of mass over the feet where a body cannot lean so far [1/m^2]; our choice
 EASY_LEAN = 0.8  # share of the farthest lean with which a body leaves a seat on feet and hands; our choice
 RISING_TIME = 0.9  # shortest time from there to standing [s]; the pace of the joints mostly asks for more
+RISING_SHARE, QUICKEST_RISE, RISING_PACE = 0.7, 0.6, 2.4
+"""Of a body that rises without a rest: its time to lean relative to the above, its shortest time from the seat to
+standing [s], and the mean speed of the hinge that turns most [rad/s]."""
 LETTING_GO_TIME = 0.2  # shortest time from one hand that lets go to the other one [s]; our choice
 SETTLING_TIME = 0.8  # shortest time that the body stands then [s]
 SEATED_ROOM = (0.01, 0.01, 0.006)  # for the centre of mass [m]: a seated trunk cannot follow any path
@@ -205,7 +208,9 @@ def leave_seat(
     held = {name: contact for name, contact in start.contacts.items() if name in feet}
     if len(held) == len(start.contacts):
         return Leaving((start,))
-    risen = poser.pose(held, held, start.q, upright, restarts=True)
+    # The posture nearest to the seated one may be a squat, as with thighs below a table.
+    near = start.q if upright is None else poser.standing_at(upright)
+    risen = poser.pose(held, held, near, upright, restarts=True)
     if risen.q is None:
         return Leaving((start,), f"no posture on {', '.join(held) or 'feet'} alone: {risen.reason}")
     pushing = {name: contact for name, contact in start.contacts.items() if name not in SEATED_ON}
@@ -318,6 +323,26 @@ def _rising(poser: PostureFinder, start: Stage, changes: Sequence[Stage], risen:
             before = time
     standing = Stage.of(body, changes[-1].contacts, risen, SETTLING_TIME)
     return Leaving((*stages, *changes, standing))
+
+
+def rising_times(stages: Sequence[Stage]) -> list[float]:
+    """Least durations of the stages of a body that rises from a seat without a rest, at people's pace [s].
+
+    Args:
+        stages: Of a plan that begins on a seat.
+
+    Returns:
+        One for each stage up to the first in which the body stands; none where it does not rise on its feet.
+    """
+    names = [stage.contacts.keys() for stage in stages]
+    off = next((number for number, held in enumerate(names) if not held & SEATED_ON), 0)
+    if not 0 < off < len(stages) - 1 or any(held != names[0] for held in names[:off]) or len(names[0]) > 3:
+        return []
+    start, way = stages[0].com[:2], float(np.linalg.norm(stages[off].com[:2] - stages[0].com[:2]))
+    shares = [float(np.linalg.norm(stage.com[:2] - start)) / way for stage in stages[: off + 1]]
+    times = [RISING_SHARE * _leaning_time(min(share, 1.0), moving=True) for share in shares]
+    turn = float(np.abs(stages[off + 1].q[7:] - stages[off].q[7:]).max())
+    return [after - before for before, after in pairwise(times)] + [max(QUICKEST_RISE, turn / RISING_PACE)]
 
 
 def _leaning_time(share: float, moving: bool) -> float:
