@@ -383,11 +383,11 @@ def _height(stance: Stance, feet: Sequence[str]) -> float:
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:
-    """Soles that ``other`` lacks; none when nothing else would be left to stand on."""
+    """Full soles that ``other`` lacks; none when nothing else would be left to stand on."""
     changing = tuple(
-        contact.effector
-        for contact in stance
-        if contact.kind is ContactKind.SOLE and contact.effector not in other
+        item.effector
+        for item in stance
+        if item.kind is ContactKind.SOLE and item.part is SolePart.FULL and item.effector not in other
     )
     staying = [contact for contact in stance if contact.effector not in changing]
     return changing if any(contact.kind is ContactKind.SOLE for contact in staying) else ()

@@ -44,7 +44,7 @@ PLANNING: Mapping[str, Any] = {"degree": 5, "weights": WEIGHTS}
 """Options of the planner of a body on its feet, where the file keeps the defaults; our choice."""
 PLANNING_CRAWLING: Mapping[str, Any] = {"degree": 5, "weights": WEIGHTS | {"duration": 20.0}}
 """The same of a body that goes on hands and knees, as fast as its contacts let it; our choice."""
-PLANNING_SITTING: Mapping[str, Any] = {"zero_end_accelerations": False}
+PLANNING_SITTING: Mapping[str, Any] = {"degree": 5, "zero_end_accelerations": False}
 """The same of a body that sits down: it is at the seat sooner if it may start with an acceleration."""
 PLANNING_RISING: Mapping[str, Any] = {
     "degree": 5, "min_margin": RISING_MARGIN, "weights": WEIGHTS | {"margin": 0.2, "duration": 5.0},
@@ -136,14 +136,17 @@ def without_rests(
         rolls: Whether feet may roll over heels and toes.
     """
     rise = len(rising_times(plan.stages))
-    carriers = {name for stage in plan.stages[rise:] for name in stage.contacts}
+    # The last stage before a seat leads to its touch.
+    walk = range(rise, len(plan.stages) - 2 if "buttocks" in plan.stages[-1].contacts else len(plan.stages))
+    carriers = {name for number in walk for name in plan.stages[number].contacts}
     if scenario.file.task.act is not None or not carriers <= set(FEET):
         return None
     paces = paces or [Pace.PASSING] * len(plan.stages)
     moving = [pace is not Pace.RESTING for pace in paces]
     inner = range(1, len(plan.stages))
     passed = [
-        key > rise and moving[key - 1] and moving[key] and _is_mild(plan.stages[key - 1 : key + 2], scenario)
+        rise < key < walk.stop and moving[key - 1] and moving[key]
+        and _is_mild(plan.stages[key - 1 : key + 2], scenario)
         for key in inner
     ]  # fmt: skip
     if not any(passed) and not (rise and all(moving[: rise + 1])):
@@ -227,8 +230,9 @@ def _supported(
             name: "same" if before.get(name) is contact else _entry(contact, friction)
             for name, contact in stage.contacts.items()
         }
-        # Who sits down, or rests on the way, is as fast as the seat is met or left.
-        pace = 1.0 if sits or (rises and not quick) else PACES[scenario.file.task.pace]
+        # Who rests on the way to or from a seat is as fast as that is met or left.
+        hurries = bool(quick) or any(passed) or not (rises or sits)
+        pace = PACES[scenario.file.task.pace] if hurries else 1.0
         phase["min_duration_s"] = pace * stage.min_duration
         if ground is not None and passed[number] and passed[number + 1]:
             times = EASY if paces[number] is Pace.UNHURRIED else QUICK
@@ -281,6 +285,7 @@ def _supported(
         planning = PLANNING_SITTING if sits else PLANNING_RISING if rises else planning
         if any(passed):
             planning = {**PLANNING_WALKING, "min_margin": walk_margin(scenario, WALKING_MARGIN)}
+            planning |= PLANNING_SITTING if sits else {}
     # Of a body that walks the region of its postures is known.
     constraints = _given_constraints(scenario) if any(passed) else _constraints(scenario, plan)
     manner = scenario.file.manner

@@ -252,8 +252,8 @@ def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
 
 def _standing(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
     """The stances before the body sits: all, where it does not."""
-    sequence = stance_sequence(values, planning=planning)
-    return StanceSequence(sequence.phases[: values.seated_from])
+    sequence, seat = stance_sequence(values, planning=planning), values.seated_from
+    return sequence if seat is None else StanceSequence(sequence.phases[: sequence.begins[seat]])
 
 
 def _key_planes(values: ScenarioValues, sequence: StanceSequence) -> tuple[KeyPlane, ...]:

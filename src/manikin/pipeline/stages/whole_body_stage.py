@@ -123,10 +123,11 @@ def _on_real_supports(
     context: RunContext, report: Report, planned: CentroidalTrajectory
 ) -> CentroidalTrajectory | None:
     """The plan on the real soles, friction and caps, with the seated part where there is one."""
-    real, seat = context.scenario.build_sequence(), context.scenario.seated_from
-    standing = real if seat is None else StanceSequence(real.phases[:seat])
+    real, seated_from = context.scenario.build_sequence(), context.scenario.seated_from
+    seat = len(real) if seated_from is None else real.begins[seated_from]
+    standing = StanceSequence(real.phases[:seat])
     trajectory = replace(planned, schedule=ContactSchedule(standing, planned.schedule.instants))
-    if seat is None:
+    if seat == len(real):
         return trajectory
     sitting = StanceSequence(real.phases[seat:])
     continuation = continue_seated(context.body, context.scene, trajectory, sitting)
@@ -320,7 +321,11 @@ def _known_postures(context: RunContext, plan: KeyedPlan, schedule: ContactSched
     if context.resting is None or plan.postures is None:
         times, postures = context.plan.keys(schedule)
     else:
-        times, postures = schedule.instants, np.array([item.q for item in plan.postures.postures])
+        found = plan.postures.postures
+        times, postures = np.array([item.time for item in found]), np.array([item.q for item in found])
+        if times[-1] < schedule.instants[-1]:  # they end as the centre of mass binds no more, on a seat
+            times = np.append(times, schedule.instants[-1])
+            postures = np.vstack([postures, context.plan.goal])
     return Guide(times, align_quaternions(postures), ())
 
 
