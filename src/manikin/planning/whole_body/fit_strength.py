@@ -24,6 +24,10 @@ from manikin.motion.configuration_spline import StateSamples
 from manikin.numerics.spatial import FloatArray, skew
 
 
+AT_KEY = 1.0e-6
+"""Time from a key instant within which a sample is at it [s]."""
+
+
 @dataclass(frozen=True, eq=False)
 class HeldForces:
     """Contact forces at the samples of a fit.
@@ -47,8 +51,15 @@ class HeldForces:
 
     @classmethod
     def of(cls, body: BodyModel, schedule: ContactSchedule, motion: Motion, time: FloatArray) -> "HeldForces":
-        """Contact forces of a motion at the samples (n,) of a fit [s]."""
+        """Contact forces of a motion at the samples (n,) of a fit [s].
+
+        At a key instant they are those on the stance before or after it that has fewer contacts.
+        """
         rows = np.clip(np.searchsorted(motion.time, time), 0, len(motion.time) - 1)
+        made = np.diff([len(phase.stance) for phase in schedule.sequence]) > 0
+        ends = np.any(np.abs(time[:, None] - schedule.instants[1:-1][made]) < AT_KEY, axis=1)
+        before = np.searchsorted(motion.time, time - AT_KEY) - 1
+        rows = np.where(ends, np.maximum(before, 0), rows)
         names, phases = motion.contact_names, schedule.phase_at(motion.time[rows])
         settling = np.any([schedule.settling(motion.time[rows], name) for name in names], axis=0)
         # Wrench that contact forces may leave unsupplied where they are held [N, N.m].
