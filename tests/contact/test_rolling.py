@@ -40,15 +40,28 @@ def random_wrenches(count=500):
     return rng.normal(size=(count, 6)) * [60, 60, 300, 40, 40, 10] + [0, 0, 600, 0, 0, 0]
 
 
-@pytest.mark.parametrize(("way", "parts"), [(0.4, {SolePart.HEEL, SolePart.TOES}), (-0.3, {SolePart.TOES})])
-def test_a_foot_that_goes_back_lands_flat(way, parts):
-    """It leaves over its toes either way, as it heads."""
+@pytest.mark.parametrize(("way", "parts"), [(0.4, {SolePart.HEEL, SolePart.TOES}), (-0.3, set())])
+def test_a_foot_that_goes_back_leaves_and_lands_flat(way, parts):
+    """One that goes on leaves over its toes and lands on its heel, as it heads."""
     left, right = foot(), foot("right_foot", (0.0, -0.1, 0.0))
     ahead = np.array([np.cos(0.3), np.sin(0.3), 0.0])
     there = foot("right_foot", tuple(right.position + way * ahead))
     phases = [Phase(Stance(contacts, 1500.0), 0.3) for contacts in ([left, right], [left], [left, there])]
     held = [c.part for phase in roll_feet(StanceSequence(phases), HINGE) for c in phase.stance]
     assert set(held) - {SolePart.FULL} == parts
+
+
+def test_phases_without_a_change_of_contact_keep_their_beginnings():
+    """Parts that a rolling foot makes of a phase go on in it, wherever phases on the same contacts are."""
+    left, right = foot(), foot("right_foot", (0.0, -0.1, 0.0))
+    held = [[left, right], [left, right], [left], [left, foot("right_foot", (0.4, -0.1, 0.0))]]
+    sequence = StanceSequence([Phase(Stance(contacts, 1500.0), 0.3) for contacts in held])
+    assert sequence.begins == (0, 1, 2, 3)
+    rolled = roll_feet(sequence, HINGE)
+    assert len(rolled) > len(sequence)
+    names = [{contact.effector for contact in contacts} for contacts in held]
+    assert [set(rolled[k].stance.effectors) for k in rolled.begins] == names
+    assert rolled.begins[:2] == (0, 1)
 
 
 def parts_of(*stances):

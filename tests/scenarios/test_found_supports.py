@@ -13,8 +13,9 @@ from manikin.pipeline.stages import Report, RunContext, whole_body_stage
 from manikin.pipeline.stages.contact_stage import find_supports, plan_contacts, slower
 from manikin.pipeline.stages.context import Passing
 from manikin.planning.com import Failure, plan_com
+from manikin.planning.contacts import rising_times
 from manikin.scenarios import found_supports, load_scenario
-from manikin.scenarios.found_supports import without_rests
+from manikin.scenarios.found_supports import Pace, without_rests
 
 BLOCK = """
 - {name: block, box: [3.0, 2.0, HEIGHT], position: [1.8, 0.0, MIDDLE]}
@@ -152,6 +153,42 @@ def test_the_pace_of_a_task_stretches_all_phases_on_feet(tmp_path):
         np.testing.assert_allclose(ratios, 1.5)
     with pytest.raises(ScenarioError, match=r"task\.pace is given beside supports, whose phases"):
         found.scenario.with_overrides(["task.pace=brisk"])
+
+
+def test_a_body_rises_from_a_seat_without_a_rest_and_walks_on():
+    """It keeps to its leaning postures on the seat; nothing holds it there as it leaves, or on its steps."""
+    scenario = load_scenario("stand-up-chair").in_task_frame()
+    found = find_supports(scenario, scenario.build_body(), scenario.build_scene(), np.random.default_rng(0))
+    rise = len(rising_times(found.plan.stages))
+    walking, resting = without_rests(scenario, found.plan), found.scenario
+    quick, slow = (one.file.supports.phases for one in (walking, resting))
+    assert slow[rise - 1].com_lead_s > 0.0
+    assert all(phase.com_lead_s == 0.0 and phase.com_near is not None for phase in quick[1 : rise + 1])
+    assert all(phase.com_near is None for phase in quick[rise + 1 :])
+    assert sum(phase.min_duration_s for phase in quick) < 0.7 * sum(phase.min_duration_s for phase in slow)
+    sequence = walking.build_centroidal_problem().sequence
+    assert len(sequence.begins) == len(quick)
+    assert walking.file.supports.foot == "rolling"
+    paces = [Pace.RESTING if number == rise - 1 else Pace.PASSING for number in range(len(quick))]
+    part = without_rests(scenario, found.plan, paces).file.supports.phases
+    assert part[rise - 1].com_lead_s > 0.0
+    assert [phase.com_near for phase in part[rise + 1 :]] == [phase.com_near for phase in quick[rise + 1 :]]
+
+
+def test_a_body_walks_to_a_seat_and_rests_before_it():
+    """Steps are passed; the centre of mass is planned up to the touch, on as many phases as come before."""
+    scenario = load_scenario("stand-up-chair", overrides=[
+        "task={start: {at: [1.2, -1.2]}, goal: {at: [0.0, 0.0], heading_deg: 0, posture: seated}}",
+        "scene=[{name: seat, padded: true, box: [0.42, 0.46, 0.06], position: [-0.08, 0.0, 0.38]}]",
+    ]).in_task_frame()  # fmt: skip
+    found = find_supports(scenario, scenario.build_body(), scenario.build_scene(), np.random.default_rng(0))
+    walking = without_rests(scenario, found.plan)
+    phases = walking.file.supports.phases
+    rests = [number for number, phase in enumerate(phases) if phase.com_near is not None]
+    assert rests == [len(phases) - 2, len(phases) - 1]
+    sequence = walking.build_centroidal_problem().sequence
+    assert len(sequence.begins) == len(phases) - 1
+    assert "buttocks" not in sequence.effectors
 
 
 def test_a_walk_without_a_plan_of_the_centre_of_mass_rests_there_then_everywhere(tmp_path):

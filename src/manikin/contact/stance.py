@@ -291,19 +291,19 @@ def roll_feet(sequence: StanceSequence, hinge: float, like: StanceSequence | Non
     """Split every phase in which a foot lands or leaves beside another full contact.
 
     The parts' shares are taken from the split phase's least duration, which is never shortened. Soles are
-    full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back leaves flat and
-    lands flat, one that goes onto a step lands flat, and deep below the other one on its ball, which is reached with the other knee bent
-    less. One that is left above the other rises onto its toes as soon as that has landed: flat, its ankle
-    would have to bend farther than it can.  Soles that hang over an edge land flat, and leave flat where
+    full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back leaves and
+    lands flat; one that goes onto a step lands flat, and deep below the other one on its ball, which is
+    reached with the other knee bent less. One that is left above the other rises onto its toes as soon as
+    that has landed: flat, its ankle would have to bend farther than it can.  Soles that hang over an edge land flat, and leave flat where
     their toes have nothing below them, in these stances or in those ``like`` them with soles of another size.
     """
     pairs = zip(sequence, sequence if like is None else like, strict=True)
-    back = {(swing.first_phase, swing.effector) for swing in sequence.swings() if _way(swing)[0] < -BACK}
+    back = {(swing.first_phase - 1, swing.effector) for swing in sequence.swings() if _goes_back(swing)}
     rises = [
         {
             name
             for name in one.stance.effectors
-            if (number + 1, name) not in back and all(x.stance[name].rises_on_toes(hinge) for x in (one, other))
+            if (number, name) not in back and all(x.stance[name].rises_on_toes(hinge) for x in (one, other))
         }
         for number, (one, other) in enumerate(pairs)
     ]
@@ -321,10 +321,14 @@ def _way(swing: Swing) -> FloatArray:
     return (swing.end.position - swing.start.position) @ swing.end.rotation_contact_to_world
 
 
+def _goes_back(swing: Swing) -> bool:
+    """Whether a foot lands behind where it left, as it heads then."""
+    return float(_way(swing)[0]) < -BACK
+
+
 def _lands_flat(swing: Swing) -> bool:
-    """Whether a foot lands behind where it left, as it heads then, or higher or lower."""
-    way = _way(swing)
-    return float(way[0]) < -BACK or abs(float(way[2])) > STEP
+    """Whether a foot lands behind where it left, or higher or lower."""
+    return _goes_back(swing) or abs(float(_way(swing)[2])) > STEP
 
 
 def _split(

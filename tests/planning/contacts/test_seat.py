@@ -12,7 +12,7 @@ from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import IDENTITY
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.pipeline.stages.context import plan_in_world
-from manikin.planning.contacts import Endpoints, Habit, PostureFinder, leave_seat
+from manikin.planning.contacts import Endpoints, Habit, PostureFinder, leave_seat, rising_times
 from manikin.planning.contacts.footholds import FEET
 from manikin.planning.contacts.seat import hand_supports
 from manikin.scenarios import load_scenario
@@ -62,6 +62,26 @@ def test_the_pelvis_rolls_so_that_the_spine_need_not_bend():
     assert np.arctan2(-turn[2, 0], turn[0, 0]) > 0.3
     moved, tilt = found.plan.stages[0].contacts["buttocks"].rolled_away(turn, place)
     assert max(moved, tilt) < 1e-3
+
+
+def test_the_times_of_a_rise_are_peoples():
+    """Young adults take 1.60 s (SD 0.28) to lean and rise (Kazi, Miller and Silverman 2025)."""
+    found = planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
+    times, stages = rising_times(found.plan.stages), found.plan.stages
+    assert 1.60 - 2.0 * 0.28 < sum(times) < 1.60 + 0.28
+    assert min(times) > 0.0
+    assert "buttocks" in stages[len(times) - 2].contacts
+    assert "buttocks" not in stages[len(times) - 1].contacts
+    assert sum(times) < 0.8 * sum(stage.min_duration for stage in stages[: len(times)])
+    assert rising_times(stages[len(times) :]) == []
+
+
+def test_who_stands_before_a_table_stands_up_straight():
+    """Below its top a squat is nearer to the seated posture: it was taken for the one that has risen."""
+    found = planned(load_scenario("stand-up-chair").in_task_frame())
+    heights = [float(stage.com[2]) for stage in found.plan.stages]
+    assert min(heights) > 0.95 * heights[0] - 0.01
+    assert heights[len(rising_times(found.plan.stages))] > 0.95
 
 
 def test_a_person_sits_down():

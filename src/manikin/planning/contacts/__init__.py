@@ -39,5 +39,6 @@ __all__ = [
     "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability",
     "PostureFinder", "PostureFinderSettings", "Random", "Situation", "Stage", "StrongEfort",
     "WalkSearch", "WalkSettings", "WeightedSum", "duration",
-    "find_candidates", "heading_of", "leave_seat", "limb_holds", "starts_on_limbs", "take_seat",
+    "find_candidates", "heading_of", "leave_seat", "limb_holds", "rising_times", "starts_on_limbs",
+    "take_seat",
 ]  # fmt: skip

@@ -177,8 +177,8 @@ LEAN_WEIGHT = 300.0  # of the centre of mass over the feet where a body cannot l
 EASY_LEAN = 0.8  # share of the farthest lean with which a body leaves a seat on feet and hands; our choice
 RISING_TIME = 0.9  # shortest time from there to standing [s]; the pace of the joints mostly asks for more
 RISING_SHARE, QUICKEST_RISE, RISING_PACE = 0.8, 0.6, 2.4
-"""Of a body that rises without a rest: its time to lean relative to the above, its shortest time from the seat to
-standing [s], and the mean speed of the hinge that turns most [rad/s]."""
+"""Of a body that rises without a rest: its time to lean relative to the above, its shortest time from the
+seat to standing [s], and the mean speed of the hinge that turns most [rad/s]; our choice."""
 LETTING_GO_TIME = 0.2  # shortest time from one hand that lets go to the other one [s]; our choice
 SETTLING_TIME = 0.8  # shortest time that the body stands then [s]
 SEATED_ROOM = (0.01, 0.01, 0.006)  # for the centre of mass [m]: a seated trunk cannot follow any path
