@@ -294,8 +294,9 @@ def roll_feet(sequence: StanceSequence, hinge: float, like: StanceSequence | Non
     full, and the hinge of the toes crosses their x axes at ``hinge`` [m]. A foot that goes back leaves and
     lands flat; one that goes onto a step lands flat, and deep below the other one on its ball, which is
     reached with the other knee bent less. One that is left above the other rises onto its toes as soon as
-    that has landed: flat, its ankle would have to bend farther than it can.  Soles that hang over an edge land flat, and leave flat where
-    their toes have nothing below them, in these stances or in those ``like`` them with soles of another size.
+    that has landed: flat, its ankle would have to bend farther than it can. Soles that hang over an edge land
+    flat, and leave flat where their toes have nothing below them, in these stances or in those ``like`` them
+    with soles of another size.
     """
     pairs = zip(sequence, sequence if like is None else like, strict=True)
     back = {(swing.first_phase - 1, swing.effector) for swing in sequence.swings() if _goes_back(swing)}

@@ -23,7 +23,6 @@ from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples
 from manikin.numerics.spatial import FloatArray, skew
 
-
 AT_KEY = 1.0e-6
 """Time from a key instant within which a sample is at it [s]."""
 
