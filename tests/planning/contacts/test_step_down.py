@@ -86,7 +86,7 @@ def test_feet_tilt_within_the_phases_that_they_share(on_toes):
         {"left_foot": toes, "right_foot": full},
         {"right_foot": full},
     ]
-    begins = schedule.instants[on_toes.begins(schedule.sequence)]
+    begins = schedule.instants[list(schedule.sequence.begins)]
     whole = [stage.min_duration for stage in on_toes.stages]
     np.testing.assert_allclose(np.diff([*begins, schedule.instants[-1]]), whole, atol=1e-12)
     np.testing.assert_array_equal(on_toes.keys(schedule)[0], [*begins, schedule.instants[-1]])
