@@ -223,6 +223,9 @@ def _supported(
     quick = rising_times(plan.stages) if paces else []
     if Pace.RESTING in paces[: len(quick) + 1]:
         quick = []
+    # Who rests on the way to or from a seat is as fast as that is met or left.
+    hurries = bool(quick) or any(passed) or not (rises or sits)
+    pace = PACES[scenario.file.task.pace] if hurries else 1.0
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -230,9 +233,6 @@ def _supported(
             name: "same" if before.get(name) is contact else _entry(contact, friction)
             for name, contact in stage.contacts.items()
         }
-        # Who rests on the way to or from a seat is as fast as that is met or left.
-        hurries = bool(quick) or any(passed) or not (rises or sits)
-        pace = PACES[scenario.file.task.pace] if hurries else 1.0
         phase["min_duration_s"] = pace * stage.min_duration
         if ground is not None and passed[number] and passed[number + 1]:
             times = EASY if paces[number] is Pace.UNHURRIED else QUICK

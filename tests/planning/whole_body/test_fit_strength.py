@@ -132,3 +132,20 @@ def test_torques_with_a_motions_own_forces_are_the_motions(runs, overrides):
     share = np.maximum(body.torque_share(motion.tau[rows, 6:]), 0.0)
     assert len(excess.hinges) > 30
     np.testing.assert_allclose(excess.value, share[:, excess.hinges], atol=1e-6)
+
+
+def test_at_a_touch_down_the_foot_that_lands_carries_nothing(runs):
+    """The instant before asks for most, as one foot carries; a lift-off is on the stance after it."""
+    result = runs("platform")
+    body, content = load_scenario("platform").build_body(), read_motions(result.directory / "motion.h5")
+    schedule, names = content.schedule, content.planned.contact_names
+    held = HeldForces.of(body, schedule, content.planned, schedule.instants[1:-1])
+    pairs = zip(schedule.sequence.phases[:-1], schedule.sequence.phases[1:], strict=True)
+    changed = 0
+    for sample, (before, after) in enumerate(pairs):
+        for column, name in enumerate(names):
+            if (name in before.stance) != (name in after.stance):
+                changed += 1
+                assert not held.wrench[sample, column].any()
+                assert not held.sharing[sample, column].any()
+    assert changed >= 4
