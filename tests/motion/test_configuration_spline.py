@@ -121,6 +121,20 @@ def at_rest(rng, start, end, points=12, degree=5):
     return ConfigurationSpline(knots, control, degree)
 
 
+def test_inserted_knots_change_nothing_of_the_motion(spline):
+    """Control points are convex combinations of those before: the error is that of rounding."""
+    first, last = spline.knots[[0, -1]]
+    more = first + (last - first) * np.array([0.013, 0.377, 0.6181, 0.9991])
+    finer = spline.on_knots(np.sort(np.append(spline.knots, more)))
+    assert len(finer.control_points) == len(spline.control_points) + len(more)
+    time = np.linspace(first, last, 200)
+    for before, after in zip(spline.evaluate(time), finer.evaluate(time), strict=True):
+        np.testing.assert_allclose(after, before, atol=1e-9 * max(1.0, float(np.abs(before).max())))
+    np.testing.assert_array_equal(spline.on_knots(spline.knots).control_points, spline.control_points)
+    with pytest.raises(SplineError, match="include those of the spline"):
+        finer.on_knots(spline.knots)
+
+
 def test_joined_splines_are_each_of_them_and_smooth_where_they_meet():
     """A quaternion and its negative are the same attitude; the second one is turned round."""
     rng = np.random.default_rng(5)

@@ -73,6 +73,21 @@ class ConfigurationSpline:
             points = np.concatenate([points, following[1:]])
         return cls(knots, points, degree)
 
+    def on_knots(self, knots: FloatArray) -> "ConfigurationSpline":
+        """The same motion on clamped knots [s] that include its own (knot insertion, [deBoor2001]_ XI).
+
+        Raises:
+            SplineError: If one of its knots is missing among them.
+        """
+        finer, own = np.unique(knots), np.unique(self.knots)
+        if not np.isin(own, finer).all():
+            missing = own[~np.isin(own, finer)][0]
+            raise SplineError(f"knots lack {missing:.6g} s; valid: knots that include those of the spline")
+        spline = BSpline(self.knots, self.control_points, self.degree)
+        for knot in np.setdiff1d(finer, own):
+            spline = spline.insert_knot(knot)
+        return ConfigurationSpline(spline.t, spline.c, self.degree)
+
     def evaluate(self, time: ArrayLike) -> StateSamples:
         """Evaluate the motion at ``time`` (n,) [s], clamped to the spline's interval."""
         t = np.clip(np.atleast_1d(np.asarray(time, dtype=float)), self.knots[0], self.knots[-1])

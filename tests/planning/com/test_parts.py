@@ -139,6 +139,16 @@ def test_a_body_that_rises_comes_to_rest_at_each_change(problem):
     assert _parted(steep, keys) == keys
 
 
+def test_a_part_of_one_phase_has_the_six_conditions_of_rest_at_both_ends(problem):
+    """A spline of degree 4, as walks have, would have five control points there."""
+    kept = {1, *range(PART + 1, len(problem.sequence), PART)}
+    rests = tuple(rest if key in kept else None for key, rest in enumerate(problem.rests))
+    found = plan_com(replace(problem, degree=4, rests=rests))
+    assert found.succeeded, found.failure
+    assert found.residuals().within()
+    assert resting(found) == sorted(kept)
+
+
 def test_a_short_motion_and_one_without_rests_are_planned_at_once():
     """Nothing holds a motion still then between its ends."""
     short = replace(crawl(1), rests=())

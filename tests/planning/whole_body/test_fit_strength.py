@@ -59,6 +59,11 @@ def held_of(body, states, rng):
     return HeldForces(joints, known, wrench, sharing, hinges, (body.pinocchio,) * len(known))
 
 
+def jacobians_of(body, states):
+    model, data = body.pinocchio, body.pinocchio.createData()
+    return np.array([pin.computeJointJacobians(model, data, q) for q in states.q])
+
+
 def required(body, held, s, forces, states):
     """(n, nv - 6) torque shares of states, with what the root lacks supplied by the contacts."""
     model, data = body.pinocchio, body.pinocchio.createData()
@@ -90,7 +95,7 @@ def test_derivatives_are_those_of_inverse_dynamics_whose_root_lacks_nothing(body
     rng = np.random.default_rng(5)
     states = states_of(body, rng)
     held = held_of(body, states, rng)
-    excess = excess_torque(body, states, held, wanted=0.05)
+    excess = excess_torque(body, states, jacobians_of(body, states), held, wanted=0.05)
     model = body.pinocchio
     assert excess.value.shape[1] > 5
     for s in range(len(states.q)):
@@ -128,7 +133,7 @@ def test_torques_with_a_motions_own_forces_are_the_motions(runs, overrides):
     motion, rows = content.planned, np.arange(0, len(content.planned.time), 97)
     held = HeldForces.of(body, content.schedule, motion, motion.time[rows])
     states = StateSamples(motion.q[rows], motion.v[rows], motion.a[rows])
-    excess = excess_torque(body, states, held, wanted=0.0)
+    excess = excess_torque(body, states, jacobians_of(body, states), held, wanted=0.0)
     share = np.maximum(body.torque_share(motion.tau[rows, 6:]), 0.0)
     assert len(excess.hinges) > 30
     np.testing.assert_allclose(excess.value, share[:, excess.hinges], atol=1e-6)

@@ -353,6 +353,8 @@ def _in_parts(
     The programme grows faster than the motion, and one that lasts a minute does not end.
     """
     began, whole, parts, first = time.perf_counter(), None, list[CentroidalResult](), keys[0]
+    # A part of one phase that rests at both ends has six conditions, and all parts one degree.
+    problem = replace(problem, degree=max(problem.degree, 5))
     waiting = [*itertools.pairwise(_parted(problem, keys))]
     while waiting and (not parts or parts[-1].failure is None):
         first, last = waiting.pop(0)

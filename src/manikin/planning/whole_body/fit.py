@@ -9,7 +9,6 @@ Contacts and a required centre of mass are constraints. Penalties show the way t
 the best one that meets their linearisation, and a last one restores what its curvature left.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,21 +22,28 @@ from manikin.planning.whole_body.fit_scales import MotionScales
 DEGREE = 5
 """Degree of every whole-body spline: four continuous derivatives."""
 
-LEAST_DAMPING, FIRST_DAMPING, RESTORING_DAMPING, MOST_DAMPING = 1.0, 30.0, 100.0, 1.0e6
+LEAST_DAMPING, FIRST_DAMPING, RESTORING_DAMPING, MOST_DAMPING = 1.0, 30.0, 100.0, 1.0e5
 """Levenberg damping of a control point: the smallest one, that with which a fit begins, the largest one of a
 step that only restores the contacts, and the largest one."""
+
+MORE, LESS = 5.0, 0.3
+"""Factors of the damping where a step makes the objective greater and less."""
 
 HELD, AT_REST = 1.0e15, 3
 """Damping of control points that stay, and their number at an end at rest in a given posture: velocity and
 acceleration are zero there."""
 
-FURTHER_DECREASE = 3.0e-4
+FURTHER_DECREASE, SPARED = 3.0e-4, 0.06
 """Relative decrease of the objective below which constrained steps that go on from a solution stop: what it
-breaks is a small part of its objective."""
+breaks is a small part of its objective. Share of the strength beyond the wanted one up to which they stop as
+those of a first solution do."""
 
-LENGTHS, REFUSED = (1.0, 0.5, 0.25), 4
+STIFFNESS = 1.0e4
+"""Factor on the squares of the constraints in the matrix with which a step and its multipliers are found."""
+
+LENGTHS, VAIN = (1.0, 0.3), 4
 """Shares of a constrained step that are tried, until one makes the objective less, and constrained steps in a
-row that make nothing better, after which no more are tried."""
+row that hardly make anything better, after which no more are tried."""
 
 
 class FitResult(NamedTuple):
@@ -75,9 +81,8 @@ class MotionFit:
         points, iterations = self._with_ends(np.array(start.control_points)), 0
         scales = final.loosened(final.stages[-1])
         if further:
-            patient = replace(scales, constrained_decrease=FURTHER_DECREASE)
             state = self._objective.linearise(points, scales, self._multiplier)
-            moved, state, iterations = self._constrain(points, state, patient)
+            moved, state, iterations = self._constrain(points, state, scales, FURTHER_DECREASE)
             if moved is not points:
                 return self._exact(moved, state, scales, iterations)
         for factor in final.stages[-1:] if further else final.stages:
@@ -85,7 +90,7 @@ class MotionFit:
             state = self._objective.linearise(points, scales, self._multiplier)
             points, state, taken = self._descend(points, state, scales)
             iterations += taken
-        points, state, constrained = self._constrain(points, state, scales)
+        points, state, constrained = self._constrain(points, state, scales, scales.constrained_decrease)
         return self._exact(points, state, scales, iterations + constrained)
 
     def _exact(
@@ -108,37 +113,48 @@ class MotionFit:
         return np.where(self._held, HELD, np.minimum(self._damping, most))
 
     def _constrain(
-        self, points: FloatArray, current: FitLinearisation, scales: MotionScales
+        self, points: FloatArray, current: FitLinearisation, scales: MotionScales, least: float
     ) -> tuple[FloatArray, FitLinearisation, int]:
         """Steps that meet contacts and centre of mass: each is the best that meets their linearisation.
 
         The multipliers that hold them come with the step, so that the augmented objective falls along it
-        and what is left of their errors is of second order in the step.
+        and what is left of their errors is of second order in the step. The whole step sets the damping, also
+        where only a part of it is taken: where it made the objective greater, the next one is shorter.
+
+        Args:
+            least: Relative decrease of the objective at which the steps stop: after one, or after
+                :data:`VAIN` in a row where only parts of steps help or the strength is exceeded.
         """
-        taken = refused = 0
-        while taken < scales.constrained_steps and refused < REFUSED:
+        taken = vain = 0
+        while taken < scales.constrained_steps and vain < VAIN:
             taken += 1
             current.assemble(self._system)
-            before = self._multiplier
-            step, after = self._system.factorised(self._damped()).constrained(
-                self._system.right, *self._constraints(current), before, scales.multiplier_rounds
+            before, (held, missed) = self._multiplier, self._constraints(current)
+            self._stiffen(held, missed)
+            factor = self._system.factorised(self._damped())
+            step, after = factor.constrained(
+                self._system.right, held, missed, before, scales.multiplier_rounds
             )
             step = self._within_reach(step)
             current.shift_tasks(before, after)
             for length in LENGTHS:
                 trial_points = points + length * step
                 trial = self._objective.linearise(trial_points, scales, after)
+                if length == 1.0:
+                    self._adapt_damping(current, trial)
                 if trial.cost < current.cost:
                     break
-            self._adapt_damping(current, trial)
             if trial.cost >= current.cost:
                 current.shift_tasks(after, before)
-                refused += 1
+                vain += 1
                 continue
             # The squared multipliers in the augmented objective say nothing of the motion.
             decrease = (current.cost - trial.cost) / (current.cost - 0.5 * float(np.sum(after**2)))
-            points, current, self._multiplier, refused = trial_points, trial, after, 0
-            if decrease < scales.constrained_decrease:
+            points, current, self._multiplier = trial_points, trial, after
+            spared = trial.excess is not None and trial.excess < SPARED
+            slight = decrease < (scales.constrained_decrease if spared else least)
+            vain = vain + 1 if slight else 0
+            if slight and (spared or trial.excess is None) and length == 1.0:
                 break
         return points, current, taken
 
@@ -159,6 +175,11 @@ class MotionFit:
                 break
             points, current = trial_points, trial
         return points, taken
+
+    def _stiffen(self, held: FloatArray, missed: FloatArray) -> None:
+        """Add squares of the constraints: no step that meets them changes, and fewer rounds find it."""
+        transposed = STIFFNESS * held.transpose(0, 2, 1)
+        self._system.add(transposed @ held, (transposed @ missed[:, :, None])[:, :, 0])
 
     def _missed(self, state: FitLinearisation) -> float:
         return float(np.abs(self._objective.exact_rows * state.task_residual).max(initial=0.0))
@@ -198,9 +219,9 @@ class MotionFit:
     def _adapt_damping(self, before: FitLinearisation, after: FitLinearisation) -> None:
         old, new = (self._basis.gather(state.sample_cost) for state in (before, after))
         if after.cost < before.cost:
-            factor = np.where(new > 1.02 * old + 0.1, 8.0, np.where(new < old, 0.4, 1.0))
+            factor = np.where(new > 1.02 * old + 0.1, MORE, np.where(new < old, LESS, 1.0))
         else:
-            factor = np.where(new > old, 8.0, 1.0)
+            factor = np.where(new > old, MORE, 1.0)
         self._damping = np.clip(self._damping * factor, LEAST_DAMPING, MOST_DAMPING)
 
 

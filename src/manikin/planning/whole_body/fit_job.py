@@ -173,8 +173,12 @@ class FitJob:
         knots = self.knots(goal.schedule, fine)
         time, basis = self.samples(knots)
         objective = goal.objective(time, basis, scales)
-        guess = objective.targets.reference if near is None else near.evaluate(time).q
-        fit, start = MotionFit(objective, knots), spline_through(guess, basis, knots)
+        if near is None or not np.isin(near.knots, knots).all():
+            guess = objective.targets.reference if near is None else near.evaluate(time).q
+            start = spline_through(guess, basis, knots)
+        else:  # a least-squares spline would have other accelerations
+            start = near.on_knots(knots)
+        fit = MotionFit(objective, knots)
         return fit, fit.solve(start, scales, further=near is not None)
 
     def attempt(

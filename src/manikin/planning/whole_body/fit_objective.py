@@ -40,6 +40,7 @@ class FitLinearisation:
         gradient: (n, nq) gradients by order.
         diagonal: (n, nq) diagonals of the matrices and gradients, for orders without other terms.
         momentum: Scaled residual (n, 6) of the momentum's rate with its derivatives.
+        excess: Greatest share of the strength beyond the wanted one; None where strength does not count.
     """
 
     sample_cost: FloatArray
@@ -49,6 +50,7 @@ class FitLinearisation:
     gradient: dict[int, FloatArray] = field(default_factory=dict)
     diagonal: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     momentum: MomentumRate | None = None
+    excess: float | None = None
 
     @property
     def cost(self) -> float:
@@ -269,20 +271,26 @@ class MotionObjective:
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
         out.momentum = MomentumRate(residual / scale, (first, second, third))
         if targets.forces is not None:
-            out.momentum = self._with_strength(out.momentum, motion, targets.forces, scales)
+            self._add_strength(out, motion, targets.forces, scales)
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
 
-    def _with_strength(
-        self, momentum: MomentumRate, motion: MotionSamples, forces: HeldForces, scales: MotionScales
-    ) -> MomentumRate:
-        """The momentum's rate with a row for each joint torque beyond the strength."""
-        excess = excess_torque(self._body, motion.states, forces, scales.strength_share)
-        rows = (to_raw(by, motion.tangent) / scales.torque_share for by in excess.by_state)
-        first, second, third = (
-            np.concatenate(pair, axis=1) for pair in zip(momentum.jacobians, rows, strict=True)
+    def _add_strength(
+        self, out: FitLinearisation, motion: MotionSamples, forces: HeldForces, scales: MotionScales
+    ) -> None:
+        """Give the momentum's rate a row for each joint torque beyond the strength."""
+        assert out.momentum is not None
+        found = excess_torque(
+            self._body, motion.states, motion.shapes.jacobians, forces, scales.strength_share
         )
-        value = np.hstack([momentum.value, excess.value / scales.torque_share])
-        return MomentumRate(value, (first, second, third))
+        rows = (to_raw(by, motion.tangent) / scales.torque_share for by in found.by_state)
+        first, second, third = (
+            np.concatenate(pair, axis=1) for pair in zip(out.momentum.jacobians, rows, strict=True)
+        )
+        value = np.hstack([out.momentum.value, found.value / scales.torque_share])
+        out.momentum, out.excess = (
+            MomentumRate(value, (first, second, third)),
+            float(found.value.max(initial=0.0)),
+        )
 
 
 def _effector_rows(

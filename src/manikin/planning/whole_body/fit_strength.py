@@ -21,7 +21,8 @@ from manikin.body.strength import with_masses
 from manikin.contact import CarriedLoad, Contact, ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples
-from manikin.numerics.spatial import FloatArray, skew
+from manikin.numerics.spatial import FloatArray, rotation_from_quaternion, skew
+from manikin.scene.distance import moves_by_joint
 
 AT_KEY = 1.0e-6
 """Time from a key instant within which a sample is at it [s]."""
@@ -121,37 +122,55 @@ class ExcessTorque(NamedTuple):
     by_state: tuple[FloatArray, FloatArray, FloatArray]
 
 
-def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wanted: float) -> ExcessTorque:
-    """Shares of the strength that n states take beyond ``wanted``, with forces near those held."""
+def excess_torque(
+    body: BodyModel, states: StateSamples, jacobians: FloatArray, held: HeldForces, wanted: float
+) -> ExcessTorque:
+    """Shares of the strength that n states take beyond ``wanted``, with forces near those held.
+
+    Args:
+        jacobians: (n, 6, nv) of all joints at the states: velocity of the point at the world origin, and
+            angular one.
+    """
     data_of = {id(model): model.createData() for model in {id(each): each for each in held.models}.values()}
-    n, hinges = len(states.q), np.array(held.hinges)
-    torque, answer = np.empty((n, body.nv - 6)), np.empty((n, body.nv - 6, 6))
-    external: list[pin.StdVec_Force] = []
+    n, moves = len(states.q), moves_by_joint(body.pinocchio)
+    required, answer = np.empty((n, body.nv)), np.zeros((n, body.nv, 6))
     for s, model in enumerate(held.models):
-        data = data_of[id(model)]
-        pin.computeJointJacobians(model, data, states.q[s])
-        forces = pin.StdVec_Force()
-        forces.extend([pin.Force.Zero() for _ in range(model.njoints)])
-        by_root = np.zeros((body.nv, 6))
-        for joint, wrench, sharing in zip(held.joints, held.wrench[s], held.sharing[s], strict=True):
-            forces[joint] += data.oMi[joint].actInv(pin.Force(wrench))
-            by_root -= pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD).T @ sharing
-        external.append(forces)
-        answer[s] = by_root[6:] @ data.oMi[1].toDualActionMatrix()
-        required = pin.rnea(model, data, states.q[s], states.v[s], states.a[s], forces)
-        torque[s] = required[6:] + answer[s] @ required[:6]
+        required[s] = pin.rnea(model, data_of[id(model)], states.q[s], states.v[s], states.a[s])
+    for number, joint in enumerate(held.joints):
+        columns = np.flatnonzero(moves[joint])
+        by_wrench = jacobians[:, :, columns].transpose(0, 2, 1)
+        required[:, columns] -= (by_wrench @ held.wrench[:, number, :, None])[:, :, 0]
+        answer[:, columns] -= by_wrench @ held.sharing[:, number]
+    answer = answer[:, 6:] @ _root_to_world(states.q)
+    torque = required[:, 6:] + (answer @ required[:, :6, None])[:, :, 0]
     limit = np.where(torque > 0.0, body.torque_upper, body.torque_lower)
+    hinges = np.array(held.hinges)
     excess = np.where(held.known[:, None], np.maximum(torque / limit - wanted, 0.0), 0.0)[:, hinges]
     active = np.flatnonzero(np.any(excess > 0.0, axis=0))
     value, rows = excess[:, active], hinges[active]
+    strong = np.flatnonzero(np.any(value > 0.0, axis=1))
+    by = np.empty((3, len(strong), body.nv, body.nv))
+    forces = pin.StdVec_Force()
+    forces.extend([pin.Force.Zero() for _ in range(body.pinocchio.njoints)])
+    for k, s in enumerate(strong):
+        model, data = held.models[s], data_of[id(held.models[s])]
+        pin.forwardKinematics(model, data, states.q[s])
+        for joint in held.joints:
+            forces[joint] = pin.Force.Zero()
+        for joint, wrench in zip(held.joints, held.wrench[s], strict=True):
+            forces[joint] += data.oMi[joint].actInv(pin.Force(wrench))
+        by[:, k] = pin.computeRNEADerivatives(model, data, states.q[s], states.v[s], states.a[s], forces)
+    by[2] = np.triu(by[2]) + np.triu(by[2], 1).transpose(0, 2, 1)
+    scale = (value[strong] > 0.0) / limit[strong][:, rows]
     by_state = np.zeros((3, n, len(rows), body.nv))
-    for s in np.flatnonzero(np.any(value > 0.0, axis=1)):
-        model = held.models[s]
-        by_q, by_v, by_a = pin.computeRNEADerivatives(
-            model, data_of[id(model)], states.q[s], states.v[s], states.a[s], external[s]
-        )
-        scale = (value[s] > 0.0) / limit[s, rows]
-        full = np.triu(by_a) + np.triu(by_a, 1).T
-        for out, by in zip(by_state, (by_q, by_v, full), strict=True):
-            out[s] = scale[:, None] * (by[6 + rows] + answer[s, rows] @ by[:6])
+    by_state[:, strong] = scale[:, :, None] * (by[:, :, 6 + rows] + answer[strong][:, rows] @ by[:, :, :6])
     return ExcessTorque(rows, value, (by_state[0], by_state[1], by_state[2]))
+
+
+def _root_to_world(q: FloatArray) -> FloatArray:
+    """(n, 6, 6) map of a wrench on the root, in its frame, to the world's axes and origin."""
+    rotation = rotation_from_quaternion(q[:, 3:7])
+    result = np.zeros((len(q), 6, 6))
+    result[:, :3, :3] = result[:, 3:, 3:] = rotation
+    result[:, 3:, :3] = skew(q[:, :3]) @ rotation
+    return result

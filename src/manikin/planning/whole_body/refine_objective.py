@@ -201,7 +201,7 @@ class RefineObjective(MotionObjective):
         first, second, third = (root.transpose(0, 2, 1) @ part for part in wrench.jacobians)
         out.momentum = MomentumRate(residual, (first, second, third))
         if self.targets.forces is not None:
-            out.momentum = self._with_strength(out.momentum, motion, self.targets.forces, scales)
+            self._add_strength(out, motion, self.targets.forces, scales)
             out.sample_cost += 0.5 * np.sum(out.momentum.value[:, 6:] ** 2, axis=1)
 
     def wrench_cost(self, wrench: FloatArray, com: FloatArray, scales: RefineScales) -> WrenchCost:
