@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -112,7 +113,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     The centre of mass starts and ends where it is in the plan's first and last posture, and is near that of
     each posture in between when its phase begins. Constraints that the file gives are kept.
     """
-    return _supported(scenario, plan, [False] * (len(plan.stages) + 1))
+    return _Supports(scenario, plan, [False] * (len(plan.stages) + 1)).listed()
 
 
 class Pace(IntEnum):
@@ -151,7 +152,7 @@ def without_rests(
     ]  # fmt: skip
     if not any(passed) and not (rise and all(moving[: rise + 1])):
         return None
-    return _supported(scenario, plan, [moving[0], *passed, moving[-1]], paces, rolls=rolls)
+    return _Supports(scenario, plan, [moving[0], *passed, moving[-1]], paces, rolls).listed()
 
 
 def _is_mild(stages: Sequence[Stage], scenario: Scenario) -> bool:
@@ -209,92 +210,142 @@ def _walking_time(
     return max(times.swing, way / times.speed) + climbed / times.climbing
 
 
-def _supported(
-    scenario: Scenario, plan: ContactPlan, passed: Sequence[bool], paces: Sequence[Pace] = (), *,
-    rolls: bool = False,
-) -> Scenario:  # fmt: skip
-    """The scenario with supports; at each key instant, of start and goal too, the body rests or passes."""
-    friction = scenario.contacts.friction
-    # Rising legs are soon at full length: there is less room above such postures than below them.
-    rises, sits = ("buttocks" in plan.stages[end].contacts for end in (0, -1))
-    below = any(passed) and _passes_below(plan, scenario)
-    rolls = rolls and not below
-    ground = Footholds(build_body(scenario), build_scene(scenario)) if any(passed) else None
-    quick = rising_times(plan.stages) if paces else []
-    if Pace.RESTING in paces[: len(quick) + 1]:
-        quick = []
-    # Who rests on the way to or from a seat is as fast as that is met or left.
-    hurries = bool(quick) or any(passed) or not (rises or sits)
-    pace = PACES[scenario.file.task.pace] if hurries else 1.0
-    before: dict[str, Contact] = {}
-    phases: list[dict[str, Any]] = []
-    for number, stage in enumerate(plan.stages):
+@dataclass(frozen=True)
+class _Supports:
+    """The scenario with the supports of a plan, by how the body goes through its phases.
+
+    Attributes:
+        passed: For each key instant, start and goal included, whether the body passes it without a rest.
+        paces: Of each stage; empty where the body rests at every change.
+        may_roll: Whether feet may roll over heels and toes.
+    """
+
+    scenario: Scenario
+    plan: ContactPlan
+    passed: Sequence[bool]
+    paces: Sequence[Pace] = ()
+    may_roll: bool = False
+
+    def listed(self) -> Scenario:
+        """The scenario with supports instead of contacts to be found."""
+        file, walks = self.scenario.file, any(self.passed)
+        long, wide = _sole_size(self.scenario, self.plan)
+        share = WALKING_SHARE if walks else PLANNING_SHARE
+        supports: dict[str, Any] = {
+            "friction": self.scenario.contacts.friction,
+            "sole": {"length_m": long, "width_m": wide},
+            "planning_sole": {"length_m": share[0] * long, "width_m": share[1] * wide},
+            "phases": [self._phase(number) for number in range(len(self.plan.stages))],
+        }
+        if self._rolls:
+            supports["foot"] = "rolling"
+        manner = file.manner
+        if self._rolls and _is_level(self.plan, self.scenario):
+            manner = "walking" if manner == type(file).model_fields["manner"].default else manner
+        # Of a body that walks the region of its postures is known.
+        constraints = _given_constraints(self.scenario) if walks else _constraints(self.scenario, self.plan)
+        return self.scenario.replaced(
+            supports=supports, contacts=None, task=self._task(), com_constraints=constraints,
+            planning=self._planning(), manner=manner,
+        )  # fmt: skip
+
+    @cached_property
+    def _rises(self) -> bool:
+        return "buttocks" in self.plan.stages[0].contacts
+
+    @cached_property
+    def _sits(self) -> bool:
+        return "buttocks" in self.plan.stages[-1].contacts
+
+    @cached_property
+    def _below(self) -> bool:
+        return any(self.passed) and _passes_below(self.plan, self.scenario)
+
+    @property
+    def _rolls(self) -> bool:
+        return self.may_roll and not self._below
+
+    @cached_property
+    def _ground(self) -> Footholds:
+        return Footholds(build_body(self.scenario), build_scene(self.scenario))
+
+    @cached_property
+    def _rise(self) -> list[float]:
+        """Least durations of the stages of a rise that is passed [s]; empty where there is none."""
+        times = rising_times(self.plan.stages) if self.paces else []
+        return [] if Pace.RESTING in self.paces[: len(times) + 1] else times
+
+    def _phase(self, number: int) -> dict[str, Any]:
+        before = self.plan.stages[number - 1].contacts if number else {}
+        contacts, friction = self.plan.stages[number].contacts, self.scenario.contacts.friction
         phase: dict[str, Any] = {
             name: "same" if before.get(name) is contact else _entry(contact, friction)
-            for name, contact in stage.contacts.items()
+            for name, contact in contacts.items()
         }
-        phase["min_duration_s"] = pace * stage.min_duration
-        if ground is not None and passed[number] and passed[number + 1]:
-            times = EASY if paces[number] is Pace.UNHURRIED else QUICK
-            least = pace * _walking_time(plan, number, ground, times, rolls=rolls)
-            phase["min_duration_s"] = least
-            phase["max_duration_s"] = max(LONGEST, 1.5 * least)
-        elif number < len(quick):
-            phase["min_duration_s"] = pace * quick[number] * (EASY_RISE if paces[number] else 1.0)
-        elif 0 < number == len(quick) < len(plan.stages) - 1:
-            phase["min_duration_s"] = pace * STANDING
-        if rises and "buttocks" in stage.contacts:
-            phase["max_duration_s"] = SEATED_LONGER * phase["min_duration_s"]
-        if below:
-            phase["com_below"] = _ceiling(plan, number)
-        if number and not passed[number]:
-            x, y, z = (float(value) for value in stage.com)
-            drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
-            phase["com_near"] = [x, y, z - drop]
-            phase["com_within_m"] = list(stage.com_room)
-            leaves = "buttocks" in before and "buttocks" not in stage.contacts
-            if leaves and stage.momentum is None and not quick:
-                phase["com_lead_s"] = LEAD
-        before = dict(stage.contacts)
-        phases.append(phase)
-    long, wide = _sole_size(scenario, plan)
-    share = WALKING_SHARE if any(passed) else PLANNING_SHARE
-    supports: dict[str, Any] = {
-        "friction": friction,
-        "sole": {"length_m": long, "width_m": wide},
-        "planning_sole": {"length_m": share[0] * long, "width_m": share[1] * wide},
-        "phases": phases,
-    }
-    if rolls:
-        supports["foot"] = "rolling"
-    # The centre of mass is planned up to where a seat is touched.
-    touch = next((stage for stage in plan.stages if "buttocks" in stage.contacts), None) if sits else None
-    task: dict[str, Any] = {
-        "start": {"com": [float(x) for x in plan.stages[0].com]},
-        "goal": {"com": [float(x) for x in (plan.goal_com if touch is None else touch.com)]},
-    }
-    if touch is not None:
-        speed = np.zeros(3) if touch.momentum is None else touch.momentum.velocity
-        task["goal"]["velocity_m_s"] = [float(x) for x in speed]
-    if scenario.file.task.act is not None:
-        task["act"] = scenario.file.task.act.model_dump(mode="json")
-    planning = scenario.file.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.file.planning == type(scenario.file.planning)():
-        crawls = any(c.kind is ContactKind.POINT for stage in plan.stages for c in stage.contacts.values())
-        planning = PLANNING_CRAWLING if crawls else PLANNING
-        planning = PLANNING_SITTING if sits else PLANNING_RISING if rises else planning
-        if any(passed):
-            planning = {**PLANNING_WALKING, "min_margin": walk_margin(scenario, WALKING_MARGIN)}
-            planning |= PLANNING_SITTING if sits else {}
-    # Of a body that walks the region of its postures is known.
-    constraints = _given_constraints(scenario) if any(passed) else _constraints(scenario, plan)
-    manner = scenario.file.manner
-    if rolls and _is_level(plan, scenario) and manner == type(scenario.file).model_fields["manner"].default:
-        manner = "walking"
-    return scenario.replaced(
-        supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning,
-        manner=manner,
-    )  # fmt: skip
+        phase["min_duration_s"], most = self._times(number)
+        if most is not None:
+            phase["max_duration_s"] = most
+        if self._below:
+            phase["com_below"] = _ceiling(self.plan, number)
+        if number and not self.passed[number]:
+            phase |= self._rest(number)
+        return phase
+
+    def _times(self, number: int) -> tuple[float, float | None]:
+        """Least duration of a phase, and the longest where it has one [s]."""
+        stage, rise = self.plan.stages[number], self._rise
+        # Who rests on the way to or from a seat is as fast as that is met or left.
+        hurries = bool(rise) or any(self.passed) or not (self._rises or self._sits)
+        pace = PACES[self.scenario.file.task.pace] if hurries else 1.0
+        least, most = pace * stage.min_duration, None
+        if self.passed[number] and self.passed[number + 1] and any(self.passed):
+            times = EASY if self.paces[number] is Pace.UNHURRIED else QUICK
+            least = pace * _walking_time(self.plan, number, self._ground, times, rolls=self._rolls)
+            most = max(LONGEST, 1.5 * least)
+        elif number < len(rise):
+            least = pace * rise[number] * (EASY_RISE if self.paces[number] else 1.0)
+        elif 0 < number == len(rise) < len(self.plan.stages) - 1:
+            least = pace * STANDING
+        if self._rises and "buttocks" in stage.contacts:
+            most = SEATED_LONGER * least
+        return least, most
+
+    def _rest(self, number: int) -> dict[str, Any]:
+        """Where the centre of mass rests as a phase begins."""
+        stage, before = self.plan.stages[number], self.plan.stages[number - 1]
+        x, y, z = (float(value) for value in stage.com)
+        drop = max(0.0, stage.com_room[2] - ABOVE) if self._rises else 0.0
+        place: dict[str, Any] = {"com_near": [x, y, z - drop], "com_within_m": list(stage.com_room)}
+        leaves = "buttocks" in before.contacts and "buttocks" not in stage.contacts
+        if leaves and stage.momentum is None and not self._rise:
+            place["com_lead_s"] = LEAD
+        return place
+
+    def _task(self) -> dict[str, Any]:
+        """Start and goal; the centre of mass is planned up to where a seat is touched."""
+        stages = self.plan.stages
+        touch = next((one for one in stages if "buttocks" in one.contacts), None) if self._sits else None
+        goal: dict[str, Any] = {"com": (self.plan.goal_com if touch is None else touch.com).tolist()}
+        if touch is not None:
+            speed = np.zeros(3) if touch.momentum is None else touch.momentum.velocity
+            goal["velocity_m_s"] = [float(x) for x in speed]
+        task: dict[str, Any] = {"start": {"com": stages[0].com.tolist()}, "goal": goal}
+        if self.scenario.file.task.act is not None:
+            task["act"] = self.scenario.file.task.act.model_dump(mode="json")
+        return task
+
+    def _planning(self) -> Mapping[str, Any]:
+        """Options of the planner of the centre of mass: the file's, or those of the way of going."""
+        given = self.scenario.file.planning
+        if given != type(given)():
+            return given.model_dump(mode="json", exclude_none=True)
+        if any(self.passed):
+            walking = {**PLANNING_WALKING, "min_margin": walk_margin(self.scenario, WALKING_MARGIN)}
+            return {**walking, **PLANNING_SITTING} if self._sits else walking
+        if self._sits or self._rises:
+            return PLANNING_SITTING if self._sits else PLANNING_RISING
+        held = (contact for stage in self.plan.stages for contact in stage.contacts.values())
+        return PLANNING_CRAWLING if any(one.kind is ContactKind.POINT for one in held) else PLANNING
 
 
 def _entry(contact: Contact, friction: float) -> dict[str, Any]:

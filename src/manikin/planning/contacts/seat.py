@@ -336,7 +336,8 @@ def rising_times(stages: Sequence[Stage]) -> list[float]:
     """
     names = [stage.contacts.keys() for stage in stages]
     off = next((number for number, held in enumerate(names) if not held & SEATED_ON), 0)
-    if not 0 < off < len(stages) - 1 or any(held != names[0] for held in names[:off]) or len(names[0]) > 3:
+    alone = names[0] <= SEATED_ON.union(FEET)  # without hands
+    if not 0 < off < len(stages) - 1 or any(held != names[0] for held in names[:off]) or not alone:
         return []
     start, way = stages[0].com[:2], float(np.linalg.norm(stages[off].com[:2] - stages[0].com[:2]))
     shares = [float(np.linalg.norm(stage.com[:2] - start)) / way for stage in stages[: off + 1]]
