@@ -5,6 +5,7 @@ the motion takes no longer than the motion lasts (5.0 s).
 """
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -48,12 +49,12 @@ def linearisation(planner, swings):
 
 @pytest.fixture(scope="module")
 def swings(planner):
-    return tuple(planner.flights.plan(swing) for swing in planner.flights.flights())
+    return tuple(planner.flights.plan(swing) for swing in planner.flights.flights)
 
 
 def test_swings(benchmark, planner):
     benchmark.pedantic(
-        lambda: [planner.flights.plan(swing) for swing in planner.flights.flights()], rounds=3, iterations=1
+        lambda: [planner.flights.plan(swing) for swing in planner.flights.flights], rounds=3, iterations=1
     )
 
 
@@ -68,6 +69,14 @@ def test_guide_postures(benchmark, planner, swings):
 def test_fit(benchmark, planner, swings):
     goal = _Goal(planner, swings, planner.guide(swings, READY, None, False), READY, True)
     benchmark.pedantic(planner.job.solve, args=(goal, planner.settings.fit), rounds=3, iterations=1)
+
+
+def test_strength(benchmark, planner, swings):
+    """Constrained steps on knots twice as close, until torques of half the strength become dear."""
+    goal = _Goal(planner, swings, planner.guide(swings, READY, None, False), READY, True)
+    first = planner.job.attempt(goal, planner.settings.fit)
+    held, scales = replace(goal, forces=first.motion), replace(first.scales, strength_share=0.5)
+    benchmark.pedantic(planner.job.solve, args=(held, scales, 1, first.result.spline), rounds=3, iterations=1)
 
 
 def test_dense_clearance(benchmark, platform):
