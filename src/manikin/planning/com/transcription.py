@@ -7,7 +7,7 @@ turns the solution into the control points and knots of [Qiu2012]_ 5.20, the pub
 """
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
@@ -16,6 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from manikin.numerics.element_program import Element, Indices, PlacedElement, compile_programme
 from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.numerics.spline import (
     BSpline,
@@ -99,86 +100,179 @@ class ComProgram:
         return bezier, unknowns[-phases - 3 : -3], margin * MARGIN_SCALE[self.structure.margin_space]
 
 
-class _Builder:
-    """Collects unknowns, parameters and rows while the programme is written."""
+@dataclass(frozen=True, eq=False)
+class _Terms:
+    """An element of the programme and the groups of its rows."""
 
-    def __init__(self, structure: ComStructure) -> None:
-        self.structure = structure
-        self.parameters: dict[str, ca.SX] = {}
-        self.rows: list[ca.SX] = []
-        self.groups: list[tuple[str, int]] = []
-        self.bezier = [ca.SX.sym(f"b{i}", structure.degree + 1, 3) for i in range(structure.phases)]
-        self.durations = ca.SX.sym("h", structure.phases)
-        self.total, self.margin, self.shortfall = (ca.SX.sym(name) for name in "Tde")
+    element: Element
+    groups: tuple[tuple[str, int], ...]
 
-    def parameter(self, name: str, rows: int, columns: int = 1) -> ca.SX:
-        self.parameters[name] = ca.SX.sym(name, rows, columns)
-        return self.parameters[name]
+
+class _Writer:
+    """Collects parameters and rows while an element is written."""
+
+    def __init__(self) -> None:
+        self.parameters: list[ca.SX] = []
+        self.rows: list[tuple[str, ca.SX]] = []
+
+    def parameter(self, rows: int, columns: int = 1) -> ca.SX:
+        self.parameters.append(ca.SX.sym(f"p{len(self.parameters)}", rows, columns))
+        return self.parameters[-1]
 
     def add(self, group: str, expression: ca.SX) -> None:
-        column = ca.vec(expression)
-        self.rows.append(column)
-        self.groups.append((group, column.numel()))
+        self.rows.append((group, ca.vec(expression)))
+
+    def terms(self, unknowns: Sequence[ca.SX], objective: ca.SX | None = None) -> _Terms:
+        parameters = ca.vertcat(ca.SX(0, 1), *map(ca.vec, self.parameters))
+        rows = ca.vertcat(*(row for _, row in self.rows))
+        element = Element(
+            ca.vertcat(*map(ca.vec, unknowns)), parameters, ca.SX(0) if objective is None else objective, rows
+        )
+        return _Terms(element, tuple((group, row.numel()) for group, row in self.rows))
+
+
+@dataclass(frozen=True)
+class _PhaseKind:
+    """What the expressions of a phase depend on; as :class:`ComStructure`, of one phase.
+
+    Attributes:
+        ends: Whether the motion starts in this phase, and whether it ends there.
+    """
+
+    degree: int
+    samples: int
+    ends: tuple[bool, bool]
+    rows: int
+    contacts: int
+    faces: int
+    loaded: bool
+    margin_space: MarginSpace
+    geometric: tuple[Callable[[Any, Any, Any], Any], ...]
+
+
+class _Assembly:
+    """Numbers of the unknowns and parameters of a programme, and its elements."""
+
+    def __init__(self, structure: ComStructure) -> None:
+        each, phases = 3 * (structure.degree + 1), structure.phases
+        self.bezier = np.arange(each * phases).reshape(phases, each)
+        self.durations = each * phases + np.arange(phases)
+        self.total, self.margin, self.shortfall = self.durations[-1] + 1 + np.arange(3)
+        self.parameters: dict[str, tuple[int, int]] = {}
+        self.numbers: dict[str, Indices] = {}
+        self.elements: list[PlacedElement] = []
+        self.groups: list[tuple[str, int]] = []
+
+    @property
+    def size(self) -> int:
+        """Number of parameters so far."""
+        return sum(rows * columns for rows, columns in self.parameters.values())
+
+    def parameter(self, name: str, rows: int, columns: int = 1) -> None:
+        self.numbers[name] = self.size + np.arange(rows * columns)
+        self.parameters[name] = rows, columns
+
+    def place(self, terms: _Terms, unknowns: Sequence[Any], names: Sequence[str] = ()) -> None:
+        numbers = [np.zeros(0, dtype=np.int64), *(self.numbers[name] for name in names)]
+        self.elements.append(PlacedElement(terms.element, np.hstack(unknowns), np.hstack(numbers)))
+        self.groups += terms.groups
 
 
 @lru_cache(maxsize=8)
 def transcribe(structure: ComStructure) -> ComProgram:
-    """Write and compile the programme of [Qiu2012]_ 5.4.1-5.4.2.
-
-    Cached by structure; only the last few, because each keeps 20 to 40 MB.
-    """
-    builder = _Builder(structure)
-    mass = builder.parameter("mass", 1)
-    builder.parameter("reference", 1, 3)
+    """Write and compile the programme of [Qiu2012]_ 5.4.1-5.4.2."""
+    assembly, last = _Assembly(structure), structure.phases - 1
+    for name, size in (("mass", 1), ("reference", 3), ("weights", 4)):
+        assembly.parameter(name, size)
+    for name in _DIAGONALS:
+        assembly.parameter(name, 3)
     for phase in range(structure.phases):
-        _add_samples(builder, phase, mass)
-        if phase + 1 < structure.phases:
-            _add_continuity(builder, phase)
-    _add_end_conditions(builder)
-    _add_key_planes(builder)
-    builder.add("total_duration", ca.sum1(builder.durations) - builder.total)
-    builder.add("required_margin", builder.margin + builder.shortfall)
-    objective = _objective(builder)
-    bezier = map(ca.vec, builder.bezier)
-    unknowns = ca.vertcat(*bezier, builder.durations, builder.total, builder.margin, builder.shortfall)
-    parameters = ca.vertcat(*map(ca.vec, builder.parameters.values()))
-    problem = {"x": unknowns, "p": parameters, "f": objective, "g": ca.vertcat(*builder.rows)}
-    shapes = tuple((name, p.shape) for name, p in builder.parameters.items())
-    return ComProgram(structure, _compile(problem), tuple(builder.groups), shapes)
+        _place_phase(assembly, structure, phase)
+        if phase < last:
+            both = [*assembly.bezier[phase : phase + 2], assembly.durations[phase : phase + 2]]
+            assembly.place(_continuity(structure.degree), both)
+    for end, phase in (("start", 0), ("goal", last)):
+        names = [f"{end}_velocity", f"{end}_acceleration"]
+        for name in names:
+            assembly.parameter(name, 3)
+        unknowns = [assembly.bezier[phase], assembly.durations[phase]]
+        assembly.place(_end_conditions(structure.degree, end == "start"), unknowns, names)
+    for index, (key, lead) in enumerate(structure.key_planes):
+        names = [f"normal{index}", f"offset{index}"]
+        assembly.parameter(names[0], 3)
+        assembly.parameter(names[1], 1)
+        unknowns = [assembly.bezier[key - 1], assembly.durations[key - 1]]
+        assembly.place(_key_plane(structure.degree, lead), unknowns, names)
+    shared = [assembly.durations, assembly.total, assembly.margin, assembly.shortfall]
+    assembly.place(_whole_motion(structure.phases, structure.margin_space), shared, ["weights"])
+    solver = compile_programme(
+        "timing_free", assembly.elements, int(assembly.shortfall) + 1, assembly.size, _options()
+    )
+    return ComProgram(structure, solver, tuple(assembly.groups), tuple(assembly.parameters.items()))
 
 
-def _compile(problem: dict[str, ca.SX]) -> ca.Function:
+def _options() -> dict[str, Any]:
     ipopt = {
         "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "adaptive_mu_globalization": "kkt-error",
         "alpha_for_y": "min-dual-infeas", "max_iter": 250, "tol": 1e-5, "constr_viol_tol": 1e-8,
         "bound_relax_factor": 0.0, "linear_solver": "mumps",
     }  # fmt: skip
     options = {"print_time": False, "error_on_fail": False, "calc_lam_p": False, "no_nlp_grad": True}
-    return ca.nlpsol("timing_free", "ipopt", problem, options | {"ipopt": ipopt})
+    return options | {"ipopt": ipopt}
 
 
-def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
-    structure, k = builder.structure, builder.structure.degree
-    s = np.linspace(0.0, 1.0, structure.samples + 1)
-    points, duration = builder.bezier[phase], builder.durations[phase]
+def _place_phase(assembly: _Assembly, structure: ComStructure, phase: int) -> None:
+    contacts = structure.contacts[phase] if structure.limited_distance else 0
+    faces = structure.reach[phase] if structure.reach else 0
+    loaded, facets = phase in structure.loaded, structure.rows[phase]
+    names = [*_SHARED]
+    for name, *shape in (
+        ("H", facets, 6), ("h", facets, 1), ("load", 4 * loaded, 1), ("contacts", contacts, 3),
+        ("faces", faces, 3), ("ends", faces, 1),
+    ):  # fmt: skip
+        if shape[0]:
+            assembly.parameter(f"{name}{phase}", *shape)
+            names.append(f"{name}{phase}")
+    kind = _PhaseKind(
+        structure.degree, structure.samples, (phase == 0, phase == structure.phases - 1), facets, contacts,
+        faces, loaded, structure.margin_space, structure.geometric,
+    )  # fmt: skip
+    unknowns = [assembly.bezier[phase], assembly.durations[phase], assembly.total, assembly.margin]
+    assembly.place(_phase(kind), unknowns, names)
+
+
+_DIAGONALS = ("velocity", "acceleration", "jerk")
+_SHARED = ("mass", "reference", "weights", *_DIAGONALS)
+"""Parameters of every phase."""
+
+
+@lru_cache(maxsize=64)
+def _phase(kind: _PhaseKind) -> _Terms:
+    """Rows of one phase at its samples, and its share of the smoothness."""
+    writer, k = _Writer(), kind.degree
+    mass, reference, weights, *diagonals = (writer.parameter(size) for size in (1, 3, 4, 3, 3, 3))
+    points, (duration, total, margin) = ca.SX.sym("b", k + 1, 3), (ca.SX.sym(name) for name in "hTd")
+    s = np.linspace(0.0, 1.0, kind.samples + 1)
     position = ca.DM(bernstein_matrix(k, s)) @ points
     second = ca.DM(k * (k - 1) * bernstein_matrix(k - 2, s)) @ _differences(points, 2)
-    _add_balance(builder, phase, mass, position, second / duration**2)
-    if structure.limited_distance:
-        centres = builder.parameter(f"contacts{phase}", structure.contacts[phase], 3)
-        for index in range(structure.contacts[phase]):
+    _add_balance(writer, kind, margin, mass, position, second / duration**2)
+    if kind.contacts:
+        centres = writer.parameter(kind.contacts, 3)
+        for index in range(kind.contacts):
             offset = position - ca.repmat(centres[index, :], len(s), 1)
-            builder.add("distance", ca.sum2(offset * offset))
-    inner = slice(1 if phase == 0 else 0, len(s) - 1 if phase == structure.phases - 1 else len(s))
-    faces = structure.reach[phase] if structure.reach else 0
-    within = position[inner, :]
-    if faces:
-        normals = builder.parameter(f"faces{phase}", faces, 3)
-        offsets = builder.parameter(f"ends{phase}", faces)
-        builder.add("reach", within @ normals.T - ca.repmat(offsets.T, len(s[inner]), 1))
-    for index, function in enumerate(structure.geometric):
-        places = within + ca.repmat(builder.parameters["reference"], within.shape[0], 1)
-        builder.add(f"geometric{index}", _symbolic(function, places))
+            writer.add("distance", ca.sum2(offset * offset))
+    starts, ends = kind.ends
+    within = position[int(starts) : len(s) - int(ends), :]
+    if kind.faces:
+        normals, offsets = writer.parameter(kind.faces, 3), writer.parameter(kind.faces)
+        writer.add("reach", within @ normals.T - ca.repmat(offsets.T, within.shape[0], 1))
+    for index, function in enumerate(kind.geometric):
+        places = within + ca.repmat(reference.T, within.shape[0], 1)
+        writer.add(f"geometric{index}", _symbolic(function, places))
+    smoothness = ca.SX(0)
+    for order, diagonal in enumerate(diagonals, start=1):
+        smoothness += _squared_integral(points, duration, order, diagonal.T)
+    return writer.terms([points, duration, total, margin], weights[1] * smoothness / total)
 
 
 def _symbolic(function: Callable[[Any, Any, Any], Any], position: ca.SX) -> ca.SX:
@@ -190,26 +284,26 @@ def _symbolic(function: Callable[[Any, Any, Any], Any], position: ca.SX) -> ca.S
     return values + ca.SX.zeros(position.shape[0])
 
 
-def _add_balance(builder: _Builder, phase: int, mass: ca.SX, position: ca.SX, acceleration: ca.SX) -> None:
+def _add_balance(
+    writer: _Writer, kind: _PhaseKind, margin: ca.SX, mass: ca.SX, position: ca.SX, acceleration: ca.SX
+) -> None:
     """Rows ``h - H w_p >= d_min`` ([Qiu2012]_ 5.4.2), each over its length with moments about the CoM.
 
     In force space it is over its slope in f; about the world origin its length is 1.
     """
-    structure = builder.structure
-    facets, count = builder.structure.rows[phase], position.shape[0]
-    H, h = builder.parameter(f"H{phase}", facets, 6), builder.parameter(f"h{phase}", facets)
+    count = position.shape[0]
+    H, h = writer.parameter(kind.rows, 6), writer.parameter(kind.rows)
     force = mass * (acceleration - ca.repmat(ca.DM([[0.0, 0.0, -GRAVITY]]), count, 1))
     wrench = ca.horzcat(force, _cross(position, force))
-    if phase in structure.loaded:  # a further mass that moves with the CoM, at an offset from it
-        load = builder.parameter(f"load{phase}", 4)
+    if kind.loaded:  # a further mass that moves with the CoM, at an offset from it
+        load = writer.parameter(4)
         push = load[0] / mass * force
         wrench += ca.horzcat(push, _cross(position + ca.repmat(load[1:].T, count, 1), push))
     slack = ca.repmat(h.T, count, 1) - wrench @ H.T
-    scale = MARGIN_SCALE[structure.margin_space]
-    wanted = builder.margin * ca.SX.ones(count, facets)
-    if structure.margin_space != "wrench_about_origin":
-        wanted = builder.margin * _lengths(H, position, with_moment=structure.margin_space == "wrench")
-    builder.add("balance", slack / scale - wanted)
+    wanted = margin * ca.SX.ones(count, kind.rows)
+    if kind.margin_space != "wrench_about_origin":
+        wanted = margin * _lengths(H, position, with_moment=kind.margin_space == "wrench")
+    writer.add("balance", slack / MARGIN_SCALE[kind.margin_space] - wanted)
 
 
 def _lengths(H: ca.SX, position: ca.SX, *, with_moment: bool) -> ca.SX:
@@ -226,52 +320,57 @@ def _lengths(H: ca.SX, position: ca.SX, *, with_moment: bool) -> ca.SX:
     return ca.horzcat(*columns)
 
 
-def _add_continuity(builder: _Builder, phase: int) -> None:
-    """Equal derivatives 0 ... k - 1 at the key instant after ``phase``, in units of position."""
-    before, after = builder.bezier[phase], builder.bezier[phase + 1]
-    ratio = builder.durations[phase] / builder.durations[phase + 1]
-    for order in range(builder.structure.degree):
+@lru_cache(maxsize=8)
+def _continuity(degree: int) -> _Terms:
+    """Equal derivatives 0 ... k - 1 at the key instant between two phases, in units of position."""
+    writer, durations = _Writer(), ca.SX.sym("h", 2)
+    before, after = (ca.SX.sym(name, degree + 1, 3) for name in ("before", "after"))
+    ratio = durations[0] / durations[1]
+    for order in range(degree):
         left, right = _differences(before, order)[-1, :], _differences(after, order)[0, :]
-        builder.add("continuity", left - ratio**order * right)
+        writer.add("continuity", left - ratio**order * right)
+    return writer.terms([before, after, durations])
 
 
-def _add_end_conditions(builder: _Builder) -> None:
-    """Velocities and accelerations at both ends ([Qiu2012]_ 5.24-5.25), in units of position."""
-    k, last = builder.structure.degree, builder.structure.phases - 1
-    for name, phase, row in (("start", 0, 0), ("goal", last, -1)):
-        points, duration = builder.bezier[phase], builder.durations[phase]
-        velocity = builder.parameter(f"{name}_velocity", 1, 3)
-        acceleration = builder.parameter(f"{name}_acceleration", 1, 3)
-        builder.add("end", _differences(points, 1)[row, :] - velocity * duration / k)
-        builder.add("end", _differences(points, 2)[row, :] - acceleration * duration**2 / (k * (k - 1)))
+@lru_cache(maxsize=16)
+def _end_conditions(degree: int, at_start: bool) -> _Terms:
+    """Velocity and acceleration at an end ([Qiu2012]_ 5.24-5.25), in units of position."""
+    writer, row = _Writer(), 0 if at_start else -1
+    points, duration = ca.SX.sym("b", degree + 1, 3), ca.SX.sym("h")
+    velocity, acceleration = writer.parameter(1, 3), writer.parameter(1, 3)
+    writer.add("end", _differences(points, 1)[row, :] - velocity * duration / degree)
+    curved = acceleration * duration**2 / (degree * (degree - 1))
+    writer.add("end", _differences(points, 2)[row, :] - curved)
+    return writer.terms([points, duration])
 
 
-def _add_key_planes(builder: _Builder) -> None:
-    """How far the CoM is beyond each plane at its key instant, the end of the phase before."""
-    degree = builder.structure.degree
-    for index, (key, lead) in enumerate(builder.structure.key_planes):
-        normal, offset = builder.parameter(f"normal{index}", 3), builder.parameter(f"offset{index}", 1)
-        points, place = builder.bezier[key - 1], builder.bezier[key - 1][-1, :]
-        if lead > 0.0:
-            place = place + lead * degree / builder.durations[key - 1] * _differences(points, 1)[-1, :]
-        builder.add("key_plane", place @ normal - offset)
+@lru_cache(maxsize=16)
+def _key_plane(degree: int, lead: float) -> _Terms:
+    """How far the CoM is beyond a plane at the end of a phase, or where it would be a lead [s] later."""
+    writer, points, duration = _Writer(), ca.SX.sym("b", degree + 1, 3), ca.SX.sym("h")
+    normal, offset = writer.parameter(3), writer.parameter(1)
+    place = points[-1, :]
+    if lead > 0.0:
+        place = place + lead * degree / duration * _differences(points, 1)[-1, :]
+    writer.add("key_plane", place @ normal - offset)
+    return writer.terms([points, duration])
 
 
-def _objective(builder: _Builder) -> ca.SX:
-    """Weighted objectives ([Qiu2012]_ 5.27-5.28), the sums exactly integrated.
+@lru_cache(maxsize=32)
+def _whole_motion(phases: int, margin_space: MarginSpace) -> _Terms:
+    """Total duration, required margin, and what they weigh ([Qiu2012]_ 5.27-5.28).
 
     An exact penalty asks for the required margin, so that the largest is found when it cannot be reached. The
     total duration is an unknown of its own, which keeps the second derivatives sparse.
     """
-    weights = builder.parameter("weights", 4)
-    diagonals = [builder.parameter(name, 1, 3) for name in ("velocity", "acceleration", "jerk")]
-    total, smoothness = builder.total, ca.SX(0)
-    scale = MARGIN_SCALE[builder.structure.margin_space]
-    for points, duration in zip(builder.bezier, ca.vertsplit(builder.durations), strict=True):
-        for order, diagonal in enumerate(diagonals, start=1):
-            smoothness += _squared_integral(points, duration, order, diagonal)
-    margin = weights[0] * builder.margin - weights[3] * builder.shortfall
-    return -scale * margin + weights[1] * smoothness / total + weights[2] * total
+    writer, durations = _Writer(), ca.SX.sym("h", phases)
+    total, margin, shortfall = (ca.SX.sym(name) for name in "Tde")
+    weights = writer.parameter(4)
+    writer.add("total_duration", ca.sum1(durations) - total)
+    writer.add("required_margin", margin + shortfall)
+    wished = weights[0] * margin - weights[3] * shortfall
+    objective = -MARGIN_SCALE[margin_space] * wished + weights[2] * total
+    return writer.terms([durations, total, margin, shortfall], objective)
 
 
 def _squared_integral(points: ca.SX, duration: ca.SX, order: int, diagonal: ca.SX) -> ca.SX:
