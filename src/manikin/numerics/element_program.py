@@ -37,8 +37,8 @@ class Element:
         self.objective = ca.Function("objective", given, [objective])
         self.gradient = ca.Function("gradient", given, [ca.densify(ca.gradient(objective, unknowns))])
         self.rows = ca.Function("rows", given, [rows])
-        self.slopes = ca.Function("slopes", given, [jacobian.nz[:]])
-        self.curvature = ca.Function("curvature", [*given, factor, multipliers], [hessian.nz[:]])
+        self.slopes = ca.Function("slopes", given, [ca.vec(jacobian.nz[:])])
+        self.curvature = ca.Function("curvature", [*given, factor, multipliers], [ca.vec(hessian.nz[:])])
         self.jacobian, self.hessian = _places(jacobian), _places(hessian)
         self.count = rows.numel()
 
