@@ -28,9 +28,12 @@ CLEARANCE = frozenset({"min_clearance_m"})
 UNITS = {"min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0}
 """Size at which a broken requirement counts as one, where that is not its limit."""
 
-MOST_EXCESS, MUCH_EXCESS, A_LOT = 10.0, 4.0, 0.6
-"""Excess of a fit of which no repair is tried: its contacts, or their times, are not the body's. Excess above
-which a repair has to help a lot, and the share of it that it may leave then."""
+FORCES = frozenset({"max_missing_wrench", "max_torque_share"})
+"""Keys of the requirements on forces. A first fit does not know the strength, and has sudden momentum."""
+
+MOST_ASTRAY, MUCH_EXCESS, A_LOT = 10.0, 4.0, 0.6
+"""Excess but of forces of a fit of which no repair is tried: its contacts, or their times, are not the body's.
+Excess above which a repair has to help a lot, and the share of it that it may leave then."""
 
 STRONGER, NEARER, LEAST_SAFE_DISTANCE = 0.5, 0.75, 0.014
 """Factor of the scales of what was missed; factor of the wanted clearance where the required one is missed,
@@ -108,7 +111,15 @@ class FitAttempt(Generic[G]):
     @property
     def excess(self) -> float:
         """Sum of how far requirements are broken, each in units of its limit or of :data:`UNITS`."""
-        rows = [row for row in self.certificate if row.key in self.broken]
+        return self._excess(self.broken)
+
+    @property
+    def astray(self) -> float:
+        """The excess of all requirements but those on forces."""
+        return self._excess(self.broken - FORCES)
+
+    def _excess(self, broken: frozenset[str]) -> float:
+        rows = [row for row in self.certificate if row.key in broken]
         return sum(abs(row.measured - row.limit) / UNITS.get(row.key, max(row.limit, 1e-9)) for row in rows)
 
     def is_too_near(self, segments: Collection[str]) -> bool:
@@ -211,7 +222,7 @@ class FitJob:
         """
         best, last, vain = first, first, 0
         for number in range(most):
-            if not last.broken or (self.gives_up and last.excess > MOST_EXCESS):
+            if not last.broken or (self.gives_up and last.astray > MOST_ASTRAY):
                 break
             following = remedy(number, last)
             if following is None:

@@ -328,7 +328,9 @@ class _Planner:
         # Raised arms may have to pass through a thigh, swinging ones through a wall.
         if manner in (READY, WALKING) and best.is_too_near(frozenset[str]().union(*arms)):
             best = self.job.better(best, self._attempt(swings, CLOSE, progress))
-        if best.is_too_near(toes):  # Straight toes may be in the way of a flight.
+        # Straight toes may be in the way of a flight; those of feet that roll are as the roll has them.
+        straight = flat_share(body, self.trajectory.schedule, self.instants[:1]).keys()
+        if straight - self.toes(swings, self.instants[:1]).keys() and best.is_too_near(toes):
             best = self.job.better(best, self._attempt(swings, manner, progress, straight_toes=False))
         searched = self._search_again(swings, best)
         if searched is not None:
