@@ -7,7 +7,6 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
@@ -140,6 +139,8 @@ def low_passed(values: FloatArray, cutoff: float, rate: float, padding: int | No
         rate: Per second [Hz], or :data:`SHARES`.
         padding: Most values by which each end is continued, mirrored; None for two periods of the cutoff.
     """
+    from scipy.signal import sosfiltfilt  # loaded when it is wanted: it takes a fifth of the start
+
     wanted = int(np.ceil(2.0 * rate / cutoff)) if padding is None else padding
     sections = _sections(float(cutoff), float(rate))
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=min(wanted, len(values) - 1)))
@@ -148,4 +149,6 @@ def low_passed(values: FloatArray, cutoff: float, rate: float, padding: int | No
 @lru_cache(maxsize=16)
 def _sections(cutoff: float, rate: float) -> FloatArray:
     """The same for every signal of a recording."""
+    from scipy.signal import butter
+
     return np.asarray(butter(2, cutoff, fs=rate, output="sos"), dtype=np.float64)

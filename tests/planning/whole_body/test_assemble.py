@@ -287,23 +287,27 @@ def test_what_is_too_near_decides_what_is_tried(
 
 
 @pytest.mark.parametrize(
-    ("shares", "tried"),
+    ("key", "values", "tried"),
     [
-        ((1.2, 1.1, 1.05, 1.02), 3),
-        ((1.2, 1.3, 1.1, 1.05), 3),
-        ((1.2, 1.3, 1.35), 2),
-        ((6.0, 6.5), 1),
-        ((12.0,), 0),
+        ("max_torque_share", (1.2, 1.1, 1.05, 1.02), 3),
+        ("max_torque_share", (1.2, 1.3, 1.1, 1.05), 3),
+        ("max_torque_share", (1.2, 1.3, 1.35), 2),
+        ("max_torque_share", (6.0, 6.5), 1),
+        ("max_missing_wrench", (300.0, 60.0, 0.0), 2),
+        ("max_joint_limit_violation_rad", (0.2,), 0),
     ],
 )
-def test_repairs_end_where_they_make_nothing_better(step_attempt, shares, tried):
-    """Two repairs in a row that make it worse are the last; the attempt that misses least is the result."""
-    attempts = [blocked(step_attempt, "max_torque_share", share) for share in shares]
+def test_repairs_end_where_they_make_nothing_better(step_attempt, key, values, tried):
+    """Two repairs in a row that make it worse are the last; the attempt that misses least is the result.
+
+    None is tried where joints are far out of their range, but whatever forces are missing.
+    """
+    attempts = [blocked(step_attempt, key, value) for value in values]
     left = iter(attempts[1:])
     job = FitJob(0.05, gives_up=True)
     best = job.repair(attempts[0], lambda *_: next(left), 3)
     assert len(attempts) - 1 - len(list(left)) == tried
-    assert best.certificate.value("max_torque_share") == min(shares)
+    assert best.certificate.value(key) == min(values)
 
 
 @pytest.mark.slow

@@ -216,7 +216,7 @@ def _options() -> dict[str, Any]:
         "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "adaptive_mu_globalization": "kkt-error",
         "alpha_for_y": "min-dual-infeas", "max_iter": 250, "tol": 1e-5, "constr_viol_tol": 1e-8,
         "bound_relax_factor": 0.0, "linear_solver": "mumps",
-        # With more than that no step leads anywhere: the rows are restored first, instead of hundreds of those.
+        # With more than that no step leads anywhere: the rows are restored first.
         "max_hessian_perturbation": 1e7,
     }  # fmt: skip
     options = {"print_time": False, "error_on_fail": False, "calc_lam_p": False, "no_nlp_grad": True}

@@ -32,8 +32,8 @@ FORCES = frozenset({"max_missing_wrench", "max_torque_share"})
 """Keys of the requirements on forces. A first fit does not know the strength, and has sudden momentum."""
 
 MOST_ASTRAY, MUCH_EXCESS, A_LOT = 10.0, 4.0, 0.6
-"""Excess but of forces of a fit of which no repair is tried: its contacts, or their times, are not the body's.
-Excess above which a repair has to help a lot, and the share of it that it may leave then."""
+"""Excess, but of forces, of a fit of which no repair is tried: its contacts, or their times, are not the
+body's. Excess above which a repair has to help a lot, and the share of it that it may leave then."""
 
 STRONGER, NEARER, LEAST_SAFE_DISTANCE = 0.5, 0.75, 0.014
 """Factor of the scales of what was missed; factor of the wanted clearance where the required one is missed,
