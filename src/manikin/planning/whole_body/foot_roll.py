@@ -162,7 +162,7 @@ def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootR
     flat = land if end.part is SolePart.FULL else schedule.instants[swing.last_phase + 2]
     others = schedule.sequence[swing.first_phase].stance
     lower = max((float(contact.position[2]) for contact in others), default=float(end.position[2]))
-    drop = (float(start.position[2]) - lower) / (HIGH_STEP * (body.stature or 1.75))
+    drop = abs(float(start.position[2]) - lower) / (HIGH_STEP * (body.stature or 1.75))
     return FootRoll(
         np.array([up, off, land, flat]), Pose.of(start), Pose.of(end), np.zeros(3) if toes is None else toes,
         np.array([-0.5 * (body.sole_length or start.length), 0.0, 0.0]),

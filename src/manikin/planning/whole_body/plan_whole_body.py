@@ -424,7 +424,7 @@ class _Planner:
         return plan_guide(
             self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time), com,
             ignored_pairs(self.body, self.scene, schedule, time), reference,
-            self.settings.fit.safe_distance, manner.preferences, exact, restarts,
+            self.settings.fit.safe_distance, manner, exact, restarts,
         )  # fmt: skip
 
     def toes(self, swings: tuple[PlannedSwing, ...], time: FloatArray) -> dict[int, FloatArray]:

@@ -7,6 +7,7 @@ tell, before the motion is fitted, whether it can be done, and they are what the
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from types import MappingProxyType
 
 import numpy as np
@@ -14,10 +15,18 @@ import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from manikin.body import BodyModel
-from manikin.body.configuration import Configuration
-from manikin.contact import Contact, ContactSchedule, SolePart
+from manikin.body.configuration import Configuration, difference
+from manikin.body.limbs import end_segments
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.errors import InputError
-from manikin.kinematics import Placement, PostureProblem, Preferences, SolverSettings, generate_posture
+from manikin.kinematics import (
+    Placement,
+    PostureProblem,
+    PostureResult,
+    Preferences,
+    SolverSettings,
+    generate_posture,
+)
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray, rotation_from_quaternion
 from manikin.planning.com import CentroidalTrajectory
@@ -25,6 +34,7 @@ from manikin.planning.whole_body.fit_targets import EffectorTarget, settled_shar
 from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.planning.whole_body.swing_planner import rolls_on_point
 from manikin.scene import Proximity
+from manikin.scene.distance import segment_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +99,7 @@ class Guide:
 def plan_guide(
     body: BodyModel, proximity: Proximity, schedule: ContactSchedule, time: FloatArray,
     effectors: dict[str, EffectorTarget], com: FloatArray, ignored: tuple[Ignored, ...],
-    reference: FloatArray, clearance: float, preferences: Preferences, exact: Sequence[int], restarts: bool,
+    reference: FloatArray, clearance: float, manner: "PostureStyle", exact: Sequence[int], restarts: bool,
 ) -> Guide:  # fmt: skip
     """Find a posture at each time, each one starting from the one before.
 
@@ -100,11 +110,12 @@ def plan_guide(
         ignored: Pairs that may touch, per time.
         reference: (k, nq) preferred postures, the first of which starts the search.
         clearance: Wanted distance to everything [m].
-        preferences: What the postures should look like.
+        manner: What the postures should look like.
         exact: Joints that keep to the reference whatever the posture before.
         restarts: Whether a posture that is not found from the one before is sought from others as well.
     """
     crawls = any(rolls_on_point(contact) for phase in schedule.sequence for contact in phase.stance)
+    preferences, scale = manner.preferences, manner.scale(body)
     creeping = replace(preferences, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
     q, exactly = reference[0], [7 + joint for joint in exact]
     found, failures, touched = list[FloatArray](), list[tuple[float, str]](), dict[str, FloatArray]()
@@ -120,15 +131,15 @@ def plan_guide(
         distance, likes = (NEAR * clearance, creeping) if lies else (clearance, preferences)
         problem = PostureProblem(
             body, contacts, placements, com=com[k], proximity=proximity, clearance=distance,
-            self_clearance=distance, ignore=ignored[k], reference=wanted, preferences=likes,
+            self_clearance=distance, ignore=ignored[k] | fixed_pairs(body, proximity, contacts),
+            reference=wanted, preferences=likes,
         )  # fmt: skip
-        result = generate_posture(problem, q, settings=settings)
         flying = [name for name in placements if effectors[name].weight[k] < 1.0]
-        if not result.succeeded and flying:
-            # In flight an effector need not pass exactly where its curve does: weight of its place [1/m^2].
-            loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
-            retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
-            result = retry if retry.succeeded else result
+        # In flight an effector need not pass exactly where its curve does: weight of its place [1/m^2].
+        loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
+        near = replace(problem, clearance=NEAR * distance, self_clearance=NEAR * distance)
+        ways = (problem, near, replace(near, placements=loose))[: 3 if flying else 2]
+        result = _guide_posture(ways, q, settings, reference[k], scale)
         if not result.succeeded:
             failures.append((instant, result.failure or "posture not found"))
         q = result.q
@@ -136,9 +147,47 @@ def plan_guide(
     return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))
 
 
+def _guide_posture(
+    ways: Sequence[PostureProblem], before: FloatArray, settings: SolverSettings, preferred: FloatArray,
+    scale: FloatArray,
+) -> PostureResult:  # fmt: skip
+    """First posture that is near to the preferred one, or else the nearest.
+
+    It is sought by several problems, each from the posture before and from the preferred one: from a trunk
+    that is bent the next one is found bent, whether it has to be or not.
+    """
+
+    def order(result: PostureResult) -> tuple[bool, float]:
+        apart = difference(ways[0].body, preferred, result.q)[3:] / scale[3:]
+        return not result.succeeded, float(np.linalg.norm(apart))
+
+    found = list[PostureResult]()
+    for problem, start in product(ways, (before, preferred)):
+        found.append(generate_posture(problem, start, settings=settings))
+        if order(found[-1]) < (False, FAR):
+            return found[-1]
+    return min(found, key=order)
+
+
+FAR = 3.0
+"""Distance from the preferred posture beyond which another is sought, in scales of the manner; our choice."""
+
 LYING, NEAR = 0.7, 0.5
 """Cosine of the pelvis' tilt from which on a body creeps, without upright trunk, level head and hanging arms,
 and near to the ground: share of the wanted distance that its guide postures keep then; our choice."""
+
+
+def fixed_pairs(body: BodyModel, proximity: Proximity, contacts: Sequence[Contact]) -> Ignored:
+    """Pairs whose distance the contacts decide: whole soles with obstacles, and with each other.
+
+    No posture changes it. Contacts are chosen with less of it than postures keep elsewhere; where it is asked
+    for all the same, the search bends the rest of the body in vain.
+    """
+    soles = [c for c in contacts if c.kind is ContactKind.SOLE and c.part is SolePart.FULL]
+    still = {segment for sole in soles for segment in end_segments(body, sole.effector)}
+    moving = {segment.name for segment in body.segments} - still
+    pairs = {(segment_of(first), segment_of(second)) for first, second in proximity.pairs}
+    return frozenset(pair for pair in pairs if still.intersection(pair) and moving.isdisjoint(pair))
 
 
 def _requirements(
