@@ -23,7 +23,7 @@ from manikin.planning.com import CentroidalResult, CentroidalTrajectory, KeyPlan
 from manikin.planning.whole_body.certificate import WholeBodyRequirements
 from manikin.planning.whole_body.fit_targets import ignored_pairs, lay_toes_flat, toe_angles
 from manikin.planning.whole_body.foot_roll import FootRoll, Rolls, foot_roll
-from manikin.planning.whole_body.posture_style import READY, Guide, PostureStyle, reference_motion
+from manikin.planning.whole_body.posture_style import FAR, READY, Guide, PostureStyle, reference_motion
 from manikin.planning.whole_body.swing_planner import leaning_pairs
 from manikin.scene import Proximity, Scene
 
@@ -45,6 +45,8 @@ class KeyPosture:
         reason: What it misses and what helps, in one line; None when it is found.
         nearest_com: (3,) nearest centre of mass found with which there is a posture [m]; None when the
             posture is found, or there is none with any centre of mass.
+        easier_com: (3,) a centre of mass close by with which a posture is much nearer to the preferred one
+            [m]; None where the posture found is near, or no other one is much nearer.
     """
 
     key: int
@@ -55,6 +57,7 @@ class KeyPosture:
     q: FloatArray
     reason: str | None = None
     nearest_com: FloatArray | None = None
+    easier_com: FloatArray | None = None
 
     @property
     def found(self) -> bool:
@@ -146,6 +149,8 @@ def find_key_postures(
             # An examination takes seconds; the first is the one that is reported.
             first = all(item.found or item.nearest_com is not None for item in found)
             posture = _explained(posture, problem, result, settings, first)
+        else:
+            posture = _eased(posture, problem, manner, settings)
         found.append(posture)
         q = posture.q
     return KeyPostures(tuple(found))
@@ -179,6 +184,28 @@ def _explained(
         f"it {away:.3f} m from {np.round(posture.com, 3).tolist()}, at {np.round(com, 3).tolist()} m"
     )
     return replace(posture, reason=reason, nearest_com=com)
+
+
+EASIER_WEIGHT, EASIER, LITTLE_LONGER = 200.0, 0.7, 1.1
+"""Weight of the planned centre of mass where an easier posture is sought [1/m^2]; share of the distance from
+the preferred posture that it comes down to; most duration of a plan with it, over that of the one before."""
+
+
+def _eased(
+    posture: KeyPosture, problem: PostureProblem, manner: PostureStyle, settings: SolverSettings
+) -> KeyPosture:
+    """The posture with a centre of mass that makes it more natural, if it is far from the preferred one.
+
+    At the end of their reach legs leave the rest to trunk and arms, which are thrown up.
+    """
+    body, preferred = problem.body, problem.reference
+    strain = manner.strain(body, preferred, posture.q)
+    if preferred is None or strain < FAR:
+        return posture
+    wished = generate_posture(replace(problem, com_weight=EASIER_WEIGHT), posture.q, settings=settings)
+    com = np.array(Configuration(body, wished.q).com)
+    easier = wished.succeeded and manner.strain(body, preferred, wished.q) < EASIER * strain
+    return replace(posture, easier_com=com) if easier else posture
 
 
 def requirements_at(
@@ -249,6 +276,32 @@ class Eligibility:
     failure: IneligiblePlan | None
 
 
+def _with_easier(
+    found: Eligibility, realise: Callable[[CentroidalTrajectory], CentroidalTrajectory | None],
+    look: Callable[[CentroidalTrajectory], KeyPostures], guesses: int | None,
+) -> Eligibility:  # fmt: skip
+    """A plan with easier key postures, where there is one that is hardly slower; else the one found."""
+    plan, postures = found.centroidal, found.postures
+    assert plan.trajectory is not None
+    assert postures is not None
+    last = len(plan.problem.sequence)
+    planes = tuple(
+        KeyPlane.towards(item.key, item.com, item.easier_com)
+        for item in postures.postures if item.easier_com is not None and 0 < item.key < last
+    )  # fmt: skip
+    if not planes:
+        return found
+    problem = replace(plan.problem, key_planes=(*plan.problem.key_planes, *planes))
+    again = plan_com(problem, guesses=guesses, near=plan.trajectory)
+    if again.trajectory is None or again.trajectory.duration > LITTLE_LONGER * plan.trajectory.duration:
+        return found
+    trajectory = realise(again.trajectory)
+    easier = None if trajectory is None else look(trajectory)
+    if easier is None or easier.failed:
+        return found
+    return Eligibility(again, trajectory, easier, found.replans + 1, None)
+
+
 def find_eligible_plan(
     first: CentroidalResult, realise: Callable[[CentroidalTrajectory], CentroidalTrajectory | None],
     look: Callable[[CentroidalTrajectory], KeyPostures], *, replan: bool = True, guesses: int | None = None,
@@ -270,7 +323,8 @@ def find_eligible_plan(
             return Eligibility(plan, None, None, replans, None)
         postures = look(trajectory)
         if not postures.failed:
-            return Eligibility(plan, trajectory, postures, replans, None)
+            found = Eligibility(plan, trajectory, postures, replans, None)
+            return _with_easier(found, realise, look, guesses) if replan else found
         # None helps where there is no posture with any centre of mass, nor at both ends, where it is given.
         hopeless = [
             item for item in postures.failed

@@ -8,6 +8,7 @@ tell, before the motion is fitted, whether it can be done, and they are what the
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
+from operator import itemgetter
 from types import MappingProxyType
 
 import numpy as np
@@ -15,7 +16,7 @@ import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from manikin.body import BodyModel
-from manikin.body.configuration import Configuration, difference
+from manikin.body.configuration import Configuration, difference, interpolate
 from manikin.body.limbs import end_segments
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.errors import InputError
@@ -115,7 +116,7 @@ def plan_guide(
         restarts: Whether a posture that is not found from the one before is sought from others as well.
     """
     crawls = any(rolls_on_point(contact) for phase in schedule.sequence for contact in phase.stance)
-    preferences, scale = manner.preferences, manner.scale(body)
+    preferences = manner.preferences
     creeping = replace(preferences, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
     q, exactly = reference[0], [7 + joint for joint in exact]
     found, failures, touched = list[FloatArray](), list[tuple[float, str]](), dict[str, FloatArray]()
@@ -139,7 +140,7 @@ def plan_guide(
         loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
         near = replace(problem, clearance=NEAR * distance, self_clearance=NEAR * distance)
         ways = (problem, near, replace(near, placements=loose))[: 3 if flying else 2]
-        result = _guide_posture(ways, q, settings, reference[k], scale)
+        result = _guide_posture(ways, q, settings, reference[k], manner)
         if not result.succeeded:
             failures.append((instant, result.failure or "posture not found"))
         q = result.q
@@ -149,28 +150,34 @@ def plan_guide(
 
 def _guide_posture(
     ways: Sequence[PostureProblem], before: FloatArray, settings: SolverSettings, preferred: FloatArray,
-    scale: FloatArray,
+    manner: "PostureStyle",
 ) -> PostureResult:  # fmt: skip
     """First posture that is near to the preferred one, or else the nearest.
 
     It is sought by several problems, each from the posture before and from the preferred one: from a trunk
-    that is bent the next one is found bent, whether it has to be or not.
+    that is bent the next one is found bent, whether it has to be or not. No part of the body goes through
+    anything on the way from the posture before, if that can be had.
     """
+    body, shares = ways[0].body, np.linspace(0.0, 1.0, 5)[1:-1]
 
-    def order(result: PostureResult) -> tuple[bool, float]:
-        apart = difference(ways[0].body, preferred, result.q)[3:] / scale[3:]
-        return not result.succeeded, float(np.linalg.norm(apart))
+    def order(result: PostureResult) -> tuple[bool, bool, float]:
+        between = np.array([interpolate(body, before, result.q, share) for share in shares])
+        assert ways[0].proximity is not None
+        depth = ways[0].proximity.minimum_over(between, ways[0].ignore).distance
+        return not result.succeeded, depth < -THROUGH, manner.strain(body, preferred, result.q)
 
-    found = list[PostureResult]()
+    found = list[tuple[tuple[bool, bool, float], PostureResult]]()
     for problem, start in product(ways, (before, preferred)):
-        found.append(generate_posture(problem, start, settings=settings))
-        if order(found[-1]) < (False, FAR):
-            return found[-1]
-    return min(found, key=order)
+        result = generate_posture(problem, start, settings=settings)
+        found.append((order(result), result))
+        if found[-1][0] < (False, False, FAR):
+            return result
+    return min(found, key=itemgetter(0))[1]
 
 
-FAR = 3.0
-"""Distance from the preferred posture beyond which another is sought, in scales of the manner; our choice."""
+FAR, THROUGH = 3.0, 5.0e-3
+"""Distance from the preferred posture beyond which another is sought, in scales of the manner; depth to which
+a part of the body may go into something half way from one posture to the next [m]; our choice."""
 
 LYING, NEAR = 0.7, 0.5
 """Cosine of the pelvis' tilt from which on a body creeps, without upright trunk, level head and hanging arms,
@@ -264,6 +271,10 @@ class PostureStyle:
         for index, name in enumerate(body.joint_names):
             scale[6 + index] = next((s for key, s in self.scales.items() if key in name), 0.5)
         return scale
+
+    def strain(self, body: BodyModel, preferred: FloatArray, q: FloatArray) -> float:
+        """Distance of a posture (nq,) from a preferred one, attitude and joints in units of :meth:`scale`."""
+        return float(np.linalg.norm((difference(body, preferred, q) / self.scale(body))[3:]))
 
 
 def _degrees(**angles: float) -> Mapping[str, float]:
