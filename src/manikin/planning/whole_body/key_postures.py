@@ -199,8 +199,7 @@ def _eased(
     At the end of their reach legs leave the rest to trunk and arms, which are thrown up.
     """
     body, preferred = problem.body, problem.reference
-    strain = manner.strain(body, preferred, posture.q)
-    if preferred is None or strain < FAR:
+    if preferred is None or (strain := manner.strain(body, preferred, posture.q)) < FAR:
         return posture
     wished = generate_posture(replace(problem, com_weight=EASIER_WEIGHT), posture.q, settings=settings)
     com = np.array(Configuration(body, wished.q).com)
