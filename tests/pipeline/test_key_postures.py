@@ -8,7 +8,8 @@ import pytest
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import Report, RunContext, whole_body_stage
 from manikin.pipeline.stages.whole_body_stage import plan_centre_of_mass
-from manikin.planning.whole_body import Eligibility
+from manikin.planning.whole_body import Eligibility, key_postures
+from manikin.planning.whole_body.posture_style import FAR, READY, reference_motion
 from manikin.scenarios import load_scenario
 
 STRIDE = """
@@ -79,6 +80,36 @@ def test_a_plan_too_high_for_the_legs_is_planned_again_lower_and_executed(tmp_pa
     kept = json.loads((tmp_path / "run/stages/key_postures.json").read_text())
     np.testing.assert_allclose(kept["time_s"], result.centroidal.key_instants)
     assert kept["reason"] == [None] * 6
+
+
+def test_a_plan_at_the_end_of_the_legs_is_planned_lower_so_that_the_arms_may_hang(tmp_path, monkeypatch):
+    """Feet 0.66 m apart: the first plan has postures, with the trunk bent and arms thrown up to be that high.
+
+    The other one is hardly slower, and no posture of it is farther from the preferred one.
+    """
+    far = "[{max_support_distance_m: 1.3}]"
+    context = RunContext.of(load_scenario(stride(tmp_path, length=0.66, constraints=far)))
+    report = Report(context, None, None, 0.0)
+    planned = plan_centre_of_mass(context, report)
+    found = {}
+    for name, search in (("first", lambda found, *_: found), ("easier", key_postures._with_easier)):
+        monkeypatch.setattr(key_postures, "_with_easier", search)
+        found[name] = whole_body_stage._eligible(context, report, planned, 0.0, 1e-3)
+
+    def strains(eligible):
+        preferred = reference_motion(context.body, eligible.trajectory, eligible.trajectory.schedule.instants)
+        postures = eligible.postures.postures
+        return [READY.strain(context.body, q, item.q) for q, item in zip(preferred, postures, strict=True)]
+
+    first, easier = found["first"], found["easier"]
+    assert not first.postures.failed
+    assert not easier.postures.failed
+    assert max(strains(first)) > 2.0 * FAR
+    assert max(strains(easier)) < 0.6 * max(strains(first))
+    assert easier.trajectory.duration < key_postures.LITTLE_LONGER * first.trajectory.duration
+    for item in first.postures.postures:
+        if item.easier_com is not None:
+            assert item.easier_com[2] < item.com[2] - 0.005
 
 
 def test_a_goal_beyond_the_legs_is_named_without_planning_again(tmp_path):

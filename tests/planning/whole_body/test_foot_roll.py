@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manikin.body import human
-from manikin.contact import ContactSchedule, SolePart, roll_feet
+from manikin.contact import ContactSchedule, SolePart, Stance, StanceSequence, roll_feet
 from manikin.contact.stance import ON_TOES
 from manikin.planning.whole_body.foot_roll import (
     BALL_PITCH,
@@ -40,6 +40,25 @@ def placed(roll, curve, time, local):
     state = curve.evaluate(time)
     position, rotation = roll.pose(state.position, state.rotation, time)
     return position + rotation @ local
+
+
+@pytest.mark.parametrize("height", [0.0, 0.15, 0.6])
+def test_a_heel_rises_more_where_the_other_foot_is_higher_or_lower(height):
+    """Up or down a step alike: by what the step is over 0.22 of the stature, up to 48 degrees."""
+    body, pitches = human(1.75, 79.0, "male"), []
+    for z in (height, -height):
+        phases = [
+            replace(phase, stance=Stance([
+                replace(contact, position=contact.position + np.array([0.0, 0.0, z]))
+                if contact.effector == "right_foot" else contact for contact in phase.stance
+            ], 1500.0))
+            for phase in roll_feet(step_sequence(), HINGE)
+        ]  # fmt: skip
+        sequence = StanceSequence(phases)
+        schedule = ContactSchedule(sequence, np.cumsum([0.0, *(phase.min_duration for phase in phases)]))
+        pitches.append(foot_roll(body, schedule, sequence.swings()[0]).push_off)
+    share = min(height / (0.22 * 1.75), 1.0)
+    assert pitches == pytest.approx([PUSH_OFF_PITCH + share * (HIGHEST_PITCH - PUSH_OFF_PITCH)] * 2)
 
 
 def test_the_pivot_rests_while_the_foot_turns(rolled):

@@ -29,8 +29,9 @@ BALL_PITCH = float(np.deg2rad(20.0))
 """Pitch at landing on the ball of the foot, heel up [rad]."""
 
 HIGHEST_PITCH, HIGH_STEP = float(np.deg2rad(48.0)), 0.22
-"""Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature: with the
-heel down no leg bends far enough for the body to be over the lower foot."""
+"""Pitch at lift-off [rad] of a foot that is left behind on a step of this height over the stature, or below
+one: with the heel down no leg bends far enough for the body to be over the lower foot, and none is long
+enough for it to be over the higher one."""
 
 LEAST_PITCH = 1.0e-3
 """Least pitch of a foot on its toes [rad]."""
@@ -161,12 +162,12 @@ def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootR
     up = schedule.instants[swing.first_phase - 1] if start.part is SolePart.TOES else off
     flat = land if end.part is SolePart.FULL else schedule.instants[swing.last_phase + 2]
     others = schedule.sequence[swing.first_phase].stance
-    lower = max((float(contact.position[2]) for contact in others), default=float(end.position[2]))
-    drop = abs(float(start.position[2]) - lower) / (HIGH_STEP * (body.stature or 1.75))
+    other = max((float(contact.position[2]) for contact in others), default=float(end.position[2]))
+    step = abs(float(start.position[2]) - other) / (HIGH_STEP * (body.stature or 1.75))
     return FootRoll(
         np.array([up, off, land, flat]), Pose.of(start), Pose.of(end), np.zeros(3) if toes is None else toes,
         np.array([-0.5 * (body.sole_length or start.length), 0.0, 0.0]),
-        PUSH_OFF_PITCH + float(np.clip(drop, 0.0, 1.0)) * (HIGHEST_PITCH - PUSH_OFF_PITCH),
+        PUSH_OFF_PITCH + min(step, 1.0) * (HIGHEST_PITCH - PUSH_OFF_PITCH),
         BALL_PITCH if end.part is SolePart.TOES else -HEEL_STRIKE_PITCH,
     )  # fmt: skip
 
