@@ -272,18 +272,32 @@ def test_mesh_with_too_many_loose_triangles_is_refused():
 
 @pytest.mark.parametrize("change", [
     {"timestep": 0.0}, {"timestep": float("nan")}, {"friction": 0.0}, {"friction": -0.5},
-    {"armature": -1.0}, {"joint_damping": float("inf")}, {"soft_time_constant": 0},
+    {"least_inertia": -1.0}, {"joint_damping": float("inf")}, {"soft_time_constant": 0},
 ])  # fmt: skip
 def test_nonsense_options_are_refused(change):
     with pytest.raises(InputError, match="valid"):
         PhysicsOptions(**change)
 
 
-def test_damping_and_armature_reach_the_hinges_only():
-    model = compile_model(human(), options=PhysicsOptions(joint_damping=1.5, armature=0.02))
+def test_damping_reaches_the_hinges_only():
+    model = compile_model(human(), options=PhysicsOptions(joint_damping=1.5))
     damping = np.asarray(model.mujoco.dof_damping).reshape(model.mujoco.nv, -1)[:, 0]
     np.testing.assert_allclose(damping, [0.0] * 6 + [1.5] * 39)
-    np.testing.assert_allclose(model.mujoco.dof_armature, [0.0] * 6 + [0.02] * 39)
+
+
+@pytest.mark.parametrize("least", [0.0, 1e-3, 0.02])
+def test_hinges_move_at_least_the_least_inertia(least):
+    """About each hinge of a body that stands, and no more than its own where that is enough."""
+    body = human()
+    model = compile_model(body, options=PhysicsOptions(least_inertia=least))
+    data, q = mujoco.MjData(model.mujoco), body.standing_posture()
+    model.set_state(data, q, np.zeros(body.nv))
+    own, found = np.diag(Configuration(body, q).mass_matrix)[6:], np.diag(full_mass_matrix(model, data))[6:]
+    np.testing.assert_allclose(found, np.maximum(own, least), rtol=1e-6)
+    assert np.all(np.asarray(model.mujoco.dof_armature)[:6] == 0.0)
+    if least == 1e-3:
+        lacking = {name for name, value in zip(body.joint_names, own, strict=True) if value < least}
+        assert lacking == {"left_toe_extension", "right_toe_extension"}
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-4, 1e-3])

@@ -22,6 +22,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Hinge, Segment, Shape, ShapeKind
@@ -43,7 +44,8 @@ class PhysicsOptions:
         contact_time_constant: How fast a contact pushes penetration out [s]; at least two time steps.
         soft_time_constant: The same for segments with their own friction: flesh on a cushion [s].
         joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
-        armature: Inertia added to the axis of each hinge [kg.m^2]; 0 keeps the planning model's mass matrix.
+        least_inertia: Least inertia about a hinge of all that it moves [kg.m^2]; what lacks is added. 0 keeps
+            the planning model's mass matrix.
         joint_limits: Whether hinges stop at the ends of their ranges.
         crossed: Boxes that soles lie across, see :func:`is_narrow`; they are convex meshes.
         self_collision: Whether :attr:`~manikin.body.BodyModel.collision_pairs` may touch.
@@ -56,7 +58,7 @@ class PhysicsOptions:
     contact_time_constant: float = 5e-3
     soft_time_constant: float = 0.012
     joint_damping: float = 0.0
-    armature: float = 0.0
+    least_inertia: float = 0.0
     joint_limits: bool = True
     self_collision: bool = True
     crossed: tuple[str, ...] = ()
@@ -66,7 +68,7 @@ class PhysicsOptions:
             finite_number(getattr(self, name), f"physics {name}", above=0.0)
         for segment, value in (*self.contact_friction, *self.segment_friction):
             finite_number(value, f"physics friction of {segment}", above=0.0)
-        for name in ("joint_damping", "armature"):
+        for name in ("joint_damping", "least_inertia"):
             finite_number(getattr(self, name), f"physics {name}", at_least=0.0)
 
     def with_friction(self, factor: float) -> "PhysicsOptions":
@@ -272,8 +274,8 @@ def compile_model(
 ) -> SimulationModel:  # fmt: skip
     """Compile a body and a scene to MuJoCo.
 
-    With the default options (no damping, no armature) mass matrix and bias forces are those of the Pinocchio
-    model. The pairs that may touch are :attr:`BodyModel.segment_pairs`; MuJoCo's filter of parents is off.
+    With the default options (no damping, no least inertia) mass matrix and bias forces are those of Pinocchio.
+    The pairs that may touch are :attr:`BodyModel.segment_pairs`; MuJoCo's filter of parents is off.
 
     Args:
         scene: Obstacles and floor; None for an empty world without a floor.
@@ -318,7 +320,7 @@ def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:
 
 def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
     made: dict[str, Any] = {}
-    contact = _contact(options, scenery=False)
+    contact, lacking = _contact(options, scenery=False), _lacking_inertia(body, options.least_inertia)
     for segment in body.segments:
         parent = spec.worldbody if segment.parent is None else made[segment.parent]
         item = parent.add_body(name=segment.name, pos=segment.origin)
@@ -328,7 +330,7 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
         if segment.parent is None:
             item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
         for hinge in segment.hinges:
-            _add_hinge(spec, item, hinge, options)
+            _add_hinge(spec, item, hinge, options, lacking[hinge.name])
         friction = dict(options.contact_friction).get(segment.name)
         soft = dict(options.segment_friction).get(segment.name)
         # Of two geometries the engine takes the larger friction.
@@ -351,11 +353,18 @@ SOFT_IMPEDANCE = (0.3, 0.8, 0.005)
 under load, so that a body slides on a cushion instead of bouncing along it."""
 
 
-def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions) -> None:
+def _lacking_inertia(body: BodyModel, least: float) -> dict[str, float]:
+    """Inertia about each hinge [kg.m^2] that what it moves has less than the least, standing."""
+    model = body.pinocchio
+    own = np.diag(pin.crba(model, model.createData(), body.standing_posture()))[6:]
+    return dict(zip(body.joint_names, np.maximum(least - own, 0.0).tolist(), strict=True))
+
+
+def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions, armature: float) -> None:
     item.add_joint(
         name=hinge.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=hinge.axis, pos=[0.0, 0.0, 0.0],
         limited=options.joint_limits, range=[hinge.lower, hinge.upper],
-        damping=[options.joint_damping, 0.0, 0.0], armature=options.armature,
+        damping=[options.joint_damping, 0.0, 0.0], armature=armature,
     )  # fmt: skip
     motor = spec.add_actuator(
         name=hinge.name, target=hinge.name, trntype=mujoco.mjtTrn.mjTRN_JOINT,

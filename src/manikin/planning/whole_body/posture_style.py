@@ -138,7 +138,7 @@ def plan_guide(
         flying = [name for name in placements if effectors[name].weight[k] < 1.0]
         # In flight an effector need not pass exactly where its curve does: weight of its place [1/m^2].
         loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
-        near = replace(problem, clearance=NEAR * distance, self_clearance=NEAR * distance)
+        near = replace(problem, clearance=NEAR * distance)
         ways = (problem, near, replace(near, placements=loose))[: 3 if flying else 2]
         result = _guide_posture(ways, q, settings, reference[k], manner)
         if not result.succeeded:
