@@ -274,7 +274,7 @@ def compile_model(
 ) -> SimulationModel:  # fmt: skip
     """Compile a body and a scene to MuJoCo.
 
-    With the default options (no damping, no least inertia) mass matrix and bias forces are those of Pinocchio.
+    By default (no damping, no least inertia) the mass matrix and the bias forces are those of Pinocchio.
     The pairs that may touch are :attr:`BodyModel.segment_pairs`; MuJoCo's filter of parents is off.
 
     Args:
