@@ -152,7 +152,7 @@ def _guide_posture(
     ways: Sequence[PostureProblem], before: FloatArray, settings: SolverSettings, preferred: FloatArray,
     manner: "PostureStyle",
 ) -> PostureResult:  # fmt: skip
-    """First posture that is near to the preferred one, or else the nearest.
+    """First posture that is near to the preferred one and to the one before, or else the nearest.
 
     It is sought by several problems, each from the posture before and from the preferred one: from a trunk
     that is bent the next one is found bent, whether it has to be or not. No part of the body goes through
@@ -164,20 +164,22 @@ def _guide_posture(
         between = np.array([interpolate(body, before, result.q, share) for share in shares])
         assert ways[0].proximity is not None
         depth = ways[0].proximity.minimum_over(between, ways[0].ignore).distance
-        return not result.succeeded, depth < -THROUGH, manner.strain(body, preferred, result.q)
+        apart = sum(manner.strain(body, near, result.q) for near in (preferred, before))
+        return not result.succeeded, depth < -THROUGH, apart
 
     found = list[tuple[tuple[bool, bool, float], PostureResult]]()
     for problem, start in product(ways, (before, preferred)):
         result = generate_posture(problem, start, settings=settings)
         found.append((order(result), result))
-        if found[-1][0] < (False, False, FAR):
+        if found[-1][0] < (False, False, FAR + NEXT):
             return result
     return min(found, key=itemgetter(0))[1]
 
 
-FAR, THROUGH = 3.0, 5.0e-3
-"""Distance from the preferred posture beyond which another is sought, in scales of the manner; depth to which
-a part of the body may go into something half way from one posture to the next [m]; our choice."""
+FAR, NEXT, THROUGH = 3.0, 1.0, 5.0e-3
+"""Distances from the preferred posture and from the one before, in scales of the manner, beyond whose sum another
+one is sought; depth to which a part of the body may go into something half way from one posture to the next
+[m]; our choice."""
 
 LYING, NEAR = 0.7, 0.5
 """Cosine of the pelvis' tilt from which on a body creeps, without upright trunk, level head and hanging arms,
