@@ -177,9 +177,9 @@ def _guide_posture(
 
 
 FAR, NEXT, THROUGH = 3.0, 1.0, 5.0e-3
-"""Distances from the preferred posture and from the one before, in scales of the manner, beyond whose sum another
-one is sought; depth to which a part of the body may go into something half way from one posture to the next
-[m]; our choice."""
+"""Distances from the preferred posture and from the one before, in scales of the manner, beyond whose sum
+another one is sought; depth to which a part of the body may go into something half way from one posture to
+the next [m]; our choice."""
 
 LYING, NEAR = 0.7, 0.5
 """Cosine of the pelvis' tilt from which on a body creeps, without upright trunk, level head and hanging arms,
