@@ -108,7 +108,8 @@ def test_the_motion_file_holds_both_motions(platform):
 def test_the_lowest_margin_is_explained_as_in_the_summary(platform, which):
     """Found again from the file, by the planned contacts and from the effectors alone.
 
-    The execution's lowest margin has the same foot; over which of its edges it would tip may differ.
+    The execution's lowest margin may be at another instant: it is that of a foot that stands then. It counts
+    the points that carried; the whole soles of the plan give it to a tenth.
     """
     content = read_motions(platform.directory / "motion.h5")
     motion = content.motions[which]
@@ -116,10 +117,16 @@ def test_the_lowest_margin_is_explained_as_in_the_summary(platform, which):
     for schedule in (content.schedule, None):
         found = lowest_margin(content.body, motion, schedule)
         assert found.value == pytest.approx(platform.summary[stage]["min_margin"], abs=1e-9)
-        assert found.reproduced
+        assert found.reproduced or which == "executed"
+        assert found.again == pytest.approx(found.value, rel=0.1)
         expected = platform.summary["centroidal"]["limiting_contact"]
         told = found.limiting.description
-        assert told == expected if which == "planned" else told.split(":")[0] == expected.split(":")[0]
+        if which == "planned":
+            assert told == expected
+        else:
+            stands = motion.support[int(np.argmin(np.abs(motion.time - found.time)))]
+            foot = ("left_foot", "right_foot").index(told.split(":")[0])
+            assert stands[foot]
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ from manikin.planning.whole_body.fit_job import (
     sample_times,
 )
 from manikin.planning.whole_body.fit_scales import FitScales
-from manikin.planning.whole_body.posture_style import CLOSE
+from manikin.planning.whole_body.posture_style import CLOSE, READY
 from manikin.scene import Box, Obstacle, Scene
 
 MODULE = importlib.import_module("manikin.planning.whole_body.plan_whole_body")
@@ -236,28 +236,32 @@ def step_attempt(person, flat_ground, step_com):
     return first_attempt(person, flat_ground, step_com)
 
 
-def test_where_straight_toes_are_in_the_way_they_may_bend(
-    step_motion, step_attempt, person, flat_ground, step_com, monkeypatch
-):
+def test_where_straight_toes_are_in_the_way_they_may_bend(person, flat_ground, step_com, monkeypatch):
     """Toes that are too near something while they are straight are fitted without that.
 
-    The other requirements are kept with and without; the fit that counts differs in the toes.
+    Both fits are led by toes bent by 3 degrees; straight ones keep a tenth of that where their foot stands.
     """
-    attempt, straight = MODULE._Planner._attempt, []
+    attempt, fits = MODULE._Planner._attempt, {}
 
-    def nothing_with_straight_toes(planner, swings, manner, progress, straight_toes=True):
-        straight.append(straight_toes)
-        if straight_toes:
-            return blocked(step_attempt, "min_clearance_m", -0.004, "left_toes/sole")
-        return attempt(planner, swings, manner, progress, straight_toes)
+    def too_near_with_straight_toes(planner, swings, manner, progress, straight_toes=True):
+        found = fits[straight_toes] = attempt(planner, swings, manner, progress, straight_toes)
+        return blocked(found, "min_clearance_m", -0.004, "left_toes/sole") if straight_toes else found
 
-    monkeypatch.setattr(MODULE._Planner, "_attempt", nothing_with_straight_toes)
-    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
-    assert straight == [True, False]
+    monkeypatch.setattr(MODULE._Planner, "_attempt", too_near_with_straight_toes)
+    bent = replace(READY, angles={**READY.angles, "toe_extension": np.radians(3.0)})
+    settings = WholeBodySettings(manner=bent)
+    result = plan_whole_body(
+        person, flat_ground, step_com, rng=np.random.default_rng(0), settings=settings
+    )  # fmt: skip
+    assert [*fits] == [True, False]
     assert result.succeeded, result.failure
-    toes = [7 + k for k, name in enumerate(person.joint_names) if name.endswith("toe_extension")]
-    held, loose = (np.abs(motion.q[:, toes]).max() for motion in (step_motion.motion, result.motion))
-    assert loose > held
+    toes = 7 + person.joint_index("right_toe_extension")
+    foot = step_com.schedule.sequence.effectors.index("right_foot")
+    straight, free = (
+        np.median(motion.q[motion.support[:, foot].astype(bool), toes])
+        for motion in (fits[way].motion for way in (True, False))
+    )
+    assert straight < np.radians(0.3) < np.radians(2.0) < free
 
 
 @pytest.mark.parametrize(

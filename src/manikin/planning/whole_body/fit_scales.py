@@ -46,7 +46,7 @@ class MotionScales:
     velocity_share: float = 0.9
     torque_share: float = 0.02
     strength_share: float = 0.85
-    acceleration: float = 32.0
+    acceleration: float = 24.0
     pelvis_acceleration: float = 4.0
     rest: float = 1.0e-3
     max_iterations: int = 30
