@@ -85,7 +85,7 @@ def test_a_plan_too_high_for_the_legs_is_planned_again_lower_and_executed(tmp_pa
 def test_a_plan_at_the_end_of_the_legs_is_planned_lower_so_that_the_arms_may_hang(tmp_path, monkeypatch):
     """Feet 0.66 m apart: the first plan has postures, with the trunk bent and arms thrown up to be that high.
 
-    The other one is hardly slower, and no posture of it is farther from the preferred one.
+    The other one is hardly slower, and its farthest posture is nearer to the preferred one.
     """
     far = "[{max_support_distance_m: 1.3}]"
     context = RunContext.of(load_scenario(stride(tmp_path, length=0.66, constraints=far)))

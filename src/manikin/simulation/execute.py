@@ -27,13 +27,13 @@ from manikin.simulation.world import Grip, World
 
 JOINT_DAMPING = 0.1
 """Passive damping of every joint in the default physics [N.m.s/rad]. Relaxed human joints have about 0.1 to
-2; the engine's contact solver does not see damping, so that a light segment under load (toes: 3e-4 kg.m^2)
+2; the engine's contact solver does not see damping, so that a light segment under load (toes: 1.6e-4 kg.m^2)
 sinks and chatters where damping times time step exceeds its inertia. The controller overcomes the damping."""
 
 LEAST_INERTIA = 1.4e-5
 """Least inertia of what a hinge moves in the default physics, over the body's mass and the squared height of
-its centre of mass standing: 1e-3 kg.m^2 for a man, which toes alone lack. They chattered where a heel rose
-under load, at 75 rad/s and 10 mm into the floor. The controller does not know it."""
+its centre of mass standing: 1e-3 kg.m^2 for a man, which toes alone lack (1.6e-4). They chattered where a
+heel rose under load, at 75 rad/s and 10 mm into the floor. The controller does not know it; our choice."""
 
 CONTACT_TIME = 3e-3
 """Time constant of the contacts in the default physics [s]: a stiff floor, three time steps. Halves sinking
