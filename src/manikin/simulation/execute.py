@@ -62,20 +62,24 @@ class _Hold:
     obstacles: tuple[str, ...]
 
 
+def body_physics(body: BodyModel) -> PhysicsOptions:
+    """Physics of every simulation of a body: stiff contacts, passive damping, and a least inertia."""
+    height = float(Configuration(body).com[2])
+    return PhysicsOptions(
+        joint_damping=JOINT_DAMPING, least_inertia=LEAST_INERTIA * body.mass * height**2,
+        contact_time_constant=CONTACT_TIME,
+    )  # fmt: skip
+
+
 def default_physics(body: BodyModel, schedule: ContactSchedule) -> PhysicsOptions:
-    """Physics of an execution: stiff contacts, passive damping, and the friction of the planned contacts.
+    """Physics of an execution: :func:`body_physics` with the friction of the planned contacts.
 
     Each segment that makes contact has the least friction of its own contacts, everything else the least of
     all: feet do not slip because a seat is smooth. One that slides to its place has that friction alone.
     """
     contacts = [c for phase in schedule.sequence for c in phase.stance if c.kind is not ContactKind.GRASP]
-    height = float(Configuration(body).com[2])
-    options = PhysicsOptions(
-        joint_damping=JOINT_DAMPING, least_inertia=LEAST_INERTIA * body.mass * height**2,
-        contact_time_constant=CONTACT_TIME,
-    )  # fmt: skip
     sliding = {body.effector(c.effector).segment: c.friction for c in contacts if c.settle > 0.0}
-    options = replace(options, segment_friction=tuple(sorted(sliding.items())))
+    options = replace(body_physics(body), segment_friction=tuple(sorted(sliding.items())))
     firm: dict[str, float] = {}
     for contact in contacts:
         if contact.settle == 0.0:

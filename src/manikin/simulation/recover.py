@@ -4,7 +4,7 @@ import math
 import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import mujoco
@@ -19,8 +19,8 @@ from manikin.control.stepping import SteppingRecovery, StepSettings
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.scene import Scene
-from manikin.simulation.compile import PhysicsOptions, compile_model
-from manikin.simulation.execute import CONTACT_TIME, JOINT_DAMPING
+from manikin.simulation.compile import compile_model
+from manikin.simulation.execute import JOINT_DAMPING, body_physics
 from manikin.simulation.push_force import Push
 from manikin.simulation.recovery import Recovery, at_rest, judge, trunk_lean
 from manikin.simulation.recovery_record import RecoveryRecorder
@@ -118,9 +118,7 @@ class _RecoveryRun:
         if task.until_at_rest is not None:
             finite_number(task.until_at_rest, "until_at_rest [s]", above=0.0)
         self.q = np.array(body.standing_posture() if task.q is None else task.q, dtype=np.float64)
-        physics = PhysicsOptions(
-            friction=task.friction, joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME
-        )
+        physics = replace(body_physics(body), friction=task.friction)
         damping = np.full(body.nv - 6, JOINT_DAMPING)
         welded = task.feet is Feet.HELD
         if welded and task.steps:

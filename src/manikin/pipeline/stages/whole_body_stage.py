@@ -51,7 +51,7 @@ class KeyedPlan:
         centroidal: The plan, the last one where it was planned again.
         trajectory: It on the real supports; None where it cannot be done.
         postures: Its key postures, or None.
-        replans: Plans tried after the first one.
+        replans: Plans tried after the first one because a posture failed.
     """
 
     centroidal: CentroidalResult
@@ -100,6 +100,7 @@ def _eligible(
     context: RunContext, report: Report, planned: CentroidalResult, range_margin: float, tolerance: float
 ) -> Eligibility:
     """Test the key postures of a plan, and plan again where they fail."""
+    replan = not isinstance(context.problem, KeyframeProblem)
 
     def realise(trajectory: CentroidalTrajectory) -> CentroidalTrajectory | None:
         return _on_real_supports(context, report, trajectory)
@@ -109,13 +110,12 @@ def _eligible(
             context.body, context.scene, trajectory, manner=context.settings.manner,
             requirements=context.settings.requirements, range_margin=range_margin,
             tolerance=tolerance, known=_planned_postures(context, trajectory.schedule),
-            padded=() if context.plan is None else context.padded,
+            padded=() if context.plan is None else context.padded, ease=replan,
         )  # fmt: skip
 
     # Where the body may rest instead, only the way that was found is mended.
     return find_eligible_plan(
-        planned, realise, look, replan=not isinstance(context.problem, KeyframeProblem),
-        guesses=None if context.resting is None else 0,
+        planned, realise, look, replan=replan, guesses=None if context.resting is None else 0,
     )  # fmt: skip
 
 

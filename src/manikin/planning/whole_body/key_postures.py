@@ -108,6 +108,7 @@ def find_key_postures(
     body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, *, manner: PostureStyle = READY,
     requirements: WholeBodyRequirements | None = None, range_margin: float = 0.0,
     tolerance: float = SETTINGS.tolerance, known: FloatArray | None = None, padded: Sequence[str] = (),
+    ease: bool = True,
 ) -> KeyPostures:  # fmt: skip
     """Look for a posture at every key instant until which the trajectory binds.
 
@@ -119,6 +120,7 @@ def find_key_postures(
         known: (phases + 1, nq) postures from which each search starts and to which it stays near; the
             posture before and the manner's when omitted.
         padded: Obstacles that any part of the body may lean on.
+        ease: Whether postures far from the preferred ones ask for an easier centre of mass.
     """
     schedule = trajectory.schedule
     time = schedule.instants[trajectory.binds(schedule.instants)]
@@ -149,7 +151,7 @@ def find_key_postures(
             # An examination takes seconds; the first is the one that is reported.
             first = all(item.found or item.nearest_com is not None for item in found)
             posture = _explained(posture, problem, result, settings, first)
-        else:
+        elif ease:
             posture = _eased(posture, problem, manner, settings)
         found.append(posture)
         q = posture.q
@@ -264,7 +266,7 @@ class Eligibility:
         centroidal: The last plan that was found.
         trajectory: It, completed; None when it could not be.
         postures: Its key postures; None without a trajectory.
-        replans: Plans tried after the first one.
+        replans: Plans tried after the first one because a posture failed.
         failure: Why the plan cannot be done, or None.
     """
 
@@ -298,7 +300,7 @@ def _with_easier(
     easier = None if trajectory is None else look(trajectory)
     if easier is None or easier.failed:
         return found
-    return Eligibility(again, trajectory, easier, found.replans + 1, None)
+    return Eligibility(again, trajectory, easier, found.replans, None)
 
 
 def find_eligible_plan(
