@@ -1,6 +1,7 @@
 """Key postures decide about a plan of the centre of mass, and a failed one leads to another plan."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import pytest
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import Report, RunContext, whole_body_stage
 from manikin.pipeline.stages.whole_body_stage import plan_centre_of_mass
+from manikin.planning.com.feasibility import Failure
 from manikin.planning.whole_body import Eligibility, key_postures
+from manikin.planning.whole_body.key_postures import KeyPosture, KeyPostures
 from manikin.planning.whole_body.posture_style import FAR, READY, reference_motion
 from manikin.scenarios import load_scenario
 
@@ -171,3 +174,28 @@ def test_a_stricter_search_counts_only_where_it_leads_to_another_plan(ramp, monk
     assert other is not None
     assert other.replans == found.replans + 1
     assert report.failure is None
+
+
+def test_a_plan_that_cannot_pass_well_inside_a_place_passes_just_inside(ramp, monkeypatch):
+    """A posture exists 5 mm away; 10 mm farther no plan passes: the one that does is 2 mm farther."""
+    context, _, planned = ramp
+    time, beyond, there = planned.trajectory.schedule.instants[1], [], planned.trajectory.position
+    near = there(time) - [0.0, 0.0, 0.005]
+    nothing = KeyPosture(1, time, 0, ("left_foot",), there(time), context.body.standing_posture(), "x", near)
+    search = key_postures.plan_com
+
+    def narrow(problem, **options):
+        beyond.append(problem.key_planes[-1].violation(near))
+        if beyond[-1] > 0.005:
+            return replace(planned, trajectory=None, failure=Failure("key plane", "no trajectory found"))
+        return search(problem, **options)
+
+    def look(trajectory):
+        return KeyPostures((nothing,) if trajectory.position(time)[2] > near[2] else ())
+
+    monkeypatch.setattr(key_postures, "plan_com", narrow)
+    found = key_postures.find_eligible_plan(planned, lambda trajectory: trajectory, look)
+    assert found.failure is None
+    assert found.replans == 1
+    np.testing.assert_allclose(beyond, [0.01, 0.002])
+    assert found.trajectory.position(time)[2] <= near[2] - 0.002 + 1e-6

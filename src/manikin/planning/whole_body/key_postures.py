@@ -188,6 +188,10 @@ def _explained(
     return replace(posture, reason=reason, nearest_com=com)
 
 
+BEYOND = (0.01, 0.002)
+"""How far a new plan is kept inside the place where a posture begins to exist, the second where no plan keeps
+the first [m]."""
+
 EASIER_WEIGHT, EASIER, LITTLE_LONGER = 200.0, 0.7, 1.1
 """Weight of the planned centre of mass where an easier posture is sought [1/m^2]; share of the distance from
 the preferred posture that it comes down to; most duration of a plan with it, over that of the one before."""
@@ -334,14 +338,16 @@ def find_eligible_plan(
         worst = (hopeless or postures.failed)[0]
         stage, cause = "wholebody", ""
         if replan and replans < 3 and not hopeless:
-            # A new plan is kept inside the place where a posture begins to exist [m].
-            planes = (
-                KeyPlane.towards(item.key, item.com, item.nearest_com, 0.01)
-                for item in postures.failed if item.nearest_com is not None
-            )  # fmt: skip
-            tightened = replace(plan.problem, key_planes=(*plan.problem.key_planes, *planes))
-            again = plan_com(tightened, guesses=guesses, near=plan.trajectory)
             replans += 1
+            for beyond in BEYOND:
+                planes = tuple(
+                    KeyPlane.towards(item.key, item.com, item.nearest_com, beyond)
+                    for item in postures.failed if item.nearest_com is not None
+                )  # fmt: skip
+                tightened = replace(plan.problem, key_planes=(*plan.problem.key_planes, *planes))
+                again = plan_com(tightened, guesses=guesses, near=plan.trajectory)
+                if again.failure is None:
+                    break
             if again.failure is None:
                 plan = again
                 continue
