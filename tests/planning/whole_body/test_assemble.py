@@ -320,7 +320,7 @@ def test_a_step_found_by_the_bi_rrt_is_followed_like_any_other(person, flat_grou
     real = swing_planner.plan_swing
 
     def fails(*args, **kwargs):
-        return replace(real(*args, **kwargs), failure="made to fail")
+        return replace(real(*args, **kwargs), clearance=-0.01, failure="made to fail")
 
     monkeypatch.setattr(swing_planner, "plan_swing", fails)
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))

@@ -46,12 +46,12 @@ def test_every_step_of_the_platform_has_a_smooth_curve_that_keeps_clear(planner)
 
 @pytest.mark.parametrize("number", [0, 2])
 def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypatch, number):
-    """With the smooth family made to fail, a step of the platform is searched instead."""
+    """With the smooth family made to pass through something, a step of the platform is searched instead."""
     swing = planner.flights[number]
     real = swing_planner.plan_swing
 
     def fails(*args, **kwargs):
-        return replace(real(*args, **kwargs), failure="made to fail")
+        return replace(real(*args, **kwargs), clearance=-0.01, failure="made to fail")
 
     monkeypatch.setattr(swing_planner, "plan_swing", fails)
     found = planner._planned(swing)  # not the flight that is known
@@ -59,6 +59,18 @@ def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypat
     check = check_swing(found.curve, planner._clearance(swing), SwingLimits())
     # The search checks at its own instants; between them 2 mm may be lost.
     assert check.slack > -2e-3
+
+
+def test_a_curve_a_little_too_near_or_too_fast_is_not_searched_anew(planner, monkeypatch):
+    """The fit has the last word on it; what it misses is known."""
+    real = swing_planner.plan_swing
+
+    def near(*args, **kwargs):
+        return replace(real(*args, **kwargs), clearance=0.02, failure="speed reaches 3.06 m/s")
+
+    monkeypatch.setattr(swing_planner, "plan_swing", near)
+    found = planner._planned(planner.flights[0])
+    assert (found.method, found.failure, found.searched) == ("smooth", "speed reaches 3.06 m/s", False)
 
 
 def test_a_roll_is_searched_where_no_smooth_curve_is_clear(monkeypatch):

@@ -350,12 +350,11 @@ class _Planner:
         """Replace a smooth swing whose limb comes too near to something, when there is one."""
         time = best.certificate["min_clearance_m"].time_s or 0.0
         for index, item in enumerate(swings):
-            smooth = item.method == "smooth" and item.failure is None and item.roll is None
+            smooth = item.method == "smooth" and not item.searched and item.roll is None
             # A clearance that is missed this close to a flight is put down to it [s].
             near = item.interval[0] - 0.05 <= time <= item.interval[1] + 0.05
             if smooth and near and best.is_too_near(_limb_of(self.body, item.swing.effector)):
-                # Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it.
-                other = self.flights.search(item.swing, item, iterations=600)
+                other = self.flights.search(item.swing, item)
                 if other.method != item.method:
                     return (*swings[:index], other, *swings[index + 1 :])
         return None

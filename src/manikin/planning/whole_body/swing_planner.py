@@ -39,6 +39,10 @@ ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
 
 
+RANDOM_POINTS = 600
+"""Random points of a search."""
+
+
 def with_mid_flights(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, padded: Sequence[str] = (), *,
     dense: bool = False,
@@ -139,7 +143,7 @@ def _clear_flight(
     # The Bi-RRT asks for a clear effector only; its draws are always the same, and its flights slower.
     rng, slower = np.random.default_rng(0), replace(limits, speed=2.0, angular_speed=5.0)
     found = search_swing(
-        *ends, *interval, check(0.0), rng, roomy=check(ROOM), limits=slower, iterations=600
+        *ends, *interval, check(0.0), rng, roomy=check(ROOM), limits=slower, iterations=RANDOM_POINTS
     )  # fmt: skip
     return None if found.curve is None else (found.curve, is_clear)
 
@@ -166,6 +170,7 @@ class PlannedSwing:
         method: ``"smooth"``, ``"bi-rrt"``, or ``"reach"`` for an effector that is free at one end.
         failure: None, or what the best attempt does not keep.
         roll: How the foot pitches; the curve is then that of the point it tilts about.
+        searched: Whether the Bi-RRT has been asked.
     """
 
     swing: Swing
@@ -173,6 +178,7 @@ class PlannedSwing:
     method: str
     failure: str | None = None
     roll: FootRoll | None = None
+    searched: bool = False
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -233,9 +239,8 @@ class FlightPlanner:
             end_normal=swing.end.normal, pitch=pitch, heights=heights, laterals=self._laterals(swing),
         )  # fmt: skip
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure, roll)
-        if plan.succeeded or (roll is not None and plan.clearance >= 0.0):
-            return smooth  # a foot that rolls may come a little nearer than wanted
-        return self.search(swing, smooth, 2000 if roll is None else 600)
+        # One that is a little nearer or faster than wanted may do: the fit has the last word.
+        return smooth if plan.succeeded or plan.clearance >= 0.0 else self.search(swing, smooth)
 
     def _way(self, swing: Swing, roll: FootRoll | None) -> tuple[tuple[Pose, Pose], Clearance, SwingLimits]:
         """Poses at both ends of a flight, the clearance of a pose, and limits; of the pivot of a roll."""
@@ -292,7 +297,7 @@ class FlightPlanner:
 
         return clearance
 
-    def search(self, swing: Swing, fallback: PlannedSwing, iterations: int = 2000) -> PlannedSwing:
+    def search(self, swing: Swing, fallback: PlannedSwing) -> PlannedSwing:
         """Search a curve with the Bi-RRT; ``fallback`` when there is none, with whose roll it is.
 
         A foot that lies flat at its ends must have postures on its way; a roll is kept clear alone.
@@ -308,12 +313,12 @@ class FlightPlanner:
             return PostureCheck(swing.effector, partial(self._problem, swing), screen, rotation_weight=0.3)
 
         found = search_swing(
-            *ends, *times, check(0.0), self._rng, roomy=check(ROOM), limits=limits, iterations=iterations
+            *ends, *times, check(0.0), self._rng, roomy=check(ROOM), limits=limits, iterations=RANDOM_POINTS
         )
         if found.curve is None:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
-            return PlannedSwing(swing, fallback.curve, fallback.method, reason, roll)
-        return PlannedSwing(swing, found.curve, "bi-rrt", roll=roll)
+            return replace(fallback, failure=reason, searched=True)
+        return PlannedSwing(swing, found.curve, "bi-rrt", roll=roll, searched=True)
 
     def _laterals(self, swing: Swing) -> tuple[float, ...]:
         """Offsets with which the limb does not pass round the far side of one that stands beside its way."""
