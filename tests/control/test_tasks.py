@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -6,7 +8,7 @@ from hypothesis import strategies as st
 
 from manikin.balance.friction import edges_in_world
 from manikin.contact import grasp, sole
-from manikin.control.build_qp import joint_acceleration_bounds
+from manikin.control.build_qp import JointBounds, joint_acceleration_bounds
 from manikin.control.dynamics import Dynamics
 from manikin.control.edge_forces import contact_force_basis, contact_geometry
 from manikin.control.reference import Reference
@@ -110,17 +112,50 @@ def test_grasp_forces_are_bounded_along_world_axes(body):
 @given(angle=st.floats(-2, 2), speed=st.floats(-20, 20))
 def test_acceleration_bounds_are_never_contradictory(angle, speed):
     """Lower never exceeds upper, and a joint inside its range is sent to neither end."""
-    one = np.ones(1)
-    least, greatest = joint_acceleration_bounds(angle * one, speed * one, -one, one, 10.0 * one, 0.05, 500.0)
+    one, coming = np.ones(1), angle + 0.05 * speed
+    least, greatest = joint_acceleration_bounds(
+        coming * one, speed * one, 0.0 * one, -one, one, 10.0 * one, 0.05, 500.0
+    )
     assert least <= greatest
-    if abs(angle + 0.05 * speed) < 1 and abs(speed) < 10:
+    if abs(coming) < 1 and abs(speed) < 10:
         assert least <= 0.0 <= greatest
+
+
+@pytest.mark.parametrize("away", [0.0, 0.03])
+def test_a_joint_may_follow_a_quick_plan_to_the_end_of_its_range_and_is_stopped_off_it(body, away):
+    """20 degrees in 0.15 s by minimum jerk, to 1 degree from the end: 90 rad/s^2 in two directions.
+
+    From its speed alone it would be expected beyond its range, and be held back by more than 20 rad/s^2.
+    """
+    joint, horizon, duration = body.joint_index("left_ankle_dorsiflexion"), 0.05, 0.15
+    time, amplitude = np.linspace(-0.05, 0.25, 601), np.radians(20.0)
+    share = np.clip(time / duration, 0.0, 1.0)
+    q, v, a = (np.zeros((len(time), body.nv + 1 - k)) for k in (0, 1, 1))
+    q[:, 6] = 1.0
+    q[:, 7 + joint] = (
+        body.upper[joint] - np.radians(21.0) + amplitude * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    )
+    v[:, 6 + joint] = amplitude * 30.0 * share**2 * (1.0 - share) ** 2 / duration
+    a[:, 6 + joint] = amplitude * 60.0 * share * (1.0 - share) * (1.0 - 2.0 * share) / duration**2
+    within, held_back = True, 0.0
+    for k in np.flatnonzero((time >= 0.0) & (time <= duration)).tolist():
+        later = k + round(horizon / 5e-4)
+        planned = SimpleNamespace(q=q[k], v=v[k], a=a[k], later=(q[later, 7:], v[later, 6:]))
+        there = q[k].copy()
+        there[7 + joint] += away
+        state = SimpleNamespace(q=there, v=v[k])
+        greatest = JointBounds.of(body, state, horizon, 500.0, planned=planned).acceleration_upper[joint]
+        within &= greatest >= a[k, 6 + joint]
+        alone = JointBounds.of(body, state, horizon, 500.0).acceleration_upper[joint]
+        held_back = max(held_back, a[k, 6 + joint] - alone)
+    assert within == (away == 0.0)  # 1.7 degrees off it would end beyond the range
+    assert held_back > 20.0
 
 
 def test_reference_averages_accelerations_over_the_hold(body, still):
     """The mean acceleration is the change of the planned velocity over the hold."""
     frames = {"left_foot": body.effector_frame("left_foot")}
-    reference = Reference(body, still, frames, 0.005)
+    reference = Reference(body, still, frames, 0.005, 0.05)
     sample = reference.sample(0.5)
     assert np.allclose(sample.q, body.standing_posture())
     assert np.abs(sample.com_acceleration).max() < 1e-12

@@ -138,7 +138,7 @@ def test_a_sine_is_one_in_an_execution_too(stand):
 def test_a_plan_at_another_rate_has_its_velocities_and_what_slowing_down_takes(stepping):
     """At the rate r all velocities are r times as large; from r to s within a hold, a = (s v' - r v) / T."""
     frames = {"pelvis": stepping.body.effector_frame("pelvis")}
-    reference = Reference(stepping.body, stepping.motion, frames, 0.005)
+    reference = Reference(stepping.body, stepping.motion, frames, 0.005, 0.05)
     full, then = reference.sample(0.5), reference.sample(0.5 + 0.25 * 0.005)
     slow = reference.sample(0.5, 0.5, 0.25)
     np.testing.assert_array_equal(slow.com, full.com)

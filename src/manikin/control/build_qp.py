@@ -13,6 +13,7 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.control.dynamics import DynamicsState
 from manikin.control.edge_forces import ContactForceBasis
+from manikin.control.reference import ReferenceSample
 from manikin.control.tasks import AccelerationTask
 from manikin.numerics.qp import QuadraticProgram
 from manikin.numerics.spatial import FloatArray
@@ -36,11 +37,24 @@ class JointBounds:
 
     @classmethod
     def of(
-        cls, body: BodyModel, state: DynamicsState, horizon: float, largest: float, strength: float = 1.0
-    ) -> "JointBounds":
-        """Limits of a body at a state, torques and speeds times ``strength``, over a horizon [s]."""
+        cls, body: BodyModel, state: DynamicsState, horizon: float, largest: float, strength: float = 1.0,
+        planned: ReferenceSample | None = None,
+    ) -> "JointBounds":  # fmt: skip
+        """Limits of a body at a state, torques and speeds times ``strength``, over a horizon [s].
+
+        Args:
+            planned: Planned state, from which the body is expected to be as far at the end of the horizon as
+                it is drifting now; without one it is expected to go on at its speed.
+        """
+        angle, speed = state.q[7:], state.v[6:]
+        if planned is None or planned.later is None:
+            coming = angle + horizon * speed, speed, np.zeros_like(speed)
+        else:
+            drift = speed - planned.v[6:]
+            away = angle - planned.q[7:] + horizon * drift
+            coming = planned.later[0] + away, planned.later[1] + drift, planned.a[6:]
         accelerations = joint_acceleration_bounds(
-            state.q[7:], state.v[6:], body.lower, body.upper, strength * body.velocity_limit, horizon, largest
+            *coming, body.lower, body.upper, strength * body.velocity_limit, horizon, largest
         )
         return cls(strength * body.torque_lower, strength * body.torque_upper, *accelerations)
 
@@ -159,19 +173,24 @@ def build_qp(
 
 
 def joint_acceleration_bounds(
-    angle: FloatArray, speed: FloatArray, lower: FloatArray, upper: FloatArray, speed_limit: FloatArray,
-    horizon: float, largest: float,
+    angle: FloatArray, speed: FloatArray, usual: FloatArray, lower: FloatArray, upper: FloatArray,
+    speed_limit: FloatArray, horizon: float, largest: float,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Accelerations that keep angles and speeds admissible over ``horizon``.
 
-    ``q + v T + a T^2 / 2`` must stay within the range and ``v + a T`` within the speed limit; near the end of
-    its range a joint meets a stiff, damped stop. Angles and speeds are (n,) [rad, rad/s], ``T`` is the
-    horizon [s], and the bounds are cut to the largest acceleration [rad/s^2].
+    With ``d`` more than the usual acceleration, ``angle + d T^2 / 2`` must be within the range and ``speed +
+    d T`` within the speed limit; near the end of its range a joint meets a stiff, damped stop.
+
+    Args:
+        angle: (n,) at the end of the horizon, with the usual acceleration [rad].
+        speed: (n,) there [rad/s].
+        usual: (n,) acceleration now with which they come about [rad/s^2].
+        horizon: ``T`` [s].
+        largest: Largest acceleration, to which the bounds are cut [rad/s^2].
     """
-    coasting = angle + horizon * speed
     half_square = 0.5 * horizon**2
-    least = np.maximum((lower - coasting) / half_square, (-speed_limit - speed) / horizon)
-    greatest = np.minimum((upper - coasting) / half_square, (speed_limit - speed) / horizon)
+    least = usual + np.maximum((lower - angle) / half_square, (-speed_limit - speed) / horizon)
+    greatest = usual + np.minimum((upper - angle) / half_square, (speed_limit - speed) / horizon)
     least = np.clip(least, -largest, 0.9 * largest)
     return least, np.maximum(np.clip(greatest, -0.9 * largest, largest), least)
 

@@ -115,7 +115,8 @@ class Controller:
         names = (name for geometry in self._geometry.values() for name, _ in geometry.patches)
         segments = {segment_key(name): body.segment_frame(name) for name in names}
         self._dynamics = Dynamics(body, segments | frames)
-        self.reference = Reference(body, motion, frames, self.settings.period)
+        horizon = self.settings.joint_limit_horizon
+        self.reference = Reference(body, motion, frames, self.settings.period, horizon)
         self._solver, self._spare_solver = WarmQPSolver(), WarmQPSolver()
         self.clock = PlanClock(self.settings.period, self.settings.returning)
         self._previous = np.zeros(joints)
@@ -174,7 +175,7 @@ class Controller:
         if self.body.stature is not None and kinds == {ContactKind.POINT}:
             loaded = [replace(one, least=self._least(supports, one)) for one in loaded]
         horizon, largest = settings.joint_limit_horizon, settings.max_joint_acceleration
-        bounds = JointBounds.of(self.body, state, horizon, largest)
+        bounds = JointBounds.of(self.body, state, horizon, largest, planned=reference)
         return build_qp(
             state, self.tasks(state, reference, supports, deviation), loaded, bounds, self._damping,
             period=settings.period, acceleration_weight=settings.weights.acceleration,

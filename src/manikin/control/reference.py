@@ -44,6 +44,7 @@ class ReferenceSample:
         angular_momentum: (3,) about the CoM [kg.m^2/s].
         angular_momentum_rate: (3,) mean over the hold [N.m].
         effectors: Reference of each frame by name.
+        later: Angles and speeds (nv - 6,) of the joints at the end of the horizon [rad, rad/s].
     """
 
     q: FloatArray
@@ -55,6 +56,7 @@ class ReferenceSample:
     angular_momentum: FloatArray
     angular_momentum_rate: FloatArray
     effectors: dict[str, EffectorReference]
+    later: tuple[FloatArray, FloatArray] | None = None
 
     def slowed(self, rate: float) -> "ReferenceSample":
         """The same state, passed at ``rate`` times the speed."""
@@ -83,12 +85,15 @@ class Reference:
     is held cannot follow anything finer, and with the acceleration at its start the body would lag behind.
     """
 
-    def __init__(self, body: BodyModel, motion: Motion, frames: dict[str, int], period: float) -> None:
+    def __init__(
+        self, body: BodyModel, motion: Motion, frames: dict[str, int], period: float, horizon: float
+    ) -> None:
         """Bind a motion to the body that it was planned for.
 
         Args:
             frames: Pinocchio frame indices by the name they get in ``ReferenceSample.effectors``.
             period: Time for which torques are held [s].
+            horizon: Time over which joints must stay admissible [s].
 
         Raises:
             InputError: If the motion's joints are not the body's.
@@ -99,7 +104,7 @@ class Reference:
             raise InputError(f"{told}, or they differ in name; valid: a motion planned for this body")
         self.motion = motion
         self._model, self._data = body.pinocchio, body.pinocchio.createData()
-        self._frames, self._period = dict(frames), period
+        self._frames, self._period, self._horizon = dict(frames), period, horizon
         self._rest = np.zeros(self._model.nv)
         self._next: tuple[float, ReferenceSample] | None = None
 
@@ -114,7 +119,8 @@ class Reference:
             self._next = end, then
         if rate != 1.0 or next_rate != 1.0:
             now, then = now.slowed(rate), then.slowed(next_rate)
-        return now.until(then, self._period)
+        q, v, _ = self._state(time + next_rate * self._horizon)
+        return replace(now.until(then, self._period), later=(q[7:], next_rate * v[6:]))
 
     def _rates(self, time: float) -> ReferenceSample:
         """Planned state at a time [s], with no accelerations."""
