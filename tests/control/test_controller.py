@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -93,6 +95,23 @@ def test_tasks_are_met_where_nothing_limits_them(body, still, schedule):
     for task in output.problem.tasks:
         tolerance = 0.2 if task.name == "posture" else 0.02
         assert np.abs(task.residual(output.acceleration)).max() < tolerance
+
+
+@pytest.mark.parametrize("inwards", [0.0, 30.0])
+def test_contacts_carry_as_planned_what_the_motion_leaves_open(body, still, schedule, inwards):
+    """Feet that stand may press against each other as they like: they do as the plan has them.
+
+    Without planned forces they do as costs least, which is not that.
+    """
+    free = Controller(body, still, schedule).step(0.0, body.standing_posture(), np.zeros(body.nv)).wrenches
+    planned = np.array([free[name] for name in still.contact_names])
+    planned[:, 1] += np.where([name == "left_foot" for name in still.contact_names], -inwards, inwards)
+    moving = replace(still, contact_force=np.tile(planned, (len(still.time), 1, 1)))
+    output = Controller(body, moving, schedule).step(0.0, body.standing_posture(), np.zeros(body.nv))
+    for name, wanted in zip(still.contact_names, planned, strict=True):
+        # The regularisation, a twentieth as heavy, takes its share of the difference.
+        assert output.wrenches[name][:3] == pytest.approx(wanted[:3], abs=0.1 * inwards + 0.5)
+    assert abs(free["left_foot"][1] - planned[still.contact_names.index("left_foot"), 1]) >= inwards - 1e-9
 
 
 def test_com_feedback_is_realised(body, still, schedule):

@@ -18,6 +18,9 @@ from manikin.control.tasks import AccelerationTask
 from manikin.numerics.qp import QuadraticProgram
 from manikin.numerics.spatial import FloatArray
 
+RANK = 1e-6
+"""Singular values of a contact's force map smaller than this share of the largest count as zero."""
+
 
 @dataclass(frozen=True, eq=False)
 class JointBounds:
@@ -70,6 +73,8 @@ class LoadedContact:
         grasp_share: Share of a grasp's limits that it may use now, in [0, 1].
         wished: (3,) force that it should feel now [N], or None.
         wish_weight: Of the squared error of that force [1/N^2].
+        planned: (6,) wrench about the effector frame's origin that it should be near to, or None.
+        planned_weight: Of the squared distances of the force variables from those that make it up [1/N^2].
     """
 
     basis: ContactForceBasis
@@ -78,6 +83,8 @@ class LoadedContact:
     wished: FloatArray | None = None
     wish_weight: float = 0.0
     least: float = 0.0
+    planned: FloatArray | None = None
+    planned_weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +171,10 @@ def build_qp(
     upper = np.concatenate([np.full(6, np.inf), bounds.acceleration_upper, *most])
     hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
     for loaded, part in zip(contacts, variables, strict=True):
+        if loaded.planned is not None:
+            smallest = np.linalg.lstsq(loaded.basis.wrench, loaded.planned, rcond=RANK)[0]
+            hessian[part, part] += loaded.planned_weight * np.eye(len(smallest))
+            gradient[part] -= loaded.planned_weight * smallest
         if loaded.wished is not None:  # weight |force - wished|^2 / 2
             forces = loaded.basis.wrench[:3]
             hessian[part, part] += loaded.wish_weight * forces.T @ forces

@@ -171,6 +171,7 @@ class Controller:
         settings = self.settings
         on = [support for support in supports.values() if support.mode is SupportMode.STANCE]
         loaded = [self._wishing(self._loaded(s, s.contact, state), time) for s in on if s.contact is not None]
+        loaded = [self._planned(one, reference) for one in loaded]
         kinds = {one.basis.contact.kind for one in loaded}
         if self.body.stature is not None and kinds == {ContactKind.POINT}:
             loaded = [replace(one, least=self._least(supports, one)) for one in loaded]
@@ -276,6 +277,13 @@ class Controller:
         support = supports[loaded.basis.contact.effector]
         carries = support.planned and support.unload_share >= 1.0
         return min(PRESSED * self.body.mass * GRAVITY, loaded.cap) if carries else 0.0
+
+    def _planned(self, loaded: LoadedContact, reference: ReferenceSample) -> LoadedContact:
+        """The contact with its planned wrench, where that is known and no other force is wished."""
+        wrench = reference.wrenches.get(loaded.basis.contact.effector)
+        if wrench is None or loaded.wished is not None:
+            return loaded
+        return replace(loaded, planned=wrench, planned_weight=self.settings.weights.planned_force)
 
     def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:
         """The contact with the force that it should feel at a time, where there is one."""

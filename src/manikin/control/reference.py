@@ -1,6 +1,7 @@
 """The planned motion as the controller reads it: placements, velocities, accelerations."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
@@ -45,6 +46,8 @@ class ReferenceSample:
         angular_momentum_rate: (3,) mean over the hold [N.m].
         effectors: Reference of each frame by name.
         later: Angles and speeds (nv - 6,) of the joints at the end of the horizon [rad, rad/s].
+        wrenches: Force [N] and moment [N.m] (6,) of each contact about its own origin, in the middle of the
+            hold, by effector; empty where none is known to carry.
     """
 
     q: FloatArray
@@ -57,6 +60,7 @@ class ReferenceSample:
     angular_momentum_rate: FloatArray
     effectors: dict[str, EffectorReference]
     later: tuple[FloatArray, FloatArray] | None = None
+    wrenches: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def slowed(self, rate: float) -> "ReferenceSample":
         """The same state, passed at ``rate`` times the speed."""
@@ -120,7 +124,14 @@ class Reference:
         if rate != 1.0 or next_rate != 1.0:
             now, then = now.slowed(rate), then.slowed(next_rate)
         q, v, _ = self._state(time + next_rate * self._horizon)
-        return replace(now.until(then, self._period), later=(q[7:], next_rate * v[6:]))
+        hold, later = now.until(then, self._period), (q[7:], next_rate * v[6:])
+        return replace(hold, later=later, wrenches=self._wrenches(time + 0.5 * next_rate * self._period))
+
+    def _wrenches(self, time: float) -> Mapping[str, FloatArray]:
+        """Planned wrench of each contact at the next sample, if any of them carries."""
+        motion = self.motion
+        planned = motion.contact_force[min(int(np.searchsorted(motion.time, time)), len(motion.time) - 1)]
+        return dict(zip(motion.contact_names, planned, strict=True)) if planned.any() else {}
 
     def _rates(self, time: float) -> ReferenceSample:
         """Planned state at a time [s], with no accelerations."""

@@ -19,6 +19,8 @@ class TaskWeights:
         angular_momentum: Rate of the angular momentum [1/(N.m)^2]; 0, as in the thesis, leaves it free.
         acceleration: Regularisation of every generalised acceleration.
         force: Regularisation of every edge force of the friction pyramids [1/N^2].
+        planned_force: Distance of edge forces from those that make up the planned wrench, added to it where
+            the plan has one [1/N^2].
     """
 
     com: float = 2e4
@@ -28,9 +30,10 @@ class TaskWeights:
     angular_momentum: float = 0.0
     acceleration: float = 1e-3
     force: float = 5e-3
+    planned_force: float = 0.1
 
     def __post_init__(self) -> None:
-        for name in ("com", "effectors", "pelvis", "posture", "angular_momentum"):
+        for name in ("com", "effectors", "pelvis", "posture", "angular_momentum", "planned_force"):
             finite_number(getattr(self, name), f"task weight {name!r}", at_least=0.0)
         for name in ("acceleration", "force"):
             finite_number(getattr(self, name), f"task weight {name!r}", above=0.0)
