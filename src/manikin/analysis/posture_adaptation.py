@@ -404,10 +404,10 @@ class _AdaptationGoal:
         task = self.task
         start = spline_through(task.reference, basis, task.job.knots(task.schedule, FINE))
         targets = FitTargets(
-            time=time, effectors=task.paths.targets, com=self.com, com_weight=np.ones(len(time)),
-            com_acceleration=self.acceleration, margin=np.zeros(len(time)), reference=task.reference,
-            reference_scale=task.scale, ignored=task.ignored, turning=self.turning,
-            reference_second=_steady_ends(time, basis.evaluate(start.control_points, 2)),
+            time=time, schedule=task.schedule, effectors=task.paths.targets, com=self.com,
+            com_weight=np.ones(len(time)), com_acceleration=self.acceleration, margin=np.zeros(len(time)),
+            reference=task.reference, reference_scale=task.scale, ignored=task.ignored, turning=self.turning,
+            reference_second=_steady_ends(time, basis.evaluate(start.control_points, 2)), strength=False,
         )  # fmt: skip
         return MotionObjective(task.body, task.proximity, targets, basis)
 

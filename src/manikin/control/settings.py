@@ -1,5 +1,6 @@
 """Weights, gains and limits of the controller."""
 
+import math
 from dataclasses import dataclass, field
 
 from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
@@ -30,7 +31,7 @@ class TaskWeights:
     angular_momentum: float = 0.0
     acceleration: float = 1e-3
     force: float = 5e-3
-    planned_force: float = 0.1
+    planned_force: float = 0.03
 
     def __post_init__(self) -> None:
         for name in ("com", "effectors", "pelvis", "posture", "angular_momentum", "planned_force"):
@@ -80,7 +81,7 @@ class SupportSettings:
         early_window: A touch this long before the planned landing counts as the landing [s].
         release_time: A support that has not touched for this long is landed anew [s].
         hover: Before its landing a foot is held this far above its support, not to touch ahead of time [m].
-        press_speed: From its landing time on it goes down at up to this speed, to ``press_depth`` [m/s].
+        press_speed: It goes down at up to this speed, to ``press_depth``, and lands at its time [m/s].
         press_time: That speed rises from zero over this time [s].
         rolling_press_speed: The same of a foot that lands on its heel, which this speed sets turning [m/s].
         press_depth: How far below the planned support it is sent at most [m].
@@ -117,11 +118,19 @@ class SupportSettings:
 
     def descent(self, contact: Contact | None, late: float) -> tuple[float, float]:
         """Way [m] and speed [m/s], which rises evenly, of a foot ``late`` [s] after it began to go down."""
-        rolls = contact is not None and contact.part is not SolePart.FULL
-        speed = self.rolling_press_speed if rolls else self.press_speed
-        rising = min(late, self.press_time)
+        speed, rising = self._press_speed(contact), min(max(late, 0.0), self.press_time)
         share = rising / self.press_time
-        return speed * (late - rising + 0.5 * share * rising), speed * share
+        return speed * (max(late, 0.0) - rising + 0.5 * share * rising), speed * share
+
+    def lead(self, contact: Contact, height: float) -> float:
+        """Time in which a foot goes down by a height [m] to its contact [s]."""
+        ways = height / self._press_speed(contact)
+        half = 0.5 * self.press_time
+        return half + ways if ways > half else math.sqrt(2.0 * ways * self.press_time)
+
+    def _press_speed(self, contact: Contact | None) -> float:
+        rolls = contact is not None and contact.part is not SolePart.FULL
+        return self.rolling_press_speed if rolls else self.press_speed
 
 
 @dataclass(frozen=True)

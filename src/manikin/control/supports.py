@@ -205,9 +205,11 @@ class SupportSwitch:
             )  # fmt: skip
         if not planned:
             return self._hovering(name, interval, time)
-        height = self._hover(interval) if memory.touched < interval.start else 0.0
-        part = interval.contact_at(time)
-        way, rate = self._settings.descent(part, time - max(interval.start, memory.touched))
+        part, height, begun = interval.contact_at(time), 0.0, memory.touched
+        if memory.touched < interval.start:
+            height = self._hover(interval)
+            begun = self._sets_out(interval)
+        way, rate = self._settings.descent(part, time - begun)
         press = min(self._settings.press_depth, way - height)
         return SupportState(name, SupportMode.LANDING, part, press=press, press_rate=rate, settling=settling)
 
@@ -220,12 +222,23 @@ class SupportSwitch:
         return float(np.clip(rising, _FIRST_SHARE, 1.0)) ** (2 if rolls else 1)
 
     def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
-        """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""
+        """Lift the end of a flight smoothly, in the first part of the time in which it might touch.
+
+        It sets out from there in time to land when it is planned to.
+        """
         duration = _LIFTING_SHARE * (interval.start - interval.early)
-        share = float(np.clip((time - interval.early) / duration, 0.0, 1.0))
-        up = self._hover(interval) * interval.contact.normal
-        lift, rate = share**2 * (3.0 - 2.0 * share) * up, 6.0 * share * (1.0 - share) / duration * up
-        return SupportState(name, SupportMode.SWING, None, lift=lift, lift_rate=rate)
+        share, hover = float(np.clip((time - interval.early) / duration, 0.0, 1.0)), self._hover(interval)
+        lift, rate = hover * share**2 * (3.0 - 2.0 * share), 6.0 * hover * share * (1.0 - share) / duration
+        way, speed = self._settings.descent(interval.contact, time - self._sets_out(interval))
+        normal = interval.contact.normal
+        return SupportState(
+            name, SupportMode.SWING, None, lift=(lift - way) * normal, lift_rate=(rate - speed) * normal
+        )
+
+    def _sets_out(self, interval: SupportInterval) -> float:
+        """When an effector leaves the height at which its support is waited for [s]."""
+        lead = self._settings.lead(interval.contact, self._hover(interval))
+        return max(interval.start - lead, interval.early)
 
     def _hover(self, interval: SupportInterval) -> float:
         """Height at which a support is waited for [m]; a tip has no edge that would touch first."""

@@ -131,8 +131,8 @@ def test_torques_with_a_motions_own_forces_are_the_motions(runs, overrides):
     body = scenario.build_body()
     content = read_motions(result.directory / "motion.h5")
     motion, rows = content.planned, np.arange(0, len(content.planned.time), 97)
-    held = HeldForces.of(body, content.schedule, motion, motion.time[rows])
     states = StateSamples(motion.q[rows], motion.v[rows], motion.a[rows])
+    held = HeldForces.of(body, content.schedule, motion.time[rows], states)
     excess = excess_torque(body, states, jacobians_of(body, states), held, wanted=0.0)
     share = np.maximum(body.torque_share(motion.tau[rows, 6:]), 0.0)
     assert len(excess.hinges) > 30
@@ -143,8 +143,10 @@ def test_at_a_touch_down_the_foot_that_lands_carries_nothing(runs):
     """The instant before asks for most, as one foot carries; a lift-off is on the stance after it."""
     result = runs("platform")
     body, content = load_scenario("platform").build_body(), read_motions(result.directory / "motion.h5")
-    schedule, names = content.schedule, content.planned.contact_names
-    held = HeldForces.of(body, schedule, content.planned, schedule.instants[1:-1])
+    schedule, motion, names = content.schedule, content.planned, content.planned.contact_names
+    rows = np.searchsorted(motion.time, schedule.instants[1:-1])
+    states = StateSamples(motion.q[rows], motion.v[rows], motion.a[rows])
+    held = HeldForces.of(body, schedule, schedule.instants[1:-1], states)
     pairs = zip(schedule.sequence.phases[:-1], schedule.sequence.phases[1:], strict=True)
     changed = 0
     for sample, (before, after) in enumerate(pairs):

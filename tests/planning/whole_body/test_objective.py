@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.planning.whole_body.fit_job import phase_knots, sample_times
 from manikin.planning.whole_body.fit_objective import MotionObjective
@@ -30,6 +31,13 @@ def setup(person):
     n = len(time)
     targets = FitTargets(
         time=time,
+        schedule=ContactSchedule(
+            StanceSequence(
+                [Phase(Stance([sole("left_foot", [0.0, 0.1, 0.0], length=0.28, width=0.12, friction=0.7)]))]
+            ),
+            [0.0, 0.4],
+        ),
+        strength=False,
         effectors={
             name: EffectorTarget(
                 rng.normal(size=(n, 3)),

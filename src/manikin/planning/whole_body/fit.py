@@ -34,9 +34,12 @@ HELD, AT_REST = 1.0e15, 3
 acceleration are zero there."""
 
 FURTHER_DECREASE, SPARED = 3.0e-4, 0.06
-"""Relative decrease of the objective below which constrained steps that go on from a solution stop: what it
-breaks is a small part of its objective. Share of the strength beyond the wanted one up to which they stop as
-those of a first solution do."""
+"""Relative decrease of the objective below which constrained steps stop where the strength is exceeded, a
+small part of the objective; and share of the strength beyond the wanted one from which it counts as that."""
+
+SHARINGS, FALLING = 3, 0.7
+"""How often the contact forces are shared at most during the constrained steps, and the share of the excess
+before that is left at most where they are shared once more."""
 
 STIFFNESS = 1.0e4
 """Factor on the squares of the constraints in the matrix with which a step and its multipliers are found."""
@@ -81,8 +84,7 @@ class MotionFit:
         points, iterations = self._with_ends(np.array(start.control_points)), 0
         scales = final.loosened(final.stages[-1])
         if further:
-            state = self._objective.linearise(points, scales, self._multiplier)
-            moved, state, iterations = self._constrain(points, state, scales, FURTHER_DECREASE)
+            moved, state, iterations = self._constrain(points, scales)
             if moved is not points:
                 return self._exact(moved, state, scales, iterations)
         for factor in final.stages[-1:] if further else final.stages:
@@ -90,8 +92,26 @@ class MotionFit:
             state = self._objective.linearise(points, scales, self._multiplier)
             points, state, taken = self._descend(points, state, scales)
             iterations += taken
-        points, state, constrained = self._constrain(points, state, scales, scales.constrained_decrease)
+        points, state, constrained = self._constrain(points, scales)
         return self._exact(points, state, scales, iterations + constrained)
+
+    def _constrain(
+        self, points: FloatArray, scales: MotionScales
+    ) -> tuple[FloatArray, FitLinearisation, int]:
+        """Steps that meet contacts and centre of mass, with contact forces that are shared anew in between.
+
+        Forces that are held make torques seem smaller than they are once the motion has changed.
+        """
+        taken, last = 0, np.inf
+        for _ in range(SHARINGS):
+            self._objective.share_forces(points)
+            state = self._objective.linearise(points, scales, self._multiplier)
+            excess = state.excess or 0.0
+            if taken > 0 and not SPARED <= excess < FALLING * last:
+                break
+            points, state, more = self._constrained(points, state, scales)
+            taken, last = taken + more, excess
+        return points, state, taken
 
     def _exact(
         self, points: FloatArray, state: FitLinearisation, scales: MotionScales, iterations: int
@@ -112,18 +132,16 @@ class MotionFit:
         """Damping of each control point, at most so large where it may move."""
         return np.where(self._held, HELD, np.minimum(self._damping, most))
 
-    def _constrain(
-        self, points: FloatArray, current: FitLinearisation, scales: MotionScales, least: float
+    def _constrained(
+        self, points: FloatArray, current: FitLinearisation, scales: MotionScales
     ) -> tuple[FloatArray, FitLinearisation, int]:
         """Steps that meet contacts and centre of mass: each is the best that meets their linearisation.
 
         The multipliers that hold them come with the step, so that the augmented objective falls along it
         and what is left of their errors is of second order in the step. The whole step sets the damping, also
         where only a part of it is taken: where it made the objective greater, the next one is shorter.
-
-        Args:
-            least: Relative decrease of the objective at which the steps stop: after one, or after
-                :data:`VAIN` in a row where only parts of steps help or the strength is exceeded.
+        They stop after one that hardly makes it less, or after :data:`VAIN` in a row where only parts of
+        steps help or the strength is exceeded.
         """
         taken = vain = 0
         while taken < scales.constrained_steps and vain < VAIN:
@@ -151,10 +169,10 @@ class MotionFit:
             # The squared multipliers in the augmented objective say nothing of the motion.
             decrease = (current.cost - trial.cost) / (current.cost - 0.5 * float(np.sum(after**2)))
             points, current, self._multiplier = trial_points, trial, after
-            spared = trial.excess is not None and trial.excess < SPARED
-            slight = decrease < (scales.constrained_decrease if spared else least)
+            strong = trial.excess is not None and trial.excess >= SPARED
+            slight = decrease < (FURTHER_DECREASE if strong else scales.constrained_decrease)
             vain = vain + 1 if slight else 0
-            if slight and (spared or trial.excess is None) and length == 1.0:
+            if slight and not strong and length == 1.0:
                 break
         return points, current, taken
 

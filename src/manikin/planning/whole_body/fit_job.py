@@ -39,9 +39,6 @@ STRONGER, NEARER, LEAST_SAFE_DISTANCE = 0.5, 0.75, 0.014
 """Factor of the scales of what was missed; factor of the wanted clearance where the required one is missed,
 and the wanted clearance that this leaves [m]: more than the required one."""
 
-RESERVED = 0.93
-"""Share of the strength above which a motion is fitted on, so that control has some in reserve."""
-
 SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
 """Knots added around a touch-down at speed, relative to it [s]."""
 
@@ -238,20 +235,6 @@ class FitJob:
             if self.by_count and last.continued and best is not last and same:
                 last = replace(best, scales=last.scales, fine=last.fine)
         return replace(best, scales=last.scales, fine=last.fine)
-
-    def with_reserve(self, best: FitAttempt[G], goal: G) -> FitAttempt[G]:
-        """A motion that keeps every requirement and leaves more of the strength to control, if one is found.
-
-        Args:
-            best: Found before; it is returned where it breaks a requirement or asks for little strength.
-            goal: Its goal, with its contact forces held.
-        """
-        share = best.certificate.value("max_torque_share")
-        if best.broken or share <= RESERVED:
-            return best
-        scales = replace(best.scales, decrease=self.patience)
-        easier = self.attempt(goal, scales, best.fine, best.result.spline)
-        return best if easier.broken or easier.certificate.value("max_torque_share") > share else easier
 
     def better(self, first: FitAttempt[G], second: FitAttempt[G]) -> FitAttempt[G]:
         """The better of two attempts, see :attr:`by_count`."""

@@ -119,6 +119,7 @@ class MotionObjective:
         if targets.low_flights is not None:
             self._ignored = targets.low_flights.without(self._ignored)
         self._last: tuple[FloatArray, MotionSamples] | None = None
+        self._forces: HeldForces | None = None
         with np.errstate(divide="ignore"):
             self._reference_weight = np.atleast_2d(1.0 / targets.reference_scale)
         self.task_rows = 6 * len(targets.effectors) + 3
@@ -151,6 +152,12 @@ class MotionObjective:
         self._add_accelerations(out, raw[2], scales)
         self._add_dynamics(out, motion, scales)
         return out
+
+    def share_forces(self, points: FloatArray) -> None:
+        """Hold the contact forces of a motion with control points (k, nq) where strength counts."""
+        if self.targets.strength:
+            states = self._sampled(points).states
+            self._forces = HeldForces.of(self._body, self.targets.schedule, self.targets.time, states)
 
     def _sampled(self, points: FloatArray) -> MotionSamples:
         """The spline at its samples; those of the last one, when only the scales have changed since."""
@@ -270,17 +277,16 @@ class MotionObjective:
             residual[:, 3:] -= targets.turning
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
         out.momentum = MomentumRate(residual / scale, (first, second, third))
-        if targets.forces is not None:
-            self._add_strength(out, motion, targets.forces, scales)
+        self._add_strength(out, motion, scales)
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
 
-    def _add_strength(
-        self, out: FitLinearisation, motion: MotionSamples, forces: HeldForces, scales: MotionScales
-    ) -> None:
-        """Give the momentum's rate a row for each joint torque beyond the strength."""
+    def _add_strength(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> bool:
+        """Give the momentum's rate a row for each torque beyond the strength where forces are held, if so."""
+        if self._forces is None:
+            return False
         assert out.momentum is not None
         found = excess_torque(
-            self._body, motion.states, motion.shapes.jacobians, forces, scales.strength_share
+            self._body, motion.states, motion.shapes.jacobians, self._forces, scales.strength_share
         )
         rows = (to_raw(by, motion.tangent) / scales.torque_share for by in found.by_state)
         first, second, third = (
@@ -291,6 +297,7 @@ class MotionObjective:
             MomentumRate(value, (first, second, third)),
             float(found.value.max(initial=0.0)),
         )
+        return True
 
 
 def _effector_rows(

@@ -1,10 +1,10 @@
 """Joint torques beyond the strength as residuals of the whole-body fit, with their derivatives.
 
-The torques that inverse dynamics asks of the joints with the contact forces of an earlier motion are
+The torques that inverse dynamics asks of the joints with the contact forces of a motion nearby are
 differentiated by the state. What wrench the root then lacks is given by changes of those forces at the points
 of the contacts, least in the sum of squares, weighed by the load of each contact. A single support has one
 such change, so that a step along these derivatives shifts its centre of pressure as the true one does;
-between several supports the forces are shared anew after each fit.
+between several supports the forces are shared anew now and then (:meth:`.MotionFit.solve`).
 """
 
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from manikin.balance.motion_forces import plan_forces
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.body.strength import with_masses
 from manikin.contact import CarriedLoad, Contact, ContactSchedule
-from manikin.motion import Motion
 from manikin.motion.configuration_spline import StateSamples
 from manikin.numerics.spatial import FloatArray, rotation_from_quaternion, skew
 from manikin.scene.distance import moves_by_joint
@@ -50,21 +50,21 @@ class HeldForces:
     models: tuple[pin.Model, ...]
 
     @classmethod
-    def of(cls, body: BodyModel, schedule: ContactSchedule, motion: Motion, time: FloatArray) -> "HeldForces":
-        """Contact forces of a motion at the samples (n,) of a fit [s].
+    def of(
+        cls, body: BodyModel, schedule: ContactSchedule, time: FloatArray, states: StateSamples
+    ) -> "HeldForces":
+        """Contact forces of the states of a motion at times (n,) [s].
 
         At a key instant they are those on the stance before or after it that has fewer contacts.
         """
-        rows = np.clip(np.searchsorted(motion.time, time), 0, len(motion.time) - 1)
         made = np.diff([len(phase.stance) for phase in schedule.sequence]) > 0
         ends = np.any(np.abs(time[:, None] - schedule.instants[1:-1][made]) < AT_KEY, axis=1)
-        before = np.searchsorted(motion.time, time - AT_KEY) - 1
-        rows = np.where(ends, np.maximum(before, 0), rows)
-        names, phases = motion.contact_names, schedule.phase_at(motion.time[rows])
-        settling = np.any([schedule.settling(motion.time[rows], name) for name in names], axis=0)
+        time = np.where(ends, time - 2.0 * AT_KEY, time)
+        tau, wrench = plan_forces(body, schedule, time, *states)
+        names, phases = schedule.sequence.effectors, schedule.phase_at(time)
+        settling = np.any([schedule.settling(time, name) for name in names], axis=0)
         # Wrench that contact forces may leave unsupplied where they are held [N, N.m].
-        known = ~settling & (np.linalg.norm(motion.tau[rows, :6], axis=1) < 1.0)
-        wrench = motion.contact_force[rows].copy()
+        known = ~settling & (np.linalg.norm(tau[:, :6], axis=1) < 1.0)
         give = np.zeros((*wrench.shape, 6))
         for number, phase in enumerate(schedule.sequence):
             for contact in phase.stance:

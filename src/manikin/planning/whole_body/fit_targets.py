@@ -12,7 +12,6 @@ from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment, hangs
 from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, SolePart
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.foot_roll import Rolls
 from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown, with_pairs
 from manikin.planning.whole_body.swing_planner import (
@@ -65,6 +64,7 @@ class FitTargets:
 
     Attributes:
         time: (n,) [s].
+        schedule: Contacts in time.
         effectors: Target of each controlled effector.
         com: (n, 3) centre of mass [m].
         com_weight: (n,) importance of the centre of mass: 1 where it is required, less where the
@@ -81,7 +81,7 @@ class FitTargets:
         reference_second: (n, nq) second derivatives of the reference, from which accelerations count; None
             where any acceleration costs.
         loads: What is carried at each sample besides the body, or None for nothing.
-        forces: Contact forces at which joint torques beyond the strength cost; None where no torque costs.
+        strength: Whether joint torques beyond the strength cost.
         ends: (nq,) postures in which the body rests at the start and at the end; None where it only comes to
             rest.
         settles: Whether it comes to rest at the end without acceleration: another part goes on from there.
@@ -89,6 +89,7 @@ class FitTargets:
     """
 
     time: FloatArray
+    schedule: ContactSchedule
     effectors: Mapping[str, EffectorTarget]
     com: FloatArray
     com_weight: FloatArray
@@ -101,7 +102,7 @@ class FitTargets:
     turning: FloatArray | None = None
     reference_second: FloatArray | None = None
     loads: tuple[CarriedLoad | None, ...] | None = None
-    forces: HeldForces | None = None
+    strength: bool = True
     ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
     settles: bool = False
     low_flights: "LowFlights | None" = None

@@ -34,7 +34,6 @@ from manikin.planning.whole_body.certificate import (
 from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress, split_spans
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
-from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.fit_targets import (
     FLAT_TOES,
     FitTargets,
@@ -185,7 +184,6 @@ class _Goal:
 
     Attributes:
         straight_toes: Whether toes are straight while their sole is held.
-        forces: Motion at whose contact forces torques beyond the strength cost; None where no torque costs.
     """
 
     planner: "_Planner"
@@ -193,7 +191,6 @@ class _Goal:
     guide: Guide
     manner: PostureStyle
     straight_toes: bool
-    forces: Motion | None = None
 
     @property
     def schedule(self) -> ContactSchedule:
@@ -242,7 +239,7 @@ class _Goal:
             scale[:, 6 + joint] *= (FLAT_TOES / scale[:, 6 + joint]) ** flat
         lay_toes_flat(planner.toes(self.swings, time), reference, scale)
         return FitTargets(
-            time, effector_targets(schedule, self.swings, time), trajectory.position(time),
+            time, schedule, effector_targets(schedule, self.swings, time), trajectory.position(time),
             # Importance of a centre of mass that only shows the way.
             com_weight=np.where(trajectory.binds(time), 1.0, 0.01),
             com_acceleration=trajectory.acceleration(time), margin=planner.planned_margins(time),
@@ -250,7 +247,6 @@ class _Goal:
             ignored=ignored_pairs(planner.body, planner.scene, schedule, time),
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
-            forces=None if self.forces is None else HeldForces.of(planner.body, schedule, self.forces, time),
             ends=planner.ends, settles=planner.settles,
             low_flights=LowFlights.of(planner.body, planner.scene, schedule, time),
         )  # fmt: skip
@@ -335,8 +331,6 @@ class _Planner:
         searched = self._search_again(swings, best)
         if searched is not None:
             best = self.job.better(best, self._attempt(searched, manner, progress))
-        if best.goal.forces is None:  # else the strength has been fitted to
-            best = self.job.with_reserve(best, replace(best.goal, forces=best.motion))
         progress(1.0)
         goal, failure = best.goal, best.goal.failure(best.certificate)
         return WholeBodyResult(
@@ -389,9 +383,9 @@ class _Planner:
 
     def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal] | None:
         """The next fit after one that breaks requirements; None where contacts stay out of reach."""
-        goal, broken = replace(last.goal, forces=None), last.broken
+        goal, broken = last.goal, last.broken
         if last.is_caught:  # Fits that follow may have the finer knots again.
-            return replace(self.job.restart(replace(last, goal=goal)), fine=last.fine)
+            return replace(self.job.restart(last), fine=last.fine)
         if last.fine > 0 and broken & INEXACT:
             return None
         inexact, weak = bool(broken & INEXACT), "max_torque_share" in broken
@@ -400,12 +394,10 @@ class _Planner:
             if any(goal.schedule.settling(when, name)[0] for name in names):
                 broken |= {"max_missing_wrench"}
         scales = self.job.updated(last.scales, broken, narrow=number > 0)
-        if inexact or weak:
-            if weak and last.goal.forces is not None:  # those held made the torques seem too small
-                scales = replace(scales, strength_share=scales.strength_share - STRENGTH_STEP)
-            if weak or last.goal.forces is not None:  # what was too strong once would be so again
-                goal = replace(goal, forces=last.motion)
-            return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
+        if weak:
+            scales = replace(scales, strength_share=scales.strength_share - STRENGTH_STEP)
+        if inexact:
+            return self.job.attempt(goal, scales, 1, last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
 
     def _guide(

@@ -37,7 +37,6 @@ from manikin.planning.whole_body.fit import DEGREE, spline_through
 from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import MotionScales, RefineScales
-from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.refine_input import (
     ROUNDS,
     KeyPath,
@@ -161,7 +160,6 @@ class _RefineGoal:
     """Keys and contacts at one timing, or a part of them.
 
     Attributes:
-        forces: Motion whose contact forces are held where its torques are beyond the strength.
         span: Key instants from which and to which the part lasts.
         ends: Postures in which the body rests there; None where it only comes to rest.
     """
@@ -171,7 +169,6 @@ class _RefineGoal:
     schedule: ContactSchedule
     span: tuple[int, int]
     ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
-    forces: Motion | None = None
 
     @property
     def is_whole(self) -> bool:
@@ -192,8 +189,6 @@ class _RefineGoal:
             job.body, job.scene, self.path, self.schedule, time, scales, job.task, job.padded, job.variables
         )
         targets = replace(targets, ends=self.ends)
-        if self.forces is not None:
-            targets = replace(targets, forces=HeldForces.of(job.body, self.schedule, self.forces, time))
         wanted = job.rooms(self.schedule.sequence, job.settings.friction_share, job.settings.sole_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
@@ -269,7 +264,7 @@ class Refinement:
             ends = known[first] if first > 0 else None, known[last] if last < count else None
             self._job = replace(self._job, span=(first, last))
             done = partial(self._done, progress, schedule, (first, last))
-            parts.append(self._fitted(replace(goal, span=(first, last), ends=ends, forces=None), done))
+            parts.append(self._fitted(replace(goal, span=(first, last), ends=ends), done))
             goal = parts[-1].goal
             if parts[-1].broken:
                 break
@@ -304,7 +299,7 @@ class Refinement:
         None for a part that is caught a second time: in the postures at its ends it will stay so.
         """
         progress((number + 1) / (REPAIRS + 1))
-        goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
+        goal, job, broken = last.goal, self._job, last.broken
         if self._chooses(goal):
             chosen = self._chosen(goal, goal.samples(last.result.spline), goal.samples())
             if chosen is not goal:
@@ -313,22 +308,20 @@ class Refinement:
         if caught and number > 0 and not last.goal.is_whole:
             return None
         if last.is_caught:
-            return job.restart(replace(last, goal=goal), last.fine)
+            return job.restart(last, last.fine)
         scales = job.updated(last.scales, broken)
         weak = "max_torque_share" in broken
-        # Weights may find the strength with forces that are held; where they do not, time does.
-        waits = weak and (number < 2 or last.goal.forces is None)
+        # Weights may find the strength; where they do not, time does.
+        waits = weak and number < 2
         slower = number > 0 and self.settings.retime and not waits and bool(broken & _SLOWED.keys())
         # How often the spline's knots near the key instants are doubled at most.
         fine = last.fine + (last.fine < 2 and bool(broken & _EXACT))
-        if not weak and not slower and fine == last.fine:
+        if not slower and fine == last.fine:
             return job.improve(last, scales)
         near = last.result.spline
         if slower:
             goal = self._slower(last)
             near = _retimed(near, last.goal.schedule, goal.schedule)
-        elif weak or last.goal.forces is not None:  # what was too strong once would be so again
-            goal = replace(goal, forces=last.motion)
         return job.attempt(goal, scales, fine, near)
 
     def _hurried(self, best: FitAttempt[_RefineGoal], share: float) -> FitAttempt[_RefineGoal]:
@@ -366,7 +359,7 @@ class Refinement:
             worst = last.certificate[name].time_s or 0.0
             when = float(np.interp(worst, last.goal.schedule.instants, schedule.instants))
             path, schedule = stretched_around(path, schedule, when, _SLOWED[name], last.goal.span)
-        return replace(last.goal, path=path, schedule=schedule, forces=None)
+        return replace(last.goal, path=path, schedule=schedule)
 
     def _result(
         self, parts: Sequence[FitAttempt[_RefineGoal]], duration: float, given: ContactSchedule, began: float

@@ -60,7 +60,6 @@ class RefineTargets(FitTargets):
     load: FloatArray
     limbs: dict[str, LimbDirections]
     obstacles: RefineObstacles
-    schedule: ContactSchedule
 
 
 def refine_targets(
@@ -88,10 +87,10 @@ def refine_targets(
     rolls = rolls_through(body, schedule, lambda when: path.at(np.array([when]))[0])
     lay_toes_flat(toe_angles(body, rolls, time), reference, guide)
     return RefineTargets(
-        time, contact_targets(schedule, time, variables, scales.position / scales.approach, rolls),
+        time, schedule, contact_targets(schedule, time, variables, scales.position / scales.approach, rolls),
         com=np.zeros((n, 3)), com_weight=np.zeros(n), com_acceleration=np.zeros((n, 3)), margin=np.zeros(n),
         reference=reference, reference_scale=guide, ignored=obstacles.ignored, variables=variables, load=load,
-        limbs=limb_directions(body, path, schedule, time, task), obstacles=obstacles, schedule=schedule,
+        limbs=limb_directions(body, path, schedule, time, task), obstacles=obstacles,
     )  # fmt: skip
 
 
@@ -200,8 +199,7 @@ class RefineObjective(MotionObjective):
         residual = np.linalg.solve(root, cost.gradient[:, :, None])[:, :, 0]
         first, second, third = (root.transpose(0, 2, 1) @ part for part in wrench.jacobians)
         out.momentum = MomentumRate(residual, (first, second, third))
-        if self.targets.forces is not None:
-            self._add_strength(out, motion, self.targets.forces, scales)
+        if self._add_strength(out, motion, scales):
             out.sample_cost += 0.5 * np.sum(out.momentum.value[:, 6:] ** 2, axis=1)
 
     def wrench_cost(self, wrench: FloatArray, com: FloatArray, scales: RefineScales) -> WrenchCost:
