@@ -94,7 +94,9 @@ def test_a_foot_sets_out_in_time_for_its_height(contacts):
     settings = SupportSettings(press_speed=0.05, press_time=0.03)
     contact = contacts[0]
     for height in (0.0, 1e-4, 7.5e-4, 1.5e-3, 0.01):
-        assert settings.descent(contact, settings.lead(contact, height))[0] == pytest.approx(height, abs=1e-12)
+        assert settings.descent(contact, settings.lead(contact, height))[0] == pytest.approx(
+            height, abs=1e-12
+        )
 
 
 def test_early_touch_down_counts_within_its_window(stepping):

@@ -9,6 +9,8 @@ from manikin.contact import sole
 from manikin.motion.configuration_spline import StateSamples
 from manikin.motion.file import read_motions
 from manikin.numerics.spatial import skew
+from manikin.planning.whole_body import plan_whole_body
+from manikin.planning.whole_body.fit import SPARED, MotionFit
 from manikin.planning.whole_body.fit_strength import HeldForces, compliance, excess_torque
 from manikin.scenarios import load_scenario
 
@@ -156,3 +158,16 @@ def test_at_a_touch_down_the_foot_that_lands_carries_nothing(runs):
                 assert not held.wrench[sample, column].any()
                 assert not held.sharing[sample, column].any()
     assert changed >= 4
+
+
+def test_the_first_fit_knows_the_strength(step_com, step_motion, flat_ground, monkeypatch):
+    """Who is as weak as to need 1.25 of the strength for a step has one that keeps it after one fit."""
+    needed, fits = step_motion.certificate.value("max_torque_share"), []
+    solve = MotionFit.solve
+    monkeypatch.setattr(MotionFit, "solve", lambda *args, **more: fits.append(1) or solve(*args, **more))
+    weak = human(1.75, 79.0, "male", sole_length=0.28, sole_width=0.12, strength=needed / 1.25)
+    result = plan_whole_body(weak, flat_ground, step_com, rng=np.random.default_rng(0))
+    assert result.succeeded
+    assert len(fits) == 1
+    # Between the samples of the fit, and with forces shared anew, it is a little more.
+    assert result.certificate.value("max_torque_share") < 0.85 + SPARED + 0.02

@@ -33,13 +33,13 @@ HELD, AT_REST = 1.0e15, 3
 """Damping of control points that stay, and their number at an end at rest in a given posture: velocity and
 acceleration are zero there."""
 
-FURTHER_DECREASE, SPARED = 3.0e-4, 0.06
+FURTHER_DECREASE, SPARED = 3.0e-4, 0.1
 """Relative decrease of the objective below which constrained steps stop where the strength is exceeded, a
 small part of the objective; and share of the strength beyond the wanted one from which it counts as that."""
 
-SHARINGS, FALLING = 3, 0.7
-"""How often the contact forces are shared at most during the constrained steps, and the share of the excess
-before that is left at most where they are shared once more."""
+SHARINGS, FALLING, BEYOND = 3, 0.7, 2.0
+"""How often the contact forces are shared at most for the strength, the share of the excess before that is left
+at most where they are shared once more, and the excess of a motion that goes wrong in another way."""
 
 STIFFNESS = 1.0e4
 """Factor on the squares of the constraints in the matrix with which a step and its multipliers are found."""
@@ -84,6 +84,7 @@ class MotionFit:
         points, iterations = self._with_ends(np.array(start.control_points)), 0
         scales = final.loosened(final.stages[-1])
         if further:
+            self._objective.share_forces(points)
             moved, state, iterations = self._constrain(points, scales)
             if moved is not points:
                 return self._exact(moved, state, scales, iterations)
@@ -98,16 +99,18 @@ class MotionFit:
     def _constrain(
         self, points: FloatArray, scales: MotionScales
     ) -> tuple[FloatArray, FitLinearisation, int]:
-        """Steps that meet contacts and centre of mass, with contact forces that are shared anew in between.
+        """Steps that meet contacts and centre of mass, and then the strength where it is exceeded.
 
-        Forces that are held make torques seem smaller than they are once the motion has changed.
+        Contact forces are shared when the contacts are met: those of a motion that is far off say nothing.
+        They are shared anew after that, since forces that are held make torques seem too small.
         """
-        taken, last = 0, np.inf
+        state, last = self._objective.linearise(points, scales, self._multiplier), np.inf
+        points, state, taken = self._constrained(points, state, scales)
         for _ in range(SHARINGS):
             self._objective.share_forces(points)
             state = self._objective.linearise(points, scales, self._multiplier)
             excess = state.excess or 0.0
-            if taken > 0 and not SPARED <= excess < FALLING * last:
+            if not SPARED <= excess < min(FALLING * last, BEYOND):
                 break
             points, state, more = self._constrained(points, state, scales)
             taken, last = taken + more, excess

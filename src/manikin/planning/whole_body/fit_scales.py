@@ -44,7 +44,7 @@ class MotionScales:
     joint_buffer: float = 0.03
     joint_velocity: float = 0.1
     velocity_share: float = 0.9
-    torque_share: float = 0.02
+    torque_share: float = 0.01
     strength_share: float = 0.85
     acceleration: float = 24.0
     pelvis_acceleration: float = 4.0
