@@ -38,8 +38,8 @@ FURTHER_DECREASE, SPARED = 3.0e-4, 0.1
 small part of the objective; and share of the strength beyond the wanted one from which it counts as that."""
 
 SHARINGS, FALLING, BEYOND = 3, 0.7, 2.0
-"""How often the contact forces are shared at most for the strength, the share of the excess before that is left
-at most where they are shared once more, and the excess of a motion that goes wrong in another way."""
+"""How often the contact forces are shared at most for the strength, the share of the excess before that is
+left at most where they are shared once more, and the excess of a motion that goes wrong in another way."""
 
 STIFFNESS = 1.0e4
 """Factor on the squares of the constraints in the matrix with which a step and its multipliers are found."""
