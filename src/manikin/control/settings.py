@@ -81,7 +81,7 @@ class SupportSettings:
         early_window: A touch this long before the planned landing counts as the landing [s].
         release_time: A support that has not touched for this long is landed anew [s].
         hover: Before its landing a foot is held this far above its support, not to touch ahead of time [m].
-        press_speed: It goes down at up to this speed, to ``press_depth``, and lands at its time [m/s].
+        press_speed: It goes down at up to this speed, to ``press_depth``, to land at its time [m/s].
         press_time: That speed rises from zero over this time [s].
         rolling_press_speed: The same of a foot that lands on its heel, which this speed sets turning [m/s].
         press_depth: How far below the planned support it is sent at most [m].
