@@ -1,5 +1,6 @@
 """Creatures from robot descriptions: the same mechanics as in the file, limbs where they were named."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -133,11 +134,15 @@ def test_parts_that_always_overlap_are_not_checked(dog_file):
         ('effort="40"', "", "effort is missing"),
         ('<mass value="6.0"/>', '<mass value="nan"/>', "mass value is 'nan'"),
         ('<mass value="6.0"/>', '<mass value="-6.0"/>', "mass is -6"),
+        ('<mass value="6.0"/>', '<mass value="1e300"/>', r"mass is 1e\+300; valid: 0 to 10000 kg"),
         ('<mass value="6.0"/>', "", "no <mass>"),
+        ('ixx="0.03"', 'ixx="1e300"', "at most 1e"),
+        ('scale="0.001 0.001 0.001"', 'scale="0.001 0 0.001"', "scale is .*; valid: not zero"),
+        ('<box size="0.42 0.16 0.12"/>', '<box size="0.42 0.16 1e5"/>', "at most 100 m"),
         ('<mass value="0.9"/>', '<mass value="0"/>', "moves and has no mass"),
         ('ixx="0.03"', 'ixx="9.0"', "principal moments"),
         ('<box size="0.42 0.16 0.12"/>', '<box size="0.42 0.16"/>', "3 finite numbers"),
-        ('<box size="0.42 0.16 0.12"/>', '<box size="0.42 0.16 -1"/>', "metres > 0"),
+        ('<box size="0.42 0.16 0.12"/>', '<box size="0.42 0.16 -1"/>', "> 0 and at most"),
         ('<box size="0.42 0.16 0.12"/>', "<cone/>", "valid: box, sphere"),
         ("shank.stl", "nowhere.stl", "not found"),
         ("shank.stl", "dog.urdf", "cannot be read"),
@@ -181,6 +186,23 @@ def test_broken_descriptions_are_refused_in_one_line(dog_file, old, new, match):
 def test_limbs_that_do_not_fit_are_refused(dog_file, limbs, options, match):
     with pytest.raises(BodyError, match=match):
         creature_from_urdf(dog_file, limbs, **options)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_a_device_and_a_vast_file_are_refused_at_once(tmp_path):
+    """Reading the first would wait for ever, the others would take all memory."""
+    os.mkfifo(tmp_path / "pipe.urdf")
+    with (tmp_path / "vast.urdf").open("wb") as file:
+        file.truncate(10**12)
+    links = "".join(f'<link name="l{number}"/>' for number in range(2000))
+    (tmp_path / "many.urdf").write_text(f'<robot name="snake">{links}</robot>')
+    for path, said in (
+        (tmp_path / "pipe.urdf", "no regular file"), ("/dev/zero", "no regular file"),
+        (tmp_path / "vast.urdf", "at most 20000000"),
+        (tmp_path / "many.urdf", "2000 links; valid: at most 200"),
+    ):  # fmt: skip
+        with pytest.raises(BodyError, match=said):
+            read_urdf(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"<robot/>", b"<robot><link/></robot>"])

@@ -23,8 +23,10 @@ from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Pla
 def random_motion(body, n=50, seed=0):
     rng = np.random.default_rng(seed)
     names = ("left_foot", "right_foot", "right_hand")
+    q = rng.standard_normal((n, body.nq))
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     return Motion(
-        time=np.cumsum(rng.uniform(1e-3, 2e-3, n)), q=rng.standard_normal((n, body.nq)),
+        time=np.cumsum(rng.uniform(1e-3, 2e-3, n)), q=q,
         v=rng.standard_normal((n, body.nv)), a=rng.standard_normal((n, body.nv)),
         tau=rng.standard_normal((n, body.nv)), com=rng.standard_normal((n, 3)),
         angular_momentum=rng.standard_normal((n, 3)), margin=rng.standard_normal(n) * 1e-300,
@@ -131,6 +133,24 @@ def replaced(file, name, value):
     file.create_dataset(name, data=value)
 
 
+def linked(file, name, link):
+    del file[name]
+    file[name] = link
+
+
+def outside(file, name):
+    """A dataset whose numbers are the bytes of another file."""
+    shape = file[name].shape
+    del file[name]
+    file.create_dataset(name, shape, np.float64, external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
+
+
+def vast(file, name, kind):
+    """A dataset of 10^12 numbers that takes no room in the file, since none was written."""
+    del file[name]
+    file.create_dataset(name, (10**6, 10**6), kind, chunks=(1000, 1000), compression="gzip")
+
+
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
@@ -141,6 +161,17 @@ def replaced(file, name, value):
         (lambda f: [f.__delitem__(name) for name in GROUPS if name in f], "holds no motion"),
         (lambda f: f["planned/time"].__setitem__(3, -1.0), "time does not increase"),
         (lambda f: replaced(f, "planned/com", [1.0]), "com has shape"),
+        (lambda f: f["planned/q"].__setitem__((3, 9), 1e300), "planned/q has the value 1e+300"),
+        (lambda f: f["planned/q"].__setitem__((3, 9), np.nan), "q or time is not finite"),
+        (lambda f: f["planned/q"].__setitem__((3, 6), 7.0), "quaternion of another norm"),
+        (lambda f: f["executed/com"].__setitem__((3, 0), np.inf), "executed/com has the value inf"),
+        (lambda f: linked(f, "planned/q", h5py.SoftLink("/planned/q")), "q is a link"),
+        (lambda f: linked(f, "planned", h5py.SoftLink("/executed")), "planned is a link"),
+        (lambda f: linked(f, "body", h5py.ExternalLink("/etc/passwd", "/")), "body is a link"),
+        (lambda f: outside(f, "planned/com"), "lies in another file"),
+        (lambda f: vast(f, "planned/q", np.float64), "MB of numbers; valid: at most 800 MB"),
+        (lambda f: vast(f, "scene", np.uint8), "MB of numbers; valid: at most 800 MB"),
+        (lambda f: replaced(f, "planned/com", b"text"), "planned"),
         (lambda f: replaced(f, "body", "{}"), "body is damaged"),
         (lambda f: replaced(f, "scene", "{"), "scene is damaged"),
         (lambda f: replaced(f, "schedule", 3.0), "schedule is damaged"),
@@ -177,6 +208,35 @@ def test_failed_write_keeps_the_old_file_and_no_other(content, tmp_path, monkeyp
     monkeypatch.setattr("manikin.motion.description.describe_scene", fail)
     with pytest.raises(KeyboardInterrupt):
         write_motions(path, content)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["motion.h5"]  # noqa: PTH208
+
+
+FULL = """
+import resource, sys
+from manikin.errors import MotionFileError
+from manikin.motion.file import read_motions, write_motions
+content = read_motions(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+try:
+    write_motions(sys.argv[1], content)
+except MotionFileError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a limit on the size of files")
+def test_no_room_on_the_disk_gives_one_line_and_keeps_the_old_file(content, tmp_path):
+    """A limit on the size of files ends the write as a full disk does."""
+    path = tmp_path / "motion.h5"
+    write_motions(path, content)
+    before = path.read_bytes()
+    assert len(before) > 50_000
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "cannot be written (File too large)" in done.stdout
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["motion.h5"]  # noqa: PTH208
 

@@ -3,6 +3,9 @@
 import json
 import subprocess
 import sys
+import time
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
@@ -164,3 +167,40 @@ def test_real_runs_write_their_directories(tmp_path):
         summary = json.loads((tmp_path / "out" / folder / "summary.json").read_text())
         assert summary["failure"] == run["failure"]
         assert summary["scenario"] == run["scenario"] == folder
+
+
+MANY = """
+from manikin.pipeline.batch import Job, RunOptions, run_jobs
+jobs = [Job("platform"), Job("stairs")]
+run_jobs(jobs, RunOptions().command, workers=2)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+def test_runs_end_with_the_process_that_started_them():
+    """It is killed, so that it cannot end them itself."""
+
+    def children(parent):
+        found = []
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            with suppress(OSError):
+                if stat.read_text().rpartition(")")[2].split()[1] == str(parent):
+                    found.append(int(stat.parent.name))
+        return found
+
+    parent = subprocess.Popen(
+        [sys.executable, "-c", MANY], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        until = time.monotonic() + 60.0
+        while len(runs := children(parent.pid)) < 2 and time.monotonic() < until:
+            time.sleep(0.05)
+        assert len(runs) == 2
+        time.sleep(2.0)  # until they listen
+    finally:
+        parent.kill()
+        parent.wait()
+    until = time.monotonic() + 20.0
+    while any(Path(f"/proc/{run}").exists() for run in runs) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not any(Path(f"/proc/{run}").exists() for run in runs)

@@ -25,9 +25,10 @@ from manikin.scene import (
     Sphere,
     load_mesh,
 )
-from manikin.scene.collision import ClosedSurface, triangle_geometry
+from manikin.scene.collision import ClosedSurface
 from manikin.scene.covering import winding_inside
 from manikin.scene.distance_bounds import KnownDistances
+from manikin.scene.triangles import triangle_geometry
 
 FAR = 100.0
 # Coal iterates to 1e-8 m, on cylinders to 1e-6 m; ten times that is allowed.

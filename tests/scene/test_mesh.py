@@ -104,11 +104,72 @@ def test_a_size_that_suggests_a_mistaken_unit_is_refused(tmp_path):
     big = BOX.copy()
     big.apply_scale(1000.0)
     big.export(str(path))
-    with pytest.raises(SceneError, match=r"3000 m, which suggests a mistaken unit.*set unit"):
+    with pytest.raises(SceneError, match=r"3000 m if its unit is the metre, and 3 m .* or say its unit"):
         load_mesh(path)
+    with pytest.raises(SceneError, match=r"3000 m, which suggests a mistaken unit.*set unit"):
+        load_mesh(path, unit="m")
     assert np.allclose(np.ptp(load_mesh(path, unit="mm").vertices, axis=0), (1.0, 2.0, 3.0))
     with pytest.raises(SceneError, match="mistaken unit"):
         load_mesh(path, unit="mm", scale=1e-5)
+
+
+def test_a_step_in_millimetres_is_no_plateau_and_a_hall_says_its_metres(tmp_path):
+    """0.151 m in millimetres reads as 151 m, far below the size of the largest mesh; so is asked for."""
+    step = trimesh.creation.box((151.0, 400.0, 90.0))
+    step.export(str(tmp_path / "step.stl"))
+    with pytest.raises(
+        SceneError, match=r"400 m if its unit is the metre, and 0\.4 m if it is the millimetre"
+    ):
+        load_mesh(tmp_path / "step.stl")
+    assert np.allclose(
+        np.ptp(load_mesh(tmp_path / "step.stl", unit="mm").vertices, axis=0), (0.151, 0.4, 0.09)
+    )
+    assert np.allclose(np.ptp(load_mesh(tmp_path / "step.stl", unit="m").vertices, axis=0), (151, 400, 90))
+
+
+def test_a_file_that_is_cut_off_or_not_finite_says_so(tmp_path):
+    BOX.export(str(tmp_path / "box.stl"))
+    whole = (tmp_path / "box.stl").read_bytes()
+    text = trimesh.exchange.stl.export_stl_ascii(BOX).encode()
+    nan = whole[:96] + np.float32(np.nan).tobytes() + whole[100:]
+    for content, said in (
+        (whole[: 84 + 5 * 50 + 17], "cut off: 5 of 12 triangles are there"),
+        (text[: len(text) // 2], "cut off, it has no endsolid"),
+        (nan, "vertices is"),
+    ):
+        (tmp_path / "box.stl").write_bytes(content)
+        with pytest.raises(SceneError, match=said):
+            load_mesh(tmp_path / "box.stl")
+    (tmp_path / "box.stl").write_bytes(text)
+    assert len(load_mesh(tmp_path / "box.stl").faces) == 12
+
+
+def test_a_fine_mesh_is_decimated_where_its_surface_stays(tmp_path):
+    """A ball of 81,920 triangles keeps its surface; 80,000 random triangles in a cube cannot."""
+    ball = trimesh.creation.icosphere(subdivisions=6)
+    ball.export(str(tmp_path / "ball.stl"))
+    fewer = load_mesh(tmp_path / "ball.stl")
+    assert 40_000 < len(fewer.faces) <= 50_000
+    distance = np.linalg.norm(fewer.vertices, axis=1)
+    np.testing.assert_allclose(distance, 1.0, atol=2e-3)
+    corners = np.random.default_rng(0).uniform(-1.0, 1.0, (80_000, 3, 3))
+    cloud = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(240_000).reshape(-1, 3), process=False)
+    cloud.export(str(tmp_path / "cloud.stl"))
+    with pytest.raises(SceneError, match=r"80000 triangles, and with \d+ its surface is .* mm off"):
+        load_mesh(tmp_path / "cloud.stl")
+
+
+def test_too_many_triangles_are_counted_before_they_are_loaded(tmp_path):
+    """The header alone, of three million triangles that are all zero, in a file without content."""
+    with (tmp_path / "huge.stl").open("wb") as file:
+        file.write(bytes(80) + (3_000_000).to_bytes(4, "little"))
+        file.truncate(84 + 50 * 3_000_000)
+    with pytest.raises(SceneError, match="3000000 triangles; valid: at most 2000000"):
+        load_mesh(tmp_path / "huge.stl")
+    with (tmp_path / "huge.stl").open("wb") as file:
+        file.truncate(10**12)
+    with pytest.raises(SceneError, match="has 1000000000000 bytes; valid: at most"):
+        load_mesh(tmp_path / "huge.stl")
 
 
 def test_bad_arrays_are_refused():

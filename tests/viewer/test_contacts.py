@@ -16,7 +16,8 @@ from manikin.scene import Box, Obstacle, Scene
 
 pytest.importorskip("viser")
 
-from manikin.viewer.drive import LiveContacts  # only where viser is
+from manikin.viewer.door import Door  # only where viser is
+from manikin.viewer.drive import LiveContacts
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def viewer(live):
     live.aim(0.0, 0.0)
     live.ask([limb.name for limb in live.body.limbs])
     live.heuristic, live.role, live.pulling = "efort", Role.AUTO, False
-    session = ContactViewer(live, port=0)
+    session = ContactViewer(live, Door(0))
     yield session
     session.close()
 
@@ -134,7 +135,7 @@ def test_a_body_without_limbs_is_refused():
 
 def test_the_command_serves_a_scenario(monkeypatch, capfd):
     served = []
-    monkeypatch.setattr("manikin.viewer.serve_contacts", lambda *given: served.append(given[0]))
+    monkeypatch.setattr("manikin.viewer.serve_contacts", lambda *given, **_: served.append(given[0]))
     assert main(["view", "platform", "--contacts", "--samples", "200"]) == DONE
     assert {limb.name for limb in served[0].body.limbs} >= {"left_arm", "right_leg"}
     assert main(["view", "nowhere", "--contacts"]) == BAD_INPUT

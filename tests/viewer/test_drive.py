@@ -15,6 +15,8 @@ from manikin.walking import WalkController
 
 pytest.importorskip("viser")
 
+from manikin.viewer.door import Door  # only where viser is
+
 FRAME = 1.0 / 60.0
 
 
@@ -27,7 +29,7 @@ def drive():
 
 @pytest.fixture
 def viewer(drive):
-    page = drive.WalkViewer(WalkController(), port=0)
+    page = drive.WalkViewer(WalkController(), Door(0))
     yield page
     page.close()
 
@@ -157,13 +159,13 @@ def test_a_directive_beyond_the_library_is_said_so(viewer, press):
 
 def test_the_walker_stands_on_the_floor_of_the_scene(drive):
     box = Obstacle("box", Box((1.0, 1.0, 1.0)), translation=(3.0, 0.0, 1.0))
-    page = drive.WalkViewer(WalkController(place=(0.5, 0.0, 0.0)), Scene([box], 0.5), port=0)
+    page = drive.WalkViewer(WalkController(place=(0.5, 0.0, 0.0)), Door(0), Scene([box], 0.5))
     try:
         assert 0.5 + 0.8 < page._shapes.frames["pelvis"].position[2] < 0.5 + 1.1
     finally:
         page.close()
     with pytest.raises(InputError, match="scene has no floor"):
-        drive.WalkViewer(WalkController(), Scene([], None), port=0)
+        drive.WalkViewer(WalkController(), Door(0), Scene([], None))
 
 
 def test_it_runs_until_it_is_closed(viewer, press):

@@ -16,12 +16,14 @@ from manikin.viewer import serve
 
 pytest.importorskip("viser")
 
+from manikin.viewer.door import Door  # only where viser is
+
 
 @pytest.fixture
 def session(finished_run):
     from manikin.viewer.session import ViewerSession
 
-    viewer = ViewerSession(finished_run, port=0)
+    viewer = ViewerSession(finished_run, Door(0))
     yield viewer
     viewer.close()
 
@@ -102,7 +104,7 @@ def test_cursor_of_the_plot_stands_at_the_instant_shown(session):
 def test_closing_twice_is_fine_and_ends_the_service(finished_run):
     from manikin.viewer.session import ViewerSession
 
-    viewer = ViewerSession(finished_run, port=0)
+    viewer = ViewerSession(finished_run, Door(0))
     url = viewer.url
     runner = threading.Thread(target=viewer.run)
     runner.start()
@@ -115,12 +117,10 @@ def test_closing_twice_is_fine_and_ends_the_service(finished_run):
         urllib.request.urlopen(url, timeout=2)
 
 
-def test_taken_and_impossible_ports_are_refused_in_one_line(session, finished_run):
-    from manikin.viewer.session import ViewerSession
-
+def test_taken_and_impossible_ports_are_refused_in_one_line(session):
     for port in (session.server.get_port(), 70000, -1):
         with pytest.raises(InputError, match="valid: a free port"):
-            ViewerSession(finished_run, port=port)
+            Door(port)
 
 
 def test_file_without_body_is_refused(finished_run):
@@ -133,8 +133,8 @@ def test_others_move_on_the_same_clock(finished_run):
     from manikin.viewer.session import ViewerSession
 
     with pytest.raises(InputError, match="twin"):
-        ViewerSession(finished_run, port=0, others={"twin": MotionFile(finished_run.planned)})
-    session = ViewerSession(finished_run, port=0, others={"twin": finished_run})
+        ViewerSession(finished_run, Door(0), {"twin": MotionFile(finished_run.planned)})
+    session = ViewerSession(finished_run, Door(0), {"twin": finished_run})
     try:
         for time in (0.5, 1.2):
             session.show(time)
@@ -149,7 +149,7 @@ def test_a_recording_is_shown_beside_its_plan(finished_run):
     """Both at the same instant, apart across the way and nowhere else."""
     from manikin.viewer.session import BESIDE, ViewerSession
 
-    viewer = ViewerSession(replace(finished_run, recorded=finished_run.planned), port=0)
+    viewer = ViewerSession(replace(finished_run, recorded=finished_run.planned), Door(0))
     try:
         assert viewer.beside == "recorded"
         viewer.choose("planned")

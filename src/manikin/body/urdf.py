@@ -20,6 +20,16 @@ from manikin.numerics.spatial import FloatArray, rotation_from_rpy
 
 _THINNEST = 1e-4
 """Least side of a box around a mesh [m]."""
+MAX_BYTES = 20_000_000
+"""Largest file that is read; those of humanoids have a hundredth of it."""
+MAX_MESH_BYTES = 200_000_000
+"""Largest mesh file that is read."""
+MAX_LINKS = 200
+"""Most links; humanoids with hands have about a hundred."""
+HEAVIEST = 1e4
+"""Largest mass of a link [kg]."""
+FARTHEST = 100.0
+"""Largest length, and distance from the frame that it is given in [m]."""
 
 
 class UrdfShape(NamedTuple):
@@ -40,8 +50,8 @@ def _shape(element: Element, link: str, folder: Path) -> UrdfShape:
         tags = [item.tag[:40] for item in items]
         raise BodyError(f"{where} has geometry {tags}; valid: box, sphere, cylinder, capsule or mesh")
     kind, size, turn, centre = _primitive(items[0], where, folder)
-    if np.any(size <= 0.0):
-        raise BodyError(f"{where} size is {size.tolist()}; valid: metres > 0")
+    if np.any(size <= 0.0) or np.any(size > FARTHEST):
+        raise BodyError(f"{where} size is {size.tolist()}; valid: > 0 and at most {FARTHEST:g} m")
     return UrdfShape(kind, size, rotation @ turn, translation + rotation @ centre)
 
 
@@ -65,6 +75,8 @@ def _of_mesh(item: Element, where: str, folder: Path) -> UrdfShape:
     """The shape around a mesh file."""
     name = item.get("filename", "")
     scale = _numbers(item, "scale", f"{where} mesh", np.ones(3))
+    if np.any(scale == 0.0):
+        raise BodyError(f"{where} mesh scale is {scale.tolist()}; valid: not zero")
     file = _mesh_file(name, folder)
     if file is None:
         raise BodyError(f"{where} mesh {name[:200]!r} is not found from {folder}; valid: a mesh file")
@@ -77,6 +89,8 @@ def _of_mesh(item: Element, where: str, folder: Path) -> UrdfShape:
 @lru_cache(maxsize=64)
 def _around_file(file: Path, stamp: int, scale: tuple[float, ...]) -> UrdfShape:  # noqa: ARG001
     """The shape around a file as it was at a time; limbs often have one mesh in common."""
+    if (size := file.stat().st_size) > MAX_MESH_BYTES:
+        raise BodyError(f"mesh '{file}' has {size} bytes; valid: at most {MAX_MESH_BYTES}")
     try:
         points = np.asarray(trimesh.load(file, force="mesh").vertices, dtype=np.float64)
     except Exception as error:  # the readers of each format raise what they like
@@ -158,7 +172,10 @@ def _placement(origin: Element | None, where: str) -> tuple[FloatArray, FloatArr
     if origin is None:
         return np.eye(3), np.zeros(3)
     roll, pitch, yaw = _numbers(origin, "rpy", f"{where} origin", np.zeros(3))
-    return rotation_from_rpy(roll, pitch, yaw), _numbers(origin, "xyz", f"{where} origin", np.zeros(3))
+    place = _numbers(origin, "xyz", f"{where} origin", np.zeros(3))
+    if np.abs(place).max() > FARTHEST:
+        raise BodyError(f"{where} origin is {place.tolist()}; valid: at most {FARTHEST:g} m away")
+    return rotation_from_rpy(roll, pitch, yaw), place
 
 
 JOINT_KINDS = ("revolute", "continuous", "fixed", "floating")
@@ -232,6 +249,8 @@ def read_urdf(path: str | Path) -> Urdf:
     joints = [_joint(element, where) for element in root.findall("joint")]
     if not links:
         raise BodyError(f"{where}: no link; valid: at least one")
+    if len(links) > MAX_LINKS:
+        raise BodyError(f"{where}: {len(links)} links; valid: at most {MAX_LINKS}")
     _check_unique([link.name for link in links], "link", where)
     _check_unique([joint.name for joint in joints], "joint", where)
     by_name = {link.name: link for link in links}
@@ -241,6 +260,10 @@ def read_urdf(path: str | Path) -> Urdf:
 
 def _parsed(file: Path) -> Element:
     try:
+        if file.exists() and not file.is_file():
+            raise BodyError(f"{file}: is no regular file; valid: a URDF file")
+        if (size := file.stat().st_size) > MAX_BYTES:
+            raise BodyError(f"{file}: has {size} bytes; valid: at most {MAX_BYTES}")
         root = ElementTree.fromstring(file.read_bytes())
     except OSError as error:
         raise BodyError(f"{file}: {error.strerror or error}; valid: a URDF file") from None
@@ -265,8 +288,11 @@ def _link(element: Element, file: Path) -> UrdfLink:
         _number(matrix, key, f"{where} inertia") for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if mass < 0.0:
-        raise BodyError(f"{where} mass is {mass:g}; valid: >= 0")
+    if not 0.0 <= mass <= HEAVIEST:
+        raise BodyError(f"{where} mass is {mass:g}; valid: 0 to {HEAVIEST:g} kg")
+    if (largest := np.abs(inertia).max()) > HEAVIEST * FARTHEST**2:
+        problem = f"{where} inertia has {largest:.3g}"
+        raise BodyError(f"{problem}; valid: at most {HEAVIEST * FARTHEST**2:g} kg.m^2")
     turned = turn @ inertia @ turn.T
     return UrdfLink(name, mass, com, 0.5 * (turned + turned.T), shapes)
 

@@ -25,6 +25,7 @@ from manikin.cli.view import compare, export, view
 from manikin.cli.walk import library, walk, words
 from manikin.errors import InputError, ManikinError
 from manikin.runtime import __version__
+from manikin.runtime.child import end_as_told
 
 __all__ = ["main"]
 
@@ -43,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is loaded: threads make its small products several times slower, and the last
     # bits of a result depend on their number.  Whoever sets the variable has the last word.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    end_as_told()
     try:
         with Interruption() as interruption:
             given = None if arguments is None else list(arguments)

@@ -77,6 +77,10 @@ def argument(metavar: str, text: str) -> Any:
 JsonOption = Annotated[bool, flag("--json", "Print one JSON object on standard output.")]
 OutOption = Annotated[Path | None, option("DIR", "Directory. Default: one in runs; none with --json.")]
 FiguresOption = Annotated[bool, typer.Option(help="Draw the figures into the directory.")]
+HostOption = Annotated[
+    str,
+    option("ADDRESS", "Listen to this address, as 0.0.0.0, so that others can open the page by its token."),
+]
 JobsOption = Annotated[int | None, option("N", "Processes side by side; default: one per core.", min=1)]
 SexOption = Annotated[Literal["male", "female"] | None, option("male|female", "Sex of the person.")]
 LoadHandOption = Annotated[
@@ -223,8 +227,9 @@ def print_report(report: Mapping[str, Any], shown: dict[str, Any], *, json: bool
 
 
 def announce(url: str) -> None:
-    """Say where a viewer is served."""
-    typer.echo(f"viewer at {url} (Ctrl-C ends it)", err=True)
+    """Say where a viewer is served, and for whom."""
+    others = "for who has this address" if "token=" in url else "--host 0.0.0.0 opens it for other computers"
+    typer.echo(f"viewer at {url} (Ctrl-C ends it; {others})", err=True)
 
 
 def complain(message: str, status: int) -> int:

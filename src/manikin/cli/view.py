@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 import typer
 
 from manikin.cli import console
-from manikin.cli.console import JsonOption, MotionArgument, argument, flag, option
+from manikin.cli.console import HostOption, JsonOption, MotionArgument, argument, flag, option
+from manikin.viewer import THIS_COMPUTER
 
 _SOURCE = "Run directory or motion file (.h5); with --contacts a scenario's name or file."
 
@@ -14,6 +15,7 @@ _SOURCE = "Run directory or motion file (.h5); with --contacts a scenario's name
 def view(
     source: Annotated[str, argument("DIR|FILE", _SOURCE)],
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 picks a free one.")] = 8080,
+    host: HostOption = THIS_COMPUTER,
     contacts: Annotated[
         bool, flag("--contacts", "Drag the body of a scenario and watch its contacts.")
     ] = False,
@@ -21,7 +23,7 @@ def view(
         int | None, option("N", "With --contacts: samples of each limb.", min=100, max=1_000_000)
     ] = None,
 ) -> None:
-    """Show a motion in the browser, or the contacts of a body moved by hand; on this computer only."""
+    """Show a motion in the browser, or the contacts of a body moved by hand."""
     if contacts:
         from manikin.scenarios import load_scenario
         from manikin.scenarios.world import contact_rules, start_posture
@@ -32,7 +34,7 @@ def view(
         body, scene = job.build_body(), job.build_scene()
         q, rules = start_posture(job, body, scene), contact_rules(job, body)
         live = LiveContacts(body, scene, q, samples=samples or 10_000, seed=job.seed, rules=rules)
-        serve_contacts(live, port, console.announce)
+        serve_contacts(live, port, console.announce, host=host)
         return
     console.refuse(samples is not None, "--samples", "it is for --contacts")
     from manikin.motion.file import read_motions
@@ -42,7 +44,7 @@ def view(
     others = {name: read_motions(path) for name, path in other_motions(Path(source)).items()}
     from manikin.viewer import serve
 
-    serve(content, port=port, announce=console.announce, others=others)
+    serve(content, port=port, announce=console.announce, others=others, host=host)
 
 
 def compare(

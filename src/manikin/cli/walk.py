@@ -10,6 +10,7 @@ import typer
 from manikin.cli import console
 from manikin.cli.console import (
     FiguresOption,
+    HostOption,
     JobsOption,
     JsonOption,
     OutOption,
@@ -19,6 +20,7 @@ from manikin.cli.console import (
     option,
 )
 from manikin.errors import InputError
+from manikin.viewer import THIS_COMPUTER
 
 SHOWN = (
     "duration_s", "path_length_m", "cost", "max_forward_mps", "max_left_mps", "steps", "max_stance_slide_m",
@@ -51,6 +53,7 @@ def walk(
     port: Annotated[
         int | None, option("N", "With --drive: port; 0 picks a free one.", min=0, max=65535)
     ] = None,
+    host: HostOption = THIS_COMPUTER,
     out: OutOption = None,
     figures: FiguresOption = True,
     json: JsonOption = False,
@@ -60,8 +63,9 @@ def walk(
     if drive:
         walked = {"--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out}
         console.refuse_given(walked | {"--json": json or None}, "it is for a walk to a place")
-        return _drive(body, start, scene, 8080 if port is None else port)
+        return _drive(body, start, scene, 8080 if port is None else port, host)
     console.refuse(port is not None, "--port", "it is for --drive")
+    console.refuse(host != THIS_COMPUTER, "--host", "it is for --drive")
     if to is None:
         raise InputError("--to is missing; valid: X Y HEADING_DEG, or --drive")
     from manikin.scenarios import load_scenario
@@ -75,7 +79,7 @@ def walk(
     )  # fmt: skip
 
 
-def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> None:
+def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int, host: str) -> None:
     """Serve the page until Ctrl-C."""
     from manikin.body import human
     from manikin.scenarios import load_scenario
@@ -85,7 +89,7 @@ def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> 
     person = human(body["stature_m"], body["mass_kg"], body["sex"])
     around = None if scene is None else load_scenario(scene).build_scene()
     place = (start[0], start[1], math.radians(start[2]))
-    serve_drive(WalkController(person, place=place), around, port, console.announce)
+    serve_drive(WalkController(person, place=place), around, port, console.announce, host=host)
 
 
 def words(

@@ -22,7 +22,7 @@ from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Scene, segment_of
 from manikin.scene.collision import collision_parts, local_box
-from manikin.scene.mesh import IntArray
+from manikin.scene.triangles import IntArray
 
 _SURE = 1e-6  # depth beyond that from which on two ways to measure it agree [m]
 TOUCH = 0.002  # depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]

@@ -10,6 +10,9 @@ Layout (format version 1)::
     /body, /scene, /schedule   JSON texts, see manikin.motion.description
 
 Every group and text may be missing.  The same data always gives the same bytes.
+
+A file may come from anywhere: links that lead out of it, external storage, arrays larger than
+:data:`MAX_BYTES` and numbers beyond :data:`LARGEST` are refused before they are used.
 """
 
 import json
@@ -28,12 +31,22 @@ from manikin.motion import description
 from manikin.motion.motion import Motion
 from manikin.runtime import __version__
 from manikin.runtime.display import Displayed
-from manikin.runtime.files import atomic_path
+from manikin.runtime.files import write_bytes
 from manikin.scene import Scene
 
 FORMAT = "manikin-motion"
 FORMAT_VERSION = 1
 GROUPS = ("shifted", "recorded", "planned", "executed")
+TEXTS = ("body", "scene", "schedule")
+MAX_BYTES = 800_000_000
+"""Largest size of all arrays and texts of a file; an hour at 100 Hz has two thirds of it [bytes]."""
+LARGEST: Mapping[str, float] = {
+    "time": 1e6, "q": 1e4, "com": 1e4, "v": 1e5, "a": 1e9, "tau": 1e9, "angular_momentum": 1e9,
+    "contact_force": 1e9, "margin": np.inf,
+}  # fmt: skip
+"""Largest magnitude of a number of each dataset, in its unit; what is larger is damage."""
+UNIT_NORM = 1e-3
+"""Largest deviation of a quaternion's norm from 1."""
 
 DATASETS: Mapping[str, tuple[str, str]] = {
     "time": ("s", "sample times, increasing"),
@@ -94,12 +107,16 @@ def write_motions(path: str | Path, content: MotionFile) -> None:
     """
     if not content.motions:
         raise MotionFileError(f"{path}: no motion to write; valid: a recorded, planned or executed one")
+    # In memory first: where the disk is full, HDF5 cannot close a file, and ends the process.
+    with h5py.File.in_memory(libver="v110") as file:
+        _fill(file, content)
+        file.flush()
+        data = file.id.get_file_image()
     try:
-        with atomic_path(path) as temporary, h5py.File(temporary, "w-", libver="v110") as file:
-            _fill(file, content)
+        write_bytes(path, data)
     except OSError as error:
         problem = f"cannot be written ({_reason(error)})"
-        raise MotionFileError(f"{path}: {problem}; valid: a writable folder") from None
+        raise MotionFileError(f"{path}: {problem}; valid: a writable folder with room") from None
 
 
 def read_motions(path: str | Path) -> MotionFile:
@@ -118,7 +135,7 @@ def read_motions(path: str | Path) -> MotionFile:
     try:
         with h5py.File(file_path, "r") as file:
             return _content(file, str(file_path))
-    except OSError as error:
+    except (OSError, RuntimeError, KeyError) as error:  # as h5py says that bytes do not fit each other
         problem = f"cannot be read as HDF5 ({_reason(error)})"
         raise MotionFileError(f"{file_path}: {problem}; valid: a motion file written by manikin") from None
 
@@ -128,7 +145,7 @@ def _fill(file: h5py.File, content: MotionFile) -> None:
     for name, motion in content.motions.items():
         _write_motion(file.create_group(name), motion)
         file[f"{name}/margin"].attrs["form"] = margin_form(motion, content.schedule)
-    for name in ("body", "scene", "schedule"):
+    for name in TEXTS:
         if (value := getattr(content, name)) is not None:
             # A dataset, not an attribute: attributes end at 64 kB and a mesh is larger.
             text = json.dumps(getattr(description, f"describe_{name}")(value))
@@ -161,6 +178,7 @@ def _content(file: h5py.File, source: str) -> MotionFile:
     version = file.attrs.get("format_version")
     if version != FORMAT_VERSION:
         raise MotionFileError(f"{source}: has format version {version}; valid: {FORMAT_VERSION}")
+    _check_size(file, source)
     content = MotionFile(
         body=_read_json(file, "body", description.body_from, source),
         scene=_read_json(file, "scene", description.scene_from, source),
@@ -174,6 +192,34 @@ def _content(file: h5py.File, source: str) -> MotionFile:
             problem = f"{name} has other joints than the body; valid: the body's joint_names"
             raise MotionFileError(f"{source}: {problem}")
     return content
+
+
+def _check_size(file: h5py.File, source: str) -> None:
+    """Refuse links out of the file, and arrays that would not fit into memory, before any is read."""
+    items = [(file, name) for name in TEXTS if name in file.keys()]  # noqa: SIM118  # "in file" follows links
+    for group in GROUPS:
+        if isinstance(_linked(file, group, source), h5py.Group):
+            items += [(file[group], name) for name in DATASETS]
+    size = 0
+    for parent, name in items:
+        data = _linked(parent, name, source)
+        if isinstance(data, h5py.Dataset):
+            if data.external or data.is_virtual:
+                raise MotionFileError(f"{source}: {data.name} lies in another file; valid: in this one")
+            size += data.nbytes
+    if size > MAX_BYTES:
+        problem = f"holds {size / 1e6:.0f} MB of numbers"
+        raise MotionFileError(f"{source}: {problem}; valid: at most {MAX_BYTES / 1e6:.0f} MB")
+
+
+def _linked(parent: Any, name: str, source: str) -> Any:
+    """Item of a group under a hard link, or None."""
+    link = parent.get(name, getlink=True)
+    if link is None:
+        return None
+    if not isinstance(link, h5py.HardLink):
+        raise MotionFileError(f"{source}: {name} is a link to another place; valid: as written by manikin")
+    return parent[name]
 
 
 def _read_motion(file: h5py.File, name: str, source: str) -> Motion | None:
@@ -191,9 +237,27 @@ def _read_motion(file: h5py.File, name: str, source: str) -> Motion | None:
         arrays: dict[str, Any] = {key: values[key][()] for key in DATASETS}
         joints, contacts = (tuple(map(str, values.attrs[f"{key}_names"])) for key in ("joint", "contact"))
         unit = str(values["margin"].attrs.get("unit", "N.m"))
-        return Motion(**arrays, joint_names=joints, contact_names=contacts, margin_unit=unit)
+        motion = Motion(**arrays, joint_names=joints, contact_names=contacts, margin_unit=unit)
     except (ValueError, TypeError, MotionFileError) as error:
         raise MotionFileError(f"{source}: {name}: {error}") from None
+    _check_values(motion, f"{source}: {name}")
+    return motion
+
+
+def _check_values(motion: Motion, where: str) -> None:
+    """Refuse numbers that no motion has."""
+    for key, array in motion.arrays().items():
+        limit = LARGEST.get(key)
+        # What was not measured of a recorded motion, such as its forces, is NaN.
+        worst = 0.0 if limit is None or not array.size else float(np.nanmax(np.abs(array), initial=0.0))
+        if limit is not None and worst > limit:
+            problem = f"{where}/{key} has the value {worst:.3g}"
+            raise MotionFileError(f"{problem}; valid: at most {limit:g} in magnitude [{DATASETS[key][0]}]")
+    turns = motion.q[:, 3:7]
+    if not np.all(np.isfinite(motion.time)) or not np.all(np.isfinite(motion.q)):
+        raise MotionFileError(f"{where}/q or time is not finite; valid: finite numbers")
+    if np.any(np.abs(np.linalg.norm(turns, axis=1) - 1.0) > UNIT_NORM):
+        raise MotionFileError(f"{where}/q has a quaternion of another norm than 1; valid: unit quaternions")
 
 
 def _read_json(
@@ -209,5 +273,5 @@ def _read_json(
         raise MotionFileError(f"{source}: {told}; valid: as written by manikin") from None
 
 
-def _reason(error: OSError) -> str:
-    return error.strerror or " ".join(str(error).split())[:120]
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or " ".join(str(error).split())[:120]

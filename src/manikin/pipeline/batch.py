@@ -5,7 +5,6 @@ result does not depend on what ran before or beside it.
 """
 
 import json
-import os
 import subprocess
 import sys
 import threading
@@ -19,6 +18,7 @@ from typing import Any
 
 from joblib import cpu_count
 
+from manikin.runtime.child import environment_of_child
 from manikin.scenarios import Scenario, list_scenarios, list_variants, load_scenario
 
 TIME_LIMIT = 1800.0
@@ -155,7 +155,7 @@ def _completed(
         # A session of its own: Ctrl-C reaches this process alone, which then ends the others in order.
         process = subprocess.Popen(
             command(job), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            errors="replace", start_new_session=True, env={**os.environ, "OMP_NUM_THREADS": "1"},
+            errors="replace", start_new_session=True, env=environment_of_child(),
         )  # fmt: skip
         running.add(process)
         try:

@@ -17,17 +17,21 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from filelock import FileLock, Timeout
 
 from manikin.errors import MotionFileError
 
 FIGURES = "figures"
 """Folder of the figures in a result directory."""
+LOCK = ".lock"
+"""File whose lock says that a directory is being written to."""
 
 
 class ResultDirectory:
     """Directory of one kind of result.
 
-    Whatever writes to it raises :class:`~manikin.errors.MotionFileError` if that is not possible.
+    Whatever writes to it raises :class:`~manikin.errors.MotionFileError` if that is not possible. A directory
+    with marks belongs to one process at a time, as long as the object is there.
 
     Attributes:
         path: The directory.
@@ -42,8 +46,13 @@ class ResultDirectory:
     writer: ClassVar[str] = "manikin"
 
     def __init__(self, path: str | Path, kind: str | None = None) -> None:
-        """Create the directory, or take over that of an earlier such result; else a MotionFileError."""
+        """Create the directory, or take over that of an earlier such result.
+
+        Raises:
+            MotionFileError: If that is not possible, or another process writes to it.
+        """
         self.path, self.kind = Path(path), kind or self.kind
+        self._lock: FileLock | None = None
         if self.path.exists() and not self.path.is_dir():
             raise MotionFileError(f"{self.path}: is a file; valid: a directory for the {self.kind}")
         make_directory(self.path)
@@ -55,8 +64,27 @@ class ResultDirectory:
                 f"{self.path}: holds {content[0]!r} but no {self.marks[0]}, so it is not an earlier "
                 f"{self.kind}; valid: a new or empty directory, or one of an earlier {self.kind}"
             )
+        self._claim()
         # What a killed process was about to write stays behind as a hidden .NAME.*.tmp file.
         self.remove(".*.tmp", "*/.*.tmp")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State of a copy, which claims nothing."""
+        return self.__dict__ | {"_lock": None}
+
+    def _claim(self) -> None:
+        """Keep other processes out of the directory while this object is there."""
+        # In one process a later result takes over from an earlier one.
+        lock = FileLock(self.path.resolve() / LOCK, timeout=0, thread_local=False, is_singleton=True)
+        try:
+            lock.acquire()
+        except Timeout:
+            problem = f"another process writes to this {self.kind}"
+            raise MotionFileError(f"{self.path}: {problem}; valid: another directory, or later") from None
+        except OSError as error:
+            problem = f"cannot be written ({error.strerror or error})"
+            raise MotionFileError(f"{self.path}: {problem}; valid: in a writable directory") from None
+        self._lock = lock
 
     @property
     def figures(self) -> Path:
@@ -182,5 +210,10 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 def write_text(path: str | Path, text: str) -> None:
     """Write ``text`` in UTF-8 with Unix line ends, atomically; OSError as of :func:`atomic_path`."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: str | Path, data: bytes) -> None:
+    """Write ``data`` atomically; OSError as of :func:`atomic_path`."""
     with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_bytes(data)

@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
@@ -16,6 +15,7 @@ from joblib.externals.loky.backend import resource_tracker
 from threadpoolctl import ThreadpoolController
 
 from manikin.errors import ManikinError, TimeLimitError
+from manikin.runtime.child import end_with
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -119,11 +119,5 @@ def _numbered(work: Callable[[T], R], number: int, item: T) -> tuple[int, R]:
 
 def _prepare(parent: int) -> None:
     """Make a new process deaf to Ctrl-C, which its parent sees to, and end it with its parent."""
-
-    def end_with_parent() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    end_with(parent)

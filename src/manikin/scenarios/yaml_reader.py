@@ -18,7 +18,7 @@ import yaml
 from manikin.errors import ScenarioError
 from manikin.scenarios.validation import KeyPath
 
-MAX_BYTES = 10_000_000
+MAX_BYTES = 2_000_000
 """Largest file that is read; scenarios are a few kilobytes."""
 MAX_ENTRIES = 100_000
 """Most keys and list entries of a file, counted after its aliases are written out."""
@@ -115,6 +115,8 @@ def _check_depth(text: str, source: str) -> None:
 
 def _read_text(path: Path) -> str:
     try:
+        if path.exists() and not path.is_file():
+            raise ScenarioError(f"{path}: is no regular file; valid: a text file in UTF-8")
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise ScenarioError(f"{path}: has {size} bytes; valid: at most {MAX_BYTES}")

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
 from manikin.numerics.spatial import FloatArray, axes_of_normal
-from manikin.scene.mesh import IntArray, Mesh, MeshPiece, as_trimesh
+from manikin.scene.mesh import Mesh, MeshPiece, as_trimesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Shape, Sphere, extents
+from manikin.scene.triangles import IntArray, coal_triangles, coal_vertices, triangle_geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,20 +131,10 @@ _POINT = coal.Sphere(1e-9)
 _HERE = coal.Transform3s.Identity()
 
 
-def triangle_geometry(vertices: FloatArray, faces: IntArray) -> coal.CollisionGeometry:
-    """Coal bounding-volume hierarchy over triangles."""
-    model = coal.BVHModelOBBRSS()
-    model.beginModel(len(faces), len(vertices))
-    model.addSubModel(_coal_vertices(vertices), _coal_triangles(faces))
-    model.endModel()
-    model.computeLocalAABB()
-    return model
-
-
 def convex_geometry(vertices: FloatArray) -> coal.CollisionGeometry:
     """Coal convex polytope: the hull of the vertices."""
     hull = trimesh.convex.convex_hull(vertices)
-    geometry = coal.Convex(_coal_vertices(hull.vertices), _coal_triangles(np.asarray(hull.faces)))
+    geometry = coal.Convex(coal_vertices(hull.vertices), coal_triangles(np.asarray(hull.faces)))
     geometry.computeLocalAABB()
     return geometry
 
@@ -179,18 +170,6 @@ def _merged_open_pieces(mesh: Mesh) -> list[MeshPiece]:
     vertices = np.vstack([piece.vertices for piece in loose])
     faces = np.vstack([piece.faces + start for piece, start in zip(loose, starts, strict=True)])
     return [*closed, MeshPiece(vertices, faces, closed=False, convex=False)]
-
-
-def _coal_vertices(vertices: FloatArray) -> coal.StdVec_Vec3s:
-    out = coal.StdVec_Vec3s()
-    out.extend([np.asarray(vertex, dtype=np.float64) for vertex in vertices])
-    return out
-
-
-def _coal_triangles(faces: IntArray) -> coal.StdVec_Triangle:
-    out = coal.StdVec_Triangle()
-    out.extend([coal.Triangle(int(a), int(b), int(c)) for a, b, c in faces])
-    return out
 
 
 def shape_of(geometry: coal.CollisionGeometry) -> tuple[Shape, FloatArray]:

@@ -17,7 +17,7 @@ from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray, dot
 from manikin.scene.collision import CollisionPart, local_box, shape_of
 from manikin.scene.covering import cover
-from manikin.scene.mesh import IntArray
+from manikin.scene.triangles import IntArray
 
 _PARALLEL = 1e-12
 """Squared sine of the angle below which two axes count as parallel."""

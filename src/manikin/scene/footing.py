@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.contact.contact import MOST_CORNERS
 from manikin.numerics.polytope import convex_polygon, fewer_corners, walls
 from manikin.numerics.spatial import FloatArray, cross
-from manikin.scene.mesh import IntArray
 from manikin.scene.surface import Surface, walls_of
+from manikin.scene.triangles import IntArray
 
 LEAST_SHARE = 0.6
 """Least share of a sole's area that has to lie on its surface."""

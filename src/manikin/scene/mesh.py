@@ -9,12 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.scene.triangles import IntArray, decimated
 
-IntArray = NDArray[np.int64]
 Convexity = Literal["no", "hull", "parts"]
 
 FORMATS = ("stl", "obj", "ply", "dae")
@@ -29,10 +29,18 @@ _UP_TO_Z = {
 }
 
 MAX_FACES = 50_000
-"""Meshes with more triangles are refused unless they are replaced by convex hulls."""
+"""Meshes with more triangles are decimated, unless they are replaced by convex hulls."""
+MAX_FILE_FACES = 2_000_000
+"""Files with more triangles are refused before they are loaded."""
+MAX_FILE_BYTES = 400_000_000
+"""Larger files are refused before they are loaded."""
+LARGEST_DEVIATION = 2e-3
+"""Farthest that decimation may move the surface of a mesh [m]; motions keep more away from obstacles."""
 LARGEST_EXTENT = 1000.0
 """Meshes larger than this [m] are taken for a mistaken unit."""
-SMALLEST_EXTENT = 1e-3
+LARGEST_UNSAID = 25.0
+"""So are files larger than this [m] whose unit is not said."""
+SMALLEST_EXTENT = 5e-3
 """Meshes smaller than this [m] are taken for a mistaken unit."""
 _DEGENERATE_HEIGHT = 1e-9  # [m]; a triangle flatter than this has no usable normal
 
@@ -83,8 +91,8 @@ class Mesh:
             points, triangles = _hulls(points, triangles, convex, source)
         if len(triangles) > max_faces:
             raise SceneError(
-                f"mesh {source!r} has {len(triangles)} triangles; valid: at most {max_faces}, "
-                "so decimate it (trimesh simplify_quadric_decimation) or set convex to 'parts' or 'hull'"
+                f"mesh {source!r} has {len(triangles)} triangles; valid: at most {max_faces}, so decimate it "
+                "or set convex to 'parts' or 'hull'"
             )
         triangles.setflags(write=False)
         object.__setattr__(self, "vertices", frozen_array(points, f"mesh {source!r} vertices"))
@@ -151,6 +159,10 @@ def load_mesh(
 ) -> Mesh:  # fmt: skip
     """Read an STL, OBJ, PLY or DAE file, as its extension says, into metres; SceneError if unusable.
 
+    A file of more than :data:`MAX_FACES` triangles is decimated to so many, unless convex hulls take its
+    place (:func:`manikin.scene.triangles.decimated`); its vertices are then :data:`LARGEST_DEVIATION` from
+    the surface at most.
+
     Args:
         path: The file, or ``package://NAME/path`` of an installed distribution.
         unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``; when omitted, a DAE file's own, else metres.
@@ -170,11 +182,23 @@ def load_mesh(
     if up is not None and up not in _UP_TO_Z:
         raise SceneError(f"mesh file '{file}' up is {up!r}; valid: {', '.join(_UP_TO_Z)}")
     factor = finite_number(scale, f"mesh file '{file}' scale", above=0.0, error=SceneError)
+    _check_size(file, extension)
     loaded = _read(file, extension)
     own_up, own_metres = _collada_asset(file) if extension == "dae" else ("z", 1.0)
     metres = own_metres if unit is None else UNITS[unit]
-    vertices = np.asarray(loaded.vertices, dtype=np.float64) @ _UP_TO_Z[up or own_up].T
-    return Mesh(vertices * (metres * factor), loaded.faces, str(file), convex=convex)
+    vertices = frozen_array(loaded.vertices, f"mesh file '{file}' vertices", (None, 3), SceneError)
+    points = vertices @ _UP_TO_Z[up or own_up].T * (metres * factor)
+    extent = float(np.ptp(points, axis=0).max())
+    if unit is None and extension != "dae" and extent > LARGEST_UNSAID:
+        raise SceneError(
+            f"mesh file '{file}' extends over {extent:.4g} m if its unit is the metre, and "
+            f"{extent / 1e3:.4g} m if it is the millimetre; valid: at most {LARGEST_UNSAID:g} m, or say its "
+            f"unit: {', '.join(UNITS)}"
+        )
+    faces = np.asarray(loaded.faces, dtype=np.int64)
+    if convex == "no" and len(faces) > MAX_FACES:
+        points, faces = _decimated(points, faces, str(file))
+    return Mesh(points, faces, str(file), convex=convex)
 
 
 def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:
@@ -184,7 +208,8 @@ def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:
 
 def _read(file: Path, extension: str) -> trimesh.Trimesh:
     try:
-        scene: Any = trimesh.load_scene(str(file), file_type=extension)
+        # As it is in the file: processing would drop vertices that are not finite without a word.
+        scene: Any = trimesh.load_scene(str(file), file_type=extension, process=False)
         mesh = scene.to_mesh() if scene.geometry else None
     except Exception as error:  # a reader may raise anything on a broken file
         reason = " ".join(str(error).split())[:120]
@@ -195,6 +220,56 @@ def _read(file: Path, extension: str) -> trimesh.Trimesh:
     if mesh is None or not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise SceneError(f"mesh file '{file}' holds no triangles; valid: at least one")
     return mesh
+
+
+def _check_size(file: Path, extension: str) -> None:
+    """Refuse a file that is cut off or too large, before it is loaded."""
+    size = file.stat().st_size
+    if size > MAX_FILE_BYTES:
+        raise SceneError(f"mesh file '{file}' has {size} bytes; valid: at most {MAX_FILE_BYTES}")
+    content = file.read_bytes()
+    count = 0
+    if extension == "stl":
+        count = _stl_count(content, file)
+    elif extension == "obj":
+        count = content.count(b"\nf ")
+    elif extension == "ply" and (told := re.search(rb"element face (\d{1,18})\s", content[:10_000])):
+        count = int(told[1])
+    if count > MAX_FILE_FACES:
+        problem = f"mesh file '{file}' has {count} triangles"
+        raise SceneError(f"{problem}; valid: at most {MAX_FILE_FACES}, so decimate it")
+
+
+def _stl_count(content: bytes, file: Path) -> int:
+    """Number of triangles of an STL file, which must be there to its end."""
+    told = int.from_bytes(content[80:84], "little") if len(content) >= 84 else 0
+    whole = 84 + 50 * told
+    if len(content) == whole:
+        return told
+    if content[:5].lower() == b"solid" and b"facet" in content[:1000].lower():
+        if b"endsolid" not in content[-1000:].lower():
+            raise SceneError(f"mesh file '{file}' is cut off, it has no endsolid; valid: the whole file")
+        return content.count(b"endfacet")
+    if len(content) < whole and told:
+        there = (len(content) - 84) // 50
+        problem = f"mesh file '{file}' is cut off: {there} of {told} triangles are there"
+        raise SceneError(f"{problem}; valid: the whole file")
+    return told
+
+
+def _decimated(points: FloatArray, faces: IntArray, source: str) -> tuple[FloatArray, IntArray]:
+    """Vertices and faces of a mesh of :data:`MAX_FACES` triangles at nearly the same place."""
+    merged, kept, _ = _cleaned(points, _checked_faces(faces, len(points), source))
+    if len(kept) <= MAX_FACES:
+        return merged, kept
+    fewer, left, deviation = decimated(merged, kept, MAX_FACES)
+    if len(left) > MAX_FACES or deviation > LARGEST_DEVIATION:
+        raise SceneError(
+            f"mesh '{source}' has {len(kept)} triangles, and with {len(left)} its surface is "
+            f"{1e3 * deviation:.1f} mm off; valid: at most {1e3 * LARGEST_DEVIATION:g} mm, so cut out what "
+            "is needed of it, or set convex to 'parts'"
+        )
+    return fewer, left
 
 
 def _collada_asset(file: Path) -> tuple[str, float]:
@@ -228,7 +303,7 @@ def _cleaned(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntAr
     """Merge vertices closer than a millionth of the size; drop degenerate and repeated triangles."""
     grid = max(float(np.ptp(points, axis=0).max()) * 1e-6, 1e-12)
     cells = np.round((points - points.min(axis=0)) / grid).astype(np.int64)
-    _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(_keys(cells), return_index=True, return_inverse=True)
     merged = points[first]
     faces = inverse.reshape(-1)[triangles]
     corners = merged[faces]
@@ -236,10 +311,15 @@ def _cleaned(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntAr
     doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
     good = doubled_area > _DEGENERATE_HEIGHT * np.maximum(longest, 1e-12)
-    _, kept = np.unique(np.sort(faces[good], axis=1), axis=0, return_index=True)
+    _, kept = np.unique(_keys(np.sort(faces[good], axis=1)), return_index=True)
     clean = faces[good][np.sort(kept)]
     used, renumbered = np.unique(clean, return_inverse=True)
     return merged[used], renumbered.reshape(-1, 3).astype(np.int64), len(triangles) - len(clean)
+
+
+def _keys(rows: IntArray) -> IntArray:
+    """(n,) numbers in the order of rows (n, 3) of numbers from 0 to two millions."""
+    return (rows[:, 0] << 42) | (rows[:, 1] << 21) | rows[:, 2]
 
 
 def _connected(vertices: FloatArray, faces: IntArray) -> list[IntArray]:

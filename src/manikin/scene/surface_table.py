@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.mesh import IntArray
 from manikin.scene.surface import Surface, walls_of
+from manikin.scene.triangles import IntArray
 
 
 class SurfaceTable:

@@ -9,50 +9,62 @@ if TYPE_CHECKING:
     from manikin.motion.file import MotionFile
     from manikin.scene import Scene
     from manikin.viewer.canvas import Page
+    from manikin.viewer.door import Door
     from manikin.viewer.drive import LiveContacts
     from manikin.walking import WalkController
 
-
 __all__ = ["serve", "serve_contacts", "serve_drive"]
+
+THIS_COMPUTER = "127.0.0.1"
+"""Address that only this computer can reach."""
 
 
 def serve(
     content: MotionFile, port: int = 8080, announce: Callable[[str], None] | None = None, *,
-    others: Mapping[str, MotionFile] | None = None,
+    others: Mapping[str, MotionFile] | None = None, host: str = THIS_COMPUTER,
 ) -> None:  # fmt: skip
-    """Show a motion file in the browser until Ctrl-C, on this computer only.
+    """Show a motion file in the browser until Ctrl-C.
 
     Args:
         content: At least one motion, and the body.
         port: Port to listen on; 0 picks a free one.
         announce: Told the page's address when it can be opened.
         others: Motions of others who are there, by name.
+        host: Address to listen to; any but one of this computer alone lets in who has the token of the page,
+            which is part of the address that is announced.
 
     Raises:
         InputError: If the file holds no body, or, as of the other pages, the port is taken.
     """
     from manikin.viewer.session import ViewerSession
 
-    _run(ViewerSession(content, port, others), announce)
+    _run(ViewerSession(content, _door(port, host), others), announce)
 
 
 def serve_contacts(
-    live: LiveContacts, port: int = 8080, announce: Callable[[str], None] | None = None
-) -> None:
+    live: LiveContacts, port: int = 8080, announce: Callable[[str], None] | None = None, *,
+    host: str = THIS_COMPUTER,
+) -> None:  # fmt: skip
     """Let the user drag a body through its scene and watch the contacts of its limbs, until Ctrl-C."""
     from manikin.viewer.drive import ContactViewer
 
-    _run(ContactViewer(live, port), announce)
+    _run(ContactViewer(live, _door(port, host)), announce)
 
 
 def serve_drive(
     controller: WalkController, scene: Scene | None = None, port: int = 8080,
-    announce: Callable[[str], None] | None = None,
+    announce: Callable[[str], None] | None = None, *, host: str = THIS_COMPUTER,
 ) -> None:  # fmt: skip
     """Let the user steer a walker with keys and sliders until Ctrl-C; it does not see the scene around it."""
     from manikin.viewer.drive import WalkViewer
 
-    _run(WalkViewer(controller, scene, port), announce)
+    _run(WalkViewer(controller, _door(port, host), scene), announce)
+
+
+def _door(port: int, host: str) -> Door:
+    from manikin.viewer.door import Door
+
+    return Door(port, host)
 
 
 def _run(page: Page, announce: Callable[[str], None] | None) -> None:

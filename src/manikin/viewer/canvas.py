@@ -1,6 +1,5 @@
 """A page in the browser: its server, and the obstacles and bodies that it shows."""
 
-import socket
 import threading
 import time as clock
 from abc import ABC, abstractmethod
@@ -14,35 +13,30 @@ import viser
 
 from manikin.body import BodyModel
 from manikin.body.segments import segment_triangles
-from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import HalfSpace, Plane, Scene
-
-HOST = "127.0.0.1"
-"""The viewer listens to this computer only."""
+from manikin.viewer.door import Door
 
 
 class Page(ABC):
     """Serves one page until it is closed, by the viser server ``server``."""
 
-    def __init__(self, port: int, frame_rate: float) -> None:
-        """Start the server, which makes at most ``frame_rate`` pictures per second.
-
-        Raises:
-            InputError: If the port is taken.
-        """
+    def __init__(self, door: Door, frame_rate: float) -> None:
+        """Start the server, which makes at most ``frame_rate`` pictures per second, behind a door."""
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._frame_rate = frame_rate
-        with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
-            self.server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
+        self.door = door
+        # viser greets on standard output, whatever its verbosity.
+        with redirect_stdout(StringIO()), door.watched():
+            self.server = viser.ViserServer(host=door.host, port=door.port, verbose=False)
         self.server.scene.set_up_direction("+z")
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
 
     @property
     def url(self) -> str:
         """Address of the page."""
-        return f"http://{HOST}:{self.server.get_port()}"
+        return self.door.url
 
     @abstractmethod
     def advance(self, seconds: float) -> None:
@@ -172,15 +166,3 @@ class BodyShapes:
 def side_colour(name: str) -> tuple[int, int, int]:
     """Colour of what belongs to a side of the body, by its name."""
     return next((COLOURS[side] for side in ("left", "right") if name.startswith(side)), COLOURS["trunk"])
-
-
-def _checked_port(port: int) -> int:
-    """Return a port that is free, or refuse: viser would silently take another one."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except (OSError, OverflowError) as error:
-            problem = getattr(error, "strerror", None) or str(error)
-            raise InputError(f"port {port} cannot be used ({problem}); valid: a free port, or 0") from None
-        return int(probe.getsockname()[1])

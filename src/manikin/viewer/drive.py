@@ -22,6 +22,7 @@ from manikin.planning.contacts.single_contact import Role, ask_limb, check_limbs
 from manikin.runtime.display import readable
 from manikin.scene import Scene
 from manikin.viewer.canvas import COLOURS, VIEW, BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
+from manikin.viewer.door import Door
 from manikin.walking import WalkController, WalkFrame
 
 if TYPE_CHECKING:
@@ -76,16 +77,16 @@ class WalkViewer(Page):
         notice: What the walker says about the last directive, or None.
     """
 
-    def __init__(self, controller: WalkController, scene: Scene | None = None, port: int = 8080) -> None:
+    def __init__(self, controller: WalkController, door: Door, scene: Scene | None = None) -> None:
         """Start the server and show the walker standing in a scene that it does not see.
 
         Raises:
-            InputError: If the scene has no floor, or the port is taken.
+            InputError: If the scene has no floor.
         """
         scene = Scene(floor_height=0.0) if scene is None else scene
         if scene.floor_height is None:
             raise InputError("scene has no floor; valid: floor_height_m, to walk on")
-        super().__init__(port, FRAME_RATE)
+        super().__init__(door, FRAME_RATE)
         self.controller, self.directive = controller, np.zeros(3)
         self.notice: str | None = None
         self._place = np.zeros(3)
@@ -290,13 +291,9 @@ class ContactViewer(Page):
         updates: Number of answers so far.
     """
 
-    def __init__(self, live: LiveContacts, port: int = 8080) -> None:
-        """Start the server and show the first contacts.
-
-        Raises:
-            InputError: If the port is taken.
-        """
-        super().__init__(port, FRAME_RATE)
+    def __init__(self, live: LiveContacts, door: Door) -> None:
+        """Start the server and show the first contacts."""
+        super().__init__(door, FRAME_RATE)
         self.live = live
         self.updates = 0
         self._wanted = threading.Event()

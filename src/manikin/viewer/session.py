@@ -13,6 +13,7 @@ from manikin.motion.motion import effector_positions
 from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import readable
 from manikin.viewer.canvas import COLOURS, BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
+from manikin.viewer.door import Door
 
 FRAME_RATE = 30.0
 """Pictures per second while playing."""
@@ -39,12 +40,12 @@ class ViewerSession(Page):
     """
 
     def __init__(
-        self, content: MotionFile, port: int = 8080, others: Mapping[str, MotionFile] | None = None
+        self, content: MotionFile, door: Door, others: Mapping[str, MotionFile] | None = None
     ) -> None:
         """Start the server and draw the first instant, with others who are there on the same clock, by name.
 
         Raises:
-            InputError: If a file holds no body, or the port is taken.
+            InputError: If a file holds no body.
         """
         if content.body is None:
             raise InputError("motion file holds no body; valid: a motion file written by 'manikin run'")
@@ -60,7 +61,7 @@ class ViewerSession(Page):
         if content.body.is_point_mass:
             names = self.motion.contact_names
             self._feet = effector_positions(content.body, self.motion, names, content.schedule)
-        super().__init__(port, FRAME_RATE)
+        super().__init__(door, FRAME_RATE)
         self.time = float(self.motion.time[0])
         self._build_scene()
         self._build_body()

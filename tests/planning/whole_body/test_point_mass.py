@@ -97,9 +97,10 @@ def test_the_files_are_drawn_and_read_again(climbed):
 
 def test_the_viewer_shows_legs_and_forces(climbed):
     pytest.importorskip("viser")
+    from manikin.viewer.door import Door
     from manikin.viewer.session import ViewerSession
 
-    session = ViewerSession(read_motions(climbed.directory), port=0)
+    session = ViewerSession(read_motions(climbed.directory), Door(0))
     try:
         for time in (0.0, 1.3, climbed.planned.time[-1]):
             session.show(time)

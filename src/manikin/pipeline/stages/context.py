@@ -271,6 +271,7 @@ class Report:
         planned: Whether a plan keeps every requirement of its certificate; None for a run without a plan.
         proved: Whether the body moved in the physics engine and kept every requirement.
         refused: Failures after which other contacts were tried: phase and failure of each.
+        directory: The run directory, or None.
     """
 
     def __init__(
@@ -290,7 +291,7 @@ class Report:
         self._tables: dict[str, RequirementTable] = {}
         self._files: dict[str, Callable[[RunDirectory], object]] = {}
         self._before: _Reported | None = None
-        self._directory = None if out is None else RunDirectory(out)
+        self.directory = None if out is None else RunDirectory(out)
         scenario = context.given
         self._write(SCENARIO, lambda directory: directory.write(SCENARIO, scenario.to_yaml()))
         stature = None if scenario.is_point_mass else context.body.stature
@@ -309,7 +310,7 @@ class Report:
     @property
     def path(self) -> Path | None:
         """The run directory, or None."""
-        return None if self._directory is None else self._directory.path
+        return None if self.directory is None else self.directory.path
 
     def fail(self, stage: str, reason: str, time: float = 0.0, where: str = "") -> None:
         """Say why the run is no success; positions in the reason, in the task's frame, move to the world."""
@@ -363,16 +364,16 @@ class Report:
 
     def keep_contact_plan(self, plan: ContactPlan) -> None:
         """Keep a contact plan of the task frame as a contact-plan file, in the world."""
-        if self._directory is not None:
+        if self.directory is not None:
             known = plan_in_world(plan, self.transform)
-            self._directory.write(CONTACT_PLAN, known.to_dict(self._context.body, self._context.given))
+            self.directory.write(CONTACT_PLAN, known.to_dict(self._context.body, self._context.given))
 
     def keep_motions(
         self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None,
         file: str = MOTION,
     ) -> None:  # fmt: skip
         """Keep the motions that there are so far, moved to the world, in a file of the run directory."""
-        if self._directory is None:
+        if self.directory is None:
             return
         transform = self.transform
         content = MotionFile(
@@ -382,9 +383,9 @@ class Report:
         self._write(file, lambda directory: write_motions(directory.path / file, content))
 
     def _write(self, file: str, write: Callable[[RunDirectory], object]) -> None:
-        if self._directory is not None:
+        if self.directory is not None:
             self._files[file] = write
-            write(self._directory)
+            write(self.directory)
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
@@ -397,8 +398,8 @@ class Report:
             "failure": None if failure is None else asdict(failure), "requirements": rows,
             "wall_s": clock.perf_counter() - self._began,
         }  # fmt: skip
-        if self._directory is not None:
-            self._directory.write(SUMMARY, self.summary)
+        if self.directory is not None:
+            self.directory.write(SUMMARY, self.summary)
         return self.summary
 
     def judge(self) -> None:
@@ -429,6 +430,7 @@ class RunResult:
             those that there were not.
         directory: Where the files are, or None.
         transform_task_to_world: From the frame of the task to the world.
+        claim: Keeps other processes out of the directory while the result is there.
     """
 
     summary: dict[str, Any]
@@ -440,6 +442,7 @@ class RunResult:
     directory: Path | None
     recovery: Recovery | None = None
     transform_task_to_world: PlanarTransform = IDENTITY
+    claim: RunDirectory | None = None
 
     @classmethod
     def of(
@@ -458,7 +461,7 @@ class RunResult:
         planned = planned if wholebody is None else wholebody.motion
         planned, executed = (motion_in_world(item, report.transform) for item in (planned, executed))
         stages = centroidal, wholebody, execution, report.path, recovery
-        return cls(report.close(), planned, executed, *stages, report.transform)
+        return cls(report.close(), planned, executed, *stages, report.transform, report.directory)
 
     @property
     def succeeded(self) -> bool:

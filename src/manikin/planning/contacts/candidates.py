@@ -7,8 +7,8 @@ import numpy as np
 from manikin.body import Configuration, Limb, limb_placement
 from manikin.kinematics.limb_samples import LimbSamples
 from manikin.numerics.spatial import FloatArray
-from manikin.scene.mesh import IntArray
 from manikin.scene.surface_table import SurfaceTable
+from manikin.scene.triangles import IntArray
 
 _ROUNDING = np.float32(1e-6)  # of a cosine in single precision
 

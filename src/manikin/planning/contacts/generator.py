@@ -23,8 +23,8 @@ from manikin.planning.contacts.candidates import Candidates, Situation, find_can
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact
 from manikin.planning.contacts.heuristics import Efort, Heuristic
 from manikin.scene import Scene
-from manikin.scene.mesh import IntArray
 from manikin.scene.surface_table import SurfaceTable
+from manikin.scene.triangles import IntArray
 
 _GROWTH = 0.15  # how much longer each step down the order is than the one before
 _STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1

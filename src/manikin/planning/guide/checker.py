@@ -21,8 +21,9 @@ from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.guide.abstraction import Abstraction, LimbReach, TrunkShape
 from manikin.planning.guide.condition import Condition, SceneTriangles, UsableSurface, endless
 from manikin.planning.guide.root_pose import tilt
-from manikin.scene.collision import CollisionPart, collision_parts, convex_geometry, triangle_geometry
+from manikin.scene.collision import CollisionPart, collision_parts, convex_geometry
 from manikin.scene.scene import Scene
+from manikin.scene.triangles import triangle_geometry
 
 TRUNK_MARGIN = 0.02
 """Skin around the trunk while planning [m]; our choice."""
