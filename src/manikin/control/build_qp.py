@@ -5,7 +5,7 @@ equation of motion, which splits into six equalities (nothing acts on the root) 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.control.dynamics import DynamicsState
 from manikin.control.edge_forces import ContactForceBasis
+from manikin.control.partings import Parting
 from manikin.control.reference import ReferenceSample
 from manikin.control.tasks import AccelerationTask
 from manikin.numerics.qp import QuadraticProgram
@@ -98,6 +99,7 @@ class ControlProblem:
         contacts: The contacts whose forces are unknowns, in order.
         joint_map: (nv - 6, n) with ``torque = joint_map @ x + joint_offset``.
         joint_offset: (nv - 6,) [N.m].
+        partings: Number of rows, the last of the program, that keep parts of the body apart.
     """
 
     program: QuadraticProgram
@@ -106,6 +108,14 @@ class ControlProblem:
     contacts: tuple[LoadedContact, ...]
     joint_map: FloatArray
     joint_offset: FloatArray
+    partings: int = 0
+
+    def relaxed(self) -> QuadraticProgram:
+        """The program without the bounds of joint accelerations and with parts that may touch."""
+        program = self.program.without_bounds(6, len(self.state.v))
+        rows_lower = program.rows_lower.copy()
+        rows_lower[len(rows_lower) - self.partings :] = -np.inf
+        return replace(program, rows_lower=rows_lower)
 
     def acceleration(self, x: FloatArray) -> FloatArray:
         """(nv,) generalised acceleration in the solution ``x``."""
@@ -138,7 +148,7 @@ def force_variables(bases: Sequence[ContactForceBasis], start: int) -> list[slic
 def build_qp(
     state: DynamicsState, tasks: Sequence[AccelerationTask], contacts: Sequence[LoadedContact],
     bounds: JointBounds, damping: FloatArray, *, period: float, acceleration_weight: float,
-    force_weight: float, sum_cap: float | None = None,
+    force_weight: float, sum_cap: float | None = None, partings: Sequence[Parting] = (),
 ) -> ControlProblem:  # fmt: skip
     """Build the program of one control step.
 
@@ -150,6 +160,7 @@ def build_qp(
         acceleration_weight: Regularisation of the accelerations.
         force_weight: Regularisation of the force variables.
         sum_cap: Largest sum of the normal forces [N], or None.
+        partings: Parts of the body that keep apart.
     """
     nv = len(state.v)
     bases = [loaded.basis for loaded in contacts]
@@ -161,9 +172,13 @@ def build_qp(
     joint_map[:, 6:nv] += np.diag(0.5 * period * damping)
     joint_offset = state.bias[6:] + damping * state.v[6:]
     caps, cap_limits, least = _normal_force_rows(contacts, variables, size, sum_cap)
-    rows = np.concatenate((equation[:6], joint_map, caps))
-    rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, least))
-    rows_upper = np.concatenate((-state.bias[:6], bounds.torque_upper - joint_offset, cap_limits))
+    parting = np.zeros((len(partings), size))
+    parting[:, :nv] = np.reshape([one.gradient for one in partings], (-1, nv))
+    slowest = np.array([one.least for one in partings])
+    rows = np.concatenate((equation[:6], joint_map, caps, parting))
+    rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, least, slowest))
+    free = np.full(len(slowest), np.inf)
+    rows_upper = np.concatenate((-state.bias[:6], bounds.torque_upper - joint_offset, cap_limits, free))
     shares = [np.where(item.basis.normal > 0, 1.0, item.grasp_share) for item in contacts]
     fewest = [basis.lower * share for basis, share in zip(bases, shares, strict=True)]
     most = [basis.upper * share for basis, share in zip(bases, shares, strict=True)]
@@ -180,7 +195,9 @@ def build_qp(
             hessian[part, part] += loaded.wish_weight * forces.T @ forces
             gradient[part] -= loaded.wish_weight * forces.T @ loaded.wished
     program = QuadraticProgram(hessian, gradient, rows, rows_lower, rows_upper, lower, upper, 6)
-    return ControlProblem(program, state, tuple(tasks), tuple(contacts), joint_map, joint_offset)
+    return ControlProblem(
+        program, state, tuple(tasks), tuple(contacts), joint_map, joint_offset, len(partings)
+    )
 
 
 def joint_acceleration_bounds(

@@ -13,6 +13,7 @@ from manikin.control import edge_forces, tasks
 from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import ContactGeometry, contact_geometry, segment_key
+from manikin.control.partings import SelfWatch
 from manikin.control.plan_return import Deviation, PlanClock, deviation_from_plan, returning_acceleration
 from manikin.control.reference import Reference, ReferenceSample
 from manikin.control.settings import ControlSettings
@@ -115,6 +116,7 @@ class Controller:
         names = (name for geometry in self._geometry.values() for name, _ in geometry.patches)
         segments = {segment_key(name): body.segment_frame(name) for name in names}
         self._dynamics = Dynamics(body, segments | frames)
+        self._watch = SelfWatch(body, motion)
         horizon = self.settings.joint_limit_horizon
         self.reference = Reference(body, motion, frames, self.settings.period, horizon)
         self._solver, self._spare_solver = WarmQPSolver(), WarmQPSolver()
@@ -181,6 +183,7 @@ class Controller:
             state, self.tasks(state, reference, supports, deviation), loaded, bounds, self._damping,
             period=settings.period, acceleration_weight=settings.weights.acceleration,
             force_weight=settings.weights.force, sum_cap=self.schedule.stance_at(time).normal_force_cap,
+            partings=self._watch.partings(state, reference, horizon, settings.period),
         )  # fmt: skip
 
     def geometry(self, contact: Contact) -> ContactGeometry:
@@ -316,7 +319,7 @@ class Controller:
         solution = self._solver.solve(problem.program)
         if solution.solved:
             return solution, ""
-        relaxed = self._spare_solver.solve(problem.program.without_bounds(6, self.body.nv))
+        relaxed = self._spare_solver.solve(problem.relaxed())
         if relaxed.solved:
             return relaxed, f"without joint bounds: {solution.status}"
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
