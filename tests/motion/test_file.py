@@ -186,6 +186,23 @@ def test_damaged_file_gives_one_line(content, tmp_path, damage, says):
     assert "\n" not in str(caught.value)
 
 
+def test_a_file_as_it_was_written_is_read_at_once_and_a_changed_one_is_tried_out(
+    content, tmp_path, monkeypatch
+):
+    """Bytes that do not fit can make HDF5 compute for ever: a process with a time limit reads them first."""
+    path = tmp_path / "motion.h5"
+    write_motions(path, content)
+    monkeypatch.setattr("manikin.runtime.hdf5.TIME_LIMIT", 1e-3)
+    read_motions(path)
+    with path.open("r+b") as file:
+        file.seek(-1, os.SEEK_END)
+        file.write(b"x")
+    with pytest.raises(MotionFileError, match=r"reading it does not end within 0\.001 s"):
+        read_motions(path)
+    monkeypatch.undo()
+    read_motions(path)
+
+
 def test_missing_empty_and_foreign_files_give_one_line(content, tmp_path):
     (tmp_path / "text.h5").write_text("not HDF5")
     (tmp_path / "empty.h5").write_bytes(b"")

@@ -17,6 +17,7 @@ from manikin.cli.analyze import analyze
 from manikin.cli.balance import balance, contact
 from manikin.cli.benchmark import benchmark
 from manikin.cli.console import Interruption, JsonOption, flag
+from manikin.cli.doctor import doctor
 from manikin.cli.ergonomics import ergonomics
 from manikin.cli.push import push
 from manikin.cli.run import run
@@ -96,7 +97,7 @@ def scenarios(json: JsonOption = False) -> None:
 
 for _command in (
     run, benchmark, analyze, push, walk, words, ergonomics, statistics, compare, view, balance, contact,
-    export,
+    export, doctor,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(library, name="library")

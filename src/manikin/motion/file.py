@@ -12,7 +12,8 @@ Layout (format version 1)::
 Every group and text may be missing.  The same data always gives the same bytes.
 
 A file may come from anywhere: links that lead out of it, external storage, arrays larger than
-:data:`MAX_BYTES` and numbers beyond :data:`LARGEST` are refused before they are used.
+:data:`MAX_BYTES` and numbers beyond :data:`LARGEST` are refused before they are used. The first 512 bytes,
+the user block, hold a digest (:mod:`manikin.runtime.hdf5`): what was changed since is tried out first.
 """
 
 import json
@@ -29,7 +30,7 @@ from manikin.contact import ContactSchedule
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import description
 from manikin.motion.motion import Motion
-from manikin.runtime import __version__
+from manikin.runtime import __version__, hdf5
 from manikin.runtime.display import Displayed
 from manikin.runtime.files import write_bytes
 from manikin.scene import Scene
@@ -111,9 +112,9 @@ def write_motions(path: str | Path, content: MotionFile) -> None:
     with h5py.File.in_memory(libver="v110") as file:
         _fill(file, content)
         file.flush()
-        data = file.id.get_file_image()
+        image = file.id.get_file_image()
     try:
-        write_bytes(path, data)
+        write_bytes(path, hdf5.sealed(image))
     except OSError as error:
         problem = f"cannot be written ({_reason(error)})"
         raise MotionFileError(f"{path}: {problem}; valid: a writable folder with room") from None
@@ -133,6 +134,8 @@ def read_motions(path: str | Path) -> MotionFile:
         valid = "a motion file (.h5) or a run directory"
         raise MotionFileError(f"{file_path}: there is no such file; valid: {valid}")
     try:
+        if not hdf5.is_as_written(file_path):
+            hdf5.try_out(file_path, MAX_BYTES)
         with h5py.File(file_path, "r") as file:
             return _content(file, str(file_path))
     except (OSError, RuntimeError, KeyError) as error:  # as h5py says that bytes do not fit each other

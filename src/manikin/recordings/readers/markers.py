@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from manikin.errors import InputError
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.recordings.readers.skeleton_recording import UNKNOWN, Subject
+from manikin.recordings.readers.skeleton_recording import FARTHEST, UNKNOWN, Subject
 from manikin.runtime.display import Displayed
 
 LONGEST_GAP, NEIGHBOURS = 0.1, 6
@@ -175,6 +175,11 @@ class MarkerRecording(Displayed):
         if np.any(np.isinf(positions)):
             raise InputError(f"{where} has an infinite position; valid: finite numbers, NaN for gaps")
         positions[np.any(np.isnan(positions), axis=2)] = np.nan
+        if (far := np.argwhere(np.abs(positions) > FARTHEST)).size:
+            frame, marker, axis = far[0]
+            place = f"marker {self.marker_names[marker]!r} at {positions[frame, marker, axis]:.4g} m"
+            valid = f"at most {FARTHEST:g} m from the origin"
+            raise InputError(f"{where} has {place} in frame {frame}, counted from 0; valid: {valid}")
         positions.setflags(write=False)
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "events", tuple(sorted(self.events, key=lambda event: event.time)))

@@ -48,6 +48,10 @@ Y_UP_TO_Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rotation of the files' axes (X left, Y up, Z forward) to ours (x forward, y left, z up)."""
 
 
+FARTHEST = 100.0
+"""Nothing recorded is farther away than this [m]: what is, is damage or in another unit."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(Displayed):
     """Joints of a skeleton at n instants; the world is z up.
@@ -95,7 +99,11 @@ class Recording(Displayed):
         frames = len(self.root_positions)
         shapes = {"offsets": (joints, 3), "rotations": (frames, joints, 3, 3), "root_positions": (frames, 3)}
         for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen_array(getattr(self, name), f"{where} {name}", shape))
+            array = frozen_array(getattr(self, name), f"{where} {name}", shape)
+            if np.abs(array).max(initial=0.0) > FARTHEST:
+                told = f"{where} {name} has {float(array.flat[np.abs(array).argmax()]):.4g} m"
+                raise InputError(f"{told}; valid: at most {FARTHEST:g} m, in the unit of the file")
+            object.__setattr__(self, name, array)
         if not frames:
             raise InputError(f"{where} has no frame; valid: at least one")
         ends = {key: frozen_array(end, f"{where} end of {key!r}", (3,)) for key, end in self.ends.items()}

@@ -1,0 +1,54 @@
+"""``python -m tests.robustness --cases 10000``: damaged files of every format, in processes that may end.
+
+A process may use 2 GB more than it begins with. A case is done again alone by ``--format NAME --case N``.
+"""
+
+import argparse
+import os
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+
+from tests.robustness.samples import FORMATS
+from tests.robustness.trial import Finding, batch_of
+
+BATCH = 50
+
+
+def main() -> int:
+    """Run the cases and print what was found; exit status 1 if anything was."""
+    parser = argparse.ArgumentParser(prog="python -m tests.robustness")
+    parser.add_argument("--cases", type=int, default=1500)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--format", choices=[kind.name for kind in FORMATS])
+    parser.add_argument("--case", type=int)
+    given = parser.parse_args()
+    kinds = [kind.name for kind in FORMATS if given.format in (None, kind.name)]
+    if given.case is not None:
+        batches = [(name, given.seed, given.case, 1) for name in kinds]
+    else:
+        each = -(-given.cases // len(kinds))
+        batches = [
+            (name, given.seed, at, min(BATCH, each - at)) for name in kinds for at in range(0, each, BATCH)
+        ]
+    began, findings, done = time.monotonic(), [], 0
+    with ProcessPoolExecutor(given.jobs, get_context("spawn"), max_tasks_per_child=4) as pool:
+        waiting = {pool.submit(batch_of, *batch): batch for batch in batches}
+        for future in as_completed(waiting):
+            batch = waiting[future]
+            try:
+                findings += future.result()
+                done += batch[3]
+            except BrokenProcessPool:
+                findings.append(Finding(batch[0], batch[1], batch[2], f"a process ended; cases {batch[2:]}"))
+    for finding in sorted(findings, key=lambda item: (item.format, item.case)):
+        print(f"{finding.format} seed {finding.seed} case {finding.case}: {finding.what}")
+    print(f"{done} damaged files, {len(findings)} findings, {time.monotonic() - began:.0f} s")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
