@@ -7,6 +7,7 @@ first, within limits of time and memory.
 """
 
 import hashlib
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,8 @@ TIME_LIMIT = 15.0
 MEMORY_LIMIT = 2 * 1024**3
 """What it may use more than it begins with [bytes]."""
 _SEAL = b"manikin sha256 "
+_END_WITH_PARENT = 1
+"""Linux: PR_SET_PDEATHSIG."""
 
 
 def sealed(image: bytes) -> bytes:
@@ -58,7 +61,7 @@ def try_out(path: Path, largest: int) -> None:
 
 def main() -> None:
     """Read the file that the command line names; for :func:`try_out`."""
-    _limit_memory()
+    _limit()
     largest = int(sys.argv[2])
     try:
         with h5py.File(sys.argv[1], "r") as file:
@@ -81,13 +84,18 @@ def _read_group(group: h5py.Group, largest: int, depth: int) -> None:
                 item[()]
 
 
-def _limit_memory() -> None:
+def _limit() -> None:
+    """Limit memory and processor time, and end with the parent: by the system, as HDF5 may not stop."""
     try:
+        import ctypes
         import os
         import resource
 
+        seconds = int(TIME_LIMIT) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
         pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[0]
         most = int(pages) * os.sysconf("SC_PAGE_SIZE") + MEMORY_LIMIT
         resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
-    except (ImportError, OSError, ValueError):  # another system
+        ctypes.CDLL(None).prctl(_END_WITH_PARENT, signal.SIGKILL)
+    except (ImportError, OSError, ValueError, AttributeError):  # another system
         return
