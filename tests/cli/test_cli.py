@@ -18,6 +18,7 @@ from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from manikin.motion.file import write_motions
 from manikin.reports.figures import FIGURES
+from manikin.runtime.files import LOCK
 
 SUMMARY = {
     "scenario": "platform", "stature_m": 1.75, "mass_kg": 79.0, "seed": 0,
@@ -187,6 +188,7 @@ def test_run_leaves_a_whole_directory(capfd, tmp_path, monkeypatch):
     assert json.loads(capfd.readouterr().out) == SUMMARY
     folder = tmp_path / "result"
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    files.remove(LOCK)
     assert files == {
         "scenario.yaml", "motion.h5", "motion.bvh", "summary.json", "report.html",
         *(f"figures/{name}.png" for name in FIGURES if name != "walk_paths"),

@@ -8,7 +8,7 @@ import pytest
 
 from manikin.errors import MotionFileError
 from manikin.pipeline.run_directory import RunDirectory, read_summary
-from manikin.runtime.files import atomic_path, to_json, write_text
+from manikin.runtime.files import LOCK, atomic_path, to_json, write_text
 
 
 def test_files_of_a_run(tmp_path):
@@ -31,6 +31,7 @@ def test_second_run_removes_what_the_first_left(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     RunDirectory(tmp_path)
     left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
+    left.remove(LOCK)
     assert left == ["notes.txt", "scenario.yaml"]
 
 
@@ -62,7 +63,7 @@ def test_leftovers_of_a_killed_run_are_removed_by_the_next(tmp_path):
     for folder in (tmp_path, tmp_path / "stages"):
         (folder / ".motion.h5.0a1b.tmp").write_bytes(b"half")
     RunDirectory(tmp_path)
-    assert sorted(item.name for item in tmp_path.rglob("*")) == ["scenario.yaml", "stages"]
+    assert sorted(item.name for item in tmp_path.rglob("*")) == [LOCK, "scenario.yaml", "stages"]
 
 
 def test_json_has_no_nan():

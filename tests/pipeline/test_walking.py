@@ -11,6 +11,7 @@ from manikin.motion.file import read_motions
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import walking_stage
 from manikin.pipeline.stages.walking_stage import plan_walks, walked_motion
+from manikin.runtime.files import LOCK
 from manikin.scenarios import load_scenario
 from manikin.walking import Walker, walk_along
 from manikin.walking.path.walk_obstacles import clearance
@@ -253,6 +254,7 @@ def test_no_way_is_an_explained_failure_that_keeps_its_files(tmp_path):
     assert "leg 1 of the way: " in failure["reason"]
     assert "no way" in failure["reason"]
     kept = {file.relative_to(tmp_path).as_posix() for file in tmp_path.rglob("*") if file.is_file()}
+    kept.remove(LOCK)
     assert kept == {"scenario.yaml", "summary.json", "stages/walk.json", "stages/walk_paths.json"}
 
 

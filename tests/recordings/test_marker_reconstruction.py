@@ -296,7 +296,7 @@ def test_bad_recordings_are_refused_in_one_line(walk):
     cases = (
         (walk.cut(0, 1), "has 1 frame"),
         (replace(walk, positions=np.full_like(walk.positions, np.nan)), "sees no marker"),
-        (replace(walk, positions=1000.0 * walk.positions), "ASIS 250 m apart.*unit"),
+        (replace(walk, positions=10.0 * walk.positions), r"ASIS 2\.5 m apart.*unit"),
         (replace(walk, positions=0.001 * walk.positions), "ASIS 0.00025 m apart"),
         (swap("KNE", "KNEM"), "left and right knee swapped"),
         (swap(*everything), "left and right of the pelvis swapped"),
@@ -307,6 +307,14 @@ def test_bad_recordings_are_refused_in_one_line(walk):
         with pytest.raises(InputError, match=message) as caught:
             reconstruct(recording)
         assert "\n" not in str(caught.value)
+
+
+def test_a_marker_farther_away_than_any_laboratory_is_refused_by_its_name(walk):
+    """One wrong cell in one frame."""
+    positions = np.array(walk.positions)
+    positions[7, 3, 1] = 9e11
+    with pytest.raises(InputError, match=rf"marker '{walk.marker_names[3]}' at 9e\+11 m in frame 7"):
+        replace(walk, positions=positions)
 
     def apart(positions):
         positions[::2, walk.marker_index("LASI")] = np.nan

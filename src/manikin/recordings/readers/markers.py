@@ -178,7 +178,7 @@ class MarkerRecording(Displayed):
         if (far := np.argwhere(np.abs(positions) > FARTHEST)).size:
             frame, marker, axis = far[0]
             place = f"marker {self.marker_names[marker]!r} at {positions[frame, marker, axis]:.4g} m"
-            valid = f"at most {FARTHEST:g} m from the origin"
+            valid = f"at most {FARTHEST:g} m from the origin, in the unit of the file"
             raise InputError(f"{where} has {place} in frame {frame}, counted from 0; valid: {valid}")
         positions.setflags(write=False)
         object.__setattr__(self, "positions", positions)
