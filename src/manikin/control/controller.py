@@ -68,8 +68,9 @@ class ControlOutput:
 class Controller:
     """Follows a planned motion by one quadratic program per control step.
 
-    Keeps three things between steps: the state of the supports, the time of the plan and the solver's
-    starting point. All are functions of the steps made so far, so that equal runs give equal bits.
+    Keeps four things between steps: the state of the supports, the time of the plan, the solver's starting
+    point and the distances between parts of the body. All are functions of the steps made so far, so that
+    equal runs give equal bits.
 
     Attributes:
         clock: Time of the plan.

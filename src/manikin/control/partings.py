@@ -100,7 +100,7 @@ class SelfWatch:
             before, distance = self._gaps[index], self._distance(self._placed, index)
             self._gaps[index] = distance
             self._due[index] = self._step + max(1, int((distance - NEAR) / (FASTEST * period)))
-            # By how it changed: the rate itself takes longer.
+            # By how it changed, and a fifth more as it may have quickened: the rate itself takes longer.
             rate, room = 1.2 * (distance - before) / period, distance - self._kept[index]
             if distance >= NEAR or least_parting(room, rate, horizon) == -LARGEST:
                 continue

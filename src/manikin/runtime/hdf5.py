@@ -27,8 +27,7 @@ _END_WITH_PARENT = 1
 
 def sealed(image: bytes) -> bytes:
     """Content of an HDF5 file behind a user block with its digest."""
-    seal = _SEAL + hashlib.sha256(image).hexdigest().encode()
-    return seal.ljust(USER_BLOCK, b"\n") + image
+    return _user_block(hashlib.sha256(image).hexdigest()) + image
 
 
 def is_as_written(path: Path) -> bool:
@@ -37,7 +36,11 @@ def is_as_written(path: Path) -> bool:
         head = file.read(USER_BLOCK)
         if not head.startswith(_SEAL):
             return False
-        return head == (_SEAL + hashlib.file_digest(file, "sha256").hexdigest().encode()).ljust(512, b"\n")
+        return head == _user_block(hashlib.file_digest(file, "sha256").hexdigest())
+
+
+def _user_block(digest: str) -> bytes:
+    return (_SEAL + digest.encode()).ljust(USER_BLOCK, b"\n")
 
 
 def try_out(path: Path, largest: int) -> None:
