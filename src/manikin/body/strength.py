@@ -197,6 +197,21 @@ A hinge's first entry bounds its negative torque, so that of ``knee_flexion`` is
 """
 
 
+VARIATION, ARM_VARIATION, KNEE_VARIATION = 0.25, 0.277, 0.189
+"""Standard deviation over the mean of the strength of healthy adults of one sex: the middle of the 20 to 30 %
+of [Benfica2018]_; of an arm ([LaDelfa2017]_); of the knee's extension, isometric, untrained men
+([Stebbings2014]_)."""
+
+_ARM_JOINTS, _KNEE_EXTENSION = ("shoulder", "elbow", "forearm", "wrist"), "knee_flexion"
+
+
+def variation(name: str) -> float:
+    """Standard deviation over the mean of a hinge's strength, a key of :data:`HUMAN_STRENGTH`."""
+    if name.startswith(_ARM_JOINTS):
+        return ARM_VARIATION
+    return KNEE_VARIATION if name == _KNEE_EXTENSION else VARIATION
+
+
 def age_factor(sex: str, age: float) -> float:
     """Strength over that of the young ([DanneskioldSamsoe2009]_).
 

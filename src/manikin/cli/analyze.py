@@ -116,6 +116,8 @@ def _one(
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     """Printed values of a recording; everything is in the JSON."""
+    from manikin.ergonomics.load_report import load_lines
+
     margin, residual, effort = summary["margin"], summary["reconstruction_residual_m"], summary["ergonomics"]
     shown = {
         "duration": f"{summary['duration_s']:.2f} s, {summary['frames']} frames",
@@ -144,6 +146,7 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         if (score := effort[name]) is not None:
             worst = f"{score['max']} at {score['max_at_s']:.2f} s"
             shown[name.upper()] = f"{worst}, {score['mean']:.1f} on average"
+    shown |= load_lines(effort)
     if (strength := effort["strength"]) is not None:
         share, joint = 100.0 * strength["max_share"], strength["max_joint"]
         shown["largest torque"] = f"{share:.0f} % of strength, {joint} at {strength['max_at_s']:.2f} s"

@@ -1,4 +1,4 @@
-"""``manikin ergonomics``: RULA and REBA, torques against strength, effort and lowest margin of a motion."""
+"""``manikin ergonomics``: posture scores, loads, strength, effort and lowest margin of a motion."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -47,11 +47,20 @@ def ergonomics(
         float, option("X", "Share of the strength above which a joint counts as loaded.")
     ] = 0.5,
     neck: Annotated[float, option("DEG", "Flexion of the neck when it is upright.", "--neck-deg")] = 0.0,
+    lifts: Annotated[float, option("N", "How often the load is lifted.", "--lifts-per-minute")] = 0.2,
+    hours: Annotated[float, option("H", "For how long at a stretch.", "--lifting-hours")] = 1.0,
+    people_age: Annotated[
+        float | None, option("YEARS", "Age of those who shall have the strength. Default: the body's.")
+    ] = None,
+    back_lever: Annotated[
+        float, option("M", "Lever of the back's muscles about L5/S1.", "--back-lever-m")
+    ] = 0.05,
 ) -> None:
-    """Judge a motion: RULA and REBA over time, torques against strength, effort, lowest margin."""
+    """Judge a motion: posture scores, load on the low back, lifting, strength, effort, lowest margin."""
     if planned and executed:
         raise InputError("--planned and --executed exclude each other; valid: one of them or none")
     from manikin.ergonomics import Circumstances, ergonomics_of
+    from manikin.ergonomics.lift_of_motion import heaviest
     from manikin.motion.file import read_motions
 
     content = read_motions(source)
@@ -67,12 +76,10 @@ def ergonomics(
         if content.schedule is None:
             raise InputError(f"{source}: holds no contacts for --load-kg; valid: a motion of manikin run")
         body, motion = carried_motion(body, motion, content.schedule, load_kg, load_hand or "both")
-    phases = () if content.schedule is None else content.schedule.sequence
-    carried = sum(body.loads.values())
-    carried += max((phase.load.mass for phase in phases if phase.load is not None), default=0.0)
     given = Circumstances(
-        carried, load_pattern, coupling, static, repeated, rapid, raised, supported,
-        neck_upright_deg=neck,
+        heaviest(body, content.schedule), load_pattern, coupling, static, repeated, rapid, raised, supported,
+        neck_upright_deg=neck, lifts_per_minute=lifts, lifting_hours=hours, people_age=people_age,
+        back_lever_m=back_lever,
     )  # fmt: skip
     with console.stdout_kept_clean():
         result = ergonomics_of(body, motion, schedule=content.schedule, given=given, fraction=fraction)
@@ -93,11 +100,13 @@ def ergonomics(
 
 def _print(report: dict[str, Any]) -> None:
     """The main values of each part, then what could not be told and why."""
+    from manikin.ergonomics.load_report import load_lines
+
     rows: dict[str, Any] = {key: report[key] for key in ("motion", "duration_s", "frames")}
     for part, keys in SHOWN.items():
         values = report[part]
         shown = None if values is None else {key: values[key] for key in keys}
         rows |= console.flattened({part: shown})
-    console.print_table(rows)
+    console.print_table(rows | load_lines(report))
     for part, reason in report["missing"].items():
         typer.echo(f"{part}: {reason}", err=True)

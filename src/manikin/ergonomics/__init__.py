@@ -1,4 +1,4 @@
-"""Ergonomics of any motion: RULA and REBA, torques against strength, effort, the lowest margin."""
+"""Ergonomics of any motion: posture scores, loads on the back, lifting, strength, effort, lowest margin."""
 
 from manikin.ergonomics.assessment import (
     Assessment,
@@ -8,6 +8,19 @@ from manikin.ergonomics.assessment import (
     joint_strength,
 )
 from manikin.ergonomics.body_parts import bearing_of
+from manikin.ergonomics.capable_share import CapableShare, capable_share, capable_shares
+from manikin.ergonomics.lift_of_motion import lift_of
+from manikin.ergonomics.lifting import (
+    HandPlace,
+    Lift,
+    LiftingIndex,
+    Multipliers,
+    composite_index,
+    lifting_index,
+)
+from manikin.ergonomics.load_report import LoadAssessment, loads_of
+from manikin.ergonomics.low_back import LowBack, low_back_load
+from manikin.ergonomics.owas import Owas, owas_category, owas_of
 from manikin.ergonomics.postural_angles import postural_angles, upright_neck
 from manikin.ergonomics.report import Ergonomics, LowestMargin, ergonomics_of, lowest_margin
 from manikin.ergonomics.rula_reba import (
@@ -19,10 +32,14 @@ from manikin.ergonomics.rula_reba import (
     rula_action_level,
     rula_score,
 )
+from manikin.ergonomics.static_postures import StaticPostures, static_postures
 
 __all__ = [
-    "Assessment", "Circumstances", "Ergonomics", "JointStrength", "LowestMargin", "RebaSteps",
-    "RulaSteps", "assess_posture", "bearing_of", "cumulative_effort", "ergonomics_of", "joint_strength",
-    "lowest_margin", "postural_angles", "reba_action_level", "reba_score", "rula_action_level",
-    "rula_score", "upright_neck",
+    "Assessment", "CapableShare", "Circumstances", "Ergonomics", "HandPlace", "JointStrength", "Lift",
+    "LiftingIndex", "LoadAssessment", "LowBack", "LowestMargin", "Multipliers", "Owas", "RebaSteps",
+    "RulaSteps", "StaticPostures", "assess_posture", "bearing_of", "capable_share", "capable_shares",
+    "composite_index", "cumulative_effort", "ergonomics_of", "joint_strength", "lift_of",
+    "lifting_index", "loads_of", "low_back_load", "lowest_margin", "owas_category", "owas_of",
+    "postural_angles", "reba_action_level", "reba_score", "rula_action_level", "rula_score",
+    "static_postures", "upright_neck",
 ]  # fmt: skip

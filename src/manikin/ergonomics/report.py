@@ -1,4 +1,4 @@
-"""Ergonomics of one motion: scores, strength, effort, and the lowest margin with its limiting contact."""
+"""Ergonomics of one motion: scores, loads, strength, effort, and the lowest margin with its contact."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +18,7 @@ from manikin.contact.from_motion import stance_at
 from manikin.ergonomics import assessment
 from manikin.ergonomics.assessment import LOADED, CumulativeEffort, JointStrength, PosturalAssessment
 from manikin.ergonomics.body_parts import parts_of
+from manikin.ergonomics.load_report import LoadAssessment, loads_of
 from manikin.ergonomics.rula_reba import Circumstances
 from manikin.errors import BodyError
 from manikin.motion import Motion
@@ -156,7 +157,9 @@ class Ergonomics(Displayed):
         time: (n,) [s].
         circumstances: Given by the observer.
         margin_series: (n,) margin of the motion, NaN where it is not known.
-        missing: Reason by part: ``"posture"``, ``"strength"``, ``"effort"``, ``"margin"``.
+        loads: OWAS, static postures, the low back, the lifting equation, who has the strength.
+        missing: Reason by part: ``"posture"``, ``"strength"``, ``"effort"``, ``"margin"``, and those of
+            :class:`~manikin.ergonomics.load_report.LoadAssessment`.
         untold: Segments that the recording does not observe; they were scored as in standing.
     """
 
@@ -167,6 +170,7 @@ class Ergonomics(Displayed):
     effort: CumulativeEffort | None
     margin: LowestMargin | None
     margin_series: FloatArray
+    loads: LoadAssessment
     missing: Mapping[str, str]
     untold: tuple[str, ...] = ()
 
@@ -179,6 +183,7 @@ class Ergonomics(Displayed):
             "legs_from": None if posture is None else posture.bearing.source,
             "rula": None if posture is None else posture.rula.as_dict(),
             "reba": None if posture is None else posture.reba.as_dict(),
+            **self.loads.as_dict(self.time),
             "strength": None if self.strength is None else _strength(self.strength),
             "effort": None if self.effort is None else _effort(self.effort),
             "margin": None if self.margin is None else _margin(self.margin),
@@ -194,6 +199,7 @@ class Ergonomics(Displayed):
                 columns |= {name: one.score, **{f"{name}_{side}": one.sides[side] for side in one.sides}}
                 columns[f"{name}_action_level"] = one.level
             columns |= self.posture.angles.columns_deg()
+        columns |= self.loads.series()
         if self.strength is not None:
             columns["largest_torque_share"] = self.strength.largest
             for number, joint in enumerate(self.strength.joint_names):
@@ -252,8 +258,10 @@ def ergonomics_of(
         missing["margin"] = "the motion has no margin"
     elif margin.unknown is not None:
         missing["margin"] = f"no limiting contact: {margin.unknown}"
-    found = posture, strength, effort, margin, motion.margin
-    return Ergonomics(motion.time, given or Circumstances(), *found, missing, tuple(untold))
+    circumstances = given or Circumstances()
+    loads = loads_of(body, motion, posture, circumstances, schedule)
+    found = posture, strength, effort, margin, motion.margin, loads, missing | dict(loads.missing)
+    return Ergonomics(motion.time, circumstances, *found, tuple(untold))
 
 
 def _strength(found: JointStrength) -> dict[str, Any]:

@@ -119,6 +119,9 @@ class Circumstances:
         trunk_supported: Whether the trunk of somebody seated is well supported.
         neck_upright_deg: Flexion of the body's neck when it is upright; of a recording see
             :func:`manikin.ergonomics.postural_angles.upright_neck` [deg].
+        lifts_per_minute, lifting_hours: How often a load is lifted, and for how long at a stretch [h].
+        people_age: Age of the people whose strength is compared [years]; None for that of the body.
+        back_lever_m: Lever of the back's muscles about L5/S1 [m].
     """
 
     load_kg: float = 0.0
@@ -130,10 +133,19 @@ class Circumstances:
     shoulder_raised: bool = False
     trunk_supported: bool = False
     neck_upright_deg: float = 0.0
+    lifts_per_minute: float = 0.2
+    lifting_hours: float = 1.0
+    people_age: float | None = None
+    back_lever_m: float = 0.05
 
     def __post_init__(self) -> None:
         finite_number(self.load_kg, "load [kg]", at_least=0.0)
         finite_number(self.neck_upright_deg, "upright neck [deg]", at_least=-60.0, at_most=60.0)
+        finite_number(self.lifts_per_minute, "lifts per minute", at_least=0.0)
+        finite_number(self.lifting_hours, "hours of lifting", above=0.0, at_most=8.0)
+        finite_number(self.back_lever_m, "lever of the back's muscles [m]", at_least=0.03, at_most=0.09)
+        if self.people_age is not None:
+            finite_number(self.people_age, "age of the people [years]", at_least=18.0, at_most=90.0)
         for name, value, valid in (
             ("load pattern", self.load_pattern, PATTERNS),
             ("coupling", self.coupling, COUPLINGS),

@@ -14,6 +14,7 @@ from typing import Any
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactSchedule, Stance, StanceSequence
+from manikin.ergonomics.load_report import ergonomics_in_short
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
@@ -291,6 +292,7 @@ class Report:
         self._tables: dict[str, RequirementTable] = {}
         self._files: dict[str, Callable[[RunDirectory], object]] = {}
         self._before: _Reported | None = None
+        self._schedule: ContactSchedule | None = None
         self.directory = None if out is None else RunDirectory(out)
         scenario = context.given
         self._write(SCENARIO, lambda directory: directory.write(SCENARIO, scenario.to_yaml()))
@@ -299,7 +301,7 @@ class Report:
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "verdict": "failed", "planned": False, "proved": False, "succeeded": False, "failure": None,
             "requirements": [], "contacts": None, "centroidal": None, "wholebody": None, "act": None,
-            "execution": None, "trials": None, "push": None, "walk": None, "wall_s": 0.0,
+            "execution": None, "trials": None, "push": None, "walk": None, "ergonomics": None, "wall_s": 0.0,
         }  # fmt: skip
 
     @property
@@ -357,6 +359,11 @@ class Report:
         file = f"{STAGES}/{name}.json"
         self._write(file, lambda directory: directory.write(file, result))
 
+    def judge_ergonomics(self, motion: Motion | None) -> None:
+        """Take the scores and loads of a person's last motion into the summary, in short."""
+        if motion is not None and not self._context.scenario.is_point_mass:
+            self.summary["ergonomics"] = ergonomics_in_short(self._context.body, motion, self._schedule)
+
     def keep_scenario(self, scenario: Scenario) -> None:
         """Keep a scenario of the task frame with the supports that were found, in the world."""
         text = scenario.from_task_frame(self.transform).to_yaml()
@@ -373,6 +380,8 @@ class Report:
         file: str = MOTION,
     ) -> None:  # fmt: skip
         """Keep the motions that there are so far, moved to the world, in a file of the run directory."""
+        if file == MOTION:
+            self._schedule = schedule
         if self.directory is None:
             return
         transform = self.transform
@@ -461,6 +470,7 @@ class RunResult:
         planned = planned if wholebody is None else wholebody.motion
         planned, executed = (motion_in_world(item, report.transform) for item in (planned, executed))
         stages = centroidal, wholebody, execution, report.path, recovery
+        report.judge_ergonomics(executed if executed is not None else planned)
         return cls(report.close(), planned, executed, *stages, report.transform, report.directory)
 
     @property
