@@ -193,5 +193,15 @@ def test_what_is_no_lift_is_refused():
         lift_of(body, motion)
     with pytest.raises(InputError, match="the load is in one hand"):
         lift_of(carrying(body, 5.0, "left"), motion)
+    stepping, walking = (np.array(raised(body, 20.0, 100.0)) for _ in range(2))
+    for side in ("hip", "knee"):
+        stepping[:, 7 + body.joint_index(f"left_{side}_flexion")] += np.deg2rad(60.0)
+    walking[1, 0] += 1.5
+    for frames, reason in (
+        (stepping, "one foot is on a step"),
+        (walking, "the person walks between the ends"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            lift_of(carrying(body, 5.0), still(body, frames, duration=1.0, rate=1.0))
     with pytest.raises(InputError, match="up and down by less than 25 cm"):
         lift_of(carrying(body, 5.0), still(body, body.standing_posture()))

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 
 from manikin.body import insect, kudoh
+from manikin.body.strength import carrying
 from manikin.ergonomics import Circumstances, ergonomics_of, upright_neck
+from manikin.ergonomics.load_report import ergonomics_in_short, load_lines
 from manikin.errors import BodyError, InputError
 from manikin.recordings import motion_of, read_recording, reconstruct
 from manikin.runtime.files import to_json
 
-from .conftest import still
+from .conftest import posture, still
+
+ELBOWS = ("left_elbow_flexion", "right_elbow_flexion")
 
 
 def test_standing_is_acceptable(body):
@@ -128,3 +132,36 @@ def test_a_recorded_pick_up_is_bad_where_it_stoops(picked_up):
     assert reba.score[upright].max() <= 2
     assert found.posture.bearing.source == "heights of the soles"
     assert found.strength is None
+
+
+def test_a_run_keeps_the_worst_of_a_person_in_short(finished_run):
+    """Its values are those of the whole report; a creature has none."""
+    report = ergonomics_of(finished_run.body, finished_run.executed, schedule=finished_run.schedule)
+    whole = report.as_dict()
+    short = ergonomics_in_short(finished_run.body, finished_run.executed, finished_run.schedule)
+    assert short["rula_max"] == whole["rula"]["max"]
+    assert short["owas_code"] == whole["owas"]["code"]
+    assert short["l5s1_max_compression_N"] == whole["low_back"]["max_compression_N"]
+    assert short["lifting_index"] is None
+    assert short["capable_min_share"]["female"] == whole["capable"]["female"]["min_share"]
+    creature = insect()
+    assert ergonomics_in_short(creature, still(creature, creature.zero_posture(), contacts=())) is None
+
+
+def test_a_lift_is_told_in_a_line_and_what_is_none_is_a_reason(body):
+    """With a load in one hand the report says why there is no index."""
+    frames = [posture(body, **dict.fromkeys(ELBOWS, angle)) for angle in (20.0, 100.0)]
+    for hand, missing in (("both", None), ("left", "the load is in one hand")):
+        carrier = carrying(body, 8.0, hand)
+        motion = still(carrier, np.array(frames), duration=1.0, rate=1.0)
+        report = ergonomics_of(carrier, motion, given=Circumstances(load_kg=8.0, lifts_per_minute=4.0))
+        told = report.as_dict()
+        assert told["missing"].get("lifting") == missing
+        lines = load_lines(told)
+        assert ("lifting index" in lines) == (missing is None)
+        assert {"OWAS", "static postures", "low back L5/S1"} <= set(lines)
+        if missing is None:
+            lift = told["lifting"]
+            assert lift["index"] == pytest.approx(8.0 / lift["recommended_kg"])
+            assert lift["origin"]["multipliers"]["frequency"] == 0.84
+            assert f"{lift['index']:.2f}: 8.0 kg" in lines["lifting index"]

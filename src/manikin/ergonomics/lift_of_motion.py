@@ -22,6 +22,11 @@ from manikin.numerics.spatial import FloatArray
 BETWEEN_FEET = 0.10
 """Hands that are nearer to the ankles than this along the floor are straight ahead [m]; ours."""
 
+LEVEL_FEET = 0.10
+"""At the ends of a lift one sole is not higher above the other than this [m]; ours."""
+TWO_STEPS = 1.0
+"""The ankles go no further than this between its ends [m]; ours, the manual allows one or two steps."""
+
 HANDS = ("left_hand", "right_hand")
 SIDES = ("left", "right")
 
@@ -41,19 +46,24 @@ def lift_of(
         coupling: As of REBA; ``"unacceptable"`` counts as ``"poor"``.
 
     Raises:
-        InputError: If there is no load in both hands, or they move by less than 25 cm up or down.
+        InputError: If there is no load in both hands, they move by less than 25 cm up or down, or the person
+            climbs or walks meanwhile.
     """
     loads = carried(body, motion, schedule)
     both = np.all(loads > 0.0, axis=1)
     if not both.any():
         reason = "the load is in one hand" if np.any(loads > 0.0) else "nothing is in the hands"
         raise InputError(f"{reason}; valid: a load in both hands")
-    places, straight = _ankles_and_hands(body, motion)
+    base, unevenness, places, straight = _ankles_and_hands(body, motion)
     rows = np.flatnonzero(both)
     height = places[rows, 2]
     first, last = sorted((int(rows[height.argmin()]), int(rows[height.argmax()])))
     if abs(places[last, 2] - places[first, 2]) < LEAST_TRAVEL:
         raise InputError("the loaded hands go up and down by less than 25 cm; valid: a lift")
+    if unevenness[[first, last]].max() > LEVEL_FEET:
+        raise InputError("one foot is on a step at an end of the lift; valid: both on level ground")
+    if np.linalg.norm((base[last] - base[first])[:2]) > TWO_STEPS:
+        raise InputError("the person walks between the ends of the lift; valid: at most two steps")
     ends = [_place(places[row], straight[row]) for row in (first, last)]
     hold = coupling if coupling in COUPLING else "poor"
     load = float(loads[rows].sum(axis=1).max())
@@ -79,10 +89,14 @@ def heaviest(body: BodyModel, schedule: ContactSchedule | None = None) -> float:
     return float(sum(body.loads.values()) + most)
 
 
-def _ankles_and_hands(body: BodyModel, motion: Motion) -> tuple[FloatArray, FloatArray]:
+def _ankles_and_hands(
+    body: BodyModel, motion: Motion
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """From the ankles to the hands, and straight ahead.
 
     Returns:
+        (n, 3) the middle of the ankles, level with the lower sole [m].
+        (n,) height of the upper sole above the lower one [m].
         (n, 3) from the middle of the ankles, level with the lower sole, to that of the hands [m].
         (n, 2) unit directions straight ahead.
     """
@@ -93,9 +107,11 @@ def _ankles_and_hands(body: BodyModel, motion: Motion) -> tuple[FloatArray, Floa
     ankles = placed.shifts.transpose(0, 2, 1) + motion.q[None, :, :3]
     ahead = placed.turns.transpose(0, 3, 1, 2)[:, :, :2, 0].mean(axis=0)
     base = ankles.mean(axis=0)
-    base[:, 2] = np.minimum(*(place[:, 2] for place in soles.values()))
+    heights = np.array([place[:, 2] for place in soles.values()])
+    base[:, 2] = heights.min(axis=0)
     middle = np.mean([hands[name] for name in HANDS], axis=0)
-    return middle - base, ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
+    straight = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
+    return base, np.ptp(heights, axis=0), middle - base, straight
 
 
 def _place(away: FloatArray, ahead: FloatArray) -> HandPlace:

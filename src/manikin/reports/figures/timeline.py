@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from manikin.contact import ContactSchedule
-from manikin.ergonomics import Assessment, Ergonomics, JointStrength
+from manikin.ergonomics import Assessment, Ergonomics, JointStrength, LowBack
+from manikin.ergonomics.low_back import ACTION_LIMIT, MAXIMUM_LIMIT
 from manikin.motion import Motion
 from manikin.motion.motion import PhaseTable
 from manikin.numerics.signals import mask_runs
@@ -294,15 +295,18 @@ _RULA_ENDS, _REBA_ENDS = (2, 4, 6, 7), (1, 3, 7, 10, 15)
 
 
 def ergonomics_figure(found: Ergonomics, title: str = "Ergonomics") -> Figure:
-    """Draw the scores of both sides over the colours of the action levels, and the largest torque shares."""
+    """Draw the scores of both sides, the compression of the low back, and the largest torque shares."""
     posture, strength = found.posture, found.strength
-    rows = 2 * (posture is not None) + (strength is not None)
+    back = None if posture is None else found.loads.low_back
+    rows = 2 * (posture is not None) + (back is not None) + (strength is not None)
     style.need(rows and len(found.time) > 1, "scores or torques over time", "a motion of a human")
     figure, grid = style.new_grid(11.0, 0.9 + 2.3 * rows, title, rows, 1, between=0.45, left=0.6)
     panels = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
     if posture is not None:
         _draw_scores(panels[0], posture.rula, _RULA_ENDS, LEVEL_COLOURS[1:])
         _draw_scores(panels[1], posture.reba, _REBA_ENDS, LEVEL_COLOURS)
+    if back is not None:
+        _draw_low_back(panels[2], back)
     if strength is not None:
         _draw_shares(panels[-1], found, strength)
     for axes in panels:
@@ -324,6 +328,26 @@ def _draw_scores(axes: Axes, one: Assessment, ends: Sequence[int], colours: Sequ
     axes.set_yticks(range(1, ends[-1] + 1, 1 if ends[-1] < 10 else 2))
     lines, _ = axes.get_legend_handles_labels()
     levels = zip(colours, LEVELS[one.method], strict=True)
+    style.legend_above(axes, [*lines, *(Patch(color=colour, label=level) for colour, level in levels)])
+
+
+def _draw_low_back(axes: Axes, back: LowBack) -> None:
+    """Compression of L5/S1 over the colours of the levels of NIOSH."""
+    top = 1.1 * max(MAXIMUM_LIMIT, float(np.nanmax(back.compression)))
+    for bottom, limit, colour in zip(
+        (0.0, ACTION_LIMIT, MAXIMUM_LIMIT),
+        (ACTION_LIMIT, MAXIMUM_LIMIT, top),
+        LEVEL_COLOURS[::2],
+        strict=True,
+    ):
+        axes.axhspan(bottom / 1e3, limit / 1e3, color=colour, linewidth=0, zorder=0)
+    axes.plot(back.time, back.compression / 1e3, color="#0072B2", linewidth=1.1, label="compression")
+    axes.plot(back.time, back.shear / 1e3, color="#D55E00", linewidth=1.1, label="shear")
+    style.dress(axes, "L5/S1 [kN]")
+    axes.grid(visible=False)
+    axes.set_ylim(min(0.0, float(np.nanmin(back.shear)) / 1e3), top / 1e3)
+    lines, _ = axes.get_legend_handles_labels()
+    levels = zip(LEVEL_COLOURS[::2], ("below action limit", "above", "above maximum"), strict=True)
     style.legend_above(axes, [*lines, *(Patch(color=colour, label=level) for colour, level in levels)])
 
 
