@@ -165,3 +165,15 @@ def test_a_lift_is_told_in_a_line_and_what_is_none_is_a_reason(body):
             assert lift["index"] == pytest.approx(8.0 / lift["recommended_kg"])
             assert lift["origin"]["multipliers"]["frequency"] == 0.84
             assert f"{lift['index']:.2f}: 8.0 kg" in lines["lifting index"]
+
+
+def test_a_recorded_pick_up_loads_the_back_where_it_stoops(picked_up):
+    """Without force plates: near the weight of the trunk in standing, several times as much bent forward."""
+    found, _ = picked_up
+    back, angles = found.loads.low_back, np.rad2deg(found.posture.angles.trunk_flexion)
+    assert back.known.all()
+    standing = np.median(back.compression[np.abs(angles) < 5.0])
+    stooped = np.median(back.compression[angles > 60.0])
+    assert 400.0 < standing < 1000.0
+    assert 2000.0 < stooped < 5000.0
+    assert found.loads.lifting is None
