@@ -21,6 +21,7 @@ def test_json_is_one_object_about_the_executed_motion(run, capsys):
     assert main(["ergonomics", str(run), "--json"]) == DONE
     report = json.loads(capsys.readouterr().out)
     assert report["motion"] == "executed"
+    assert set(report) >= {"owas", "static_postures", "low_back", "lifting", "capable"}
     assert set(report) >= {"rula", "reba", "strength", "effort", "margin", "missing", "circumstances"}
     assert 1 <= report["rula"]["max"] <= 7
 
@@ -39,7 +40,9 @@ def test_options_reach_the_scores(run, capsys):
 def test_table_and_files(run, capsys):
     csv, figure = run / "series.csv", run / "ergonomics.png"
     assert main(["ergonomics", str(run), "--csv", str(csv), "--figure", str(figure)]) == DONE
-    assert "margin.limiting_contact" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "margin.limiting_contact" in shown
+    assert all(name in shown for name in ("OWAS", "static postures", "low back L5/S1", "strong enough"))
     assert csv.read_text().startswith("time_s,rula,rula_left,rula_right,")
     assert figure.read_bytes().startswith(b"\x89PNG")
 
@@ -51,6 +54,9 @@ def test_table_and_files(run, capsys):
         (["--load-pattern", "often"], "valid: intermittent, static, shock"),
         (["--load-kg", "-1"], "valid: a finite number >= 0"),
         (["--fraction", "2"], "fraction of the strength"),
+        (["--back-lever-m", "0.5"], "lever of the back's muscles"),
+        (["--lifting-hours", "9"], "hours of lifting"),
+        (["--people-age", "12"], "age of the people"),
         (["--csv", "/there/is/no/such/folder.csv"], "cannot be written"),
     ],
 )

@@ -111,6 +111,7 @@ class LowBack:
             "twist_moment_Nm": float(self.twist_moment[worst]), "max_shear_N": float(self.shear[shear]),
             "share_above_3400_N": float(share[self.compression > ACTION_LIMIT].sum()),
             "share_above_6400_N": float(share[self.compression > MAXIMUM_LIMIT].sum()),
+            "share_shear_above_1000_N": float(share[np.abs(self.shear) > SHEAR_LIMIT].sum()),
             "lever_m": self.lever, "model": self.model, "known_share": float(self.known.mean()),
         }  # fmt: skip
 
