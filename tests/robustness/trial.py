@@ -2,8 +2,6 @@
 
 import contextlib
 import io
-import os
-import resource
 import signal
 import tempfile
 import traceback
@@ -19,6 +17,7 @@ from tests.robustness.mutations import mutated
 from tests.robustness.samples import DAMAGED, FORMATS, Format
 
 from manikin.errors import InputError, ManikinError
+from manikin.runtime.child import limit_memory
 
 LONGEST = 30
 """Time in which every file is read or refused [s]."""
@@ -99,7 +98,6 @@ def _time_limit() -> Iterator[None]:
 
 def batch_of(name: str, seed: int, first: int, count: int) -> list[Finding]:
     """Findings among cases of a format, in a process that may use :data:`MEMORY` more than it does."""
-    used = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, resource.RLIM_INFINITY))
+    limit_memory(MEMORY)
     kind = next(kind for kind in FORMATS if kind.name == name)
     return tried(kind, seed, range(first, first + count))

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from manikin.errors import MotionFileError
+from manikin.pipeline.batch import BatchDirectory
 from manikin.pipeline.run_directory import RunDirectory
 
 OTHER = """
@@ -47,3 +48,17 @@ def test_a_directory_that_is_something_else_is_not_claimed(tmp_path):
     with pytest.raises(MotionFileError, match=r"letter\.txt"):
         RunDirectory(tmp_path)
     assert [item.name for item in tmp_path.iterdir()] == ["letter.txt"]
+
+
+def test_a_set_of_runs_belongs_to_one_process_and_leaves_other_files_alone(tmp_path):
+    (tmp_path / "letter.txt").write_text("Dear reader")
+    (tmp_path / "results.json").write_text("{}")
+    directory = BatchDirectory(tmp_path)
+    assert not (tmp_path / "results.json").exists()
+    command = [sys.executable, "-m", "manikin", "run", "all", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"manikin: {tmp_path}: another process writes to this set of runs; valid: ")
+    assert len(done.stderr.splitlines()) == 1
+    assert directory.write("results.json", {"runs": []}).exists()
+    assert (tmp_path / "letter.txt").read_text() == "Dear reader"

@@ -18,6 +18,7 @@ from manikin.recordings.readers import read_recording
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.runtime.display import Displayed
+from manikin.runtime.files import write_result
 from manikin.scenarios import Scenario, load_scenario
 from manikin.viewer import serve
 
@@ -330,8 +331,8 @@ class Drawing:
         return self.svg
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file."""
-        Path(path).write_text(self.svg, encoding="utf-8")
+        """Write it to a file, as a whole; MotionFileError if it cannot be written."""
+        write_result(path, self.svg)
 
 
 def read(path: str | Path, frames: tuple[int, int] | None = None) -> RecordedMotion:

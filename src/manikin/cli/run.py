@@ -21,9 +21,6 @@ from manikin.cli.console import (
 ALL = "all"
 """In place of a scenario: every built-in one with its variants."""
 
-RESULTS = "results.json"
-"""Results of ``manikin run all --out DIR``, in DIR."""
-
 _SCENARIO = "Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them."
 _SET = "Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable."
 _TRIALS = "Execute a proved motion in N other worlds, too: masses, friction, heights, delay, noise, a push."
@@ -86,7 +83,6 @@ def _run_all(
 ) -> int:  # fmt: skip
     from manikin.pipeline import batch
     from manikin.reports.summary_table import counts_line, text_table, verdict_line
-    from manikin.runtime.files import make_directory, write_result
     from manikin.scenarios import list_scenarios, load_scenario
 
     # A value that is not usable is refused once, and not once per run.
@@ -97,8 +93,7 @@ def _run_all(
     words = [word for name, value in given.items() if value is not None for word in (f"--{name}", str(value))]
     directory = out if out is not None else None if json else Path("runs")
     runs = batch.built_in_jobs(statures=body["stature_m"] is not None)
-    if directory is not None:
-        make_directory(directory)
+    kept = None if directory is None else batch.BatchDirectory(directory)
 
     def report(entry: dict[str, Any], done: int) -> None:
         interruption.check()
@@ -108,8 +103,8 @@ def _run_all(
     options = batch.RunOptions(directory, draw and directory is not None, tuple(words))
     results = {"stature_m": body["stature_m"], "seed": seed}
     results |= batch.run_jobs(runs, options.command, workers=workers, report=report)
-    if directory is not None:
-        write_result(directory / RESULTS, results)
+    if kept is not None:
+        kept.write(kept.RESULTS, results)
     if json:
         console.print_json(results)
     else:

@@ -14,17 +14,31 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from joblib import cpu_count
 
 from manikin.runtime.child import environment_of_child
+from manikin.runtime.files import ResultDirectory
 from manikin.scenarios import Scenario, list_scenarios, list_variants, load_scenario
 
 TIME_LIMIT = 1800.0
 """Wall time after which a run is ended [s]."""
 _EXPLAINED = 3
 """Exit status of a run that ended in an explained failure."""
+
+
+class BatchDirectory(ResultDirectory):
+    """Directory of many run directories and their results; what else is in it is left alone."""
+
+    kind, exclusive = "set of runs", True
+    RESULTS: ClassVar[str] = "results.json"
+    """File of the results, written when every run has ended."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Create the directory, or take over one, whose earlier results are removed; see the base."""
+        super().__init__(path)
+        self.remove(self.RESULTS, f".{self.RESULTS}.*.tmp")
 
 
 @dataclass(frozen=True)

@@ -31,18 +31,20 @@ class ResultDirectory:
     """Directory of one kind of result.
 
     Whatever writes to it raises :class:`~manikin.errors.MotionFileError` if that is not possible. A directory
-    with marks belongs to one process at a time, as long as the object is there.
+    with marks, or with ``exclusive``, belongs to one process at a time, as long as the object is there.
 
     Attributes:
         path: The directory.
         kind: What the result is called in messages, such as ``"run"``.
         marks: Files of which every such directory has one, the first of them named in messages: a directory
             without any is not taken over. If empty, any directory is, and its other files are left alone.
+        exclusive: Whether a directory without marks belongs to one process, too.
         writer: Command that writes the files, for messages.
     """
 
     kind: str = "result"
     marks: ClassVar[tuple[str, ...]] = ()
+    exclusive: ClassVar[bool] = False
     writer: ClassVar[str] = "manikin"
 
     def __init__(self, path: str | Path, kind: str | None = None) -> None:
@@ -57,6 +59,8 @@ class ResultDirectory:
             raise MotionFileError(f"{self.path}: is a file; valid: a directory for the {self.kind}")
         make_directory(self.path)
         if not self.marks:
+            if self.exclusive:
+                self._claim()
             return
         content = sorted(item.name for item in self.path.iterdir() if not item.name.startswith("."))
         if content and not set(self.marks) & set(content):

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import h5py
 
+from manikin.runtime.child import limit_memory
+
 USER_BLOCK = 512
 """Bytes before the HDF5 content."""
 TIME_LIMIT = 15.0
@@ -91,14 +93,11 @@ def _limit() -> None:
     """Limit memory and processor time, and end with the parent: by the system, as HDF5 may not stop."""
     try:
         import ctypes
-        import os
         import resource
 
         seconds = int(TIME_LIMIT) + 1
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-        pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[0]
-        most = int(pages) * os.sysconf("SC_PAGE_SIZE") + MEMORY_LIMIT
-        resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+        limit_memory(MEMORY_LIMIT)
         ctypes.CDLL(None).prctl(_END_WITH_PARENT, signal.SIGKILL)
     except (ImportError, OSError, ValueError, AttributeError):  # another system
         return
