@@ -31,6 +31,7 @@ from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
 from manikin.scenarios.found_supports import Pace
+from manikin.scenarios.plausibility import check_plausible
 from manikin.scene import Scene
 from manikin.simulation import Execution, Recovery
 from manikin.verification import PlannedContacts, PlannedStage
@@ -180,6 +181,7 @@ class RunContext:
         """
         settings = settings or WholeBodySettings(manner=posture_style_of(scenario.file.manner))
         body, scene = scenario.build_body(), scenario.build_scene()
+        check_plausible(scenario, body, scene)
         if scenario.file.supports is not None:
             scenario.check_contacts(scene)
         transform, task = scenario.transform_task_to_world, scenario.in_task_frame()
