@@ -1,5 +1,6 @@
 """The programme says the same as the spline, the wrench and the polytopes."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +8,7 @@ from hypothesis import strategies as st
 
 from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR
 from manikin.numerics.spline import BSpline, bernstein_matrix, clamped_knots
+from manikin.planning.com.com_constraints import CeilingHeight, Zone, height_below
 from manikin.planning.com.feasibility import polytopes_of
 from manikin.planning.com.optimise import (
     MarginTargets,
@@ -18,7 +20,13 @@ from manikin.planning.com.optimise import (
     with_violated,
 )
 from manikin.planning.com.timing_free import GUESS_STYLES, PENDULUM, guess
-from manikin.planning.com.transcription import ComStructure, bernstein_gram, spline_from_bezier, transcribe
+from manikin.planning.com.transcription import (
+    ComStructure,
+    bernstein_gram,
+    spline_from_bezier,
+    transcribe,
+    written,
+)
 from manikin.scenarios import load_scenario
 
 
@@ -198,3 +206,27 @@ def test_second_derivatives_grow_with_the_number_of_phases_only():
     few, double = entries(4), entries(8)
     # One block is (3 (k + 1) + 1)^2 / 2; ties to the neighbour through the continuity are of the same kind.
     assert double / few == pytest.approx(2.0, rel=0.1)
+
+
+def test_equal_problems_share_one_programme():
+    """Each of ten runs of a scenario with an overhead obstacle kept 60 MB of another programme."""
+    surfaces = [
+        CeilingHeight(Zone.below([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (), 0.1), 1.1, low)
+        for low in (0.8, 0.8, 0.7)
+    ]
+    texts = [written(height_below("roof", surface).function) for surface in surfaces]
+    assert texts[0] == texts[1]
+    assert texts[0] != texts[2]
+    structures = [ComStructure(4, 2, (1,), (1,), "wrench", (text,), False) for text in texts]
+    before = transcribe.cache_info().misses
+    programmes = [transcribe(structure) for structure in structures]
+    assert transcribe.cache_info().misses - before == 2
+    assert programmes[0] is programmes[1]
+
+
+def test_a_written_constraint_has_the_values_of_its_function():
+    surface = CeilingHeight(Zone.below([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (), 0.1), 1.1, 0.8)
+    function = height_below("roof", surface).function
+    again, places = ca.Function.deserialize(written(function)), np.random.default_rng(0).random((50, 3))
+    found = [float(again(*place)) for place in places]
+    np.testing.assert_allclose(found, function(*places.T), rtol=0.0, atol=1e-15)

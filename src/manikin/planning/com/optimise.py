@@ -22,6 +22,7 @@ from manikin.planning.com.transcription import (
     ComStructure,
     spline_from_bezier,
     transcribe,
+    written,
 )
 
 FIRST_COUNT, FIRST_FACES = 12, 6
@@ -161,7 +162,7 @@ def build_programme(problem: CentroidalProblem, facets: Rows, faces: Rows = ()) 
     structure = ComStructure(
         problem.degree, problem.samples, rows=tuple(map(len, facets)),
         contacts=tuple(len(phase.stance) for phase in phases), margin_space=problem.margin_space,
-        geometric=tuple(constraint.function for constraint in problem.geometric),
+        geometric=tuple(written(constraint.function) for constraint in problem.geometric),
         limited_distance=problem.support_distance is not None,
         key_planes=tuple((plane.key, plane.lead) for plane in problem.key_planes),
         loaded=tuple(number for number, phase in enumerate(phases) if phase.load is not None),

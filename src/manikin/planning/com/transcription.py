@@ -39,6 +39,7 @@ class ComStructure:
         samples: n_s, samples of each phase but one.
         rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
+        geometric: Geometric constraints, each as :func:`written`.
         key_planes: Key instant and lead [s] of each plane.
         loaded: Phases with a load.
         reach: Number of faces of its region imposed in each phase.
@@ -49,7 +50,7 @@ class ComStructure:
     rows: tuple[int, ...]
     contacts: tuple[int, ...]
     margin_space: MarginSpace
-    geometric: tuple[Callable[[Any, Any, Any], Any], ...]
+    geometric: tuple[str, ...]
     limited_distance: bool
     key_planes: tuple[tuple[int, float], ...] = ()
     loaded: tuple[int, ...] = ()
@@ -147,7 +148,7 @@ class _PhaseKind:
     faces: int
     loaded: bool
     margin_space: MarginSpace
-    geometric: tuple[Callable[[Any, Any, Any], Any], ...]
+    geometric: tuple[str, ...]
 
 
 class _Assembly:
@@ -277,13 +278,24 @@ def _phase(kind: _PhaseKind) -> _Terms:
     return writer.terms([points, duration, total, margin], weights[1] * smoothness / total)
 
 
-def _symbolic(function: Callable[[Any, Any, Any], Any], position: ca.SX) -> ca.SX:
-    """Values of a geometric constraint at (n, 3) symbolic positions, one per position."""
+def written(function: Callable[[Any, Any, Any], Any]) -> str:
+    """CasADi's text of a function of x, y and z, the same for all functions with the same expression.
+
+    Programmes are kept by it: a function of an equal problem is another object, by which none is found again.
+    """
+    symbols = [ca.SX.sym(name) for name in "xyz"]
     with warnings.catch_warnings():
         # CasADi announces that numpy's functions on its symbols may change; what it returns is right.
         warnings.simplefilter("ignore", FutureWarning)
-        values = function(position[:, 0], position[:, 1], position[:, 2])
-    return values + ca.SX.zeros(position.shape[0])
+        value = function(*symbols)
+    return ca.Function("geometric", symbols, [ca.SX(value)]).serialize()
+
+
+def _symbolic(text: str, position: ca.SX) -> ca.SX:
+    """Values of a :func:`written` function at (n, 3) symbolic positions, one per position."""
+    function = ca.Function.deserialize(text)
+    places = [position[row, :] for row in range(position.shape[0])]
+    return ca.vertcat(*(function(place[0], place[1], place[2]) for place in places))
 
 
 def _add_balance(
