@@ -1,16 +1,19 @@
 """``python -m tests.robustness --cases 10000``: damaged files of every format, in processes that may end.
 
 A process may use 2 GB more than it begins with. A case is done again alone by ``--format NAME --case N``.
+``--kills 100`` ends that many commands at random times instead; with ``--case N`` that one alone.
 """
 
 import argparse
 import os
 import sys
 import time
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
+from tests.robustness.kills import killed
 from tests.robustness.samples import FORMATS
 from tests.robustness.trial import Finding, batch_of
 
@@ -25,7 +28,10 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--format", choices=[kind.name for kind in FORMATS])
     parser.add_argument("--case", type=int)
+    parser.add_argument("--kills", type=int)
     given = parser.parse_args()
+    if given.kills is not None:
+        return _kills(given.seed, range(given.kills) if given.case is None else [given.case])
     kinds = [kind.name for kind in FORMATS if given.format in (None, kind.name)]
     if given.case is not None:
         batches = [(name, given.seed, given.case, 1) for name in kinds]
@@ -48,6 +54,16 @@ def main() -> int:
         print(f"{finding.format} seed {finding.seed} case {finding.case}: {finding.what}")
     print(f"{done} damaged files, {len(findings)} findings, {time.monotonic() - began:.0f} s")
     return 1 if findings else 0
+
+
+def _kills(seed: int, cases: Iterable[int]) -> int:
+    count = 0
+    for case in cases:
+        for what in killed(seed, case):
+            count += 1
+            print(f"kill, seed {seed} case {case}: {what}", flush=True)
+    print(f"{count} findings")
+    return 1 if count else 0
 
 
 if __name__ == "__main__":

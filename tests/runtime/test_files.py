@@ -1,14 +1,20 @@
 """A result directory belongs to one process at a time."""
 
 import pickle
+import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+from manikin.api.runs import Drawing
 from manikin.errors import MotionFileError
 from manikin.pipeline.batch import BatchDirectory
 from manikin.pipeline.run_directory import RunDirectory
+from manikin.reports.figures import save_figure
+from manikin.runtime.files import columns_csv, write_result
 
 OTHER = """
 import sys
@@ -62,3 +68,39 @@ def test_a_set_of_runs_belongs_to_one_process_and_leaves_other_files_alone(tmp_p
     assert len(done.stderr.splitlines()) == 1
     assert directory.write("results.json", {"runs": []}).exists()
     assert (tmp_path / "letter.txt").read_text() == "Dear reader"
+
+
+@pytest.fixture
+def full_disk():
+    """A disk on which files of this process cannot grow beyond 1,000 bytes."""
+    resource = pytest.importorskip("resource")
+    before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+def _figure(path):
+    save_figure(Figure((2, 2)), path)
+
+
+WRITERS = {
+    "page.html": lambda path: write_result(path, "<p>" * 1000),
+    "summary.json": lambda path: write_result(path, {"values": np.arange(1000.0)}),
+    "series.csv": lambda path: write_result(path, columns_csv({"t": np.arange(1000.0)}, 6)),
+    "figure.png": _figure,
+    "drawing.svg": lambda path: Drawing("<svg/>" * 1000).save(path),
+}
+
+
+@pytest.mark.usefixtures("full_disk")
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_full_disk_is_told_in_one_line_and_leaves_the_earlier_file(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(b"earlier")
+    with pytest.raises(MotionFileError, match="cannot be written") as caught:
+        WRITERS[name](path)
+    assert "\n" not in str(caught.value)
+    assert [item.name for item in tmp_path.iterdir()] == [name]
+    assert path.read_bytes() == b"earlier"
