@@ -82,7 +82,9 @@ def full_disk():
 
 
 def _figure(path):
-    save_figure(Figure((2, 2)), path)
+    figure = Figure((4, 4))
+    figure.subplots().plot([0.0, 1.0])
+    save_figure(figure, path)
 
 
 WRITERS = {
