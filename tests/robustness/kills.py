@@ -1,7 +1,7 @@
 """Commands that are ended at random times: nothing half written, nothing left behind, no traceback.
 
-Each is started in a directory of its own and gets SIGKILL, SIGTERM or SIGINT after a seeded time. Then
-nothing of it may run, its directory must be free, and every file in it whole.
+Each is started in a directory of its own and gets SIGKILL, SIGTERM or SIGINT after a seeded time.
+Then nothing of it may run, its directory must be free, and every file in it whole.
 """
 
 import json
