@@ -1,7 +1,7 @@
 """Every trial of other laboratories, as delivered: read, reconstructed, compared with its plates, or why not.
 
-`python benchmarks/survey_laboratories.py FOLDER RESULTS` analyses every C3D and TRC file below FOLDER, each in
-its own process with a time limit, and keeps one JSON file per trial in RESULTS: a second run does the missing
+`python benchmarks/survey_laboratories.py FOLDER RESULTS` analyses every C3D and TRC file below FOLDER, each
+in its own process with a time limit, and keeps one JSON file per trial in RESULTS: a second run does the missing
 ones only. It then prints a table. `--refused` does those again that were refused or took too long.
 """
 
@@ -87,7 +87,8 @@ def table(results: Path) -> str:
         if plates.get("timing_median_s") is not None:
             cells.append(f"{1e3 * plates['timing_median_s']:.0f} ms of {plates['events']}")
         if plates.get("cop_rms_m") is not None:
-            cells.append(f"{100 * plates['vertical_rms_body_weight']:.1f} % {1e3 * plates['cop_rms_m']:.0f} mm")
+            vertical = 100.0 * plates["vertical_rms_body_weight"]
+            cells.append(f"{vertical:.1f} % {1e3 * plates['cop_rms_m']:.0f} mm")
         lines.append(f"{found['stage']:14}{found['trial'][-60:]:62}{', '.join(cells)}")
     return "\n".join([*lines, ", ".join(f"{count} {stage}" for stage, count in counts.items())])
 

@@ -175,14 +175,12 @@ def test_without_ezc3d_one_line_says_what_to_install(c3d_file, monkeypatch):
         (("POINT", "ANGLES"), texts(["LASI", "RASI", "LKneeAngles"]), "no point is a place"),
         (("ANALOG", "USED"), integers([600], ()), "ANALOG:USED"),
         (("ANALOG", "SCALE"), reals([1.0]), "ANALOG:SCALE"),
-        (("ANALOG", "UNITS"), texts(["N"] * 3 + ["N.m"] * 3), "moments in N.m of lengths in mm"),
         (("FORCE_PLATFORM", "USED"), integers([9], ()), "force plates"),
         (("FORCE_PLATFORM", "TYPE"), integers([7]), "type"),
         (("FORCE_PLATFORM", "TYPE"), integers([3]), "CHANNEL"),
         (("FORCE_PLATFORM", "TYPE"), integers([4]), "CAL_MATRIX"),
         (("FORCE_PLATFORM", "CORNERS"), reals([0.0] * 3), "CORNERS"),
         (("FORCE_PLATFORM", "CORNERS"), reals([0.0] * 12, (3, 4, 1)), "NaN|no surface"),
-        (("FORCE_PLATFORM", "CHANNEL"), integers([1, 2, 3, 4, 5, 99], (6, 1)), "no channel"),
         (("FORCE_PLATFORM", "ORIGIN"), reals([np.nan] * 3, (3, 1)), "NaN"),
         (("EVENT", "TIMES"), reals([0.0, np.inf], (2, 1)), "EVENT:TIMES"),
         (("EVENT", "TIMES"), reals([0.0] * 3), "EVENT:TIMES"),
@@ -198,6 +196,31 @@ def test_broken_parameters_are_refused_in_one_line(tmp_path, key, value, message
         read_c3d(file)
     assert "\n" not in str(error.value)
     assert "valid: " in str(error.value)
+
+
+def test_a_plate_without_its_channels_is_left_out_and_said(tmp_path):
+    """Of 6 channels the plate names a 99th: the markers are read all the same."""
+    file = tmp_path / "channels.c3d"
+    wrong = integers([1, 2, 3, 4, 5, 99], (6, 1))
+    file.write_bytes(c3d_bytes(*small(), extra=[(("FORCE_PLATFORM", "CHANNEL"), wrong)]))
+    found = read_c3d(file)
+    assert len(found) == 4
+    assert not found.plates
+    assert "channels are not among the 6" in found.remarks[0]
+
+
+def test_moments_in_another_unit_of_length_are_converted_where_the_plate_says_so(tmp_path):
+    """150 N.m beside millimetres: taken as N.mm the force would act in the middle, else 0.2 m from it."""
+    points, analogs = small()
+    channels = np.zeros_like(analogs)
+    channels[..., 2], channels[..., 4] = -750.0, 150.0
+    file = tmp_path / "units.c3d"
+    units = (("ANALOG", "UNITS"), texts(["N"] * 3 + ["N.m"] * 3))
+    file.write_bytes(c3d_bytes(points, channels, extra=[units]))
+    mixed = read_c3d(file).plates[0]
+    file.write_bytes(c3d_bytes(points, channels * [1, 1, 1, 1e3, 1e3, 1e3]))
+    plain = read_c3d(file).plates[0]
+    np.testing.assert_allclose(mixed.wrenches, plain.wrenches, rtol=1e-5)
 
 
 @pytest.mark.parametrize(

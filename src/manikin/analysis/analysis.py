@@ -36,6 +36,9 @@ LARGE_RESIDUAL, OTHER_MASS = 0.02, 0.03
 """Median distance between the body and what was recorded above which the body does not fit [m], and share by
 which the mass of a person is not that on the plates."""
 
+MOST_NAMED = 40
+"""Markers that are not used and named in a remark."""
+
 SLOW_RATE, LONG_FLIGHT = 50.0, 0.5
 """Below the first rate instants of supports are as coarse as the frames [Hz]; a flight longer than the second
 means a contact that was not recorded [s]."""
@@ -44,6 +47,7 @@ means a contact that was not recorded [s]."""
 def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
     """Reasons to doubt what was measured on a recording, a line each."""
     found, supports, plates, lines = analysis.found, analysis.supports, analysis.plates, []
+    lines += recording.remarks if isinstance(recording, MarkerRecording) else ()
     if found.median > LARGE_RESIDUAL:
         lines.append(
             f"the body does not fit the recording: residual {1e3 * found.median:.0f} mm (median); "
@@ -53,7 +57,11 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         names = ", ".join(name.replace("_", " ") for name in found.neutral)
         lines.append(f"not recorded, held as in standing: {names}")
     if found.others:
-        lines.append(f"{len(found.others)} markers are not used, for their names say nothing known")
+        names = ", ".join(found.others[:MOST_NAMED])
+        more = f" and {len(found.others) - MOST_NAMED} more" if len(found.others) > MOST_NAMED else ""
+        lines.append(
+            f"{len(found.others)} markers are not used, for their names say nothing known: {names}{more}"
+        )
     dropped = len(recording) - len(found.time)
     if dropped > 0:
         lines.append(f"{dropped} of {len(recording)} frames at the ends show too little of the person")

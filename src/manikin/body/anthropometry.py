@@ -38,9 +38,9 @@ import numpy as np
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, finite_number
 
-STATURE_RANGE, SOLE_LENGTH_RANGE, SOLE_WIDTH_RANGE = (1.40, 2.10), (0.15, 0.40), (0.05, 0.16)
+STATURE_RANGE, SOLE_LENGTH_RANGE, SOLE_WIDTH_RANGE = (0.90, 2.10), (0.12, 0.40), (0.05, 0.16)
 """Accepted stature and size of the soles [m]."""
-MASS_RANGE, BODY_MASS_INDEX_RANGE = (35.0, 160.0), (10.0, 60.0)
+MASS_RANGE, BODY_MASS_INDEX_RANGE = (12.0, 160.0), (10.0, 60.0)
 """Accepted body mass [kg] and mass / stature^2 [kg/m^2]."""
 ANKLE_HEIGHT, NECK_RADIUS = 0.043, 0.034
 """Ankle joint above the sole and radius of the neck, per stature."""
@@ -54,8 +54,8 @@ HIP_JOINT_DISTANCE = 0.100
 """Distance of the hip joint centres, per stature."""
 
 MEASURED_LENGTHS: Mapping[str, tuple[float, float]] = MappingProxyType({
-    "hips": (0.04, 0.40), "thigh": (0.20, 0.70), "shank": (0.20, 0.70), "trunk": (0.25, 0.80),
-    "shoulders": (0.15, 0.60), "upper_arm": (0.12, 0.50), "forearm": (0.12, 0.50),
+    "hips": (0.04, 0.40), "thigh": (0.15, 0.70), "shank": (0.15, 0.70), "trunk": (0.20, 0.80),
+    "shoulders": (0.12, 0.60), "upper_arm": (0.10, 0.50), "forearm": (0.08, 0.50),
 })  # fmt: skip
 """Lengths between joint centres that may be given instead of scaled, and what is accepted [m].
 

@@ -103,12 +103,12 @@ def human(
     body mass index, so that limbs standing side by side stay 2 cm apart.
 
     Args:
-        stature: Sole to vertex [m], 1.40 to 2.10.
+        stature: Sole to vertex [m], 0.90 to 2.10; below 1.40 with an adult's shares of the masses.
         mass: Body mass [kg], 35 to 160, with a body mass index of 10 to 60 kg/m^2.
         sex: ``"male"`` or ``"female"``.
         age: 18 to 90 [years]; strength depends on it, nothing else.
         strength: Torque limits relative to those of a healthy adult of that sex, size and age.
-        sole_length: Length of the sole [m], 0.15 to 0.40; None for 0.16 of the stature.
+        sole_length: Length of the sole [m], 0.12 to 0.40; None for 0.16 of the stature.
         sole_width: Width of the sole [m], 0.05 to 0.16; None for 0.12/1.75 of the stature.
         lengths: Measured lengths [m] instead of scaled ones, by the names of
             :data:`manikin.body.anthropometry.MEASURED_LENGTHS`; the stature scales the others, the foot,

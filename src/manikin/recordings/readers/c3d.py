@@ -15,15 +15,18 @@ import numpy as np
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, wrench_about
 from manikin.recordings.readers.c3d_layout import C3dLayout, c3d_layout, plate_load
+from manikin.recordings.readers.marker_sets import is_known
 from manikin.recordings.readers.markers import (
+    LEAST_FORCE,
     Event,
     ForcePlate,
     MarkerRecording,
     unique_names,
     without_unseen,
 )
-from manikin.recordings.readers.skeleton_recording import Subject
+from manikin.recordings.readers.skeleton_recording import FARTHEST, Subject
 from manikin.recordings.readers.text_files import LARGEST, metres_per, rotation_to_z_up
+from manikin.recordings.readers.upward import turned_upright
 
 NO_PLACES = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "ENERGIES")
 """Parameters of ``POINT`` that list the points which are no places."""
@@ -64,18 +67,55 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     parameters, points = found["parameters"], found["data"]["points"]
     if points.shape != (4, layout.points, layout.frames):
         raise layout.error(f"data of shape {points.shape}", f"{layout.frames} frames, {layout.points} points")
-    unit = metres_per(next(iter(_texts(parameters, "POINT", "UNITS")), ""), f"{file}: POINT:UNITS")
-    if with_plates:
-        _check_moments(parameters, layout)
+    remarks = list[str]()
+    if ("POINT", "RATE") not in layout.parameters:
+        remarks.append(f"POINT:RATE is missing: {layout.rate:g} Hz as in the header")
+    unit = _unit(parameters, points, file, remarks)
     declared_up = next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "")
     turn = rotation_to_z_up(up or declared_up or "+z", f"{file}: POINT:Y_SCREEN")
-    rate, (names, kept) = layout.real("POINT", "RATE"), _markers(parameters, layout)
+    rate, (names, kept) = layout.rate, _markers(parameters, layout)
     positions = unit * _finite(points[:3, kept], file, "a point").transpose(2, 1, 0) @ turn.T
-    return MarkerRecording(
-        Path(path).name, names, without_unseen(positions), rate, (layout.first_frame - 1) / rate,
-        _plates(parameters, found["data"]["analogs"][0], layout, unit, turn) if with_plates else (),
-        _events(parameters, layout), _subject(parameters, unit),
+    positions = without_unseen(positions)
+    names, positions = _within_reach(names, positions, remarks)
+    forces = ()
+    if with_plates:
+        forces = _plates(parameters, found["data"]["analogs"][0], layout, unit, turn, remarks)
+    recording = MarkerRecording(
+        Path(path).name, names, positions, rate, (layout.first_frame - 1) / rate, forces,
+        _events(parameters, layout), _subject(parameters, unit), tuple(remarks),
     )  # fmt: skip
+    return recording if up else turned_upright(recording)
+
+
+FAR_IN_MILLIMETRES = 20.0
+"""Usual coordinate above which a number without a unit is in millimetres: no laboratory is as large [m]."""
+
+
+def _unit(parameters: Mapping[str, Any], points: FloatArray, file: str, remarks: list[str]) -> float:
+    """Unit of length [m], by the size of the numbers where the file names none."""
+    declared = next(iter(_texts(parameters, "POINT", "UNITS")), "")
+    if declared:
+        return metres_per(declared, f"{file}: POINT:UNITS")
+    sizes = np.abs(points[:3][np.isfinite(points[:3]) & (points[:3] != 0.0)])
+    unit = "mm" if sizes.size and np.median(sizes) > FAR_IN_MILLIMETRES else "m"
+    remarks.append(f"POINT:UNITS is missing: {unit} by the size of the numbers")
+    return metres_per(unit, file)
+
+
+def _within_reach(
+    names: tuple[str, ...], positions: FloatArray, remarks: list[str]
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Without points of no known name that are ever beyond any laboratory: other programs' numbers."""
+    with np.errstate(invalid="ignore"):
+        far = np.any(np.abs(positions) > FARTHEST, axis=(0, 2))
+    others = {name for name, away in zip(names, far, strict=True) if away and not is_known(name)}
+    if not others:
+        return names, positions
+    remarks.append(
+        f"points beyond {FARTHEST:g} m, of no known name, are left out: {', '.join(sorted(others))}"
+    )
+    kept = [k for k, name in enumerate(names) if name not in others]
+    return tuple(names[k] for k in kept), positions[:, kept]
 
 
 def _finite(values: FloatArray, file: str, what: str) -> FloatArray:
@@ -162,12 +202,8 @@ def _has_plates(layout: C3dLayout) -> bool:
         if layout.count("FORCE_PLATFORM", name) < each * count:
             raise layout.error(f"FORCE_PLATFORM:{name} has too few values", f"{each} for each of {count}")
     each, size = max(CHANNELS[kind] for kind in types.tolist()), layout.size("CHANNEL")
-    used = layout.integers("FORCE_PLATFORM", "CHANNEL")
     if len(size) != 2 or size[0] < each or size[1] < count:
         raise layout.error(f"FORCE_PLATFORM:CHANNEL is of size {size}", f"({each}, {count})")
-    used = used.reshape(size[1], size[0])[:count, :each]
-    if used.min() < 1 or used.max() > layout.channels:
-        raise layout.error("FORCE_PLATFORM:CHANNEL names no channel", f"1 to {layout.channels}")
     size = layout.size("CAL_MATRIX")
     complete = len(size) == 3 and min(size[:2]) >= 6 and size[2] >= count
     if not complete and (4 in types or (len(size) > 2 and layout.count("FORCE_PLATFORM", "CAL_MATRIX"))):
@@ -179,40 +215,62 @@ def _has_plates(layout: C3dLayout) -> bool:
     return True
 
 
-def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
-    """The library adds moments and forces times lengths: declared units have to agree."""
-    lengths = _texts(parameters, "POINT", "UNITS")[0].lower()
+def _moment_factor(parameters: Mapping[str, Any], channels: list[int]) -> float:
+    """Lengths of the file's unit in one of the moments', by the units of a plate's channels (from 0)."""
+    lengths = next(iter(_texts(parameters, "POINT", "UNITS")), "mm").lower()
     units = _texts(parameters, "ANALOG", "UNITS")
-    for channel in np.unique(layout.integers("FORCE_PLATFORM", "CHANNEL")).tolist():
-        declared = units[channel - 1] if 0 < channel <= len(units) else ""
-        plain = "".join(filter(str.isalpha, declared.lower()))
-        if plain in ("nm", "nmm") and plain != f"n{lengths}":
-            wrong = f"moments in {declared} of lengths in {lengths}"
-            raise layout.error(wrong, f"N{lengths}, or plates=False")
+    declared = {"".join(filter(str.isalpha, units[k].lower())) for k in channels if k < len(units)}
+    moments = declared & {"nm", "nmm"}
+    if len(moments) != 1 or lengths not in ("m", "mm"):
+        return 1.0
+    return {("nm", "mm"): 1e3, ("nmm", "m"): 1e-3}.get((moments.pop(), lengths), 1.0)
 
 
 def _plates(
-    parameters: Mapping[str, Any], channels: FloatArray, layout: C3dLayout, unit: float, turn: FloatArray
-) -> tuple[ForcePlate, ...]:
-    """Plates by their channels (c, n), their moments in the file's unit of length."""
+    parameters: Mapping[str, Any], channels: FloatArray, layout: C3dLayout, unit: float, turn: FloatArray,
+    remarks: list[str],
+) -> tuple[ForcePlate, ...]:  # fmt: skip
+    """Plates by their channels (c, n); those whose channels are not in the file are left out, with a remark.
+
+    Moments are as their channels declare where most centres of pressure then lie on the plate, else in the
+    file's unit of length.
+    """
     types = layout.integers("FORCE_PLATFORM", "TYPE")
     count = int(layout.integers("FORCE_PLATFORM", "USED")[0])
     used = layout.integers("FORCE_PLATFORM", "CHANNEL").reshape(-1, layout.size("CHANNEL")[0]) - 1
     corners, origins = (_reals(parameters, layout, name) for name in ("CORNERS", "ORIGIN"))
     force_unit = next(iter(_texts(parameters, "FORCE_PLATFORM", "UNITS")), "N")
-    rate = layout.real("POINT", "RATE")
-    if force_unit not in ("N", "") or channels.shape[1] != layout.frames * layout.samples:
-        raise layout.error(f"force plates in {force_unit[:20]!r}", "N, every sample")
+    rate = layout.rate
+    if force_unit not in ("N", ""):
+        raise layout.error(f"force plates in {force_unit[:20]!r}", "N")
+    wanted = (layout.channels, layout.frames * layout.samples)
+    if channels.shape != wanted:
+        remarks.append(
+            f"the {count} force plates are not read: {channels.shape[0]} channels of {channels.shape[1]} "
+            f"samples where {wanted[0]} of {wanted[1]} are declared"
+        )
+        return ()
     sampled, start, found = rate * layout.samples, (layout.first_frame - 1) / rate, []
     for plate, kind in enumerate(types[:count].tolist()):
-        name = f"force plate {plate + 1}"
+        name, mine = f"force plate {plate + 1}", used[plate, : CHANNELS[kind]]
+        if mine.min() < 0 or mine.max() >= layout.channels:
+            remarks.append(
+                f"{name} is not read: its channels are not among the {layout.channels} of the file"
+            )
+            continue
         calibration = None
         if kind == 4:
             table = _reals(parameters, layout, "CAL_MATRIX")
             calibration = table.reshape(layout.size("CAL_MATRIX"), order="F")[:6, :6, plate]
         surface = corners[12 * plate : 12 * plate + 12].reshape(4, 3)
-        own = _finite(channels[used[plate, : CHANNELS[kind]]], layout.file, name)
-        force, moment = plate_load(kind, own, surface, origins[3 * plate : 3 * plate + 3], calibration)
+        own = _finite(channels[mine], layout.file, name)
+        origin = origins[3 * plate : 3 * plate + 3]
+        force, moment = plate_load(kind, own, surface, origin, calibration)
+        if kind != 3 and (factor := _moment_factor(parameters, mine.tolist())) != 1.0:
+            other = plate_load(kind, *_in_lengths(kind, own, calibration, factor, surface, origin))
+            if _pressed_inside(*other, surface) >= 0.5:
+                force, moment = other
+                remarks.append(f"{name}: moments converted by {factor:g} to the unit of length of the points")
         if any(np.isnan(values).any() for values in (force, moment, surface)):
             raise layout.error(f"{name} is described or measured by NaN", "finite numbers")
         surface, where = unit * surface @ turn.T, f"{layout.file}: {name}"
@@ -220,6 +278,31 @@ def _plates(
         wrenches = wrench_about(np.hstack([force @ turn.T, unit * moment @ turn.T]), -middle)
         found.append(ForcePlate(where, wrenches, middle, sampled, start, normal, surface))
     return tuple(found)
+
+
+def _in_lengths(
+    kind: int, channels: FloatArray, calibration: FloatArray | None, factor: float, corners: FloatArray,
+    origin: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:  # fmt: skip
+    """What :func:`plate_load` takes, with moments times a factor."""
+    rows = np.ones(6)
+    rows[5 if kind == 1 else slice(3, 6)] = factor
+    if calibration is not None:
+        return channels, corners, origin, rows[:, None] * calibration
+    return rows[:, None] * channels, corners, origin, None
+
+
+def _pressed_inside(force: FloatArray, moment: FloatArray, corners: FloatArray) -> float:
+    """Share of the loaded samples whose centre of pressure is on the plate, by moments about its middle."""
+    normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+    normal /= max(float(np.linalg.norm(normal)), 1e-9)
+    along = force @ normal
+    loaded = np.abs(along) > max(LEAST_FORCE, 0.2 * float(np.abs(along).max(initial=0.0)))
+    if not loaded.any():
+        return 0.0
+    away = np.cross(normal, moment[loaded]) / along[loaded, None]
+    reach = 0.5 * float(np.linalg.norm(corners[2] - corners[0]))
+    return float(np.mean(np.linalg.norm(away, axis=1) <= reach))
 
 
 def _reals(parameters: Mapping[str, Any], layout: C3dLayout, name: str) -> FloatArray:

@@ -89,6 +89,7 @@ class C3dLayout:
         samples: Samples of each channel per frame.
         first_frame: Number of the first frame, counted from 1.
         processor: Kind of processor whose numbers these are: 84 Intel, 85 DEC, 86 MIPS.
+        header_rate: Frames per second by the header [Hz].
         parameters: By group and name, both in upper case.
     """
 
@@ -100,6 +101,15 @@ class C3dLayout:
     frames: int
     processor: int
     parameters: Mapping[tuple[str, str], Parameter]
+    header_rate: float = 0.0
+
+    @property
+    def rate(self) -> float:
+        """Frames per second [Hz]: ``POINT:RATE``, or the header's where that is missing.
+
+        Where it is 0 the library divides by it.
+        """
+        return self.real("POINT", "RATE") if ("POINT", "RATE") in self.parameters else self.header_rate
 
     def integers(self, group: str, name: str) -> NDArray[np.int64]:
         """(n,) values of a whole-numbered parameter, none where it is missing; InputError for other types."""
@@ -118,9 +128,7 @@ class C3dLayout:
             return 0.0
         if parameter.kind != _REAL:
             raise self.error(f"{group}:{name} is no real number", "a real number")
-        if self.processor == _DEC:  # the halves exchanged, the exponent greater by two
-            return float(np.frombuffer(parameter.raw[2:4] + parameter.raw[:2], "<f4")[0]) / 4.0
-        return float(np.frombuffer(parameter.raw[:4], ">f4" if self.processor == _MIPS else "<f4")[0])
+        return _real(parameter.raw, self.processor)
 
     def count(self, group: str, name: str) -> int:
         """Number of values of a parameter, 0 where it is missing."""
@@ -135,6 +143,13 @@ class C3dLayout:
     def error(self, wrong: str, valid: str) -> InputError:
         """What is wrong with the file, as one line."""
         return InputError(f"{self.file}: {wrong}; valid: {valid}")
+
+
+def _real(raw: bytes, processor: int) -> float:
+    """Real number of four bytes."""
+    if processor == _DEC:  # the halves exchanged, the exponent greater by two
+        return float(np.frombuffer(raw[2:4] + raw[:2], "<f4")[0]) / 4.0
+    return float(np.frombuffer(raw[:4], ">f4" if processor == _MIPS else "<f4")[0])
 
 
 def c3d_layout(content: bytes, file: str) -> C3dLayout:
@@ -158,13 +173,16 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
     layout = C3dLayout(
         file, points, measured // max(samples, 1), samples, max(first, 1), last - first + 1, processor,
         MappingProxyType(_parameters(content[:end], start + 4, big_endian, file)),
+        _real(content[20:24], processor),
     )  # fmt: skip
-    _check_counts(layout, measured)
     # The sign of the scale says whether data are whole numbers or reals.
-    negative = content[{_INTEL: 15, _DEC: 13, _MIPS: 12}[processor]] & 0x80
+    negative = bool(content[{_INTEL: 15, _DEC: 13, _MIPS: 12}[processor]] & 0x80)
+    _check_counts(layout, measured, negative)
     wanted = layout.frames * (4 * points + measured) * (4 if negative else 2)
     begin = (int(words[8]) - 1) * BLOCK
-    if begin < end or begin + wanted > len(content):
+    if begin < end:
+        raise layout.error(f"frames begin at byte {begin}, within the parameters", f"at least {end}")
+    if begin + wanted > len(content):
         raise layout.error(
             f"{len(content)} bytes for {layout.frames} frames of {points} points that begin at byte {begin}",
             f"{begin + wanted} bytes (is it cut short?)",
@@ -172,8 +190,8 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
     return layout
 
 
-def _check_counts(layout: C3dLayout, measured: int) -> None:
-    """Header and parameters have to say the same."""
+def _check_counts(layout: C3dLayout, measured: int, reals: bool) -> None:
+    """Header and parameters have to say the same; ``reals`` need no scale, and rates may be the header's."""
     if layout.points < 1 or layout.frames < 1:
         raise layout.error(f"{layout.points} points in {layout.frames} frames", "at least one of each")
     if layout.channels * layout.samples != measured:
@@ -185,13 +203,17 @@ def _check_counts(layout: C3dLayout, measured: int) -> None:
     for name in ("SCALE", "OFFSET"):
         if layout.count("ANALOG", name) < layout.channels:
             raise layout.error(f"ANALOG:{name} has too few values", f"{layout.channels}, one per channel")
-    rate, analog_rate = layout.real("POINT", "RATE"), layout.real("ANALOG", "RATE")
+    rate, analog_rate = layout.rate, layout.real("ANALOG", "RATE")
     if not 0.0 < rate < _FASTEST:
         raise layout.error(f"POINT:RATE is {rate:g} Hz", f"> 0 and < {_FASTEST:g}")
+    # Without the rates the library takes the channels for points: only files without channels do without.
     if layout.channels and not abs(analog_rate / rate - layout.samples) < 0.5:
         raise layout.error(f"ANALOG:RATE is {analog_rate:g} Hz", f"{rate * layout.samples:g}")
-    if not all(layout.count("POINT", name) for name in ("UNITS", "SCALE")):
-        raise layout.error("no POINT:UNITS or POINT:SCALE", "a complete file")
+    if not reals and not layout.count("POINT", "SCALE"):
+        raise layout.error("no POINT:SCALE of whole numbers", "a complete file")
+    for name in ("UNITS", "SCALE"):
+        if ("POINT", name) in layout.parameters and not layout.count("POINT", name):
+            raise layout.error(f"POINT:{name} is empty", "a complete file")
     for name in (name for name in _SINGLE if name in layout.parameters and not layout.count(*name)):
         raise layout.error(f"{':'.join(name)} is empty", "a value")
     if np.any(layout.integers("ROTATION", "USED")):

@@ -7,7 +7,7 @@ nothing are left out. Also the joints at which the segments of a recorded skelet
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -16,40 +16,78 @@ from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 
 _SIDED: tuple[tuple[str, str, str], ...] = (
-    (r"asis?", "asis", "pelvis"),
-    (r"psis?", "psis", "pelvis"),
-    (r"(iliac)?crest|ilc", "", "pelvis"),
+    (r"asis?|ias|eias|eas|fwt", "asis", "pelvis"),
+    (r"psis?|ips|eips|eps|bwt", "psis", "pelvis"),
+    (r"(iliac)?crest|ilc|csi|crete", "", "pelvis"),
     (r"hjc|hip(joint)?cent(er|re)", "hip", "pelvis"),
-    (r"kne|knee|knee(lat|lateral)|lfc|lek", "knee_lateral", "thigh"),
-    (r"kne2|knein|knem|knee(med|medial)|mfc|mek|mkne", "knee_medial", "thigh"),
-    (r"thi|th\d+|thigh\w*|f\d\d|gtr|troch\w*", "", "thigh"),
-    (r"ank|ankle|ankle(lat|lateral)|lmal", "ankle_lateral", "leg"),
-    (r"ank2|ankin|ankm|ankle(med|medial)|mmal|mank", "ankle_medial", "leg"),
-    (r"tib|tb\d+|tibia\w*|sha|sh\d+|shank\w*|t\d\d", "", "leg"),
-    (r"hee|heel|cal|calc", "heel", "foot"),
-    (r"toe|toetip|mt2|2meta", "toe", "foot"),
-    (r"mt[135]|[15]meta|toe(lat|med)|foo|foo2|[sfv]mh|midfoot\w*", "", "foot"),
-    (r"sho|shoulder|acr|acromi[ou]n|acromium", "shoulder", "thorax"),
-    (r"bak|off|offset|sternum|cla|clav|clavicle|scap\w*", "", "thorax"),
-    (r"elb|elbow|elb(lat|lateral)|elbow(lat|lateral)", "elbow_lateral", "upper_arm"),
-    (r"elb2|elbin|elbm|elb(med|medial)|elbow(med|medial)", "elbow_medial", "upper_arm"),
-    (r"upa|humerus|bicep\w*|triceps?|upperarm\w*", "", "upper_arm"),
-    (r"wra|wri|wrist|wrist(radius|lat|thumb)|rad", "wrist_radius", "forearm"),
-    (r"wrb|wri2|wrist(ulna|med|pinky)|uln", "wrist_ulna", "forearm"),
-    (r"fra|frm|forearm\w*", "", "forearm"),
-    (r"fin|finger|hand\w*|[mh]cp?\d?", "", "hand"),
-    (r"[fb]hd|head|(front|back)head|head(front|back)|ear", "", "head"),
+    (r"knee?1?|knee(lat|lateral)|lfcv?|lek|fle|lfe|lkn|lepi|kneelatepicondyle|cl", "knee_lateral", "thigh"),
+    (
+        r"kne2|knein|knem|knee(med|medial)|mfcv?|mek|mkne?|mknee|fme|mfe|kneemedepicondyle|cm",
+        "knee_medial",
+        "thigh",
+    ),
+    (r"thi\d?|th\d+|th[la][pd]|thigh\w*|f\d\d|gtr?|ftc|trc|troch?\w*|greatertrochanter", "", "thigh"),
+    (r"ank|ankle|ankle(lat|lateral)|lmalv?|fal|lm|ml|mall|latmalleolus", "ankle_lateral", "leg"),
+    (r"ank2|ankin|ankm|ankle(med|medial)|mmalv?|mank|mankle|tam|sph|mm|medmalleolus", "ankle_medial", "leg"),
+    (
+        r"tib\d?|tb\d+|tibia\w*|sha|shn|sh\d+|shank\w*|t\d\d|ti(a[pd]|lat)|fax|ttc|tta|att|tub|fib\w*|tt|hf",
+        "",
+        "leg",
+    ),
+    (r"hee|heel|heelfoot|cal|calca?|fcc|ca", "heel", "foot"),
+    (r"toe|toetip|mt2|2meta|fm2|tt2|hal|hlx|met", "toe", "foot"),
+    (
+        r"mt[135]|[15]meta|toe(lat|med)|foo|foo2|[sfv]mh|midfoot\w*|fm[15]|mfh\d|p[15]mt|foot(lat|med)\w*|latfoot|"
+        r"(first|fifth)metatarsal|d[15]m",
+        "",
+        "foot",
+    ),
+    (r"sho|sh|should|shoulder|acr|ac|acrom|acromi[ou]n|acromium|saj", "shoulder", "thorax"),
+    (r"bak|bac|off|offset|sternum|cla|clav|clavicle|sca|scap\w*|ang|aa", "", "thorax"),
+    (
+        r"elb|elbow|elb(lat|lateral)|elbow(lat|lateral)|lel|hle|lhe|epilat|armlatepicondyle|cou",
+        "elbow_lateral",
+        "upper_arm",
+    ),
+    (
+        r"elb2|elbin|elbm|elb(med|medial)|elbow(med|medial)|melbow|mel|hme|mhe|epimed|armmedepicondyle",
+        "elbow_medial",
+        "upper_arm",
+    ),
+    (r"upa|ua\d|humerus|hum|arm|bicep\w*|triceps?|upperarm\w*", "", "upper_arm"),
+    (
+        r"wra|wri?|wrist|wrist(radius|rad|lat|thumb)|rad|rsp|rs|faradius|radialstyloid",
+        "wrist_radius",
+        "forearm",
+    ),
+    (r"wrb|wri2|wrist(ulna|uln|med|pinky)|uln|uhe|usp|us|faulna|ulnarstyloid", "wrist_ulna", "forearm"),
+    (r"fra|frm|forearm\w*|la\d|olecranon|ulna|fasuperior", "", "forearm"),
+    (r"fin|finger|hand\w*|[mh]cp?\d?|hm\d|hmh\d|topofhand|pinky|ballhand|mai", "", "hand"),
+    (
+        r"[fb]hd|hd[fb]|head|(front|back)head|head(front|back)|ear|te?mp|temple|temp|tet|auricularis",
+        "",
+        "head",
+    ),
 )
-"""Stem behind the side, role (empty for a marker of which only the segment is known), segment."""
+"""Stem behind the side, role (empty for a marker of which only the segment is known), segment.
+
+Of the ISB's bony landmarks (``L_IAS``, ``R_FLE``: van Sint Jan, "Color atlas of skeletal landmark
+definitions", 2007) those that Qualisys' and Leardini's sets use; of French laboratories
+(``EIAS``, ``CM``, ``COU``), Xsens (``pRightASI``), Vicon's body (``LFWT``), and points that OpenCap
+adds (``r.ASIS_study``)."""
 
 _CENTRAL: tuple[tuple[str, str, str], ...] = (
     (r"v?sacr?|sacrum|vsacral|sacral", "sacrum", "pelvis"),
-    (r"c7|cv7", "c7", "thorax"),
-    (r"clav?|ij|sternalnotch|jug|suprasternale", "notch", "thorax"),
-    (r"strn|px|sternum|xiphoid|xyph\w*", "xiphoid", "thorax"),
-    (r"t\d+|tv\d+", "", "thorax"),
-    (r"tophead|headtop|ari|glab\w*|vertex", "", "head"),
+    (r"pelvis\d", "", "pelvis"),
+    (r"c7(spinalprocess)?|cv7", "c7", "thorax"),
+    (r"clav?|ij|snj|sternalnotch|sternotch|sternumnotch|jug|suprasternale|sup", "notch", "thorax"),
+    (r"strn|px|sxs|sternum|ster|str|xiphoid|xyph\w*", "xiphoid", "thorax"),
+    (r"t\d+(spinalprocess)?|tv\d+", "", "thorax"),
+    (r"tophead|headtop|topofhead|backofhead|ari|glab\w*|vertex|hv|occ|sel|tete[hdg]", "", "head"),
 )
+
+FEWEST_WITH_PREFIX = 8
+"""Markers from which a beginning that all names share is taken for the subject's."""
 
 _MIDLINE = frozenset({"pelvis", "thorax", "head"})
 _SIDES = (("left", "left"), ("right", "right"), ("l", "left"), ("r", "right"))
@@ -74,12 +112,14 @@ class MarkerSet:
 
 def marker_set(recording: MarkerRecording) -> MarkerSet:
     """Recognise the markers of a recording that are seen at all."""
-    # Small letters and digits behind the prefix.
-    plain = {n: re.sub(r"[^a-z0-9]", "", n.rpartition(":")[2].lower()) for n in recording.marker_names}
-    computed = _computed(set(plain.values()))
+    plain = _plain(recording.marker_names)
+    computed = _computed(set(plain.values())) | _below_knees(set(plain.values()))
     roles: dict[str, str] = {}
     segments: dict[str, str] = {}
-    for number, (name, letters) in enumerate(plain.items()):
+    numbers = sorted(range(len(plain)), key=lambda k: not _is_study(recording.marker_names[k]))
+    for number in numbers:
+        name = recording.marker_names[number]
+        letters = plain[name]
         if (
             letters not in computed
             and recording.seen[:, number].any()
@@ -88,8 +128,41 @@ def marker_set(recording: MarkerRecording) -> MarkerSet:
             role, segments[name] = found
             if role:
                 roles.setdefault(role, name)
+    in_order = {name: segments[name] for name in plain if name in segments}
     others = tuple(name for name in plain if name not in segments)
-    return MarkerSet(MappingProxyType(roles), MappingProxyType(segments), others)
+    return MarkerSet(MappingProxyType(roles), MappingProxyType(in_order), others)
+
+
+def _plain(names: Sequence[str]) -> dict[str, str]:
+    """Small letters and digits of each name, without what stands before the name of a marker.
+
+    That is a subject (``Anna:LASI``, ``A22_LASI``: what all names begin with), the ``p`` of Xsens' points
+    (``pRightASI``) and OpenCap's ``_study``.
+    """
+    own = {name: name.rpartition(":")[2] for name in names}
+    parts = re.match(r".*[_ .-]", min(own.values(), default="")) if len(own) > FEWEST_WITH_PREFIX else None
+    shared = parts.group() if parts and all(stem.startswith(parts.group()) for stem in own.values()) else ""
+    found = {}
+    for name, stem in own.items():
+        stem = re.sub(r"^p(?=[A-Z])", "", stem[len(shared) :])
+        found[name] = re.sub(r"[^a-z0-9]", "", re.sub(r"_study$", "", stem.lower()))
+    return found
+
+
+def is_known(name: str) -> bool:
+    """Whether a name says where a marker is."""
+    return next(_places(name, _plain([name])[name]), None) is not None
+
+
+def _is_study(name: str) -> bool:
+    """Whether it is a marker that OpenCap adds to the centres of joints, whose names say the same."""
+    return name.lower().endswith("_study")
+
+
+def _below_knees(names: set[str]) -> set[str]:
+    """BTS' second markers of knees, at the fibula: the first ones are ``RKNE1``, ``r knee 1``."""
+    ones = {name for name in names if re.fullmatch(r"[lr]knee?1", name)}
+    return {name[:-1] + "2" for name in ones}
 
 
 def _places(name: str, plain: str) -> Iterator[tuple[str, str]]:

@@ -150,6 +150,7 @@ class MarkerRecording(Displayed):
         start: Instant of the first frame on the recording's clock [s], which is that of the plates.
         events: In the order of time.
         subject: What the file says about the person.
+        remarks: What the file says wrongly, or what of it was not read; a line each.
     """
 
     name: str
@@ -160,6 +161,7 @@ class MarkerRecording(Displayed):
     plates: tuple[ForcePlate, ...] = ()
     events: tuple[Event, ...] = ()
     subject: Subject = UNKNOWN
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"recording {self.name!r}"

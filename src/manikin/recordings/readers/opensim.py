@@ -34,6 +34,7 @@ from manikin.recordings.readers.text_files import (
     rotation_to_z_up,
     whole_number,
 )
+from manikin.recordings.readers.upward import turned_upright
 
 FEWEST_PRESSED = 10
 """Loaded samples without which no fixed point of the moments is looked for."""
@@ -52,10 +53,17 @@ def read_mot(
         InputError: If the file is missing, damaged, cut short, uneven in time, holds what is no number
             or no force plate.
     """
+    return _read_mot(path, up, moments_about)[0]
+
+
+def _read_mot(
+    path: str | Path, up: str, moments_about: ArrayLike | None = None
+) -> tuple[tuple[ForcePlate, ...], tuple[str, ...]]:
+    """Plates, and remarks on the file."""
     file = str(path)
     fixed = None if moments_about is None else frozen_array(moments_about, "moments_about", (3,))
     turn = rotation_to_z_up(up, file)
-    names, table = _mot_table(read_text(path, "MOT"), file)
+    names, table, remarks = _mot_table(read_text(path, "MOT"), file)
     if names[0] != "time" or len(table) < 2:
         raise InputError(f"{file}: no column of time with two instants; valid: time first, a row per instant")
     time = table[:, 0]
@@ -63,10 +71,11 @@ def read_mot(
     if not 0.0 < step < np.inf:
         raise InputError(f"{file}: time does not rise; valid: evenly rising instants")
     check_even(time, 1.0 / step, file)
-    return tuple(
+    found = tuple(
         _plate(f"{file}: {plate}", [table[:, part] @ turn.T for part in parts], 1.0 / step, time[0], fixed)
         for plate, parts in _mot_plates(names, file).items()
     )
+    return found, remarks
 
 
 def _plate(
@@ -102,8 +111,9 @@ def _fixed_point(force: FloatArray, point: FloatArray, moment: FloatArray) -> Fl
     return np.asarray(fixed, dtype=np.float64) if left < 0.5 * np.linalg.norm(moment[:, :2]) else None
 
 
-def _mot_table(text: str, file: str) -> tuple[list[str], FloatArray]:
-    """Names of the columns and their numbers (n, k)."""
+def _mot_table(text: str, file: str) -> tuple[list[str], FloatArray, tuple[str, ...]]:
+    """Names of the columns, their numbers (n, k), and what the header says wrongly."""
+    remarks = list[str]()
     head, mark, rest = text.partition("endheader")
     lines = [line for line in rest.splitlines() if line.strip()]
     if not mark or len(lines) < 2:
@@ -121,10 +131,12 @@ def _mot_table(text: str, file: str) -> tuple[list[str], FloatArray]:
             if key.lower() in (f"n{name}", f"data{name}"):
                 declared = whole_number(" ".join(number), f"{file}: {key}")
                 if declared != counts[name]:
-                    wrong = f"{counts[name]} {name} where {declared} are declared"
-                    raise InputError(f"{file}: {wrong}; valid: all of them")
+                    told = (
+                        f"{Path(file).name}: {counts[name]} {name} where {declared} are declared: read as is"
+                    )
+                    remarks.append(told)
     flat = numbers([word for row in rows for word in row], f"{file}: a row", gaps=True)
-    return names, flat.reshape(len(rows), len(names))
+    return names, flat.reshape(len(rows), len(names)), tuple(remarks)
 
 
 def _mot_plates(names: list[str], file: str) -> dict[str, list[list[int]]]:
@@ -150,36 +162,139 @@ _HEADER = ("DataRate", "NumFrames", "NumMarkers", "Units")
 
 
 def read_trc(
-    path: str | Path, forces: str | Path | Sequence[ForcePlate] | None = None, up: str = "y"
+    path: str | Path, forces: str | Path | Sequence[ForcePlate] | None = None, up: str | None = None
 ) -> MarkerRecording:
     """Read a TRC file and the force plates recorded with it.
 
+    A header that counts other frames or markers than there are is read as the data are, with a remark;
+    columns without a name are left out.
+
     Args:
-        forces: Force plates or their MOT file, with the same axis up; None for ``NAME_grf.mot`` beside
-            ``NAME.trc`` where there is one. An empty sequence for none.
-        up: The file's axis that points up.
+        forces: Force plates or their MOT, STO or Cortex ``.forces`` file, with the same axis up; None for
+            ``NAME_grf.mot`` beside ``NAME.trc``, or else another such file whose name begins with ``NAME``.
+            An empty sequence for none.
+        up: The file's axis that points up; None for y, or the one along which the person stands.
 
     Raises:
-        InputError: If a file is missing, damaged, cut short, uneven in time or holds what is no number;
-            if the unit is unknown.
+        InputError: If a file is missing, damaged, uneven in time or holds what is no number; if the unit is
+            unknown.
     """
-    file = str(path)
-    turn = rotation_to_z_up(up, file)
+    file, remarks = str(path), list[str]()
+    turn = rotation_to_z_up(up or "y", file)
     lines = read_text(path, "TRC").splitlines()
     rate, frames, markers, unit = _header(lines, file)
     names = _names(lines[3], markers, file)
-    table = _table(lines[5:], 2 + 3 * markers, file)
-    if len(table) != frames:
-        raise InputError(f"{file}: {len(table)} rows for {frames} frames; valid: {frames} (is it cut short?)")
+    table = _table(lines[5:], len(names), file)
+    for declared, found, what in ((frames, len(table), "frames"), (markers, len(names), "named markers")):
+        if declared != found:
+            remarks.append(f"the header declares {declared} {what[-7:].strip()}, the file has {found} {what}")
     if np.any(np.diff(table[:, 0]) != 1.0):
         raise InputError(f"{file}: frame numbers do not rise by one; valid: no row missing")
     check_even(table[:, 1], rate, file)
-    positions = unit * without_unseen(table[:, 2:].reshape(frames, markers, 3)) @ turn.T
+    positions = unit * without_unseen(table[:, 2:].reshape(len(table), -1, 3)) @ turn.T
     if forces is None:
-        beside = Path(path).with_name(f"{Path(path).stem}_grf.mot")
-        forces = beside if beside.is_file() else ()
-    plates = read_mot(forces, up) if isinstance(forces, str | Path) else tuple(forces)
-    return MarkerRecording(Path(path).name, names, positions, rate, float(table[0, 1]), plates)
+        forces = _forces_beside(Path(path), remarks)
+    plates = forces
+    if isinstance(forces, str | Path):
+        of_cortex = Path(forces).suffix.lower() == ".forces"
+        plates, told = (read_cortex if of_cortex else _read_mot)(forces, up or "y")
+        remarks += told
+    start = float(table[0, 1])
+    found = MarkerRecording(
+        Path(path).name,
+        names,
+        positions,
+        rate,
+        start,
+        tuple(plates),
+        remarks=tuple(remarks),  # pyright: ignore
+    )
+    return found if up else turned_upright(found)
+
+
+def _forces_beside(path: Path, remarks: list[str]) -> Path | tuple[ForcePlate, ...]:
+    """File of force plates of a TRC file; other such files beside it are said not to be read."""
+    usual = path.with_name(f"{path.stem}_grf.mot")
+    if usual.is_file():
+        return usual
+    others = sorted(
+        one
+        for one in path.parent.iterdir()
+        if one.suffix.lower() in (".mot", ".sto", ".forces") and _holds_forces(one)
+    )
+    stem = path.stem.lower()
+    mine = [one for one in others if one.stem.lower().startswith(stem)]
+    alone = len(others) == 1 and len(list(path.parent.glob("*.[tT][rR][cC]"))) == 1
+    if chosen := mine or (others if alone else []):
+        remarks.append(f"force plates are those of {chosen[0].name}")
+        return chosen[0]
+    free = [one for one in others if not _belongs(one)]
+    if free:
+        remarks.append(
+            f"force plates beside, of no name that begins with {path.stem!r}, are not read: "
+            + ", ".join(one.name for one in free[:5])
+        )
+    return ()
+
+
+def _belongs(forces: Path) -> bool:
+    """Whether a TRC file beside it has the beginning of its name."""
+    trials = forces.parent.glob("*.[tT][rR][cC]")
+    return any(forces.stem.lower().startswith(trial.stem.lower()) for trial in trials)
+
+
+def _holds_forces(path: Path) -> bool:
+    """Whether a file names forces of a plate among its first lines."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(20_000).decode("latin-1").lower()
+    except OSError:
+        return False
+    return "[force data]" in head or "vx" in head
+
+
+def read_cortex(path: str | Path, up: str = "z") -> tuple[tuple[ForcePlate, ...], tuple[str, ...]]:
+    """Read the force plates of a ``.forces`` file (Motion Analysis Cortex), and remarks on it.
+
+    Per plate force [N], the point where it acts [mm] and the free moment about the vertical [N.mm]; ``up`` is
+    the file's axis that points up. InputError if the file is missing or damaged.
+    """
+    file = str(path)
+    turn = rotation_to_z_up(up, file)
+    lines = [line for line in read_text(path, "forces").splitlines() if line.strip()]
+    head = dict(line.split("=", 1) for line in lines[:4] if "=" in line)
+    place = next((k for k, line in enumerate(lines) if line.startswith("#Sample")), None)
+    if "SampleRate" not in head or place is None or len(lines) < place + 3:
+        raise InputError(
+            f"{file}: is no file of forces; valid: [Force Data], SampleRate, #Sample, the samples"
+        )
+    rate = float(numbers([head["SampleRate"]], f"{file}: SampleRate")[0])
+    names = lines[place].split()
+    rows = [line.split() for line in lines[place + 1 :]]
+    short = next((k for k, row in enumerate(rows, start=1) if len(row) != len(names)), None)
+    if short is not None:
+        raise InputError(f"{file}: sample {short} has not {len(names)} numbers; valid: as many as names")
+    if not rate > 0.0:
+        raise InputError(f"{file}: SampleRate is {rate:g}; valid: > 0")
+    table = numbers([word for row in rows for word in row], f"{file}: a sample").reshape(len(rows), -1)
+    columns, found = {name: table[:, k] for k, name in enumerate(names)}, []
+    for number in (name[2:] for name in names if name.startswith("FX")):
+        wanted = [f"{part}{number}" for part in ("FX", "FY", "FZ", "X", "Y", "Z", "MZ")]
+        if missing := [name for name in wanted if name not in columns]:
+            raise InputError(
+                f"{file}: no column {missing[0]!r}; valid: force, point and moment of each plate"
+            )
+        values = np.stack([columns[name] for name in wanted], axis=1)
+        moment = np.zeros((len(values), 3))
+        moment[:, 2] = 1e-3 * values[:, 6]
+        force, point = values[:, :3] @ turn.T, 1e-3 * values[:, 3:6] @ turn.T
+        wrenches = wrench_about(np.hstack([force, moment @ turn.T]), -point)
+        loaded = force[:, 2] >= LEAST_FORCE
+        height = float(np.median(point[loaded, 2] if loaded.any() else point[:, 2]))
+        found.append(ForcePlate(f"{file}: plate {number}", wrenches, np.array([0.0, 0.0, height]), rate))
+    if not found:
+        raise InputError(f"{file}: no columns of a force plate; valid: FX1, FY1 and so on")
+    return tuple(found), ()
 
 
 def _header(lines: list[str], file: str) -> tuple[float, int, int, float]:
@@ -199,25 +314,37 @@ def _header(lines: list[str], file: str) -> tuple[float, int, int, float]:
 
 
 def _names(line: str, markers: int, file: str) -> tuple[str, ...]:
+    """Names of the markers: one for every three cells, or as many as declared however they are parted."""
     cells = [cell.strip() for cell in line.split("\t")]
+    while cells and not cells[-1]:
+        del cells[-1]
     names = cells[2::3]
-    if cells[0] != "Frame#" or any(names[markers:]) or not all(names[:markers]) or len(names) < markers:
-        given = sum(bool(name) for name in names)
-        raise InputError(f"{file}: {given} names for {markers} markers; valid: Frame#, Time, {markers} names")
-    return unique_names(names[:markers])
+    if len(cells) < 3 or any(cells[3::3]) or any(cells[4::3]):
+        names = [cell for cell in cells if cell][2:] or line.split()[2:]
+        names = line.split()[2:] if len(names) != markers else names
+        if len(names) != markers:
+            raise InputError(
+                f"{file}: {len(names)} names for {markers} markers; valid: Frame#, Time, the names"
+            )
+    if not line.split() or line.split()[0] != "Frame#" or not any(names):
+        raise InputError(f"{file}: no names of {markers} markers; valid: Frame#, Time and the names")
+    return unique_names(names)
 
 
-def _table(lines: list[str], width: int, file: str) -> FloatArray:
-    """(n, width) numbers, NaN in empty cells."""
+def _table(lines: list[str], markers: int, file: str) -> FloatArray:
+    """(n, 2 + 3 markers) numbers, NaN in empty cells; further cells, without a name, are left out."""
+    width = 2 + 3 * markers
+    rows = [(number, line.split("\t")) for number, line in enumerate(lines, start=6) if line.strip()]
+    if rows and all(not cells[0].strip() and len(cells) > 1 for _, cells in rows):  # an empty first column
+        rows = [(number, cells[1:]) for number, cells in rows]
     words: list[str] = []
-    for number, line in enumerate(lines, start=6):
-        if not line.strip():
-            continue
-        cells = line.split("\t")
-        if len(cells) < width or any(cell.strip() for cell in cells[width:]):
+    for number, cells in rows:
+        if len(cells) < width:
             wrong = f"line {number}: {len(cells)} cells"
             raise InputError(f"{file}: {wrong}; valid: {width} (is the file cut short?)")
         words += [cell if cell.strip() else "nan" for cell in cells[:width]]
+    if not words:
+        raise InputError(f"{file}: no frame; valid: at least one row of numbers")
     table = numbers(words, f"{file}: a frame", gaps=True).reshape(-1, width)
     if np.any(np.isnan(table[:, :2])):
         raise InputError(f"{file}: a frame without number or time; valid: both in every row")
