@@ -1,8 +1,8 @@
 """Every trial of other laboratories, as delivered: read, reconstructed, compared with its plates, or why not.
 
 `python benchmarks/survey_laboratories.py FOLDER RESULTS` analyses every C3D and TRC file below FOLDER, each
-in its own process with a time limit, and keeps one JSON file per trial in RESULTS: a second run does the missing
-ones only. It then prints a table. `--refused` does those again that were refused or took too long.
+in its own process with a time limit, and keeps one JSON file per trial in RESULTS: a second run does
+the missing ones. It then prints a table. `--refused` does those again that were refused or took too long.
 """
 
 import json

@@ -194,11 +194,12 @@ def read_trc(
     positions = unit * without_unseen(table[:, 2:].reshape(len(table), -1, 3)) @ turn.T
     if forces is None:
         forces = _forces_beside(Path(path), remarks)
-    plates = forces
     if isinstance(forces, str | Path):
         of_cortex = Path(forces).suffix.lower() == ".forces"
         plates, told = (read_cortex if of_cortex else _read_mot)(forces, up or "y")
         remarks += told
+    else:
+        plates = tuple(forces)
     start = float(table[0, 1])
     found = MarkerRecording(
         Path(path).name,
