@@ -145,6 +145,36 @@ def test_broken_trc_is_refused_in_one_line(trc_file, old, new):
     assert "\n" not in str(error.value)
 
 
+CORTEX = """[Force Data]
+NumberOfForcePlates=1
+SampleRate=100.000000
+NumberOfSamples=3
+#Sample\tFX1\tFY1\tFZ1\tX1\tY1\tZ1\tMZ1
+1\t10\t20\t700\t100\t50\t0\t3000
+2\t10\t20\t700\t100\t50\t0\t3000
+3\t10\t20\t700\t100\t50\t0\t3000
+"""
+
+
+def test_a_person_who_stands_along_z_and_cortex_plates_share_their_axes(tmp_path):
+    """A TRC file declares no axis; its plates, read with the same one, are level and press upwards."""
+    places = {"L.ASIS": (0, 100, 950), "R.ASIS": (0, -100, 950), "L.Heel": (-80, 90, 30),
+              "R.Heel": (-80, -90, 30), "L.Toe": (120, 90, 30), "R.Toe": (120, -90, 30)}  # fmt: skip
+    names = "Frame#\tTime\t" + "".join(f"{name}\t\t\t" for name in places)
+    cells = "\t".join(str(value) for place in places.values() for value in place)
+    head = "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tNumFrames\tNumMarkers\tUnits\n100\t3\t6\tmm\n"
+    rows = "".join(f"{k + 1}\t{k / 100}\t{cells}\n" for k in range(3))
+    (tmp_path / "walk.trc").write_text(f"{head}{names}\n\n{rows}")
+    (tmp_path / "walk.forces").write_text(CORTEX)
+    found = read_trc(tmp_path / "walk.trc")
+    assert found.marker("L.ASIS")[0] == pytest.approx([0.0, 0.1, 0.95])
+    plate = found.plates[0]
+    assert plate.normal == pytest.approx([0.0, 0.0, 1.0])
+    # Force at (0.1, 0.05, 0) m with a free moment of 3 N.m: its moment about the origin by hand.
+    assert plate.wrenches[0] == pytest.approx([10.0, 20.0, 700.0, 35.0, -70.0, 2.0 - 0.5 + 3.0])
+    assert any("another axis" in remark for remark in found.remarks)
+
+
 @pytest.mark.parametrize("counts", ["4\t2", "2\t2", "999999999999\t2", "3\t999999999", "3\t1"])
 def test_a_trc_header_that_counts_wrongly_is_read_as_the_data_are(trc_file, counts):
     trc_file.write_text(TRC.replace("100\t100\t3\t2\tmm", f"100\t100\t{counts}\tmm", 1))

@@ -12,6 +12,7 @@ the centre of pressure is vertical, which identifies the point.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ from manikin.recordings.readers.text_files import (
     rotation_to_z_up,
     whole_number,
 )
-from manikin.recordings.readers.upward import turned_upright
+from manikin.recordings.readers.upward import TURNED, upward_axis
 
 FEWEST_PRESSED = 10
 """Loaded samples without which no fixed point of the moments is looked for."""
@@ -180,7 +181,7 @@ def read_trc(
             unknown.
     """
     file, remarks = str(path), list[str]()
-    turn = rotation_to_z_up(up or "y", file)
+    rotation_to_z_up(up or "y", file)
     lines = read_text(path, "TRC").splitlines()
     rate, frames, markers, unit = _header(lines, file)
     names = _names(lines[3], markers, file)
@@ -191,26 +192,21 @@ def read_trc(
     if np.any(np.diff(table[:, 0]) != 1.0):
         raise InputError(f"{file}: frame numbers do not rise by one; valid: no row missing")
     check_even(table[:, 1], rate, file)
-    positions = unit * without_unseen(table[:, 2:].reshape(len(table), -1, 3)) @ turn.T
+    positions, start = unit * without_unseen(table[:, 2:].reshape(len(table), -1, 3)), float(table[0, 1])
+    as_filed = MarkerRecording(Path(path).name, names, positions, rate, start, ())
+    axis = up or upward_axis(as_filed) or "+y"
+    if up is None and axis != "+y":
+        remarks.append(TURNED)
     if forces is None:
         forces = _forces_beside(Path(path), remarks)
     if isinstance(forces, str | Path):
         of_cortex = Path(forces).suffix.lower() == ".forces"
-        plates, told = (read_cortex if of_cortex else _read_mot)(forces, up or "y")
+        plates, told = (read_cortex if of_cortex else _read_mot)(forces, axis)
         remarks += told
     else:
         plates = tuple(forces)
-    start = float(table[0, 1])
-    found = MarkerRecording(
-        Path(path).name,
-        names,
-        positions,
-        rate,
-        start,
-        tuple(plates),
-        remarks=tuple(remarks),  # pyright: ignore
-    )
-    return found if up else turned_upright(found)
+    turned = positions @ rotation_to_z_up(axis, file).T
+    return replace(as_filed, positions=turned, plates=tuple(plates), remarks=tuple(remarks))
 
 
 def _forces_beside(path: Path, remarks: list[str]) -> Path | tuple[ForcePlate, ...]:

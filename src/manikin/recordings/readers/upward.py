@@ -16,29 +16,37 @@ from manikin.recordings.readers.text_files import UP_TO_Z
 UPRIGHT, LOWEST = 0.85, (-0.15, 0.35)
 """Cosine of the way from feet to pelvis with an axis from which on it points up, and the height in which the
 lowest markers then are [m]."""
+TURNED = "the person stands along another axis than the file's for up: turned upright"
+"""Remark on a recording that is turned."""
+
+
+def upward_axis(recording: MarkerRecording) -> str | None:
+    """The axis, such as ``"+y"``, along which the person of a recording stands.
+
+    None where the pelvis and the feet are not known, are not upright along an axis, or the feet are not near
+    its zero: someone who lies on the ground is upright along none.
+    """
+    way = _from_feet_to_pelvis(recording)
+    if way is None:
+        return None
+    axis = int(np.argmax(np.abs(way)))
+    sign = 1.0 if way[axis] > 0.0 else -1.0
+    lowest = float(np.nanpercentile(sign * recording.positions[..., axis], 1.0))
+    if abs(way[axis]) < UPRIGHT or not LOWEST[0] <= lowest <= LOWEST[1]:
+        return None
+    return ("+" if sign > 0.0 else "-") + "xyz"[axis]
 
 
 def turned_upright(recording: MarkerRecording) -> MarkerRecording:
-    """The recording with z up by what its markers say, with a remark where that is another axis.
-
-    Only a person who is upright along another axis, and whose feet are near its zero, is turned: someone who
-    lies on the ground is not. Recordings without a known pelvis and feet stay as they are.
-    """
-    way = _from_feet_to_pelvis(recording)
-    if way is None or way[2] >= UPRIGHT:
+    """The recording with z up by what its markers say, with a remark where that is another axis."""
+    axis = upward_axis(recording)
+    if axis is None or axis == "+z":
         return recording
-    axis = int(np.argmax(np.abs(way)))
-    sign = float(np.sign(way[axis]))
-    heights = sign * recording.positions[..., axis]
-    lowest = float(np.nanpercentile(heights, 1.0))
-    if abs(way[axis]) < UPRIGHT or not LOWEST[0] <= lowest <= LOWEST[1]:
-        return recording
-    turn = np.array(UP_TO_Z[("+" if sign > 0.0 else "-") + "xyz"[axis]], dtype=np.float64)
-    remark = "the person stands along another axis than the file's for up: turned upright"
+    turn = np.array(UP_TO_Z[axis], dtype=np.float64)
     return replace(
         recording, positions=recording.positions @ turn.T,
         plates=tuple(_turned(plate, turn) for plate in recording.plates),
-        remarks=(*recording.remarks, remark),
+        remarks=(*recording.remarks, TURNED),
     )  # fmt: skip
 
 
