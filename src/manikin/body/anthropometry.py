@@ -50,17 +50,21 @@ TOES_MASS_SHARE, NECK_MASS_SHARE = 0.10, 0.20
 """Mass of the toes per mass of the foot, and of the neck per mass of head and neck."""
 NECK_LENGTH_SHARE = 1.0 / 3.0
 """Length of the neck per cervicale-vertex length."""
-HIP_JOINT_DISTANCE = 0.100
-"""Distance of the hip joint centres, per stature."""
+HIP_JOINT_DISTANCE, HIP_BREADTH = 0.100, 0.191
+"""Distance of the hip joint centres and breadth of the hips over the flesh, per stature."""
+SEAT_DEPTH = 0.07
+"""Depth of the pressed buttocks below the hip joints, per stature (our choice)."""
 
 MEASURED_LENGTHS: Mapping[str, tuple[float, float]] = MappingProxyType({
     "hips": (0.04, 0.40), "thigh": (0.15, 0.70), "shank": (0.15, 0.70), "trunk": (0.20, 0.80),
     "shoulders": (0.12, 0.60), "upper_arm": (0.10, 0.50), "forearm": (0.08, 0.50),
+    "head_and_neck": (0.15, 0.40), "seat_depth": (0.04, 0.20), "hip_breadth": (0.20, 0.70),
 })  # fmt: skip
-"""Lengths between joint centres that may be given instead of scaled, and what is accepted [m].
+"""Lengths that may be given instead of scaled, most of them between joint centres, and what is accepted [m].
 
 ``hips`` and ``shoulders`` are the distances of the left joint from the right one, ``trunk`` is the
-height of the shoulder joints above the hip joints.
+height of the shoulder joints above the hip joints, ``head_and_neck`` reaches from C7 to the vertex,
+``seat_depth`` from the hip joints down to a seat, ``hip_breadth`` is measured over the flesh.
 """
 
 
@@ -229,6 +233,16 @@ class Anthropometry:
     def hip_distance(self) -> float:
         """Distance between the hip joint centres [m]."""
         return self.lengths.get("hips", HIP_JOINT_DISTANCE * self.stature)
+
+    @property
+    def hip_breadth(self) -> float:
+        """Breadth of the hips over the flesh [m]."""
+        return self.lengths.get("hip_breadth", HIP_BREADTH * self.stature * self.girth)
+
+    @property
+    def seat_depth(self) -> float:
+        """Depth of a seat below the hip joints [m]."""
+        return self.lengths.get("seat_depth", SEAT_DEPTH * self.stature)
 
     @property
     def knuckle_distance(self) -> float:

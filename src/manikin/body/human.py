@@ -18,6 +18,7 @@ from manikin.body.anthropometry import (
     TOES_MASS_SHARE,
     Anthropometry,
 )
+from manikin.body.dimensions import lengths_of
 from manikin.body.human_parts import (
     ALONG_X,
     HUMAN_HINGES,
@@ -49,8 +50,6 @@ _ARM_SPREAD = np.deg2rad(14.0)
 _SIDES = (("left", 1.0), ("right", -1.0))
 
 # Shares of the stature; our choice.
-SEAT_DEPTH = 0.07
-"""Depth of the pressed buttocks below the hip joints."""
 SEAT_LENGTH = 0.08
 """Length, back to front, of the patch that presses on a seat."""
 BUTTOCK_RADIUS = 0.027
@@ -64,6 +63,9 @@ FRONT_OF_KNEE = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 KNEELING = FRONT_OF_KNEE @ rotation_from_rpy(0.0, -np.deg2rad(6.0), 0.0)
 """The same of one who kneels, the shank a little up to the foot, which is clear of the ground; our choice."""
 
+THIGH_ABOVE_SEAT = 0.002
+"""Least distance of a level thigh to the seat below it [m]."""
+
 SKIN = 0.005
 """Distance of the effectors of knees and wrists to the shapes behind them, which need not be level [m]."""
 
@@ -76,7 +78,8 @@ _STANDING_DEG = MappingProxyType(
 def human(
     stature: float = 1.75, mass: float = 79.0, sex: str = "male", *, age: float = DEFAULT_AGE,
     strength: float = 1.0, sole_length: float | None = None, sole_width: float | None = None,
-    lengths: Mapping[str, float] | None = None, off_axis_masses: bool = False,
+    lengths: Mapping[str, float] | None = None, dimensions: Mapping[str, float] | None = None,
+    off_axis_masses: bool = False,
 ) -> BodyModel:  # fmt: skip
     """Make a human body of 19 segments and 45 degrees of freedom ([Qiu2012]_ Table 2.1, B.1).
 
@@ -113,13 +116,18 @@ def human(
         lengths: Measured lengths [m] instead of scaled ones, by the names of
             :data:`manikin.body.anthropometry.MEASURED_LENGTHS`; the stature scales the others, the foot,
             the head and the flesh.
+        dimensions: Outer dimensions [m] instead of scaled ones, by the names of
+            :data:`manikin.body.dimensions.DIMENSIONS`, such as ``sitting_height``; lengths that are given
+            go before what follows from them.
         off_axis_masses: Whether centres of mass lie off the lines between joints, as
             :mod:`manikin.body.human_parts` says, instead of on them.
 
     Raises:
         BodyError: If a value is out of its range.
     """
-    size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths)
+    size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width)
+    wanted = {**lengths_of(size, dimensions or {}), **(lengths or {})}
+    size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=wanted)
     finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
     finite_number(strength, "strength", above=0.0, error=BodyError)
     builder = _HumanBuilder(size, off_axis_masses, age, strength)
@@ -196,7 +204,9 @@ class _HumanBuilder:
         self._seat_x = -0.017 * self.stature  # the buttocks' middle, behind the hip joints
         self._hand_thickness = 0.016 * self.stature
         self._arm_radius = 0.025 * self.stature * self.girth
-        self._thigh_radius, self._shank_radius = (k * self.stature * self.girth for k in (0.038, 0.029))
+        # A thigh that lies on a seat is pressed flat.
+        self._thigh_radius = min(0.038 * self.stature * self.girth, size.seat_depth - THIGH_ABOVE_SEAT)
+        self._shank_radius = 0.029 * self.stature * self.girth
         # Height of the shoulder joints above the thorax' origin.
         self._shoulder_in_thorax = (
             size.shoulder_height - size.length("lower_trunk") - size.length("middle_trunk")
@@ -213,7 +223,7 @@ class _HumanBuilder:
         effectors = [
             Effector("pelvis", "pelvis", np.zeros(3)),
             Effector("head", "head", np.array([0.0, 0.0, head_length])),
-            Effector("buttocks", "pelvis", np.array([self._seat_x, 0.0, -SEAT_DEPTH * self.stature])),
+            Effector("buttocks", "pelvis", np.array([self._seat_x, 0.0, -size.seat_depth])),
         ]
         for side, sign in _SIDES:
             sole = np.array([(0.5 - ANKLE_FROM_HEEL) * size.sole_length, 0.0, -size.ankle_height])
@@ -238,13 +248,13 @@ class _HumanBuilder:
         """Pelvis, lumbar spine and thorax."""
         stature, girth, shoulders = self.stature, self.girth, self.size.shoulder_distance
         lower, middle, upper = (self.size.length(f"{part}_trunk") for part in ("lower", "middle", "upper"))
-        hips = across("hips", 0.060 * stature, 0.191 * stature * girth, 0.35 * lower)
+        hips = across("hips", 0.060 * stature, self.size.hip_breadth, 0.35 * lower)
         waist = across("waist", 0.058 * stature, 0.77 * shoulders * girth, 0.5 * middle)
         chest = across("chest", 0.062 * stature, 0.80 * shoulders * girth, 0.4 * upper)
         girdle = across("shoulders", 0.035 * stature, shoulders, self._shoulder_in_thorax)
         # Two short capsules from back to front; their lowest lines are what a seat carries.
         radius, half = BUTTOCK_RADIUS * stature, 0.5 * SEAT_LENGTH * stature
-        height, aside = radius - SEAT_DEPTH * stature, 0.5 * SEAT_WIDTH * stature
+        height, aside = radius - self.size.seat_depth, 0.5 * SEAT_WIDTH * stature
         buttocks = [
             Shape(
                 f"{side}_buttock", ShapeKind.CAPSULE, (radius, 2 * half),

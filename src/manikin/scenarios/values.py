@@ -267,8 +267,12 @@ def _level(contacts: Mapping[str, ContactSection]) -> float:
     return float(np.mean(feet or [c.position[2] for c in contacts.values()]))
 
 
-_same_human = lru_cache(maxsize=32)(bodies.human)
-"""One body for equal values, so that what is kept by the body (folds, reach) serves every scenario of it."""
+@lru_cache(maxsize=32)
+def _same_human(
+    stature: float, mass: float, sex: str, *, dimensions: tuple[tuple[str, float], ...], **others: Any
+) -> BodyModel:
+    """One body for equal values, so that what is kept by it (folds, reach) serves every scenario of it."""
+    return bodies.human(stature, mass, sex, dimensions=dict(dimensions), **others)
 
 
 def build_body(values: ScenarioValues) -> BodyModel:
@@ -285,7 +289,7 @@ def build_body(values: ScenarioValues) -> BodyModel:
     try:
         body = _same_human(
             data.stature_m, data.mass_kg, data.sex, age=data.age, strength=data.strength,
-            sole_length=length, sole_width=width,
+            sole_length=length, sole_width=width, dimensions=tuple(data.dimensions.items()),
         )  # fmt: skip
         body = body if load is None else bodies.carrying(body, load.mass_kg, load.hand)
         return bodies.with_further_contacts(body, data.further_contacts) if data.further_contacts else body

@@ -12,6 +12,7 @@ from pydantic import (
     model_validator,
 )
 
+from manikin.body.dimensions import DIMENSIONS
 from manikin.body.strength import AGE_RANGE, DEFAULT_AGE
 from manikin.contact import FrictionModel
 from manikin.errors import ScenarioError
@@ -129,7 +130,16 @@ class WholebodySection(Section):
 
 
 _KEYS = {
-    "human": ("stature_m", "mass_kg", "sex", "age", "strength", "load", "further_contacts"),
+    "human": (
+        "stature_m",
+        "mass_kg",
+        "sex",
+        "age",
+        "strength",
+        *(f"{name}_m" for name in DIMENSIONS),
+        "load",
+        "further_contacts",
+    ),
     "point_mass": ("mass_kg",),
     "kudoh": ("load",),
     "insect": ("length_m", "mass_kg"),
@@ -199,6 +209,15 @@ class BodySection(Section):
     strength: Positive = preset(
         1.0, "torque limits relative to a healthy adult of that sex, size and age, of a human only"
     )
+    sitting_height_m: Positive | None = optional(
+        "seat to vertex [m], of a human only (default of this and the next four: scaled from the stature)"
+    )
+    leg_length_m: Positive | None = optional(
+        "ground to hip joints of one who stands, as high as the trochanterion [m]"
+    )
+    arm_length_m: Positive | None = optional("acromion to radial styloid [m]")
+    shoulder_breadth_m: Positive | None = optional("between the acromia [m]")
+    hip_breadth_m: Positive | None = optional("over the flesh, standing [m]")
     load: LoadSection | None = optional("load in the hands during the whole motion, of a human or kudoh")
     further_contacts: list[Literal["knees", "elbows", "pelvis"]] | None = optional(
         "what of a human may touch beside hands and feet, as limbs left_knee, right_knee, "
@@ -233,6 +252,12 @@ class BodySection(Section):
             problem = "is missing; valid: urdf: FILE and limbs: {NAME: {tip: LINK}}"
             refuse_if(not getattr(self, key), key, problem)
         return self
+
+    @property
+    def dimensions(self) -> dict[str, float]:
+        """Outer dimensions that are given [m], by the names of :data:`manikin.body.dimensions.DIMENSIONS`."""
+        values = {name: getattr(self, f"{name}_m") for name in DIMENSIONS}
+        return {name: value for name, value in values.items() if value is not None}
 
     @model_serializer(mode="wrap")
     def _without_what_does_not_apply(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
