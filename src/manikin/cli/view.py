@@ -80,10 +80,12 @@ def compare(
 
 def export(
     source: MotionArgument,
-    format: Annotated[Literal["bvh", "csv"], option("bvh|csv", "File format.", "--format")],
+    format: Annotated[Literal["bvh", "csv", "glb"], option("bvh|csv|glb", "File format.", "--format")],
     out: Annotated[Path | None, option("FILE", "Default: beside the motion.")] = None,
     motion: Annotated[str | None, option("planned|executed", "Default: executed if there is one.")] = None,
-    rate: Annotated[float | None, option("HZ", "Samples per second; default: 100 (bvh), all (csv).")] = None,
+    rate: Annotated[
+        float | None, option("HZ", "Samples per second; default: 100 bvh, 60 glb, all csv.")
+    ] = None,
 ) -> None:
     """Write a motion for other programs."""
     from manikin.motion.file import read_motions

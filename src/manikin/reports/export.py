@@ -1,4 +1,4 @@
-"""Files made from results: figures of runs and comparisons, motions as BVH and CSV for other programs.
+"""Files made from results: figures of runs and comparisons, motions as BVH, CSV and GLB for other programs.
 
 A CSV file has one row per sample, units in the header.
 
@@ -28,8 +28,17 @@ from manikin.pipeline.run_directory import read_run
 from manikin.planning.contacts.single_contact import ContactAnswer
 from manikin.reports.comparison import RunComparison
 from manikin.reports.figures import ChoicePanel, contact_choice_figure, save_figure, write_figures
+from manikin.reports.gltf import to_glb
 from manikin.runtime.display import readable
-from manikin.runtime.files import FIGURES, ResultDirectory, columns_csv, make_directory, write_result
+from manikin.runtime.files import (
+    FIGURES,
+    ResultDirectory,
+    columns_csv,
+    make_directory,
+    write_bytes,
+    write_result,
+    writing,
+)
 from manikin.scene import Scene
 
 if TYPE_CHECKING:
@@ -202,8 +211,8 @@ def _euler(rotation: FloatArray, order: str) -> FloatArray:
     return np.degrees(np.unwrap(angles, axis=0))
 
 
-FORMATS = ("bvh", "csv")
-BVH_RATE = 100.0
+FORMATS = ("bvh", "csv", "glb")
+BVH_RATE, GLB_RATE = 100.0, 60.0
 """Samples per second of a BVH file unless the caller says otherwise [Hz]."""
 
 
@@ -230,11 +239,11 @@ def export_motion(
         format_name: One of :data:`FORMATS`.
         out: File to write; ``motion.FORMAT`` beside the motion file when omitted.
         which: ``"planned"`` or ``"executed"``; see :func:`pick_motion`.
-        rate: Samples per second [Hz]; 100 for BVH and every sample for CSV when omitted.
+        rate: Samples per second [Hz]; 100 for BVH, 60 for GLB and every sample for CSV when omitted.
 
     Raises:
         InputError: If the format, the motion or the rate is not available.
-        MotionFileError: If the file cannot be written, or BVH is wanted without a body.
+        MotionFileError: If the file cannot be written, or BVH or GLB is wanted without a body.
     """
     if format_name not in FORMATS:
         raise InputError(f"format is {format_name!r}; valid: {', '.join(FORMATS)}")
@@ -244,7 +253,12 @@ def export_motion(
     if format_name == "csv":
         return write_result(path, to_csv(resample(motion, rate)))
     if content.body is None:
-        raise MotionFileError(f"{source}: holds no body; valid: a motion file with a body for bvh")
+        raise MotionFileError(f"{source}: holds no body; valid: a motion file with a body for {format_name}")
+    if format_name == "glb":
+        sampled = resample(motion, GLB_RATE if rate is None else rate)
+        with writing(path):
+            write_bytes(path, to_glb(content.body, sampled, content.scene))
+        return path
     return write_result(path, to_bvh(content.body, resample(motion, BVH_RATE if rate is None else rate)))
 
 
