@@ -128,8 +128,8 @@ def disc_load(
 
     Args:
         moment: (n,) that bends the trunk forward [N.m].
-        normal, front: (n,) force that the trunk puts on the sacrum, against the endplate and forward along
-            it [N].
+        normal: (n,) force that the trunk puts on the sacrum, against the endplate [N].
+        front: (n,) the same, forward along the endplate [N].
         lever: Of the muscle [m].
     """
     muscle = np.abs(moment) / lever
