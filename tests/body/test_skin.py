@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from manikin.body import human
 from manikin.body.flesh import body_density
@@ -16,12 +17,23 @@ def person(request):
 
 
 def test_the_surface_is_closed(person):
-    """Each directed edge is met by as many opposite ones: nothing has a border."""
-    faces = person[1].faces
-    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    there = np.sort(edges @ [len(person[1].vertices), 1])
-    back = np.sort(edges[:, ::-1] @ [len(person[1].vertices), 1])
-    assert np.array_equal(there, back)
+    """Each edge joins two triangles, which run along it in opposite directions, in one piece."""
+    mesh = trimesh.Trimesh(person[1].vertices, person[1].faces, process=False)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.body_count == 1
+
+
+def test_joints_lie_inside(person):
+    """The solid angle of the surface, seen from a joint, is the whole sphere (Van Oosterom 1983)."""
+    _, skin = person
+    for joint in skin.origins:
+        a, b, c = np.moveaxis(skin.vertices[skin.faces] - joint, 1, 0)
+        sizes = [np.linalg.norm(each, axis=1) for each in (a, b, c)]
+        dots = [np.sum(x * y, axis=1) for x, y in ((a, b), (b, c), (c, a))]
+        above = np.sum(a * np.cross(b, c), axis=1)
+        below = np.prod(sizes, axis=0) + dots[0] * sizes[2] + dots[1] * sizes[0] + dots[2] * sizes[1]
+        assert 2.0 * np.arctan2(above, below).sum() == pytest.approx(4.0 * np.pi, rel=1e-9)
 
 
 def test_volume_times_density_is_the_mass(person):

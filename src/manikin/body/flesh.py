@@ -195,10 +195,14 @@ class Flesh:
         sums = {group: np.zeros(count) for group in _BLEND}
         segments = np.full((count, len(self.names)), FAR)
         materials = np.full((count, len(MATERIALS)), FAR)
+        low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
         for loft in self.lofts:
             place = self.placements[loft.segment]
             centre, radius = loft.ball
-            offset = points - (place.origin + place.rotation @ centre)
+            centre = place.origin + place.rotation @ centre
+            if np.any(centre + radius < low) or np.any(centre - radius > high):
+                continue
+            offset = points - centre
             near = np.flatnonzero(np.einsum("ij,ij->i", offset, offset) < (radius + margin) ** 2)
             if not len(near):
                 continue
@@ -328,7 +332,7 @@ class _Sections:
             self._loft(
                 "pelvis", group, Material.TROUSERS, "waist", ends, stations, power=2.3, caps=0.4
             ),
-            self._loft("thorax", group, shirt, "arm", (inner, outer), [(0, 0.040, 0.036), (1, 0.050, 0.048)],
+            self._loft("thorax", group, shirt, "arm", (inner, outer), [(0, 0.040, 0.036), (1, 0.042, 0.038)],
                        (_X, _Z)),
             self._ball("pelvis", group, Material.TROUSERS, "leg", (-0.060, 0.076, -0.030),
                        (0.072, 0.078, 0.086)),
@@ -351,12 +355,12 @@ class _Sections:
         top = float(self.body.effector("head").translation[2]) / size
         face: list[tuple[Material, Sequence[float], Sequence[float]]] = [
             (skin, (0.004, 0.0, top - 0.093), (0.096, 0.074, 0.088)),  # skull
-            (skin, (0.080, 0.0, -0.052), (0.018, 0.019, 0.016)),  # chin
-            (skin, (0.086, 0.022, 0.046), (0.012, 0.024, 0.010)),  # brow
-            (skin, (0.074, 0.040, 0.004), (0.016, 0.018, 0.018)),  # cheek
-            (skin, (0.092, 0.0, -0.019), (0.009, 0.022, 0.009)),  # lips
+            (skin, (0.073, 0.0, -0.050), (0.019, 0.021, 0.017)),  # chin
+            (skin, (0.086, 0.022, 0.046), (0.010, 0.026, 0.010)),  # brow
+            (skin, (0.066, 0.038, 0.004), (0.016, 0.018, 0.024)),  # cheek
+            (skin, (0.084, 0.0, -0.017), (0.009, 0.021, 0.008)),  # lips
             (skin, (0.002, 0.076, 0.020), (0.017, 0.008, 0.030)),  # ear
-            (hair, (-0.010, 0.0, top - 0.088), (0.099, 0.081, 0.088)),
+            (hair, (-0.008, 0.0, top - 0.086), (0.104, 0.081, 0.086)),
         ]
         if self.female:
             face.append((hair, (-0.052, 0.0, 0.010), (0.056, 0.072, 0.080)))
@@ -377,9 +381,9 @@ class _Sections:
         upper = float(self.body.segment("left_forearm").origin[2])
         lower = float(self.body.segment("left_hand").origin[2])
         slim = 0.88 if self.female else 1.0
-        rows = [(0, 0.060, 0.058), (0.2, 0.059, 0.056), (0.5, 0.054, 0.050), (0.85, 0.047, 0.045),
-                (1, 0.046, 0.044)]  # fmt: skip
-        below = [(0, 0.046, 0.044), (0.2, 0.048, 0.045), (0.5, 0.042, 0.040), (0.85, 0.036, 0.032),
+        rows = [(0, 0.054, 0.052), (0.2, 0.058, 0.055), (0.5, 0.054, 0.050), (0.85, 0.046, 0.044),
+                (1, 0.039, 0.037)]  # fmt: skip
+        below = [(0, 0.039, 0.037), (0.2, 0.047, 0.044), (0.5, 0.042, 0.040), (0.85, 0.036, 0.032),
                  (0.97, 0.035, 0.030)]  # fmt: skip
         end = lower + 0.004 * self.size
         rows, below = ([(u, slim * a, slim * b) for u, a, b in table] for table in (rows, below))
@@ -426,8 +430,8 @@ class _Sections:
         cloth = Material.TROUSERS
         wide = 1.03 if self.female else 1.0
         above = [(0, 0.090 * wide, 0.088 * wide, -0.004, 0.0), (0.2, 0.088 * wide, 0.083 * wide),
-                 (0.5, 0.075, 0.072), (0.8, 0.063, 0.061), (1, 0.060, 0.058)]  # fmt: skip
-        below = [(0, 0.060, 0.057), (0.15, 0.059, 0.056), (0.35, 0.061, 0.057, -0.010),
+                 (0.5, 0.075, 0.072), (0.8, 0.062, 0.060), (1, 0.053, 0.051)]  # fmt: skip
+        below = [(0, 0.053, 0.050), (0.15, 0.058, 0.055), (0.35, 0.061, 0.057, -0.010),
                  (0.65, 0.053, 0.051, -0.008), (1, 0.051, 0.050, -0.004)]  # fmt: skip
         hem = shank + 0.008 * self.size
         return [

@@ -258,10 +258,34 @@ def _half_net(flesh: Flesh, zoom: _Zoom, spacing: float) -> tuple[FloatArray, np
     values[:-1, :-1, :-1][inside] = -FAR
     chosen = np.argwhere(wanted)
     values[wanted] = flesh.distances(zoom(low + spacing * chosen), 0.05).whole
-    vertices, quads, cell_of = _surface_net(values)
+    vertices, quads, cell_of = _surface_net(_unambiguous(values))
     middle = cell_of[:, 1] == 0
     vertices[middle, 1] = 0.5
     return zoom(low + spacing * vertices), quads, middle
+
+
+def _unambiguous(values: FloatArray) -> FloatArray:
+    """Values with the grid's squares filled whose inside corners are only diagonal neighbours.
+
+    Through such a square two sheets of a surface net would share an edge.
+    """
+    values = values.copy()
+    while True:
+        inside, filled = values < 0.0, np.zeros(values.shape, dtype=bool)
+        for axis in range(3):
+            a, b = (np.moveaxis(array, axis, 0) for array in (inside, filled))
+            _, rows, columns = np.array(a.shape) - 1
+            corners = [
+                (slice(None), slice(i, i + rows), slice(j, j + columns)) for i in (0, 1) for j in (0, 1)
+            ]
+            square = [a[corner] for corner in corners]
+            bad = (square[0] == square[3]) & (square[1] == square[2]) & (square[0] != square[1])
+            for corner in corners:
+                b[corner] |= bad
+        filled &= ~inside
+        if not np.any(filled):
+            return values
+        values[filled] = -1e-4
 
 
 def _surface_net(values: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
@@ -391,7 +415,8 @@ def _cut(table: FloatArray, faces: np.ndarray, level: FloatArray) -> tuple[Float
     level = np.where(np.abs(level) < 1e-5, 0.0, level)
     sign = np.sign(level)
     edges = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    edges, inverse = np.unique(edges, axis=0, return_inverse=True)
+    keys, inverse = np.unique(edges[:, 0] * len(table) + edges[:, 1], return_inverse=True)
+    edges = np.column_stack(np.divmod(keys, len(table)))
     split = sign[edges[:, 0]] * sign[edges[:, 1]] < 0
     new = np.full(len(edges), -1)
     new[split] = len(table) + np.arange(int(split.sum()))
