@@ -55,27 +55,27 @@ def body_density(stature: float, mass: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class FleshFrame:
     """Rotation (3, 3) and origin (3,) [m] of a segment's frame in the posture of the surface."""
 
     rotation: FloatArray
     origin: FloatArray
 
 
-def spread_posture(body: BodyModel) -> dict[str, Placement]:
+def spread_posture(body: BodyModel) -> dict[str, FleshFrame]:
     """Frames of the segments with arms and legs spread, the root's frame being that of the surface."""
-    placements: dict[str, Placement] = {}
+    placements: dict[str, FleshFrame] = {}
     spread = {"upper_arm": ARM_SPREAD, "thigh": LEG_SPREAD}
     for segment in body.segments:
         if segment.parent is None:
-            placements[segment.name] = Placement(np.eye(3), np.zeros(3))
+            placements[segment.name] = FleshFrame(np.eye(3), np.zeros(3))
             continue
         side, _, part = segment.name.partition("_")
         sign = {"left": 1.0, "right": -1.0}.get(side, 0.0)
         turn = rotation_from_rpy(sign * spread.get(part, 0.0), 0.0, 0.0)
         base = placements[segment.parent]
         origin = base.origin + base.rotation @ segment.origin
-        placements[segment.name] = Placement(base.rotation @ turn, origin)
+        placements[segment.name] = FleshFrame(base.rotation @ turn, origin)
     return placements
 
 
