@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from manikin.body import human
 from manikin.body.flesh import body_density
@@ -43,10 +44,15 @@ def test_volume_times_density_is_the_mass(person):
 
 
 def test_left_and_right_are_mirror_images(person):
-    """The half is mirrored, then cut where materials change: vertices pair up to rounding."""
+    """Vertices have their mirror images among the vertices; where materials meet, the sides are cut apart.
+
+    A cut divides triangles from the first corner on, which is another one in the mirror image: there a vertex
+    may be away by a part of an edge, which is 11 mm long.
+    """
     vertices = person[1].vertices
-    assert vertices[:, 1].max() == pytest.approx(-vertices[:, 1].min(), abs=1e-9)
-    assert abs(np.sum(vertices[:, 1])) < 1e-3 * len(vertices)
+    away, _ = cKDTree(vertices).query(vertices * [1.0, -1.0, 1.0])
+    assert np.mean(away < 1e-9) > 0.99
+    assert away.max() < 5e-3
 
 
 def test_weights_sum_to_one_over_segments_of_the_body(person):

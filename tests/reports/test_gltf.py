@@ -1,13 +1,15 @@
 """GLB files, read back by the standard's own rules and by another program."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from manikin.body import human
+from manikin.body import human, quadruped
+from manikin.body.segments import segment_triangles
 from manikin.body.skin import segment_frames, skin_of
 from manikin.motion import Motion
 from manikin.reports.gltf import TO_GLTF, to_glb
@@ -99,6 +101,26 @@ def test_skinned_vertices_are_those_of_the_motion(swinging):
         found = np.einsum("nij,nj->ni", blend[:, :3, :3], places) + blend[:, :3, 3]
         wanted, _ = surface.posed(*segment_frames(body, motion.q[k]))
         assert found == pytest.approx(wanted @ TO_GLTF.T, abs=1e-4)
+
+
+def test_a_body_without_that_surface_has_the_shapes_of_its_segments(swinging):
+    """Each vertex follows one segment; in the frame of that segment it is where the shape has it."""
+    body = quadruped()
+    q = np.tile(body.standing_posture(), (2, 1))
+    still, nowhere = np.zeros((2, body.nv)), np.zeros((2, 3))
+    motion = replace(
+        swinging[1], time=np.array([0.0, 0.1]), q=q, v=still, a=still, tau=still, com=nowhere,
+        angular_momentum=nowhere, margin=np.zeros(2), support=np.zeros((2, 1), dtype=bool),
+        contact_force=np.zeros((2, 1, 6)), joint_names=body.joint_names,
+    )  # fmt: skip
+    document, array = parsed(to_glb(body, motion))
+    names = document["meshes"][0]["primitives"][0]["attributes"]
+    bones, places = array(names["JOINTS_0"])[:, 0], array(names["POSITION"])
+    for number, segment in enumerate(body.segments):
+        shape = segment_triangles(segment)
+        assert places[bones == number] == pytest.approx(
+            np.empty((0, 3)) if shape is None else shape[0], abs=1e-6
+        )
 
 
 def test_another_program_reads_body_and_scene(swinging, tmp_path):

@@ -107,7 +107,7 @@ def human(
 
     Args:
         stature: Sole to vertex [m], 0.90 to 2.10; below 1.40 with an adult's shares of the masses.
-        mass: Body mass [kg], 35 to 160, with a body mass index of 10 to 60 kg/m^2.
+        mass: Body mass [kg], 12 to 160, with a body mass index of 10 to 60 kg/m^2.
         sex: ``"male"`` or ``"female"``.
         age: 18 to 90 [years]; strength depends on it, nothing else.
         strength: Torque limits relative to those of a healthy adult of that sex, size and age.

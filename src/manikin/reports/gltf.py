@@ -89,7 +89,7 @@ def to_glb(body: BodyModel, motion: Motion, scene: Scene | None = None) -> bytes
     root = next(k for k, segment in enumerate(body.segments) if segment.parent is None)
     animation = _animation(body, motion, nodes, buffer)
     nodes.append({"name": "body", "mesh": 0, "skin": 0})
-    tops = [root, len(nodes) - 1]
+    skinned, tops = len(nodes) - 1, [root]
     for obstacle in scene or ():
         if obstacle.name == FLOOR:
             continue
@@ -100,7 +100,7 @@ def to_glb(body: BodyModel, motion: Motion, scene: Scene | None = None) -> bytes
     nodes.append({"name": "z_up_to_y_up", "rotation": _quaternion(TO_GLTF), "children": tops})
     document = {
         "asset": {"version": "2.0", "generator": "manikin"}, "scene": 0,
-        "scenes": [{"nodes": [len(nodes) - 1]}],
+        "scenes": [{"nodes": [len(nodes) - 1, skinned]}],
         "nodes": nodes, "meshes": meshes, "materials": materials, "animations": [animation],
         "skins": [{"joints": list(range(len(names))), "skeleton": root, "inverseBindMatrices": inverse}],
         "buffers": [{"byteLength": len(buffer.data)}], "bufferViews": buffer.views,
