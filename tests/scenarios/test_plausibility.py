@@ -5,6 +5,7 @@ import pytest
 from manikin.cli import main
 from manikin.errors import ScenarioError
 from manikin.scenarios import list_scenarios, load_scenario
+from manikin.scenarios.families import FAMILIES, draw_scene
 from manikin.scenarios.plausibility import check_plausible
 
 TEXT = """
@@ -15,9 +16,13 @@ floor_height_m: {floor}
 contacts: {{friction: 0.7, sole: {{length_m: 0.28, width_m: 0.12}}}}
 scene:
   - {{name: block, box: {box}, position: {position}}}
+{more}
 task: {{start: {{at: {start}}}, goal: {{at: {goal}}}}}
 """
-GIVEN = {"floor": 0.0, "box": [0.6, 1.2, 0.3], "position": [1.5, 0.0, 0.15], "start": [0, 0], "goal": [3, 0]}
+GIVEN = {"floor": 0.0, "box": [0.6, 1.2, 0.3], "position": [1.5, 0.0, 0.15], "start": [0, 0], "goal": [3, 0],
+         "more": ""}  # fmt: skip
+
+STEP = "  - {{name: step, box: [1, 1, {}], position: [1, 0, {}]}}"
 
 
 def judged(folder, **changed):
@@ -69,3 +74,17 @@ def test_every_built_in_scenario_is_plausible(name):
     if scenario.missing_mesh() is not None:
         pytest.skip("its meshes are of a distribution that is not installed")
     check_plausible(scenario, scenario.build_body(), scenario.build_scene())
+
+
+def test_a_landing_that_steps_lead_up_to_may_be_started_on(tmp_path):
+    """A landing above 2 m is a place to start on where a step is less than half a stature below it."""
+    judged(tmp_path, box=[1, 1, 2.5], position=[0, 0, 1.25], more=STEP.format(1.8, 0.9))
+    with pytest.raises(ScenarioError, match="inside of 'block'"):
+        judged(tmp_path, box=[1, 1, 2.5], position=[0, 0, 1.25], more=STEP.format(1.0, 0.5))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_family_of_the_benchmark_is_plausible(family, tmp_path):
+    for seed in range(5):
+        scenario = draw_scene(FAMILIES[family], seed, tmp_path)
+        check_plausible(scenario, scenario.build_body(), scenario.build_scene())

@@ -29,6 +29,8 @@ STEEPEST = np.deg2rad(60.0)
 """Largest slope of such a surface."""
 TRUNK = (0.35, 0.45, 0.55)
 """Heights above the lowest surface at a place at which no obstacle may be [sizes of the body]."""
+STEP = 0.5
+"""Height below the top of an obstacle within which a surface is a way onto it [sizes of the body]."""
 _UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "kilometres": 1e3}
 
 
@@ -117,15 +119,21 @@ def _check_place(values: ScenarioValues, scene: Scene, end: str, size: float) ->
 def _check_room(
     values: ScenarioValues, scene: Scene, place: FloatArray, levels: list[float], size: float
 ) -> None:
-    """A body that starts inside of an obstacle is not meant to start on it, unless the file says so."""
+    """A body inside of a tall obstacle to which nothing leads up is not meant to start on top of it."""
     inside = _inside(scene, place, levels[0], size)
     if inside is None:
         return
     top = float(inside.bounds[1][2])
-    if top - levels[0] > size:
+    if top - levels[0] > size and not _is_stepped_onto(scene, top, STEP * size):
         problem = f"is {np.round(place, 3).tolist()} m, which is inside of '{inside.name}', {top:.3g} m high"
         path = ("task", "start", "com" if values.file.task.start.at is None else "at")
         raise values.error(path, f"{problem}; valid: a place beside it, or height_m to start on it")
+
+
+def _is_stepped_onto(scene: Scene, top: float, step: float) -> bool:
+    """Whether a surface of the scene is less than a step below the height ``top`` [m]."""
+    heights = [surface.polygon[:, 2].max() for surface in scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)]
+    return any(0.0 < top - height < step for height in heights)
 
 
 def _levels(values: ScenarioValues, scene: Scene, place: FloatArray, around: float) -> Iterator[float]:
