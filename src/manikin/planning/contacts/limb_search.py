@@ -216,6 +216,7 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         # Place and rotation of the root, and the place a stride on.
         self._trunks: dict[State, tuple[FloatArray, FloatArray, FloatArray]] = {}
         self._postures: dict[tuple[object, ...], Posed] = {}
+        self._greedier = 0  # how many of the factors on the estimate found no way
         self._state = Configuration(poser.body, start.q)
 
     def _best(self) -> list[State] | str:
@@ -226,7 +227,10 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
         graph = Graph(
             self._ahead.__getitem__, self._followers, self._tested, lambda state: self._ahead[state] <= 0.0
         )
-        return graph.best([first], self.settings.greeds)[0] or "no contacts lead to the goal"
+        way, expanded = graph.best([first], self.settings.greeds[self._greedier :])
+        # Moves that are closed since do not make a way easier to find with a factor that found none.
+        self._greedier += len(expanded) - 1
+        return way or "no contacts lead to the goal"
 
     @cached_property
     def _walled_off(self) -> str:
