@@ -6,7 +6,7 @@ import pytest
 
 from manikin.cli import main
 from manikin.errors import TimeLimitError
-from manikin.pipeline import benchmark
+from manikin.pipeline import benchmark, jobs
 from manikin.pipeline.benchmark import BenchmarkTask, run_benchmark, run_task
 from manikin.reports.pages import write_benchmark_page
 from manikin.reports.summary_table import family_rows
@@ -40,14 +40,14 @@ def test_a_task_that_is_ended_later_has_come_as_far_as_it_has(monkeypatch):
         stages("wholebody", 0.0)
         raise TimeLimitError("did not end")
 
-    monkeypatch.setattr(benchmark, "_whole", endless)
+    monkeypatch.setattr(jobs, "_whole", endless)
     entry = run_task(BenchmarkTask("flat", 0, "all"))
     assert (entry["outcome"], entry["contacts"], entry["planned"]) == ("contacts", True, False)
     assert entry["failure"]["stage"] == "wholebody"
 
 
 def test_a_defect_becomes_an_entry(monkeypatch):
-    monkeypatch.setattr(benchmark, "plan_contacts", lambda *_: {}["lost"])
+    monkeypatch.setattr(jobs, "plan_contacts", lambda *_: {}["lost"])
     entry = run_task(BenchmarkTask("flat", 0))
     assert entry["failure"]["stage"] == "error"
     assert "KeyError: 'lost'" in entry["failure"]["reason"]
