@@ -4,9 +4,10 @@ The population is that of the 2012 Anthropometric Survey of U.S. Army Personnel 
 NATICK/TR-15/007; 4082 men and 1986 women, 17 to 58 years): means, standard deviations and correlations,
 computed from its public data. Soldiers are fitter and younger than a civil population.
 
-A person is a vector of :data:`MEASURES_OF_A_PERSON`, normally distributed for each sex. The ellipsoid on which
-the squared Mahalanobis distance from the mean is the quantile of chi squared with as many degrees of freedom as
-measures holds that share of the people. Leg length is not drawn: it follows from stature and sitting height.
+A person is a vector of :data:`MEASURES_OF_A_PERSON`, normally distributed for each sex. The ellipsoid that
+holds a share of the people is where the squared Mahalanobis distance from the mean is that quantile of chi
+squared, with as many degrees of freedom as measures. Leg length is not drawn: it follows from stature and
+sitting height.
 """
 
 from collections.abc import Sequence
@@ -160,7 +161,7 @@ def boundary_people(
         known.covariance[np.ix_(chosen, chosen)] / np.outer(deviation, deviation)
     )
     variances, axes = variances[::-1], axes[:, ::-1]
-    # The sign of an eigenvector is left open: here its largest component is positive, of equal ones the first.
+    # The sign of an eigenvector is left open: its largest component is positive, of equal ones the first.
     largest = np.abs(axes).round(6).argmax(axis=0)
     axes = axes * np.sign(axes[largest, np.arange(len(chosen))])
     count = len(chosen)

@@ -22,7 +22,7 @@ from manikin.pipeline.stages import Report, RunContext
 from manikin.pipeline.stages.contact_stage import plan_contacts
 from manikin.pipeline.stages.context import plan_in_world
 from manikin.runtime.files import ResultDirectory
-from manikin.runtime.parallel import processor_time_limit, side_by_side
+from manikin.runtime.parallel import on_cluster, processor_time_limit, side_by_side
 from manikin.scenarios import Scenario
 from manikin.verification import PlannedContacts, check_contact_plan
 
@@ -62,14 +62,14 @@ def job_entry(
         ``stage``, ``scene`` (digest of the scenario), ``body``, ``outcome`` (one of :data:`OUTCOMES`),
         ``contacts``, ``planned`` and ``proved`` (whether it came so far), ``checked`` (verdict of an
         independent check of the contacts, or None), ``failure`` (``stage``, ``reason``, ``where``,
-        ``time_s``, or None), ``steps``, ``duration_s`` of the motion, ``measures`` (see :func:`_measures`),
-        and ``processor_s`` by stage, with ``total``.
+        ``time_s``, or None), ``timed_out`` (whether the time limit ended it), ``steps``, ``duration_s`` of
+        the motion, ``measures`` (see :data:`MEASURES`), and ``processor_s`` by stage, with ``total``.
     """
     stages = StageClock()
     entry: dict[str, Any] = {
         "stage": stage, "scene": None, "body": None, "outcome": "failed", "contacts": False, "planned": False,
-        "proved": False, "checked": None, "failure": None, "steps": None, "duration_s": None,
-        "measures": dict.fromkeys(MEASURES),
+        "proved": False, "checked": None, "failure": None, "timed_out": False, "steps": None,
+        "duration_s": None, "measures": dict.fromkeys(MEASURES),
     }  # fmt: skip
     try:
         with processor_time_limit(time_limit):
@@ -82,7 +82,7 @@ def job_entry(
             entry |= _outcome(summary, stage)
     except TimeLimitError as error:
         reached = [name for name, stages_after in _AFTER.items() if stages.current in stages_after]
-        entry |= dict.fromkeys(reached, True)
+        entry |= dict.fromkeys(reached, True) | {"timed_out": True}
         entry |= {"outcome": (reached or ["failed"])[0], "failure": _failure(stages.current, str(error))}
     except ManikinError as error:
         entry["failure"] = _failure("scenario" if entry["scene"] is None else stages.current, str(error))
@@ -179,16 +179,16 @@ MEASURES = (
     "planned_margin_Nm", "executed_margin_Nm", "peak_torque_share", "clearance_m", "com_room_m",
     "capable_share",
 )  # fmt: skip
-"""Numbers of a job that an entry tells, None where its stages did not come so far."""
+"""Numbers of a job that an entry tells, None where its stages did not come so far.
+
+Least margin of the planned and of the executed motion, about the centre of mass; largest share of a joint's
+torque limit; least counted distance; room of the centre of mass in the contact plan; least share of people of
+that size who have the strength for a joint.
+"""
 
 
 def _measures(summary: Mapping[str, Any]) -> dict[str, float | None]:
-    """Numbers of a run, by the names of :data:`MEASURES`.
-
-    Least margin of the planned and the executed motion about the centre of mass, largest share of a joint's
-    torque limit, least counted distance, room of the centre of mass in the contact plan, and the least share
-    of people of that size who have the strength for a joint.
-    """
+    """Numbers of a run by the names of :data:`MEASURES`."""
     body, executed, checked = (summary.get(key) or {} for key in ("wholebody", "execution", "checked"))
     shares = ((summary.get("ergonomics") or {}).get("capable_min_share") or {}).values()
     return {
@@ -228,7 +228,7 @@ class JobDirectory(ResultDirectory):
 
 def do_jobs(
     work: Callable[[J], dict[str, Any]], jobs: Sequence[J], directory: JobDirectory | None, *, name: str,
-    workers: int | None = None, fresh: bool = False,
+    workers: int | None = None, cluster: str | None = None, fresh: bool = False,
     report: Callable[[J, Mapping[str, Any], int, int], None] | None = None,
 ) -> list[dict[str, Any]]:  # fmt: skip
     """Do jobs side by side, those that are not done yet, and return their entries in the order of the jobs.
@@ -238,17 +238,23 @@ def do_jobs(
         directory: Where entries are kept and looked for; nothing is kept when None.
         name: Of the work, for messages.
         workers: Processes; one per usable core when omitted.
+        cluster: Address of a Dask scheduler whose workers do the jobs instead.
         fresh: Whether jobs that the directory has already are done again.
         report: Told each job, its entry, how many are done, and of how many.
 
     Raises:
-        ManikinError: If the directory cannot be written to, or a process ends before its time.
+        ManikinError: If the directory cannot be written to, a process ends before its time, or there is no
+            such cluster.
     """
     entries: dict[str, dict[str, Any]] = {}
     if directory is not None and not fresh:
         entries = {job.name: item for job in jobs if (item := directory.known(job)) is not None}
     waiting = [job for job in jobs if job.name not in entries]
-    with closing(side_by_side(work, waiting, workers or cpu_count(), name)) as results:
+    if cluster is None:
+        work_done = side_by_side(work, waiting, workers or cpu_count(), name)
+    else:
+        work_done = on_cluster(work, waiting, cluster, name)
+    with closing(work_done) as results:
         for number, entry in results:
             job = waiting[number]
             entries[job.name] = entry

@@ -1,4 +1,4 @@
-"""Work in several processes on one machine, by joblib, and a limit of its processor time."""
+"""Work in several processes, by joblib, or on a Dask cluster, and a limit of its processor time."""
 
 import os
 import signal
@@ -7,6 +7,8 @@ import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
+from importlib import import_module
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -14,9 +16,11 @@ from joblib import Parallel, delayed
 from joblib.externals.loky.backend import resource_tracker
 from threadpoolctl import ThreadpoolController
 
-from manikin.errors import ManikinError, TimeLimitError
+from manikin.errors import InputError, ManikinError, TimeLimitError
 from manikin.runtime.child import end_with
 
+CLUSTER_TIMEOUT = 10.0
+"""Time in which a cluster answers [s]."""
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -65,6 +69,55 @@ def side_by_side(
             warnings.simplefilter("ignore")  # of results that nobody waits for
             if results is not None:
                 results.close()
+
+
+def on_cluster(
+    work: Callable[[T], R], items: Sequence[T], address: str, name: str
+) -> Generator[tuple[int, R]]:
+    """Do the same work on many items on the workers of a Dask cluster that runs already.
+
+    Workers have the same version of this package and see the same files. Each does one item at a time, on one
+    thread, as :func:`side_by_side`. They work outside of their main thread, where no limit of processor time
+    holds. What has not begun is taken back when the iterator is closed early.
+
+    Args:
+        work: As of :func:`side_by_side`.
+        items: What to work on.
+        address: Of the scheduler, such as ``"tcp://10.0.0.1:8786"``.
+        name: Of the work, for the message of an error.
+
+    Yields:
+        Number of an item and its result, as they are done; InputError if ``distributed`` is not installed or
+        nobody answers at the address, ManikinError if a worker fails.
+    """
+    try:
+        distributed = import_module("distributed")
+    except ImportError:
+        problem = "the package distributed is not installed"
+        raise InputError(f"cluster {address}: {problem}; valid: pip install 'manikin[cluster]'") from None
+    try:
+        client = distributed.Client(address, timeout=CLUSTER_TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        problem = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"cluster {address}: {problem}; valid: tcp://HOST:PORT of a scheduler") from None
+    with client:
+        futures = client.map(partial(_alone, work), range(len(items)), items, pure=False, batch_size=100)
+        try:
+            for future, result in distributed.as_completed(futures, with_results=True, raise_errors=False):
+                if future.status != "finished":
+                    raise ManikinError(f"a worker of the {name} on {address} failed: {result[1]}")
+                yield result
+        finally:
+            client.cancel(futures)
+
+
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def _alone(work: Callable[[T], R], number: int, item: T) -> tuple[int, R]:
+    """Work in a thread of a process that may have more of them, as the only one, on one thread."""
+    with _ONE_AT_A_TIME, ThreadpoolController().limit(limits=1):
+        return number, work(item)
 
 
 class _TimeIsUp(BaseException):
