@@ -22,6 +22,7 @@ from manikin.cli.ergonomics import ergonomics
 from manikin.cli.push import push
 from manikin.cli.run import run
 from manikin.cli.statistics import statistics
+from manikin.cli.study import study
 from manikin.cli.view import compare, export, view
 from manikin.cli.walk import library, walk, words
 from manikin.errors import InputError, ManikinError
@@ -96,8 +97,8 @@ def scenarios(json: JsonOption = False) -> None:
 
 
 for _command in (
-    run, benchmark, analyze, push, walk, words, ergonomics, statistics, compare, view, balance, contact,
-    export, doctor,
+    run, benchmark, study, analyze, push, walk, words, ergonomics, statistics, compare, view, balance,
+    contact, export, doctor,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(library, name="library")

@@ -149,15 +149,19 @@ def checked_contacts(scenario: Scenario, plan: PlannedContacts | Path) -> dict[s
     """Verdict of the independent check of a contact plan.
 
     Returns:
-        ``certified``, ``verdict`` in one line, ``broken`` (keys of the requirements that do not hold) and
-        ``room_m`` of the centre of mass.
+        ``certified``, ``verdict`` in one line, ``broken`` (keys of the requirements that do not hold),
+        ``room_m`` of the centre of mass, and ``torque_share``, the largest that rest takes of the strength.
     """
     try:
         result = check_contact_plan(scenario, plan)
     except ManikinError as error:
-        return {"certified": False, "verdict": f"refused: {error}", "broken": [], "room_m": None}
-    broken = sorted(result.requirements.broken)
-    return {"certified": result.held, "verdict": result.verdict, "broken": broken, "room_m": result.room}
+        unknown = {"room_m": None, "torque_share": None}
+        return {"certified": False, "verdict": f"refused: {error}", "broken": [], **unknown}
+    rest = (row.measured for row in result.requirements if row.key == "max_torque_share")
+    return {
+        "certified": result.held, "verdict": result.verdict, "broken": sorted(result.requirements.broken),
+        "room_m": result.room, "torque_share": next(rest, None),
+    }  # fmt: skip
 
 
 def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
@@ -176,14 +180,14 @@ def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
 
 
 MEASURES = (
-    "planned_margin_Nm", "executed_margin_Nm", "peak_torque_share", "clearance_m", "com_room_m",
-    "capable_share",
+    "planned_margin_Nm", "executed_margin_Nm", "peak_torque_share", "rest_torque_share", "clearance_m",
+    "com_room_m", "capable_share",
 )  # fmt: skip
 """Numbers of a job that an entry tells, None where its stages did not come so far.
 
 Least margin of the planned and of the executed motion, about the centre of mass; largest share of a joint's
-torque limit; least counted distance; room of the centre of mass in the contact plan; least share of people of
-that size who have the strength for a joint.
+torque limit, and the same at rest on the planned contacts; least counted distance; room of the centre of mass
+in the contact plan; least share of people of that size who have the strength for a joint.
 """
 
 
@@ -194,7 +198,7 @@ def _measures(summary: Mapping[str, Any]) -> dict[str, float | None]:
     return {
         "planned_margin_Nm": body.get("min_margin"), "executed_margin_Nm": executed.get("min_margin"),
         "peak_torque_share": body.get("max_torque_share"), "clearance_m": body.get("min_clearance_m"),
-        "com_room_m": checked.get("room_m"),
+        "rest_torque_share": checked.get("torque_share"), "com_room_m": checked.get("room_m"),
         "capable_share": min((share for share in shares if share is not None), default=None),
     }  # fmt: skip
 

@@ -106,14 +106,14 @@ class StudyDirectory(JobDirectory):
 
 
 def study_jobs(study: Study) -> tuple[StudyJob, ...]:
-    """The jobs of a study: settings, bodies and seeds, the seeds fastest.
+    """The jobs of a study: bodies, settings and seeds, the seeds fastest; what is known of a body serves on.
 
     Raises:
         ScenarioError: If the scenario of every job is refused; the first reason.
     """
     file, jobs, problem = study.file, [], None
-    for number, setting in enumerate(study.settings):
-        for body, seed in product(study.bodies, file.seeds):
+    for body in study.bodies:
+        for (number, setting), seed in product(enumerate(study.settings), file.seeds):
             at = f"-at{number}" if len(study.settings) > 1 else ""
             overrides = (*body.overrides, *setting.overrides, f"seed={seed}")
             try:

@@ -13,6 +13,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from manikin.analysis import Analysis
 from manikin.pipeline.run_directory import REPORT, read_summary
+from manikin.pipeline.study import PAGE
+from manikin.reports.figures import png_of
+from manikin.reports.figures.study_maps import VERDICTS, study_maps
 from manikin.reports.summary_table import FAMILY_HEADER, family_rows, verdict_line
 from manikin.runtime import __version__
 from manikin.runtime.display import readable
@@ -107,6 +110,28 @@ def write_benchmark_page(directory: Path, result: Mapping[str, Any]) -> Path:
     rows = family_rows(result)
     page = render("benchmark", result=result, header=FAMILY_HEADER, rows=rows, descriptions=descriptions)
     return write_result(directory / REPORT, page)
+
+
+def write_study_page(directory: Path, result: Mapping[str, Any]) -> Path:
+    """Write ``study.html`` of a study beside its results, and return the file.
+
+    Raises:
+        MotionFileError: If it cannot be written.
+    """
+    return write_result(directory / PAGE, study_page(result))
+
+
+def study_page(result: Mapping[str, Any]) -> str:
+    """HTML of a study: maps of success and margin, groups, and who can and who cannot, with the reasons."""
+    pictures = {words: png_of(figure) for words, figure in study_maps(result).items()}
+    people = {
+        verdict: [person for person in result["people"] if person["verdict"] == verdict]
+        for verdict in VERDICTS
+    }
+    count = {verdict: len(members) for verdict, members in people.items()}
+    swept, percent = list(result["settings"][0]), f"{100.0 * result['confidence']:g} %"
+    shown = {"pictures": pictures, "people": people, "count": count, "swept": swept, "percent": percent}
+    return render("study", result=result, **shown)
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -177,3 +177,27 @@ def failure_lines(result: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name} (check): {checked['verdict']}"
         if failure is not None:
             yield f"{name} ({failure['stage']}): {failure['reason']}"
+
+
+def group_table(result: Mapping[str, Any]) -> str:
+    """Groups of a study with their shares and intervals, in columns of equal width."""
+    swept = list(result["settings"][0])
+    percent = f"{100.0 * result['confidence']:g} % interval"
+    rows = [("group", *swept, "people", "can", "cannot", "undecided", "share", percent)]
+    for group in result["groups"]:
+        values = (str(result["settings"][group["setting"]][name]) for name in swept)
+        counts = (str(group[key]) for key in ("people", "can", "cannot", "undecided"))
+        share, interval = number(group["share"], 1, " %", 100.0), NOTHING
+        if group["interval"] is not None:
+            interval = " to ".join(number(value, 1, " %", 100.0) for value in group["interval"])
+        rows.append((group["group"], *values, *counts, share, interval))
+    return columns(rows, right=range(1, len(rows[0])))
+
+
+def person_lines(result: Mapping[str, Any]) -> Iterator[str]:
+    """Everybody of a study who cannot, or is undecided, with the reason."""
+    for person in result["people"]:
+        if person["verdict"] != "can":
+            values = result["settings"][person["setting"]]
+            at = "".join(f", {name} {value}" for name, value in values.items())
+            yield f"{person['body']}{at} {person['verdict']} ({person['stage']}): {person['reason']}"
