@@ -103,7 +103,10 @@ def on_cluster(
     with client:
         futures = client.map(partial(_alone, work), range(len(items)), items, pure=False, batch_size=100)
         try:
-            for future, result in distributed.as_completed(futures, with_results=True, raise_errors=False):
+            done = distributed.as_completed(
+                futures, loop=client.loop, with_results=True, raise_errors=False
+            )  # fmt: skip
+            for future, result in done:
                 if future.status != "finished":
                     raise ManikinError(f"a worker of the {name} on {address} failed: {result[1]}")
                 yield result
