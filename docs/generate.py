@@ -26,6 +26,7 @@ from manikin.reports.summary_table import counts_line
 from manikin.scenarios import json_schema
 from manikin.scenarios.families import FAMILIES
 from manikin.scenarios.stance_file import StanceFile
+from manikin.scenarios.study_file import study_schema
 from manikin.verification import ContactPlanFile
 
 DOCS = Path(__file__).parent
@@ -33,6 +34,7 @@ SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
     "scenario.schema.json": json_schema,
     "stance.schema.json": StanceFile.model_json_schema,
     "contact-plan.schema.json": ContactPlanFile.model_json_schema,
+    "study.schema.json": study_schema,
 }
 RESULTS = DOCS / "results.json"
 BENCHMARK = DOCS / "benchmark.json"
@@ -398,6 +400,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "scenario": lambda: schema_tables(json_schema()),
     "stance": lambda: schema_tables(StanceFile.model_json_schema()),
     "contact-plan": lambda: schema_tables(ContactPlanFile.model_json_schema()),
+    "study": lambda: schema_tables(study_schema()),
     "segments": segment_table,
     "hinges": hinge_table,
     "strength": strength_table,

@@ -12,9 +12,11 @@ import typer
 import manikin
 from manikin.cli import app
 from manikin.motion.file import write_motions
+from manikin.pipeline.study import study_jobs
 from manikin.reports import figures
 from manikin.scenarios import list_variants, load_scenario
 from manikin.scenarios.stance_file import judge_stance_file
+from manikin.scenarios.study_file import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -122,6 +124,18 @@ def test_examples_that_extend_a_scenario_are_valid_with_every_variant(tmp_path):
         (tmp_path / "example.yaml").write_text(text)
         assert load_scenario(tmp_path / "example.yaml").name
         assert list_variants(tmp_path / "example.yaml")
+
+
+def test_study_examples_are_read(tmp_path):
+    """Beside the scenario that the page gives."""
+    (scene,) = re.findall(r"```yaml\n(name: step\n.*?)```", PAGES["study.md"], re.DOTALL)
+    (tmp_path / "step.yaml").write_text(scene)
+    examples = yaml_examples("study")
+    assert examples
+    for text in examples:
+        (tmp_path / "study.yaml").write_text(text)
+        jobs = study_jobs(load_study(tmp_path / "study.yaml"))
+        assert all(job.scene is not None for job in jobs)
 
 
 def test_stance_examples_give_every_documented_key(tmp_path):

@@ -21,7 +21,7 @@ MARKS = {"female": "o", "male": "s"}
 """Marks of the sexes; others are drawn as those of men."""
 MARGINS = {
     "executed_margin_Nm": "least margin as executed [N.m]", "planned_margin_Nm": "least planned margin [N.m]",
-    "rest_torque_share": "largest share of the strength that rest on the contacts takes",
+    "rest_torque_share": "largest share of strength at rest",
 }  # fmt: skip
 """What is drawn as the margin, the first of which there is one; of a share, less is better."""
 _SHARE = ListedColormap([VERDICTS["cannot"], "#E8A77C", "#EFE3C8", "#8CCDB4", VERDICTS["can"]])
@@ -188,23 +188,29 @@ def _draw_table(
     table: FloatArray, rows: Sequence[str], columns: Sequence[str], words: Sequence[str], margin: str | None
 ) -> Figure:
     named = len(rows) <= _MOST_NAMES
-    left = 0.75 + (0.07 * max(map(len, rows)) if named else 0.0)
+    left = 0.85 + (0.07 * max(map(len, rows)) if named else 0.0)
     height = 1.6 + (0.24 * len(rows) if named else 6.0)
     width = left + max(3.0, min(0.7 * len(columns), 12.0)) + 1.3
-    title = "Share who can" if margin is None else f"Mean {MARGINS[margin]} of who can"
+    title = "Share who can" if margin is None else MARGINS[margin][0].upper() + MARGINS[margin][1:]
     figure, grid = new_grid(width, height, title, 1, 1, left=left, right=1.1, top=0.55, bottom=0.65)
     axes = figure.add_subplot(grid[0, 0])
     look: dict[str, Any] = (
-        {"cmap": _SHARE, "vmin": 0.0, "vmax": 1.0} if margin is None else {"cmap": "viridis"}
+        {"cmap": _SHARE, "vmin": 0.0, "vmax": 1.0} if margin is None else {"cmap": _colours(margin)}
     )
     axes.set_facecolor(COLOURS["shade"])
     image = axes.imshow(np.ma.masked_invalid(table), aspect="auto", origin="lower", **look)
     dress(axes, words[0], words[1])
     axes.grid(False)
+    axes.set_xticks(np.arange(len(columns) - 1) + 0.5, minor=True)
+    axes.set_yticks(np.arange(len(rows) - 1) + 0.5 if named else [], minor=True)
+    axes.grid(True, which="minor", color="white", linewidth=1.5)
+    axes.tick_params(which="minor", length=0)
     axes.set_xticks(range(len(columns)), columns, fontsize=8)
     axes.set_yticks(range(len(rows)) if named else [], rows if named else [], fontsize=8)
     if len(columns) > 8 or max(map(len, columns)) > 8:
         axes.tick_params(axis="x", labelrotation=45)
     bar = figure.add_axes((1.0 - 0.85 / width, 0.65 / height, 0.14 / width, 1.0 - 1.2 / height))
     figure.colorbar(image, cax=bar).ax.tick_params(labelsize=8)
+    grey = "grey: undecided" if margin is None else "grey: nobody who can"
+    figure.text(1.0 - 0.1 / width, 0.1 / height, grey, fontsize=8, color=COLOURS["soft"], ha="right")
     return figure
