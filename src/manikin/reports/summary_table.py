@@ -183,7 +183,9 @@ def group_table(result: Mapping[str, Any]) -> str:
     """Groups of a study with their shares and intervals, in columns of equal width."""
     swept = list(result["settings"][0])
     percent = f"{100.0 * result['confidence']:g} % interval"
-    rows = [("group", *swept, "people", "can", "cannot", "undecided", "share", percent)]
+    rows: list[tuple[str, ...]] = [
+        ("group", *swept, "people", "can", "cannot", "undecided", "share", percent)
+    ]
     for group in result["groups"]:
         values = (str(result["settings"][group["setting"]][name]) for name in swept)
         counts = (str(group[key]) for key in ("people", "can", "cannot", "undecided"))
