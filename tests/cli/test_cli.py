@@ -393,6 +393,50 @@ def test_terminated_process_ends_like_an_interrupted_one(number):
         assert process.stderr.read().count("\n") == 1
 
 
+def program(tmp_path, code, *, signalled):
+    """Status and output of ``python -m`` of a program with other commands, perhaps interrupted when ready."""
+    (tmp_path / "other.py").write_text(
+        "import os, signal, sys, time\nimport manikin.cli as cli\n"
+        f"from manikin.__main__ import program\n{code}\ncli.app = app\nsys.exit(program())\n"
+    )
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    with subprocess.Popen(
+        [sys.executable, "-m", "other"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        env={**os.environ, "PYTHONPATH": path},
+    ) as process:  # fmt: skip
+        if signalled:
+            assert process.stdout.readline() == "ready\n"
+            process.send_signal(signal.SIGINT)
+        return process.wait(timeout=30), process.stdout.read()
+
+
+def test_an_interrupt_in_code_that_was_given_as_text_is_no_death_by_signal(tmp_path):
+    """Python ends by SIGINT if KeyboardInterrupt ever left an ``exec``, as dataclasses use it."""
+    status, output = program(tmp_path, "def app(**_): exec('raise KeyboardInterrupt')", signalled=False)
+    assert status == INTERRUPTED
+    assert output.startswith("manikin: interrupted")
+
+
+def test_an_interrupt_waits_for_a_library_that_is_imported(tmp_path):
+    """Some catch everything around their own imports, and work on without a part of them."""
+    (tmp_path / "library.py").write_text(
+        "import time\nprint('ready', flush=True)\ntry:\n time.sleep(0.5)\n"
+        "except BaseException:\n PART = None\nelse:\n print('whole', flush=True)\n"
+    )
+    status, output = program(tmp_path, "def app(**_):\n import library\n time.sleep(60)", signalled=True)
+    assert (status, output.count("\n")) == (INTERRUPTED, 2)
+    assert output.startswith("whole\n")
+
+
+def test_a_signal_does_not_change_the_status_of_a_command_that_is_done(tmp_path):
+    """Python gives SIGINT back to the system before the last objects of a program go."""
+    code = (
+        "class Last:\n def __del__(self, kill=os.kill, own=os.getpid()):\n  kill(own, signal.SIGINT)\n"
+        "last = Last()\ndef app(**_):\n return 3"
+    )
+    assert program(tmp_path, code, signalled=False) == (FAILED, "")
+
+
 def test_export_writes_beside_the_run(capfd, finished_run, tmp_path):
     write_motions(tmp_path / "motion.h5", finished_run)
     assert main(["export", str(tmp_path), "--format", "csv", "--motion", "planned"]) == DONE

@@ -28,33 +28,59 @@ class Interruption:
     Both unwind the program, so that temporary files are removed.  SIGINT is listened to even
     where a shell starts background jobs with it ignored.  A native solver may swallow the
     exception and carry on with what it has; :meth:`check` raises it again if :attr:`requested`.
+    While another library is imported the exception waits: some take it for a part that is not installed.
     """
 
     def __init__(self) -> None:
         self.requested = False
         self._before: dict[signal.Signals, Any] = {}
+        self._outside: FrameType | None = None
 
     def __enter__(self) -> Self:
         # Elsewhere than in the main thread the host program decides about its signals.
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            self._outside = sys._getframe(1)
+            again = [signal.SIGALRM] if hasattr(signal, "setitimer") else []
+            for number in (signal.SIGINT, signal.SIGTERM, *again):
                 self._before[number] = signal.signal(number, self._stop)
         return self
 
     def __exit__(self, *error: object) -> None:
+        if signal.SIGALRM in self._before:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in self._before.items():
             signal.signal(number, handler)
+        self._outside = None
 
     def check(self) -> None:
         """Raise :class:`KeyboardInterrupt` if a signal has come."""
         if self.requested:
             raise KeyboardInterrupt
 
-    def _stop(self, _number: int, _frame: FrameType | None) -> None:
+    def _stop(self, _number: int, frame: FrameType | None) -> None:
         self.requested = True
+        if hasattr(signal, "setitimer") and self._loads_library(frame):
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+            return
         raise KeyboardInterrupt
 
+    def _loads_library(self, frame: FrameType | None) -> bool:
+        """Whether code of another library runs for an import, inside of the last function of ours."""
+        is_importing = is_foreign = False
+        while frame is not None and frame is not self._outside:
+            if str(frame.f_globals.get("__name__")).partition(".")[0] == _OURS:
+                break
+            of_import = frame.f_code.co_filename.startswith(_IMPORT)
+            is_importing, is_foreign = is_importing or of_import, is_foreign or not of_import
+            frame = frame.f_back
+        return is_importing and is_foreign
 
+
+_OURS = __name__.partition(".")[0]
+_IMPORT = "<frozen importlib."
+"""Beginning of the files of the functions that load modules, as tracebacks name them."""
+_AGAIN = 0.02
+"""Time after which an interruption is tried again [s]."""
 DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
 """Exit status of the commands."""
 
