@@ -36,12 +36,11 @@ from types import MappingProxyType
 import numpy as np
 
 from manikin.errors import BodyError
+from manikin.limits import BODY_MASS_INDEX_RANGE, MASS_RANGE, STATURE_RANGE
 from manikin.numerics.spatial import FloatArray, finite_number
 
-STATURE_RANGE, SOLE_LENGTH_RANGE, SOLE_WIDTH_RANGE = (0.90, 2.10), (0.12, 0.40), (0.05, 0.16)
-"""Accepted stature and size of the soles [m]."""
-MASS_RANGE, BODY_MASS_INDEX_RANGE = (12.0, 160.0), (10.0, 60.0)
-"""Accepted body mass [kg] and mass / stature^2 [kg/m^2]."""
+SOLE_LENGTH_RANGE, SOLE_WIDTH_RANGE = (0.12, 0.40), (0.05, 0.16)
+"""Accepted size of the soles [m]; that of the person is in :mod:`manikin.limits`."""
 ANKLE_HEIGHT, NECK_RADIUS = 0.043, 0.034
 """Ankle joint above the sole and radius of the neck, per stature."""
 ANKLE_FROM_HEEL, TOE_HINGE_FROM_HEEL = 0.26, 0.73

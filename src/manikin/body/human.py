@@ -33,8 +33,9 @@ from manikin.body.human_parts import (
 )
 from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
-from manikin.body.strength import AGE_RANGE, DEFAULT_AGE, HANDS, carrying, hinge_strength
+from manikin.body.strength import DEFAULT_AGE, HANDS, carrying, hinge_strength
 from manikin.errors import BodyError
+from manikin.limits import AGE_RANGE
 from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy, skew
 
 _SOFT_PAIRS = frozenset(frozenset(pair) for pair in (

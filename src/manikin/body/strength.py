@@ -29,7 +29,7 @@ from manikin.body.segments import Segment
 from manikin.errors import BodyError
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number
 
-DEFAULT_AGE, AGE_RANGE = 30.0, (18.0, 90.0)
+DEFAULT_AGE = 30.0
 """Age of a body that was given none, and accepted ages [years]."""
 
 PRINTED_FOR = 79.0

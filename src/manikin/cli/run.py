@@ -17,6 +17,7 @@ from manikin.cli.console import (
     argument,
     option,
 )
+from manikin.limits import AGE_RANGE, MASS_RANGE, STATURE_RANGE
 
 ALL = "all"
 """In place of a scenario: every built-in one with its variants."""
@@ -28,16 +29,22 @@ _UNCERTAINTY = "How far these worlds are from the believed one, relative to the 
 _MOVED = "Move the scenario's origin to X Y [m], turned [deg]."
 
 
+def _of_a_person(metavar: str, name: str, unit: str, valid: tuple[float, float]) -> Any:
+    """Option with another size or age of the person."""
+    low, high = valid
+    return option(metavar, f"Other {name}, {low:g} to {high:g} {unit}.", min=low, max=high)
+
+
 def run(
     context: typer.Context,
     scenario: Annotated[str, argument("NAME|FILE.yaml|all", _SCENARIO)],
     out: OutOption = None,
     seed: Annotated[int | None, option("N", "Seed; default: the scenario's.")] = None,
     json: JsonOption = False,
-    stature: Annotated[float | None, option("M", "Other stature, 1.4 to 2.1 m.", min=1.4, max=2.1)] = None,
-    mass: Annotated[float | None, option("KG", "Other mass, 35 to 160 kg.", min=35.0, max=160.0)] = None,
+    stature: Annotated[float | None, _of_a_person("M", "stature", "m", STATURE_RANGE)] = None,
+    mass: Annotated[float | None, _of_a_person("KG", "mass", "kg", MASS_RANGE)] = None,
     sex: SexOption = None,
-    age: Annotated[float | None, option("YEARS", "Other age, 18 to 90 years.")] = None,
+    age: Annotated[float | None, _of_a_person("YEARS", "age", "years", AGE_RANGE)] = None,
     strength: Annotated[float | None, option("X", "Torque limits over those of a healthy adult.")] = None,
     load_kg: Annotated[float | None, option("KG", "Load in the hands during the whole motion.")] = None,
     load_hand: LoadHandOption = None,
@@ -87,6 +94,7 @@ def _run_all(
 
     # A value that is not usable is refused once, and not once per run.
     any_job = load_scenario(next(iter(list_scenarios()))).with_body(**body)
+    any_job.build_body()
     if seed is not None:
         any_job.with_seed(seed)
     given = {"seed": seed} | {key.partition("_")[0]: value for key, value in body.items()}

@@ -15,8 +15,9 @@ import numpy as np
 from scipy.stats import norm
 
 from manikin.body import BodyModel
-from manikin.body.strength import AGE_RANGE, DEFAULT_AGE, HUMAN_STRENGTH, hinge_strength, variation
+from manikin.body.strength import DEFAULT_AGE, HUMAN_STRENGTH, hinge_strength, variation
 from manikin.errors import BodyError
+from manikin.limits import AGE_RANGE
 from manikin.numerics.spatial import FloatArray, finite_number
 
 SEXES = ("male", "female")

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.ergonomics.body_parts import Bearing
 from manikin.ergonomics.postural_angles import ArmAngles, PosturalAngles
 from manikin.errors import InputError
+from manikin.limits import AGE_RANGE
 from manikin.numerics.spatial import FloatArray, finite_number
 
 Scores = NDArray[np.int64]
@@ -145,7 +146,9 @@ class Circumstances:
         finite_number(self.lifting_hours, "hours of lifting", above=0.0, at_most=8.0)
         finite_number(self.back_lever_m, "lever of the back's muscles [m]", at_least=0.03, at_most=0.09)
         if self.people_age is not None:
-            finite_number(self.people_age, "age of the people [years]", at_least=18.0, at_most=90.0)
+            finite_number(
+                self.people_age, "age of the people [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1]
+            )
         for name, value, valid in (
             ("load pattern", self.load_pattern, PATTERNS),
             ("coupling", self.coupling, COUPLINGS),

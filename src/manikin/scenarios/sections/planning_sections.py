@@ -13,9 +13,10 @@ from pydantic import (
 )
 
 from manikin.body.dimensions import DIMENSIONS
-from manikin.body.strength import AGE_RANGE, DEFAULT_AGE
+from manikin.body.strength import DEFAULT_AGE
 from manikin.contact import FrictionModel
 from manikin.errors import ScenarioError
+from manikin.limits import AGE_RANGE
 from manikin.scenarios.expressions import Expression
 from manikin.scenarios.sections.support_sections import SOLE, SoleSection
 from manikin.scenarios.sections.task_sections import FrameSection
