@@ -230,8 +230,7 @@ def recordings_folder() -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
-def standing_file(tmp_path_factory) -> Path:
+def standing_bvh() -> str:
     """BVH of somebody of 1.75 m who stands for 60 frames at 50 Hz."""
     body, n = human(1.75, 79.0, "male"), 60
     flat, nv = np.zeros((n, 3)), body.nv
@@ -241,6 +240,12 @@ def standing_file(tmp_path_factory) -> Path:
         support=np.zeros((n, 0), dtype=bool), contact_force=np.zeros((n, 0, 6)), contact_names=(),
         joint_names=tuple(body.joint_names),
     )  # fmt: skip
+    return to_bvh(body, motion)
+
+
+@pytest.fixture(scope="session")
+def standing_file(tmp_path_factory) -> Path:
+    """File of :func:`standing_bvh`."""
     file = tmp_path_factory.mktemp("recordings") / "standing.bvh"
-    file.write_text(to_bvh(body, motion))
+    file.write_text(standing_bvh())
     return file

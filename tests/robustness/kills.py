@@ -1,7 +1,8 @@
 """Commands that are ended at random times: nothing half written, nothing left behind, no traceback.
 
 Each is started in a directory of its own and gets SIGKILL, SIGTERM or SIGINT after a seeded time.
-Then nothing of it may run, its directory must be free, and every file in it whole.
+Then nothing of it may run, its directory must be free, and every file in it whole. Those that do not take
+long are given once more, and must be done then; pieces that were kept are not done again.
 """
 
 import json
@@ -17,6 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from filelock import FileLock, Timeout
+from tests.robustness.samples import other_module
 
 from manikin.runtime.files import LOCK
 
@@ -24,25 +26,46 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 INTERRUPTED = 130
 LONGEST = 2.0
 """Time in which an interrupted command ends, and what it started with it [s]; our promise."""
+RESUMED = 600.0
+"""Time in which a command that is given again is done on a busy machine [s]."""
 BUSY = 4.0
 """How much longer that may take where other programs have the processors."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command that writes to a directory, and the time in which it is ended [s]."""
+    """A command that writes to a directory.
+
+    Attributes:
+        name: As in reports.
+        words: Arguments, with ``{out}`` for the directory and ``{recording}`` for a recording.
+        latest: Time in which it is ended [s].
+        is_resumed: Whether it is given again.
+        pieces: Pattern of the files of finished pieces, which stay as they are.
+    """
 
     name: str
     words: tuple[str, ...]
     latest: float
+    is_resumed: bool = False
+    pieces: str = ""
 
 
 COMMANDS = (
-    Command("run", ("run", "beam-H2C1", "--out", "{out}"), 40.0),
+    Command("run", ("run", "beam-H2C1", "--out", "{out}"), 40.0, is_resumed=True),
     Command("run all", ("run", "all", "--jobs", "2", "--no-figures", "--out", "{out}"), 25.0),
     Command("words", ("words", "--out", "{out}"), 25.0),
     Command("push map", ("push", "--map", "--out", "{out}"), 25.0),
     Command("benchmark", ("benchmark", "--out", "{out}"), 25.0),
+    Command("analyze", ("analyze", "{recording}", "--out", "{out}"), 15.0, is_resumed=True),
+    Command(
+        "benchmark of contacts",
+        (
+            "benchmark", "--families", "flat", "--seeds", "4", "--stage", "contacts", "--jobs", "2",
+            "--out", "{out}",
+        ),
+        30.0, is_resumed=True, pieces="tasks/*.json",
+    ),
 )  # fmt: skip
 
 
@@ -53,7 +76,10 @@ def killed(seed: int, case: int) -> list[str]:
     wait = float(rng.uniform(0.3, command.latest))
     with tempfile.TemporaryDirectory() as temporary:
         out = Path(temporary) / "out"
-        words = [sys.executable, "-m", "manikin", *(word.format(out=out) for word in command.words)]
+        recording = Path(temporary) / "standing.bvh"
+        recording.write_text(other_module("conftest.py").standing_bvh())
+        given = [word.format(out=out, recording=recording) for word in command.words]
+        words = [sys.executable, "-m", "manikin", *given]
         token = f"{os.getpid()}-{seed}-{case}"
         process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -65,6 +91,8 @@ def killed(seed: int, case: int) -> list[str]:
         except subprocess.TimeoutExpired:
             pass
         found = _ended(process, number, out, token)
+        if command.is_resumed:
+            found += _resumed(command, words, out)
         return [f"{command.name}, {number.name} after {wait:.2f} s: {what}" for what in found]
 
 
@@ -92,6 +120,23 @@ def _ended(process: "subprocess.Popen[str]", number: signal.Signals, out: Path, 
     if not _is_free(out):
         found.append("its directory is still locked")
     return found + _damaged(out, whole=number is not signal.SIGKILL)
+
+
+def _resumed(command: Command, words: list[str], out: Path) -> list[str]:
+    """What is wrong when the same command is given once more, and left to end."""
+    kept = {file: file.stat().st_mtime_ns for file in out.glob(command.pieces)} if command.pieces else {}
+    try:
+        again = subprocess.run(
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=RESUMED
+        )
+    except subprocess.TimeoutExpired:
+        return [f"given again, it is not done within {RESUMED:g} s"]
+    found = [
+        f"given again, does {file.name} anew" for file, at in kept.items() if file.stat().st_mtime_ns != at
+    ]
+    if again.returncode != 0:
+        found.append(f"given again, ends with status {again.returncode}: {again.stderr.strip()[-300:]}")
+    return found + [f"given again: {what}" for what in _damaged(out, whole=True)]
 
 
 def _is_free(out: Path) -> bool:

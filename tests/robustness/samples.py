@@ -40,7 +40,7 @@ class Format:
     text: bool = True
 
 
-def _other(path: str) -> Any:
+def other_module(path: str) -> Any:
     """Another test module, for its samples."""
     file = TESTS / path
     spec = importlib.util.spec_from_file_location(f"samples_of_{file.stem}", file)
@@ -86,7 +86,7 @@ def _read_stance(path: Path) -> list[Any]:
 
 def _motion(folder: Path) -> Path:
     body = load_scenario("platform").build_body()
-    module = _other("motion/test_file.py")
+    module = other_module("motion/test_file.py")
     motion = replace(module.random_motion(body, 12), time=0.01 * np.arange(12))
     write_motions(
         folder / "motion.h5", MotionFile(motion, None, body, load_scenario("platform").build_scene())
@@ -103,19 +103,19 @@ def _read_motion(path: Path) -> list[Any]:
 
 
 def _amc(folder: Path) -> Path:
-    module = _other("recordings/conftest.py")
+    module = other_module("recordings/conftest.py")
     (folder / "person.asf").write_text(module.ASF)
     return _written("person_1.amc", module.AMC)(folder)
 
 
 def _trc(folder: Path) -> Path:
-    module = _other("recordings/test_trc_mot.py")
+    module = other_module("recordings/test_trc_mot.py")
     (folder / "walk.mot").write_text(module.mot(module.pressing()))
     return _written("walk.trc", module.TRC)(folder)
 
 
 def _c3d(folder: Path) -> Path:
-    module = _other("recordings/test_c3d.py")
+    module = other_module("recordings/test_c3d.py")
     (folder / "small.c3d").write_bytes(module.c3d_bytes(*module.small()))
     return folder / "small.c3d"
 
@@ -165,7 +165,7 @@ def _read_contact_plan(path: Path) -> list[Any]:
 
 
 def _bvh(folder: Path) -> Path:
-    return _written("small.bvh", _other("recordings/conftest.py").BVH)(folder)
+    return _written("small.bvh", other_module("recordings/conftest.py").BVH)(folder)
 
 
 FORMATS = (
