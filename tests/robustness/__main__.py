@@ -2,6 +2,7 @@
 
 A process may use 2 GB more than it begins with. A case is done again alone by ``--format NAME --case N``.
 ``--kills 100`` ends that many commands at random times instead; with ``--case N`` that one alone.
+``--leaks 200`` makes every call that often, ``--determinism`` plans in two orders in two new processes.
 """
 
 import argparse
@@ -13,7 +14,9 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
+from tests.robustness.determinism import LARGE, SMALL, in_new_process
 from tests.robustness.kills import killed
+from tests.robustness.leaks import MOST, growths
 from tests.robustness.samples import FORMATS
 from tests.robustness.trial import Finding, batch_of
 
@@ -29,9 +32,15 @@ def main() -> int:
     parser.add_argument("--format", choices=[kind.name for kind in FORMATS])
     parser.add_argument("--case", type=int)
     parser.add_argument("--kills", type=int)
+    parser.add_argument("--leaks", type=int)
+    parser.add_argument("--determinism", action="store_true")
     given = parser.parse_args()
     if given.kills is not None:
         return _kills(given.seed, range(given.kills) if given.case is None else [given.case])
+    if given.leaks is not None:
+        return _leaks(given.leaks)
+    if given.determinism:
+        return _determinism()
     kinds = [kind.name for kind in FORMATS if given.format in (None, kind.name)]
     if given.case is not None:
         batches = [(name, given.seed, given.case, 1) for name in kinds]
@@ -64,6 +73,23 @@ def _kills(seed: int, cases: Iterable[int]) -> int:
             print(f"kill, seed {seed} case {case}: {what}", flush=True)
     print(f"{count} findings")
     return 1 if count else 0
+
+
+def _leaks(count: int) -> int:
+    found = growths(count)
+    for name, bytes_per_call in found.items():
+        print(f"{name}: {bytes_per_call:.0f} bytes per call")
+    return 1 if max(found.values()) > MOST else 0
+
+
+def _determinism() -> int:
+    names = (*SMALL, *LARGE)
+    first, second = in_new_process(names, hash_seed=1), in_new_process(names[::-1], hash_seed=2)
+    found = [name for name in names if first[name] != second[name]]
+    for name in found:
+        print(f"{name}: differs by what was planned before, or by hashes")
+    print(f"{len(names)} plans, {len(found)} findings")
+    return 1 if found else 0
 
 
 if __name__ == "__main__":

@@ -1,0 +1,25 @@
+"""A small share of ``python -m tests.robustness --leaks 200``."""
+
+import mmap
+import sys
+
+import pytest
+from tests.robustness.leaks import CALLS, MOST, growth, growths
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read from /proc")
+@pytest.mark.parametrize("name", [*CALLS, "scenario", "stance", "bvh", "c3d", "stl", "urdf"])
+def test_memory_does_not_grow_with_the_number_of_calls(name):
+    assert growths(20, [name])[name] <= MOST
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read from /proc")
+def test_a_leak_is_found():
+    """Memory that a call keeps, in pages of its own, is counted to the byte."""
+    kept, size = [], 1 << 20
+
+    def leak():
+        kept.append(mmap.mmap(-1, size))
+        kept[-1].write(b"x" * size)
+
+    assert growth(leak, 8) == pytest.approx(size, rel=0.05)
