@@ -49,20 +49,21 @@ def main() -> int:
         batches = [
             (name, given.seed, at, min(BATCH, each - at)) for name in kinds for at in range(0, each, BATCH)
         ]
-    began, findings, done = time.monotonic(), [], 0
+    began, count, done = time.monotonic(), 0, 0
     with ProcessPoolExecutor(given.jobs, get_context("spawn"), max_tasks_per_child=4) as pool:
         waiting = {pool.submit(batch_of, *batch): batch for batch in batches}
         for future in as_completed(waiting):
             batch = waiting[future]
             try:
-                findings += future.result()
+                findings = future.result()
                 done += batch[3]
             except BrokenProcessPool:
-                findings.append(Finding(batch[0], batch[1], batch[2], f"a process ended; cases {batch[2:]}"))
-    for finding in sorted(findings, key=lambda item: (item.format, item.case)):
-        print(f"{finding.format} seed {finding.seed} case {finding.case}: {finding.what}")
-    print(f"{done} damaged files, {len(findings)} findings, {time.monotonic() - began:.0f} s")
-    return 1 if findings else 0
+                findings = [Finding(batch[0], batch[1], batch[2], f"a process ended; cases {batch[2:]}")]
+            count += len(findings)
+            for finding in findings:
+                print(f"{finding.format} seed {finding.seed} case {finding.case}: {finding.what}", flush=True)
+    print(f"{done} damaged files, {count} findings, {time.monotonic() - began:.0f} s")
+    return 1 if count else 0
 
 
 def _kills(seed: int, cases: Iterable[int]) -> int:
