@@ -11,10 +11,8 @@ steps (:func:`recorded_walk`). ``docs/inverse.py`` applies both to recordings.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
@@ -23,7 +21,8 @@ from scipy.stats import t as student
 from manikin.errors import InputError, SolverError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.numerics.spline import BSpline, basis_matrix
-from manikin.walking.path.path_program import DEGREE, PathProgram, parameters_of, programme_of
+from manikin.walking.path.path_cost import DEGREE, path_cost, path_knots
+from manikin.walking.path.path_program import Guess, ends_of, solve, structure_of
 from manikin.walking.path.walk_obstacles import Walker
 from manikin.walking.path.walking_model import TERMS, WalkObjective, to_body, to_world
 from manikin.walking.path.walking_path import WalkingPath, WalkingTask
@@ -130,7 +129,7 @@ def _place(paths: ShoulderPaths) -> FloatArray:
 
 
 IDENTIFIED = TERMS[1:]
-"""The weights that can be identified; only their ratios to that of time matter to a path."""
+"""The weights of (5.6) that can be identified; only their ratios to that of time matter to a path."""
 
 FIRST_GUESS = WalkObjective(forward=1.0, lateral=1.0, angular=1.0, goal=1.0)
 """Where the fit starts: all weights equal."""
@@ -156,10 +155,10 @@ class IdentifiedObjective:
 
     Attributes:
         objective: With the identified weights; that of time is 1.
-        low: (4,) lower ends of the confidence intervals, in the order of :data:`IDENTIFIED`.
-        high: (4,) upper ends.
+        low: (k,) lower ends of the confidence intervals of the identified weights.
+        high: (k,) upper ends.
         confidence: Of the intervals.
-        correlation: (4, 4) of the logarithms of the weights.
+        correlation: (k, k) of the logarithms of the weights.
         position_errors: (walks,) mean distance between recorded and optimal places at the same instants [m].
         share_errors: (walks,) mean distance between them at equal shares of their durations [m].
         heading_errors: (walks,) root mean square at the same instants [rad].
@@ -183,6 +182,8 @@ def identify_objective(
     walks: Sequence[RecordedWalk],
     first: WalkObjective = FIRST_GUESS,
     *,
+    names: Sequence[str] = IDENTIFIED,
+    heading_length: float = HEADING_LENGTH,
     confidence: float = 0.95,
     independent_samples: bool = True,
 ) -> IdentifiedObjective:
@@ -190,12 +191,15 @@ def identify_objective(
 
     Args:
         walks: At least one; a single one leaves some weights vague, which the intervals show.
-        first: Where to start, and the ``goal_fade`` that is kept.
+        first: Where to start; what is not identified is kept. The weight of time is 1.
+        names: Weights that are identified, none of them 0 in ``first``.
+        heading_length: Error of position that weighs as much as one of heading of one radian [m]; 0 for
+            models that predict no heading.
         confidence: Of the intervals, between 0 and 1.
         independent_samples: Whether the errors of one walk are independent from sample to sample, as noise
             is. Those of people are not: their intervals are cluster-robust, only the walks are independent
             (Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73
-            (1986)). That takes more than four walks.
+            (1986)). That takes more walks than weights.
 
     Raises:
         InputError: If there is no walk, or too few, the confidence is not usable, or no walk depends on some
@@ -206,23 +210,23 @@ def identify_objective(
         raise InputError("no recorded walk to identify weights from; valid: at least one")
     if not 0.0 < confidence < 1.0:
         raise InputError(f"confidence is {confidence!r}; valid: between 0 and 1")
-    if not independent_samples and len(walks) <= len(IDENTIFIED):
+    if not independent_samples and len(walks) <= len(names):
         raise InputError(
-            f"{len(walks)} recorded walks for intervals between walks; valid: more than {len(IDENTIFIED)}"
+            f"{len(walks)} recorded walks for intervals between walks; valid: more than {len(names)}"
         )
-    fits = [_Fit(walk, first) for walk in walks]
-    start = np.log(np.clip(first.weights[1:] / first.time, *_RANGE))
+    fits = [_Fit(walk, first, names, heading_length) for walk in walks]
+    start = np.log(np.clip([getattr(first, name) / first.time for name in names], *_RANGE))
 
     def residuals(logs: FloatArray) -> FloatArray:
-        return np.concatenate([fit.at(_objective(first, logs)).residuals for fit in fits])
+        return np.concatenate([fit.at(_objective(first, logs, names)).residuals for fit in fits])
 
     def slopes(logs: FloatArray) -> FloatArray:
-        return np.vstack([fit.at(_objective(first, logs)).slopes for fit in fits])
+        return np.vstack([fit.at(_objective(first, logs, names)).slopes for fit in fits])
 
-    _check_effects(slopes(start))
+    _check_effects(slopes(start), names)
     exact: Any = slopes  # the stubs know names of difference rules only
     found = least_squares(residuals, start, exact, tuple(np.log(_RANGE)), xtol=1e-8, ftol=1e-10)
-    objective = _objective(first, found.x)
+    objective = _objective(first, found.x, names)
     matches = [fit.at(objective) for fit in fits]
     covariance, freedom = _covariance(matches, independent_samples)
     error = np.sqrt(np.diag(covariance))
@@ -243,11 +247,12 @@ def identify_objective(
 
 @dataclass(frozen=True, eq=False)
 class _Match:
-    """An optimal path beside a recording: (3 n,) errors [m] and (3 n, 4) slopes over the log weights."""
+    """An optimal path beside a recording: (3 n,) errors [m] and (3 n, k) slopes over the log weights."""
 
     path: WalkingPath
     residuals: FloatArray
     slopes: FloatArray
+    heading_errors: FloatArray
 
     @property
     def position_error(self) -> float:
@@ -256,17 +261,21 @@ class _Match:
 
     @property
     def heading_error(self) -> float:
-        return float(np.sqrt(np.mean((self.residuals.reshape(-1, 3)[:, 2] / HEADING_LENGTH) ** 2)))
+        return float(np.sqrt(np.mean(self.heading_errors**2)))
 
 
 class _Fit:
     """One recorded walk and its optimal path, which is kept to start the next one from."""
 
-    def __init__(self, walk: RecordedWalk, first: WalkObjective) -> None:
-        self._walk = walk
+    def __init__(
+        self, walk: RecordedWalk, first: WalkObjective, names: Sequence[str] = IDENTIFIED,
+        heading_length: float = HEADING_LENGTH,
+    ) -> None:  # fmt: skip
+        self._walk, self._names = walk, names
+        self._scales = np.array([1.0, 1.0, heading_length])
         self._task = task_of(walk, first)
-        self._programme = programme_of(self._task)
-        self._unknowns = _unknowns_of(walk, self._programme)
+        self._pieces = structure_of(self._task).pieces
+        self._guess = _guess_of(walk, self._pieces)
         self._match: _Match | None = None
 
     def at(self, objective: WalkObjective) -> _Match:
@@ -276,29 +285,27 @@ class _Fit:
         return self._match
 
     def _solved(self, objective: WalkObjective) -> _Match:
-        task, programme = replace(self._task, objective=objective), self._programme
-        values = parameters_of(task, np.zeros(1), task.goal)
-        parameters = programme.pack_parameters(values)
-        solution = programme.solver(x0=self._unknowns, p=parameters)
-        stats = programme.solver.stats()
-        if not stats["success"]:
+        task = replace(self._task, objective=objective)
+        path = solve(task, self._guess)
+        if not path.succeeded:
             raise SolverError(
                 f"no optimal path to {task.goal.tolist()} for weights {objective.weights.tolist()}: "
-                f"{stats['return_status']}"
+                f"{path.failure}"
             )
-        self._unknowns = np.asarray(solution["x"], dtype=np.float64).ravel()
-        spline, duration = programme.unpack(self._unknowns, values)
-        path = WalkingPath(
-            task, spline, duration, float(solution["f"]), "recording", int(stats["iter_count"])
+        self._guess = Guess("recording", path.spline.control_points, path.duration)
+        unknowns = np.append(path.spline.control_points[2:-2].ravel(order="F"), path.duration)
+        hessian, terms = path_cost(self._pieces, objective.further).sensitivities(
+            unknowns, ends_of(task, task.goal), objective.goal_fade, objective.weights
         )
-        hessian, terms = (np.asarray(m) for m in _sensitivities(programme)(self._unknowns, parameters))
-        moved = -np.linalg.solve(hessian, terms[:, 1:] * objective.weights[1:])
-        return _Match(path, self._errors(path), self._place_slopes(path) @ moved)
+        chosen = [objective.terms.index(name) for name in self._names]
+        moved = -np.linalg.solve(hessian, terms[:, chosen] * objective.weights[chosen])
+        errors = self._errors(path)
+        slopes = self._place_slopes(path) @ moved
+        return _Match(path, (errors * self._scales).ravel(), slopes, errors[:, 2])
 
     def _errors(self, path: WalkingPath) -> FloatArray:
         time = np.minimum(self._walk.time, path.duration)
-        errors = path.place_at(time) - self._walk.place
-        return (errors * [1.0, 1.0, HEADING_LENGTH]).ravel()
+        return path.place_at(time) - self._walk.place
 
     def _place_slopes(self, path: WalkingPath) -> FloatArray:
         """(3 n, unknowns) slopes of the scaled places at the recorded instants over the unknowns."""
@@ -306,10 +313,10 @@ class _Fit:
         whole = basis_matrix(DEGREE, path.spline.knots, share)
         basis = whole[:, 2:-2]
         running = (self._walk.time < path.duration)[:, None]
-        # The last unknown is the logarithm of the duration: a longer walk is at an earlier share of it.
-        later = -np.where(running, share[:, None] * path.spline(share, 1), 0.0)
+        # The last unknown is the duration: a longer walk is at an earlier share of it.
+        later = -np.where(running, share[:, None] * path.spline(share, 1), 0.0) / path.duration
         # The control points beside the ends follow from the velocities there, times the duration.
-        step = path.duration / (DEGREE * self._programme.structure.pieces)
+        step = 1.0 / (DEGREE * self._pieces)
         task = path.task
         rates = (
             to_world(task.start[2], task.start_velocity),
@@ -318,20 +325,10 @@ class _Fit:
         ends = step * (np.outer(whole[:, 1], rates[0]) - np.outer(whole[:, -2], rates[1]))
         count = basis.shape[1]
         slopes = np.zeros((len(share), 3, 3 * count + 1))
-        for axis, scale in enumerate((1.0, 1.0, HEADING_LENGTH)):
+        for axis, scale in enumerate(self._scales):
             slopes[:, axis, axis * count : (axis + 1) * count] = scale * basis
             slopes[:, axis, -1] = scale * (later[:, axis] + ends[:, axis])
         return slopes.reshape(3 * len(share), -1)
-
-
-@cache
-def _sensitivities(programme: PathProgram) -> ca.Function:
-    """Of unknowns and parameters: Hessian of the objective and (unknowns, 5) slopes of the terms."""
-    x, terms = programme.symbols["x"], programme.symbols["terms"]
-    hessian, _ = ca.hessian(programme.symbols["f"], x)
-    slopes = ca.jacobian(terms, x).T
-    outputs = [ca.densify(hessian), ca.densify(slopes)]
-    return ca.Function("sensitivities", [x, programme.symbols["p"]], outputs)
 
 
 def task_of(walk: RecordedWalk, objective: WalkObjective) -> WalkingTask:
@@ -368,7 +365,7 @@ def _share_error(path: WalkingPath, walk: RecordedWalk) -> float:
 
 
 def _covariance(matches: Sequence[_Match], independent_samples: bool) -> tuple[FloatArray, int]:
-    """(4, 4) of the logarithms of the weights, and the degrees of freedom of their intervals."""
+    """(k, k) of the logarithms of the weights, and the degrees of freedom of their intervals."""
     slopes = np.vstack([one.slopes for one in matches])
     residuals = np.concatenate([one.residuals for one in matches])
     bread = np.linalg.pinv(slopes.T @ slopes)
@@ -380,9 +377,9 @@ def _covariance(matches: Sequence[_Match], independent_samples: bool) -> tuple[F
     return bread @ (scores.T @ scores) @ bread * (len(matches) / freedom), freedom
 
 
-def _check_effects(slopes: FloatArray) -> None:
+def _check_effects(slopes: FloatArray, names: Sequence[str]) -> None:
     without = [
-        name for name, effect in zip(IDENTIFIED, np.abs(slopes).max(axis=0), strict=True) if effect < _EFFECT
+        name for name, effect in zip(names, np.abs(slopes).max(axis=0), strict=True) if effect < _EFFECT
     ]
     if without:
         raise InputError(
@@ -391,17 +388,18 @@ def _check_effects(slopes: FloatArray) -> None:
         )
 
 
-def _objective(first: WalkObjective, logs: FloatArray) -> WalkObjective:
-    return replace(first, time=1.0, **dict(zip(IDENTIFIED, np.exp(logs).tolist(), strict=True)))
+def _objective(
+    first: WalkObjective, logs: FloatArray, names: Sequence[str] = IDENTIFIED
+) -> WalkObjective:
+    return replace(first, time=1.0, **dict(zip(names, np.exp(logs).tolist(), strict=True)))
 
 
-def _unknowns_of(walk: RecordedWalk, programme: PathProgram) -> FloatArray:
-    """Unknowns of a smooth path through a recording."""
-    knots = programme.structure.knots
+def _guess_of(walk: RecordedWalk, pieces: int) -> Guess:
+    """A smooth path through a recording."""
     share = walk.time / walk.time[-1]
     # A recording may have fewer instants than the spline has pieces.
-    even = np.linspace(0.0, 1.0, 10 * programme.structure.pieces)
+    even = np.linspace(0.0, 1.0, 10 * pieces)
     places = np.column_stack([np.interp(even, share, walk.place[:, axis]) for axis in range(3)])
     ends = (np.tile(walk.start, (2, 1)), np.tile(walk.goal, (2, 1)))
-    spline = BSpline.fit(DEGREE, knots, even, places, first=ends[0], last=ends[1])
-    return programme.pack(spline.control_points, float(walk.time[-1]))
+    spline = BSpline.fit(DEGREE, path_knots(pieces), even, places, first=ends[0], last=ends[1])
+    return Guess("recording", spline.control_points, float(walk.time[-1]))

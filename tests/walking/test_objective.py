@@ -35,7 +35,7 @@ def test_goal_direction_is_counted_from_the_heading_within_half_a_turn(offset, h
 def test_goal_term_fades_to_one_half_at_its_distance_and_to_nothing_at_the_goal():
     objective = WalkObjective(goal_fade=0.2)
     places = np.array([[1.0 - 0.2, 2.0, np.pi / 2], [1.0 - 20.0, 2.0, np.pi / 2], [1.0, 2.0, np.pi / 2]])
-    rates = cost_rates(places, np.zeros((3, 3)), GOAL, objective)[:, 4]
+    rates = cost_rates(places, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), GOAL, objective)[:, 4]
     square = (np.pi / 2) ** 2
     assert rates == pytest.approx([square / 2, square, 0.0], rel=1e-3)
 

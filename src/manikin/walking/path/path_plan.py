@@ -22,11 +22,13 @@ from manikin.walking.path.path_program import (
     Guess,
     bent,
     cheapest,
+    free_optimum,
     lacking,
     sharpened,
     solve,
     structure_of,
 )
+from manikin.walking.path.path_table import EXPECTED, shipped_table
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
 from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective
 from manikin.walking.path.walking_path import WalkingPath, WalkingTask
@@ -212,9 +214,32 @@ def walking_path(
         frozen_array(goal_velocity, "walking goal_velocity [m/s, m/s, rad/s]", (3,)),
     )  # fmt: skip
     _check(task)
-    guesses = _guesses(task) if like is None else [Guess("like another", *bent(like, task))]
-    free = cheapest([solve(replace(task, obstacles=()), guess) for guess in guesses])
+    free = _free(replace(task, obstacles=()), like)
     return sharpened(_around(task, free) if task.obstacles else free)
+
+
+def _free(task: WalkingTask, like: WalkingPath | None) -> WalkingPath:
+    """The cheapest path without obstacles; the speed limit only matters where the best path exceeds it."""
+    unlimited = replace(task, max_speed=None)
+    path = _from_table(unlimited) if like is None else None
+    path = replace(path or _cheapest_free(unlimited, like), task=task)
+    return path if path.succeeded and lacking(path).max() <= 0.0 else _cheapest_free(task, like)
+
+
+def _cheapest_free(task: WalkingTask, like: WalkingPath | None) -> WalkingPath:
+    """The cheapest path from all guesses, or from a path like it."""
+    guesses = initial_guesses(task) if like is None else [Guess("like another", *bent(like, task))]
+    return cheapest([solve(task, guess) for guess in guesses])
+
+
+def _from_table(task: WalkingTask) -> WalkingPath | None:
+    """The best path from the guesses of the table, or None if it has none or the path is not as expected."""
+    table = shipped_table()
+    if table is None or not table.covers(task):
+        return None
+    guesses, expected = table.guesses(task)
+    found = [path for guess in guesses if (path := free_optimum(task, guess)) is not None]
+    return cheapest(found) if found and min(path.cost for path in found) <= EXPECTED * expected else None
 
 
 def _check(task: WalkingTask) -> None:
@@ -231,7 +256,8 @@ def _check(task: WalkingTask) -> None:
                 raise InputError(f"walking {name} leaves {room}; valid: at least {task.room:g} m")
 
 
-def _guesses(task: WalkingTask) -> Iterator[Guess]:
+def initial_guesses(task: WalkingTask) -> Iterator[Guess]:
+    """Guesses of the path without obstacles, those of :data:`GUESSES` that are worth trying."""
     # Somewhat above that of a straight walk.
     distance = float(np.hypot(*(task.goal[:2] - task.start[:2])))
     duration = 1.3 * task.objective.straight_duration(max(distance, 0.3))

@@ -15,13 +15,18 @@ import casadi as ca
 import numpy as np
 
 from manikin.numerics.spatial import FloatArray
-from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
+from manikin.numerics.spline import BSpline, basis_matrix
+from manikin.walking.path.path_cost import (
+    DEGREE,
+    PathEnds,
+    gauss_points,
+    path_cost,
+    path_knots,
+    term_rates,
+)
 from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_model import to_world
 from manikin.walking.path.walking_path import TOLERANCE, WalkingPath, WalkingTask
-
-DEGREE = 4
-"""Degree of the spline: continuous rates of the accelerations."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +34,24 @@ class PathStructure:
     """What the programme's expressions depend on; numbers are its parameters.
 
     Of each obstacle these are the numbers of corners and of instants, of the walker that of discs.
+    ``further`` says whether there are terms beyond those of (5.6).
     """
 
     pieces: int
     obstacles: tuple[tuple[int, int], ...] = ()
     discs: int = 1
     limited_speed: bool = False
+    further: bool = False
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing constrains the path but its ends."""
+        return not self.obstacles and not self.limited_speed
 
     @property
     def knots(self) -> FloatArray:
         """(n,) knots of the spline over [0, 1]."""
-        return clamped_knots(DEGREE, np.linspace(0.0, 1.0, self.pieces + 1))
+        return path_knots(self.pieces)
 
     @property
     def sample_shares(self) -> FloatArray:
@@ -53,7 +65,7 @@ class PathProgram:
 
     Attributes:
         structure: What its expressions depend on.
-        symbols: CasADi's ``x``, ``p``, ``f`` and ``g`` with ``terms``, (5, 1) integrals of the terms.
+        symbols: CasADi's ``x``, ``p``, ``f`` and ``g``.
         parameters: Names and shapes of the parameters, in order.
         rows: Number of rows of each group of constraints, in order: one group per obstacle, then the speed.
     """
@@ -86,13 +98,8 @@ class PathProgram:
     def unpack(self, unknowns: FloatArray, values: dict[str, Any]) -> tuple[BSpline, float]:
         """Spline over [0, 1] through place and heading, and duration [s]."""
         duration = float(np.exp(unknowns[-1]))
-        inner = unknowns[:-1].reshape(3, -1).T
-        start, goal = np.asarray(values["start"]), np.asarray(values["goal"])
-        step = duration / (DEGREE * self.structure.pieces)
-        second = start + step * np.asarray(values["start_rate"])
-        last_but_one = goal - step * np.asarray(values["goal_rate"])
-        points = np.vstack([start, second, inner, last_but_one, goal])
-        return BSpline(DEGREE, self.structure.knots, points), duration
+        ends = PathEnds(*(np.asarray(values[name]) for name in ("start", "goal", "start_rate", "goal_rate")))
+        return spline_of(self.structure, ends, np.append(unknowns[:-1], duration)), duration
 
 
 class _Parameters(dict[str, ca.SX]):
@@ -116,7 +123,7 @@ def transcribe(structure: PathStructure) -> PathProgram:
     step = duration / (DEGREE * structure.pieces)
     points = ca.vertcat(start, start + step * start_rate, inner, goal - step * goal_rate, goal)
     terms = _terms(structure, points, duration, goal, parameter("fade", 1))
-    objective = ca.dot(parameter("weights", 5), terms)
+    objective = ca.dot(parameter("weights", terms.numel()), terms)
     rows = _obstacle_rows(structure, points, duration, parameter)
     if structure.limited_speed:
         # Room below the speed limit, as a difference of squares over the limit [m/s].
@@ -124,7 +131,7 @@ def transcribe(structure: PathStructure) -> PathProgram:
         rate = _basis(structure, structure.sample_shares, 1) @ points[:, :2] / duration
         rows.append(limit - ca.sum2(rate**2) / limit)
     unknowns, packed = ca.vertcat(ca.vec(inner), log_duration), ca.vertcat(*map(ca.vec, parameter.values()))
-    symbols = {"x": unknowns, "p": packed, "f": objective, "g": ca.vertcat(*rows), "terms": terms}
+    symbols = {"x": unknowns, "p": packed, "f": objective, "g": ca.vertcat(*rows)}
     shapes = tuple((name, p.shape) for name, p in parameter.items())
     return PathProgram(structure, symbols, shapes, tuple(row.numel() for row in rows))
 
@@ -136,23 +143,15 @@ def _basis(structure: PathStructure, shares: FloatArray, derivative: int = 0) ->
 
 
 def _terms(structure: PathStructure, points: ca.SX, duration: ca.SX, goal: ca.SX, fade: ca.SX) -> ca.SX:
-    """(5, 1) integrals of (5.6) without their weights, by three Gauss points per piece."""
-    roots, weights = np.polynomial.legendre.leggauss(3)
-    shares = ((np.arange(structure.pieces)[:, None] + (roots + 1.0) / 2.0) / structure.pieces).ravel()
-    part = duration * ca.DM(np.tile(weights / 2.0 / structure.pieces, structure.pieces))
-    place = _basis(structure, shares) @ points
-    rate = _basis(structure, shares, 1) @ points / duration
-    second = _basis(structure, shares, 2) @ points / duration**2
-    cos, sin = ca.cos(place[:, 2]), ca.sin(place[:, 2])
-    forward, left = cos * rate[:, 0] + sin * rate[:, 1], cos * rate[:, 1] - sin * rate[:, 0]
-    along = cos * second[:, 0] + sin * second[:, 1] + rate[:, 2] * left
-    across = cos * second[:, 1] - sin * second[:, 0] - rate[:, 2] * forward
-    dx, dy = goal[0] - place[:, 0], goal[1] - place[:, 1]
-    psi = ca.atan2(cos * dy - sin * dx, cos * dx + sin * dy)
-    square = dx**2 + dy**2
-    faded = square / (square + fade**2) * psi**2
-    integrals = [ca.dot(part, value) for value in (along**2, across**2, second[:, 2] ** 2, faded)]
-    return ca.vertcat(duration, *integrals)
+    """(k, 1) integrals of the terms without their weights, by three Gauss points per piece."""
+    shares, parts = gauss_points(structure.pieces)
+    orders = [
+        ca.horzsplit(_basis(structure, shares, order) @ points / duration**order)
+        for order in range(4 if structure.further else 3)
+    ]
+    third = orders[3] if structure.further else None
+    rates = term_rates(orders[0], orders[1], orders[2], third, goal, fade)
+    return ca.vertcat(*(duration * ca.dot(ca.DM(parts), rate) for rate in rates))
 
 
 def _obstacle_rows(
@@ -208,7 +207,7 @@ def structure_of(task: WalkingTask, finer: int = 1) -> PathStructure:
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
     obstacles = tuple((len(item.corners), len(item.times)) for item in task.obstacles)
     discs, pieces = len(task.walker.offsets) if obstacles else 1, finer * (20 if distance <= 10.0 else 40)
-    return PathStructure(pieces, obstacles, discs, task.max_speed is not None)
+    return PathStructure(pieces, obstacles, discs, task.max_speed is not None, task.objective.further)
 
 
 def programme_of(task: WalkingTask, finer: int = 1) -> PathProgram:
@@ -244,8 +243,12 @@ def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
     """Optimise from one guess, again with more room where the path between the samples had too little.
 
     The result is the last iterate, whose ``failure`` says if it is no solution. Its pieces, and the guess's,
-    are ``finer`` times as many as usual.
+    are ``finer`` times as many as usual. Without constraints Newton's method is enough
+    (:meth:`~manikin.walking.path.path_cost.PathCost.minimum`), and IPOPT is asked where that does not end.
     """
+    free = free_optimum(task, guess, finer) if structure_of(task, finer).free else None
+    if free is not None:
+        return free
     programme = programme_of(task, finer)
     tightening = np.zeros(len(task.obstacles) + 1)
     unknowns = programme.pack(guess.points, guess.duration)
@@ -272,6 +275,35 @@ def solve(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath:
         name = task.obstacles[worst].name
         reason = f"no way around obstacle {name!r} was found; the nearest attempt lacks {short[worst]:.3g} m"
     return replace(path, failure=reason)
+
+
+def free_optimum(task: WalkingTask, guess: Guess, finer: int = 1) -> WalkingPath | None:
+    """The optimum without constraints that Newton's method reaches from a guess, or None."""
+    structure, goal = structure_of(task, finer), guess.points[-1]
+    cost = path_cost(structure.pieces, structure.further)
+    begin = np.append(guess.points[2:-2].ravel(order="F"), guess.duration)
+    found, value, iterations, converged = cost.minimum(
+        begin, ends_of(task, goal), task.objective.goal_fade, task.objective.weights
+    )
+    if not converged:
+        return None
+    spline = spline_of(structure, ends_of(task, goal), found)
+    return WalkingPath(task, spline, float(found[-1]), value, guess.name, iterations)
+
+
+def ends_of(task: WalkingTask, turned_goal: FloatArray) -> PathEnds:
+    """The ends of a task's paths, the goal (3,) turned by whole turns as a guess arrives."""
+    rates = to_world(task.start[2], task.start_velocity), to_world(task.goal[2], task.goal_velocity)
+    return PathEnds(task.start, turned_goal, *rates)
+
+
+def spline_of(structure: PathStructure, ends: PathEnds, unknowns: FloatArray) -> BSpline:
+    """Spline over [0, 1] through place and heading, of (k, 3) inner control points and a duration [s]."""
+    step = float(unknowns[-1]) / (DEGREE * structure.pieces)
+    second, last_but_one = ends.start + step * ends.start_rate, ends.goal - step * ends.goal_rate
+    inner = unknowns[:-1].reshape(3, -1).T
+    points = np.vstack([ends.start, second, inner, last_but_one, ends.goal])
+    return BSpline(DEGREE, structure.knots, points)
 
 
 def sharpened(path: WalkingPath) -> WalkingPath:

@@ -17,7 +17,16 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number
 
 TERMS = ("time", "forward", "lateral", "angular", "goal")
-"""Names of the five terms, in the order of every vector of them."""
+"""Names of the five terms of (5.6), in the order of every vector of them."""
+
+FURTHER_TERMS = ("speed", "turning", "jerk", "work", "tangential")
+"""Names of terms of other models, most of which the thesis tried and rejected (5.6).
+
+They follow the others where one has a weight."""
+
+POWER_BLUR, SPEED_BLUR = 0.05, 0.05
+"""Power per mass [W/kg] and speed [m/s] below which the terms of work and of the speed's rate are rounded
+off, where they have no slope."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +49,11 @@ class WalkObjective:
         angular: a3 [s^3/rad^2].
         goal: a4 [1/(s rad^2)].
         goal_fade: Distance at which the goal term has faded to one half [m].
+        speed: Of the square of the speed over the floor, as of kinetic energy [s/m^2].
+        turning: Of the square of the angular velocity [s/rad^2].
+        jerk: Of the square of the third derivative of the place [s^5/m^2].
+        work: Of the mechanical work per mass done on the body, either way, ``|v a|`` [s^2/m^2].
+        tangential: Of the square of the rate of the speed over the floor [s^3/m^2] (2.3).
     """
 
     time: float = 1.0
@@ -48,17 +62,35 @@ class WalkObjective:
     angular: float = 0.7
     goal: float = 5.2
     goal_fade: float = 0.5
+    speed: float = 0.0
+    turning: float = 0.0
+    jerk: float = 0.0
+    work: float = 0.0
+    tangential: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            where, least = f"walking weight {name.replace('_', ' ')}", 0.0 if name == "goal" else None
+            where, least = (
+                f"walking weight {name.replace('_', ' ')}",
+                0.0 if name in ("goal", *FURTHER_TERMS) else None,
+            )
             number = finite_number(value, where, at_least=least, above=0.0 if least is None else None)
             object.__setattr__(self, name, number)
 
     @property
+    def further(self) -> bool:
+        """Whether a term beyond those of (5.6) has a weight."""
+        return any(getattr(self, name) > 0.0 for name in FURTHER_TERMS)
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of its terms: :data:`TERMS`, with :data:`FURTHER_TERMS` if one of them has a weight."""
+        return TERMS + FURTHER_TERMS if self.further else TERMS
+
+    @property
     def weights(self) -> FloatArray:
-        """(5,) weights in the order of :data:`TERMS`."""
-        return np.array([self.time, self.forward, self.lateral, self.angular, self.goal])
+        """(k,) weights in the order of :attr:`terms`."""
+        return np.array([getattr(self, name) for name in self.terms])
 
     def straight_duration(self, distance: float) -> float:
         """Duration of the best walk straight ahead, ``(36 a1 d^2 / a0)^(1/4)`` [s]; its cost is 4/3 a0 T."""
@@ -88,15 +120,30 @@ def goal_direction(place: FloatArray, goal: FloatArray) -> FloatArray:
 
 
 def cost_rates(
-    place: FloatArray, acceleration: FloatArray, goal: FloatArray, objective: WalkObjective
-) -> FloatArray:
-    """(n, 5) integrands of the terms without their weights, on the way to a goal (3,).
+    place: FloatArray, velocity: FloatArray, acceleration: FloatArray, jerk: FloatArray,
+    goal: FloatArray, objective: WalkObjective,
+) -> FloatArray:  # fmt: skip
+    """(n, k) integrands of the terms of an objective without their weights.
 
-    Places are (n, 3) x, y [m], heading [rad], accelerations (n, 3) forward, left [m/s^2], angular [rad/s^2].
+    Args:
+        place: (n, 3) x, y [m], heading [rad].
+        velocity: (n, 3) forward, left [m/s], angular [rad/s].
+        acceleration: (n, 3) forward, left [m/s^2], angular [rad/s^2].
+        jerk: (n, 3) third derivatives of x, y [m/s^3] and heading [rad/s^3].
+        goal: (3,) x, y [m], heading [rad].
+        objective: Which terms, and where that of the goal fades.
     """
     square = np.sum((goal[:2] - place[:, :2]) ** 2, axis=1)
     faded = square / (square + objective.goal_fade**2) * goal_direction(place, goal) ** 2
-    return np.column_stack([np.ones(len(place)), acceleration**2, faded])
+    rates = np.column_stack([np.ones(len(place)), acceleration**2, faded])
+    if not objective.further:
+        return rates
+    # The rate of half the square of the speed is the same in every frame.
+    power = np.sum(velocity[:, :2] * acceleration[:, :2], axis=1)
+    square = np.sum(velocity[:, :2] ** 2, axis=1)
+    work, tangential = np.hypot(power, POWER_BLUR) - POWER_BLUR, power**2 / (square + SPEED_BLUR**2)
+    jerks = np.sum(jerk[:, :2] ** 2, axis=1)
+    return np.column_stack([rates, square, velocity[:, 2] ** 2, jerks, work, tangential])
 
 
 START = (0.0, 0.0, float(np.pi / 2))

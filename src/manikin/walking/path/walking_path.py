@@ -3,17 +3,16 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.numerics.spatial import FloatArray
-from manikin.numerics.spline import BSpline
+from manikin.numerics.spline import BSpline, basis_matrix
 from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
 from manikin.walking.path.walking_model import (
-    TERMS,
     WalkObjective,
     body_motion,
     cost_rates,
@@ -171,7 +170,7 @@ class WalkingPath(SampledWalk):
     def cost_terms(self) -> dict[str, float]:
         """Weighted terms of the cost by name [-], each a sum over many instants."""
         values = self.task.objective.weights * self.term_integrals()
-        return dict(zip(TERMS, values.tolist(), strict=True))
+        return dict(zip(self.task.objective.terms, values.tolist(), strict=True))
 
     @cached_property
     def deviation(self) -> FloatArray:
@@ -199,9 +198,11 @@ class WalkingPath(SampledWalk):
         return body_motion(place, rate / duration, second / duration**2)
 
     def term_integrals(self, intervals: int = _DENSE) -> FloatArray:
-        """(5,) integrals of the terms without their weights, by Simpson's rule over evenly many intervals."""
+        """(k,) integrals of the terms without their weights, by Simpson's rule over evenly many intervals."""
         dense = self._dense if intervals == _DENSE else self._sampled(intervals)
-        rates = cost_rates(dense.place, dense.acceleration, self.task.goal, self.task.objective)
+        rates = cost_rates(
+            dense.place, dense.velocity, dense.acceleration, dense.jerk, self.task.goal, self.task.objective
+        )
         weights = np.full(len(rates), 2.0)
         weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
         return self.duration / (3.0 * intervals) * weights @ rates
@@ -237,8 +238,18 @@ class WalkingPath(SampledWalk):
         return self._sampled(_DENSE)
 
     def _sampled(self, intervals: int) -> "_Dense":
-        time = np.linspace(0.0, self.duration, intervals + 1)
-        return _Dense(time, self.place_at(time), *self.motion_at(time))
+        spline, duration = self.spline, self.duration
+        orders = _even_basis(spline.degree, tuple(spline.knots.tolist()), intervals) @ spline.control_points
+        motion = body_motion(orders[0], orders[1] / duration, orders[2] / duration**2)
+        time = np.linspace(0.0, duration, intervals + 1)
+        return _Dense(time, orders[0], *motion, orders[3] / duration**3)
+
+
+@lru_cache(maxsize=4)
+def _even_basis(degree: int, knots: tuple[float, ...], intervals: int) -> FloatArray:
+    """(4, n + 1, k) values of the basis of a spline and their derivatives, at even instants."""
+    shares = np.linspace(0.0, 1.0, intervals + 1)
+    return np.stack([basis_matrix(degree, knots, shares, order) for order in range(4)])
 
 
 class _Dense(NamedTuple):
@@ -248,6 +259,7 @@ class _Dense(NamedTuple):
     place: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
+    jerk: FloatArray
 
 
 def _frozen(array: FloatArray) -> FloatArray:
