@@ -25,7 +25,7 @@ from manikin.walking.path.path_cost import DEGREE, path_cost, path_knots
 from manikin.walking.path.path_program import Guess, ends_of, solve, structure_of
 from manikin.walking.path.walk_obstacles import Walker
 from manikin.walking.path.walking_model import TERMS, WalkObjective, to_body, to_world
-from manikin.walking.path.walking_path import WalkingPath, WalkingTask
+from manikin.walking.path.walking_path import SampledWalk, WalkingPath, WalkingTask
 from manikin.walking.segmentation import ShoulderPaths
 
 SWAY = 0.5
@@ -184,6 +184,7 @@ def identify_objective(
     *,
     names: Sequence[str] = IDENTIFIED,
     heading_length: float = HEADING_LENGTH,
+    tolerance: float = 1e-6,
     confidence: float = 0.95,
     independent_samples: bool = True,
 ) -> IdentifiedObjective:
@@ -195,6 +196,7 @@ def identify_objective(
         names: Weights that are identified, none of them 0 in ``first``.
         heading_length: Error of position that weighs as much as one of heading of one radian [m]; 0 for
             models that predict no heading.
+        tolerance: Of the logarithms of the weights, where the fit ends.
         confidence: Of the intervals, between 0 and 1.
         independent_samples: Whether the errors of one walk are independent from sample to sample, as noise
             is. Those of people are not: their intervals are cluster-robust, only the walks are independent
@@ -225,7 +227,8 @@ def identify_objective(
 
     _check_effects(slopes(start), names)
     exact: Any = slopes  # the stubs know names of difference rules only
-    found = least_squares(residuals, start, exact, tuple(np.log(_RANGE)), xtol=1e-8, ftol=1e-10)
+    bounds = tuple(np.log(_RANGE))
+    found = least_squares(residuals, start, exact, bounds, xtol=tolerance, ftol=0.01 * tolerance)
     objective = _objective(first, found.x, names)
     matches = [fit.at(objective) for fit in fits]
     covariance, freedom = _covariance(matches, independent_samples)
@@ -347,7 +350,7 @@ def predicted(walks: Sequence[RecordedWalk], objective: WalkObjective) -> tuple[
     return tuple(_Fit(walk, objective).at(objective).path for walk in walks)
 
 
-def share_errors(walks: Sequence[RecordedWalk], paths: Sequence[WalkingPath]) -> FloatArray:
+def share_errors(walks: Sequence[RecordedWalk], paths: Sequence[SampledWalk]) -> FloatArray:
     """(walks,) mean distance between recorded and predicted places at equal shares of their durations [m].
 
     A walk against one predicted path, as [Truong2010]_ (4.8) measures walks against their mean.
@@ -355,7 +358,7 @@ def share_errors(walks: Sequence[RecordedWalk], paths: Sequence[WalkingPath]) ->
     return np.array([_share_error(path, walk) for path, walk in zip(paths, walks, strict=True)])
 
 
-def _share_error(path: WalkingPath, walk: RecordedWalk) -> float:
+def _share_error(path: SampledWalk, walk: RecordedWalk) -> float:
     share = np.linspace(0.0, 1.0, _SHARES)
     first, last = walk.time[0], walk.time[-1]
     recorded = np.column_stack([

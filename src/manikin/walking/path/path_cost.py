@@ -142,16 +142,12 @@ class PathCost:
         self, unknowns: FloatArray, ends: PathEnds, goal_fade: float, weights: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Hessian of the cost, and (unknowns, terms) slopes of the integrals of the terms without weights."""
-        columns = []
-        for unit in np.eye(len(weights)):
-            point = _Point(self, ends, np.concatenate([ends.goal[:2], [goal_fade], unit]))
-            columns.append(point.slopes(unknowns)[0])
         point = _Point(self, ends, np.concatenate([ends.goal[:2], [goal_fade], weights]))
-        return point.slopes(unknowns)[1], np.array(columns).T
+        return point.slopes(unknowns)[1], point.term_slopes(unknowns)
 
     @cached_property
-    def functions(self) -> tuple["_Mapped", "_Mapped"]:
-        """Of numbers at Gauss points and parameters: the integrand; its gradient and Hessian."""
+    def functions(self) -> tuple["_Mapped", "_Mapped", "_Mapped"]:
+        """Of numbers at Gauss points and parameters: integrand; its gradient and Hessian; slopes of terms."""
         size, count = 3 * self.orders + 1, len(self.parts)
         q = ca.SX.sym("q", size)
         p = ca.SX.sym("p", 3 + 5 + (len(FURTHER_TERMS) if self.further else 0))
@@ -163,9 +159,10 @@ class PathCost:
         value = q[-1] * ca.dot(p[3:], ca.vertcat(*rates))
         hessian, gradient = ca.hessian(value, q)
         slopes = [gradient, ca.vec(ca.densify(hessian))]
+        terms = [ca.vec(ca.densify(ca.jacobian(q[-1] * ca.vertcat(*rates), q).T))]
         return tuple(
             _Mapped(ca.Function(name, [q, p], outputs), count)
-            for name, outputs in (("value", [value]), ("slopes", slopes))
+            for name, outputs in (("value", [value]), ("slopes", slopes), ("terms", terms))
         )  # type: ignore[return-value]
 
 
@@ -180,7 +177,7 @@ class _Point:
 
     def __init__(self, cost: PathCost, ends: PathEnds, parameters: FloatArray) -> None:
         self._cost, self._parameters = cost, parameters
-        self._value, self._slopes = cost.functions
+        self._value, self._slopes, self._terms = cost.functions
         # Control points by a duration of zero, and how the two beside the ends move with it.
         self._points, self._moves = np.zeros((2, cost.points, 3))
         self._points[:2], self._points[-2:] = ends.start, ends.goal
@@ -204,23 +201,34 @@ class _Point:
         cost = self._cost
         gradient, hessian = self._slopes(self._numbers(unknowns), self._parameters)
         size, pieces = gradient.shape[1], len(cost.local)
-        gradient = gradient * cost.parts[:, None]
+        slope = self._slope(gradient)
         hessian = (hessian * cost.parts[:, None]).reshape(-1, size, size)
         local = cost.local.reshape(len(hessian), size - 1, -1)
         across = cost.local.transpose(0, 2, 1)
         both = across @ (hessian[:, :-1, :-1] @ local).reshape(cost.local.shape)
         count, inner, move = 3 * cost.points, cost.inner, self._moves.ravel(order="F")
         whole = _summed(cost.entries, both, count**2).reshape(count, count)
-        slope, mixed = (
-            _summed(cost.columns, across @ part.reshape(pieces, -1, 1), count)
-            for part in (gradient[:, :-1], hessian[:, :-1, -1])
-        )
+        mixed = _summed(cost.columns, across @ hessian[:, :-1, -1].reshape(pieces, -1, 1), count)
         turned = whole @ move
         total = np.empty((len(inner) + 1, len(inner) + 1))
         total[:-1, :-1] = whole[np.ix_(inner, inner)]
         total[-1, :-1] = total[:-1, -1] = (mixed + turned)[inner]
         total[-1, -1] = hessian[:, -1, -1].sum() + move @ (2.0 * mixed + turned)
-        return np.append(slope[inner], gradient[:, -1].sum() + slope @ move), total
+        return slope, total
+
+    def term_slopes(self, unknowns: FloatArray) -> FloatArray:
+        """(unknowns, terms) slopes of the integrals of the terms without their weights."""
+        (slopes,) = self._terms(self._numbers(unknowns), self._parameters)
+        count = len(self._parameters) - 3
+        parts = slopes.reshape(len(slopes), count, -1)
+        return np.column_stack([self._slope(parts[:, term]) for term in range(count)])
+
+    def _slope(self, gradient: FloatArray) -> FloatArray:
+        """Slope over the unknowns of what has (n, k) slopes over the numbers at the Gauss points."""
+        cost, parts = self._cost, gradient * self._cost.parts[:, None]
+        local = cost.local.transpose(0, 2, 1) @ parts[:, :-1].reshape(len(cost.local), -1, 1)
+        slope = _summed(cost.columns, local, 3 * cost.points)
+        return np.append(slope[cost.inner], parts[:, -1].sum() + slope @ self._moves.ravel(order="F"))
 
 
 class _Mapped:
