@@ -124,8 +124,9 @@ END = """
   part or no holonomic end.
 * That identification is from 15 walks which pass through their ends, with wide intervals. The weights from
   all 42 walks lie between.
-* The word of the smoothest path does not tell the parts of the walk: V is about 0.2, no more than chance in so
-  many targets. Nor do the lengths of the ends differ between words; between categories some do.
+* The word of the smoothest path does not tell the parts of the walk: V is about 0.2, no more than chance in
+  so many targets. Lengths of the ends differ between words in one of four tests (5 %), between categories in
+  three.
 * The radius of the holonomic zone is that at which psi fades: 0 as printed, and about 0.5 m if psi fades at
   0.5 m. The criterion has no such length of its own, so the zone of the thesis' people is an input here.
 * The default stays the order of the prose, for its numbers are the thesis'.
