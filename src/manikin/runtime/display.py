@@ -93,6 +93,11 @@ COLOURS = {
 }  # fmt: skip
 """Okabe and Ito's palette, which colour-blind readers can tell apart."""
 
+MATERIAL_COLOURS = {
+    "skin": "#DDB496", "hair": "#463127", "shirt": "#4774B5", "trousers": "#414957", "shoes": "#33302E",
+}  # fmt: skip
+"""Colours of what the surface of a person is made of."""
+
 CYCLE = ("#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#6A51A3", "#8C564B")
 """Colours of effectors without one of their own."""
 

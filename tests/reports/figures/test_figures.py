@@ -2,14 +2,16 @@
 
 import contextlib
 from dataclasses import replace
+from itertools import combinations
 
 import matplotlib
 import numpy as np
 import pytest
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from matplotlib.collections import LineCollection
 
 from manikin.errors import FigureError, MotionFileError
 from manikin.motion.file import MotionFile
+from manikin.motion.motion import segment_positions
 from manikin.pipeline.run_directory import ComTrack, RunRecord
 from manikin.reports.figures import (
     FIGURES,
@@ -27,7 +29,7 @@ from manikin.reports.figures import (
     write_figures,
     zmp_figure,
 )
-from manikin.reports.figures.scene import MOST, eventful_instants
+from manikin.reports.figures.scene import LEAST_CHANGE, MOST, chosen_postures, eventful_instants
 from manikin.reports.figures.timeline import phase_minima
 from manikin.reports.figures.views import ABOVE, ALONG_Y, best_view
 
@@ -164,8 +166,8 @@ def test_zmp_figure_plots_the_distances_where_they_decide(run):
 def test_point_mass_in_space_has_a_leg_to_every_contact(walls):
     """Four legs in the three phases on four feet, two in the two others."""
     axes = scene_figure(walls).axes[0]
-    legs = [c for c in axes.collections if isinstance(c, Line3DCollection)]
-    assert [len(c._segments3d) for c in legs] == [4, 2, 4, 2, 4]
+    legs = [c for c in axes.collections if isinstance(c, LineCollection)]
+    assert [len(c.get_segments()) for c in legs] == [4, 2, 4, 2, 4]
 
 
 def test_motion_of_a_body_without_joints_is_that_of_a_point_mass(finished_run, walls):
@@ -256,9 +258,26 @@ def test_tracking_errors_are_those_of_the_data(run):
 
 
 def test_scene_is_drawn_to_scale(run):
+    """A metre across is a metre upward, and the path lies on the picture of its scene."""
     axes = scene_figure(run).axes[0]
-    spans = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-    np.testing.assert_allclose(axes._box_aspect / axes._box_aspect[0], spans / spans[0], rtol=1e-12)
+    axes.apply_aspect()
+    (x0, y0), (x1, _y1), (_x2, y2) = axes.transData.transform([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+    assert x1 - x0 == pytest.approx(y2 - y0, rel=1e-9)
+    left, right, bottom, top = axes.images[0].get_extent()
+    for line in axes.get_lines():
+        x, y = np.asarray(line.get_data(), dtype=float)
+        assert left < x.min() < x.max() < right
+        assert bottom < y.min() < y.max() < top
+
+
+def test_bodies_in_one_picture_differ(run):
+    """Their segments are apart by the least change or more, and the last posture is among them."""
+    motion = list(run.motions.values())[-1]
+    _, postures = chosen_postures(run.body, motion, run.schedule)
+    places = [np.vstack(list(segment_positions(run.body, q).values())) for q in postures]
+    for first, second in combinations(places, 2):
+        assert np.sqrt(np.mean(np.sum((first - second) ** 2, axis=1))) >= LEAST_CHANGE
+    np.testing.assert_array_equal(postures[-1], motion.q[-1])
 
 
 def test_folder_that_does_not_exist_gives_one_line(run, tmp_path):

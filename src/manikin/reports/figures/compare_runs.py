@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.pipeline.run_directory import ComTrack
 from manikin.reports.alignment import TimingRow
 from manikin.reports.comparison import RunComparison, shared_tracks
 from manikin.reports.figures import scene, style
 from manikin.reports.figures.com import draw_paths, frame_plane, mark_instants, planes
-from manikin.reports.figures.views import ALONG_X, ALONG_Y
+from manikin.reports.figures.space import Space
+from manikin.reports.figures.views import ALONG_X, ALONG_Y, distinct_contacts
 from manikin.runtime.display import COLOURS, readable
 
 
@@ -193,17 +193,14 @@ def compare_planes_figure(comparison: RunComparison) -> Figure:
 def compare_scene_figure(comparison: RunComparison) -> Figure:
     """Draw both CoM paths in space, with the scene and supports of the first run ([Qiu2012]_ Fig. 7.17)."""
     tracks, first = _tracks(comparison), comparison.first
-    figure = style.new_figure(9.5, 8.0, "Centres of mass of two runs")
-    axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
-    seen = [track.position for track in tracks.values()]
-    corners = scene.draw_scene(axes, first.scene)
-    if first.schedule is not None:
-        seen.append(scene.draw_soles(axes, first.schedule))
+    contacts = [] if first.schedule is None else distinct_contacts(first.schedule)
+    space = Space.of(first.scene, [track.position for track in tracks.values()], contacts=contacts)
+    figure, axes = scene.space_figure(space, "Centres of mass of two runs")
+    space.draw_points(axes)
     for name, track in tracks.items():
-        axes.plot(*track.position.T, label=name, **{**_styles(comparison)[name], "zorder": 8})
-    scene.frame(axes, np.vstack(seen), corners)
-    axes.view_init(14.0, -62.0)
-    axes.legend(loc="upper right", fontsize=8, frameon=False)
+        space.plot(axes, track.position, label=name, **{**_styles(comparison)[name], "zorder": 8})
+    space.name_obstacles(style.Labels(axes))
+    style.legend_in_title(figure, axes)
     return figure
 
 

@@ -1,28 +1,27 @@
 """Contacts: those of each phase of a run, and those chosen for bodies shown as shaded solids in a scene."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
-import trimesh
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.segments import segment_triangles
 from manikin.contact import Contact, ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
 from manikin.reports.figures import style, views
+from manikin.reports.figures.space import Space
+from manikin.reports.solids import body_solid
 from manikin.runtime.display import COLOURS, colours_of, readable
 from manikin.scene import Scene
 
+Corners = tuple[FloatArray, FloatArray]
+PIXELS = 500.0
+"""Pixels of a panel with a body, along its longer side."""
 MARGIN = 0.3
 """Room around the bodies [m]."""
 NORMAL = 0.18
@@ -68,106 +67,51 @@ def contact_choice_figure(
     if any(panel.task is not None for panel in panels):
         high[2] += TASK
     for number, panel in enumerate(panels):
-        axes: Axes3D = figure.add_subplot(rows, wide, number + 1, projection="3d")
-        _draw(axes, body, scene, panel, low, high)
-        axes.view_init(elevation_deg, azimuth_deg)
+        direction = float(np.deg2rad(azimuth_deg)), float(np.deg2rad(elevation_deg))
+        _draw(figure.add_subplot(rows, wide, number + 1), body, scene, panel, (low, high), direction)
     return figure
 
 
 def _draw(
-    axes: Axes3D, body: BodyModel, scene: Scene, panel: ChoicePanel, low: FloatArray, high: FloatArray
-) -> None:
-    axes.computed_zorder = False
+    axes: Axes,
+    body: BodyModel,
+    scene: Scene,
+    panel: ChoicePanel,
+    box: Corners,
+    direction: tuple[float, float],
+) -> None:  # fmt: skip
     moved = [name for limb in body.limbs if limb.name in panel.limbs for name in limb.segments]
     ends = [segment.name for segment in body.segments if segment.parent in moved]
-    draw_solids(axes, [*scene_solids(scene, low, high), *body_solids(body, panel.q, [*moved, *ends])])
-    if scene.floor_height is not None:
-        draw_floor(axes, scene.floor_height, low, high)
+    solid = body_solid(body, panel.q, [*moved, *ends])
+    corners = np.array([[box[i][0], box[j][1], box[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    bodies = [] if solid is None else [solid]
+    space = Space(bodies, np.zeros((len(bodies), 3)), scene, (), corners, direction)
+    space.draw(axes, PIXELS)
     for contact in panel.contacts:
-        draw_arrow(axes, contact.position, NORMAL * contact.normal, COLOURS["planned"])
+        _draw_arrow(axes, space, contact.position, NORMAL * contact.normal, COLOURS["planned"])
     if panel.task is not None:
         middle = np.array(Configuration(body, panel.q).com)
-        middle[2] = high[2] - 0.7 * TASK
-        draw_arrow(axes, middle - 0.5 * TASK * panel.task, TASK * panel.task, COLOURS["ink"], 3.0)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.25)  # type: ignore[arg-type]
-    axes.set_axis_off()
-    axes.text2D(0.5, 0.98, panel.title, transform=axes.transAxes, ha="center", va="bottom",
-                fontsize=9.5, color=COLOURS["ink"])  # fmt: skip
+        middle[2] = box[1][2] - 0.7 * TASK
+        _draw_arrow(axes, space, middle - 0.5 * TASK * panel.task, TASK * panel.task, COLOURS["ink"], 3.0)
+    axes.set_title(panel.title, fontsize=9.5, color=COLOURS["ink"])
 
 
-def _box(body: BodyModel, panels: Sequence[ChoicePanel]) -> tuple[FloatArray, FloatArray]:
+def _draw_arrow(
+    axes: Axes, space: Space, start: FloatArray, vector: FloatArray, colour: str, width: float = 2.2
+) -> None:
+    """Draw an arrow of a vector (3,) from a point (3,) [m], before everything else."""
+    first, last = space.camera.project(np.array([start, start + vector]))
+    look = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.annotate("", tuple(last), tuple(first), arrowprops=look, zorder=20)
+
+
+def _box(body: BodyModel, panels: Sequence[ChoicePanel]) -> Corners:
     """Corners of a box around all bodies [m]."""
     places = [contact.position for panel in panels for contact in panel.contacts]
     for panel in panels:
         posture = Configuration(body, panel.q)
         places += [posture.segment_placement(segment.name)[1] for segment in body.segments]
     return np.min(places, axis=0) - MARGIN, np.max(places, axis=0) + MARGIN
-
-
-LONGEST_EDGE = 0.12
-"""Triangles of obstacles are cut to edges of at most this length [m], so that they sort by depth."""
-_LIGHT = np.array([0.35, -0.55, 0.76])
-_SHADE = 0.45
-"""Brightness of what faces away from the light, as a share."""
-
-
-Solid = tuple[FloatArray, str, float]
-"""Triangles (n, 3, 3) in the world [m], their colour, and their opacity in [0, 1]."""
-
-
-def body_solids(body: BodyModel, q: FloatArray, marked: Sequence[str]) -> list[Solid]:
-    """Shapes of a body in a configuration (nq,); ``marked`` segments in the executed motion's colour."""
-    data = body.pinocchio.createData()
-    pin.framesForwardKinematics(body.pinocchio, data, q)
-    result = []
-    for segment in body.segments:
-        if (triangles := segment_triangles(segment, rounds=10)) is None:
-            continue
-        place = data.oMf[body.segment_frame(segment.name)]
-        world = triangles[0] @ place.rotation.T + place.translation
-        colour = COLOURS["executed"] if segment.name in marked else "#7F8FA6"
-        result.append((world[triangles[1]], colour, 1.0))
-    return result
-
-
-def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
-    """Finite obstacles, those of them that are between two corners (3,) of a box [m]."""
-    result = []
-    for obstacle in views.finite_obstacles(scene, low, high):
-        mesh = obstacle.to_trimesh()
-        finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
-        triangles = np.asarray(finer[0])[np.asarray(finer[1])]
-        inside = ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
-        result.append((np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
-    return result
-
-
-def draw_solids(axes: Axes3D, solids: Iterable[Solid]) -> None:
-    """Draw solids in one collection, so that all triangles are sorted by depth together."""
-    solids = list(solids)
-    triangles = np.concatenate([part for part, _, _ in solids])
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    light = (normals / np.maximum(lengths, 1e-15)) @ (_LIGHT / np.linalg.norm(_LIGHT))
-    bright = _SHADE + (1.0 - _SHADE) * 0.5 * (1.0 + light)
-    counts = [len(part) for part, _, _ in solids]
-    colours = np.repeat([[*to_rgb(colour), alpha] for _, colour, alpha in solids], counts, axis=0)
-    colours[:, :3] *= bright[:, None]
-    axes.add_collection3d(Poly3DCollection(triangles, facecolors=colours, edgecolors="none", linewidths=0.0))
-
-
-def draw_floor(axes: Axes3D, height: float, low: FloatArray, high: FloatArray) -> None:
-    """Draw the floor between two corners as lines half a metre apart [m]."""
-    xs, ys = (np.arange(np.floor(low[i] / 0.5), np.ceil(high[i] / 0.5) + 1) * 0.5 for i in (0, 1))
-    lines = [[(x, ys[0], height), (x, ys[-1], height)] for x in xs]
-    lines += [[(xs[0], y, height), (xs[-1], y, height)] for y in ys]
-    axes.add_collection3d(Line3DCollection(lines, colors="#D5D9DF", linewidths=0.6, zorder=0))
-
-
-def draw_arrow(axes: Axes3D, start: FloatArray, vector: FloatArray, colour: str, width: float = 2.2) -> None:
-    """Draw an arrow of a vector (3,) from a point (3,) [m], before everything else."""
-    axes.quiver(*start, *vector, color=colour, linewidth=width, arrow_length_ratio=0.3, zorder=20)
 
 
 COLUMNS = 6

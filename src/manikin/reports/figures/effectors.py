@@ -4,14 +4,14 @@ from collections import Counter
 
 import numpy as np
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.contact import ContactSchedule, Swing
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.reports.figures import style
-from manikin.reports.figures.scene import draw_scene, draw_soles, frame
+from manikin.reports.figures.space import Space
 from manikin.reports.figures.timeline import timeline
+from manikin.reports.figures.views import distinct_contacts
 from manikin.runtime.display import COLOURS, colours_of, readable
 
 _AXIS_COLOURS = ("#0072B2", "#009E73", "#E69F00")
@@ -63,26 +63,25 @@ def flights_figure(record: RunRecord) -> Figure:
     swings = [swing for swing in schedule.sequence.swings() if swing.effector in paths]
     style.need(swings, "an effector that leaves or makes a contact")
     colours = colours_of(record.effectors)
+    parts = [_part(schedule, swing, planned.time, paths[swing.effector]) for swing in swings]
+    space = Space.of(record.scene, [path for _, path in parts], contacts=distinct_contacts(schedule))
     figure = style.new_figure(13.0, 6.6, "Flights of feet and hands as planned")
     grid = figure.add_gridspec(1, 2, width_ratios=[1.25, 1])
-    space: Axes3D = figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
-    height = figure.add_subplot(grid[1])
-    corners, seen = draw_scene(space, record.scene), [draw_soles(space, schedule)]
-    for swing, method in zip(swings, _methods(record, swings), strict=True):
-        time, path = _part(schedule, swing, planned.time, paths[swing.effector])
+    place, height = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+    space.draw(place)
+    space.draw_points(place)
+    for swing, (time, path), method in zip(swings, parts, _methods(record, swings), strict=True):
         colour, dash = colours[swing.effector], "solid" if method != "bi-rrt" else (0, (4, 1.5))
         first, last = swing.first_phase, swing.last_phase
         where = f"phase {first}" if first == last else f"phases {first}–{last}"
         label = ", ".join(filter(None, (readable(swing.effector), where, method)))
-        space.plot(*path.T, color=colour, linestyle=dash, linewidth=2.2, zorder=8)
+        space.plot(place, path, color=colour, linestyle=dash, linewidth=2.2, zorder=8)
         height.plot(time, path[:, 2], color=colour, linestyle=dash, linewidth=1.8, label=label)
-        seen.append(path)
         if executed := record.effector_paths.get("executed"):
             motion = record.motions["executed"]
             time, path = _part(schedule, swing, motion.time, executed[swing.effector])
             height.plot(time, path[:, 2], **_EXECUTED)
-    frame(space, np.vstack(seen), corners)
-    space.view_init(18.0, -62.0)
+    space.name_obstacles(style.Labels(place))
     if "executed" in record.effector_paths:
         height.plot([], [], **_EXECUTED, label="executed")
     style.dress(height, "height [m]", "time [s]")

@@ -17,7 +17,8 @@ from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.reports.figures import style
 from manikin.reports.figures.timeline import timeline
-from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, finite_obstacles, sections
+from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, sections
+from manikin.reports.solids import finite_obstacles
 from manikin.runtime.display import COLOURS, CYCLE, colours_of, readable
 from manikin.scene import Scene
 from manikin.simulation import PushMap

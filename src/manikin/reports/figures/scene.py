@@ -1,15 +1,11 @@
-"""A motion in its scene: path of the centre of mass with stick figures, and postures side by side."""
+"""A motion in its scene: bodies along the path of the centre of mass, and postures side by side."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-from mpl_toolkits.mplot3d.axes3d import Axes3D
-from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
@@ -18,8 +14,8 @@ from manikin.motion.motion import phases_of, segment_positions
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
 from manikin.reports.figures import style, views
+from manikin.reports.figures.space import Space
 from manikin.runtime.display import COLOURS, colours_of, side_colour
-from manikin.scene import Box, Scene
 
 MOST = 9
 """Largest number of key instants drawn; of more some are left out, evenly."""
@@ -27,8 +23,6 @@ GAP = 0.12
 """Gap between two panels [m]."""
 
 Corners = tuple[FloatArray, FloatArray]
-Moments = list[tuple[float, dict[str, FloatArray]]]
-"""Key instants [s] and the places of the segments at them."""
 
 
 def postures_figure(record: RunRecord) -> Figure:
@@ -83,10 +77,8 @@ def draw_moment(
     axes: Axes, record: RunRecord, motion: Motion, sample: int, view: views.View, box: Corners
 ) -> None:
     """Draw the body among the obstacles in a box [m] at one sample of a motion, with its CoM."""
-    if record.scene is not None:
-        views.draw_obstacles(axes, record.scene, view, *box)
     if record.body is not None:
-        views.draw_body(axes, record.body, motion.q[sample], view)
+        views.draw_body(axes, record.scene, record.body, motion.q[sample], view, box)
     axes.plot(*view(motion.com[sample]), "o", color=COLOURS["ink"], markersize=4, zorder=5)
 
 
@@ -101,7 +93,7 @@ def frame_panels(
         offsets: Where the zero of each panel is drawn [m].
     """
     left, right = across
-    axes.grid(False, axis="x")
+    axes.grid(False)
     axes.set_xticks(*views.panel_ticks(left, right, offsets))
     axes.set(xlim=(left, right + offsets[-1]), ylim=upwards)
     axes.set_aspect("equal", adjustable="box", anchor="W")
@@ -133,64 +125,74 @@ def _frame(record: RunRecord, com: FloatArray) -> Corners:
     return low, high
 
 
-MOST_TICKS = 9
-"""Ticks of the longest axis; the others have fewer."""
-_QUADS = np.array([(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)])
-"""Faces of a box by the numbers of its corners."""
+LEAST_CHANGE = 0.42
+"""Bodies in one picture differ at least so much, as the root mean square over the segments [m]."""
+MOST_BODIES = 5
+"""Largest number of bodies in one picture."""
 
 
 def scene_figure(record: RunRecord) -> Figure:
-    """Draw the CoM's path, the obstacles, the supports and the body ([Qiu2012]_ Fig. 5.21, 7.7, 7.8)."""
+    """Draw bodies on their way, the path of the CoM and the supports ([Qiu2012]_ Fig. 5.21, 7.7, 7.8).
+
+    The eye is where most of the bodies is seen. What hides more of one than a little is seen through. Of a
+    point mass, the legs in each phase are drawn.
+    """
     name, track = list(style.need(record.tracks, "a motion of the centre of mass").items())[-1]
-    motion = record.motions.get(name)
-    figure = style.new_figure(9.5, 8.0, f"Motion in the scene ({name})")
-    axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
-    seen = [track.position]
-    corners = draw_scene(axes, record.scene)
-    if record.schedule is not None:
-        seen.append(draw_soles(axes, record.schedule))
-    moments: Moments = []
-    if motion is not None and record.body is not None and not record.body.is_point_mass:
-        moments = _moments(record.body, motion, record.schedule)
-        seen.append(_draw_figures(axes, record.body, moments))
-    elif record.schedule is not None:
-        _draw_legs(axes, track, record.schedule)
-    axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
+    motion, body = record.motions.get(name), record.body
+    schedule, instants, postures = record.schedule, np.zeros(0), np.zeros((0, 0))
+    if motion is not None and body is not None and not body.is_point_mass:
+        instants, postures = chosen_postures(body, motion, schedule)
+    contacts = [] if schedule is None else views.distinct_contacts(schedule)
+    space = Space.of(record.scene, [track.position], contacts=contacts, body=body, postures=postures)
+    figure, axes = space_figure(space, f"Motion in the scene ({name})")
+    if not len(postures) and schedule is not None:
+        _draw_legs(axes, space, track, schedule)
+    space.draw_points(axes)
+    space.plot(axes, track.position, color=COLOURS[name], linewidth=2.0, label="centre of mass", zorder=8)
     if record.phases is not None:
-        places = track.at(record.phases.instants)
-        look = {"color": COLOURS["ink"], "zorder": 9, "label": "at the key instants"}
-        axes.scatter(*places.T, s=18, depthshade=False, **look)
-    frame(axes, np.vstack(seen), corners)
-    axes.view_init(14.0, -62.0)
-    if moments:
-        _label_heads(axes, moments)
-    axes.legend(loc="upper right", fontsize=8, frameon=False)
+        look = {"color": COLOURS["ink"], "markersize": 4.0, "zorder": 9, "label": "at the key instants"}
+        space.plot(axes, track.at(record.phases.instants), "o", **look)
+    labels = style.Labels(axes)
+    for instant, solid in zip(instants, space.bodies, strict=False):
+        top = space.camera.project(solid.vertices[np.argmax(solid.vertices[:, 2])])
+        look = {"ha": "center", "color": COLOURS["ink"], "size": 9.0}
+        labels.write(f"{instant:.2f} s", (top[0], top[1]), (0.0, 4.0), **look)
+    space.name_obstacles(labels)
+    style.legend_in_title(figure, axes)
     return figure
 
 
-def _moments(body: BodyModel, motion: Motion, schedule: ContactSchedule | None) -> Moments:
+def space_figure(space: Space, title: str, size: float = 9.5) -> tuple[Figure, Axes]:
+    """A figure that shows a space in its one pair of axes, so wide or high [inch]."""
+    width = size if space.shape <= 1.0 else max(size / space.shape, 0.55 * size)
+    figure = style.new_figure(width, width * space.shape + 0.5, title)
+    figure.set_layout_engine("none")
+    share = width * space.shape / (width * space.shape + 0.5)
+    axes = figure.add_axes((0.0, 0.0, 1.0, share))
+    space.draw(axes)
+    return figure, axes
+
+
+def chosen_postures(
+    body: BodyModel, motion: Motion, schedule: ContactSchedule | None
+) -> tuple[FloatArray, FloatArray]:
+    """Instants (k,) [s] and postures (k, nq) that differ: the first, the last, the farthest from those."""
     instants = phases_of(motion, schedule).instants
-    samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
-    postures = [segment_positions(body, motion.q[sample]) for sample in samples]
-    return list(zip(instants.tolist(), postures, strict=True))
+    if len(instants) == 2:
+        instants = eventful_instants(motion)
+    samples = np.unique([int(np.argmin(np.abs(motion.time - instant))) for instant in instants])
+    places = np.array([np.vstack(list(segment_positions(body, motion.q[k]).values())) for k in samples])
+    apart = np.sqrt(np.mean(np.sum((places[:, None] - places[None]) ** 2, axis=-1), axis=-1))
+    chosen = [len(samples) - 1]
+    if apart[0, -1] >= LEAST_CHANGE:
+        chosen.append(0)
+    while len(chosen) < MOST_BODIES and (away := apart[:, chosen].min(axis=1)).max() >= LEAST_CHANGE:
+        chosen.append(int(np.argmax(away)))
+    kept = samples[sorted(chosen)]
+    return motion.time[kept], motion.q[kept]
 
 
-def _draw_figures(axes: Axes3D, body: BodyModel, moments: Moments) -> FloatArray:
-    postures = [places for _, places in moments]
-    sticks = _sticks(body)
-    sides = [next((s for s in ("left", "right") if s in f"{a} {b}"), None) for a, b in sticks]
-    for number, places in enumerate(postures):
-        end = number in (0, len(postures) - 1)
-        axes.add_collection3d(Line3DCollection(
-            [[places[first], places[second]] for first, second in sticks],
-            colors=[COLOURS["ink" if side is None else f"{side}_foot"] for side in sides],
-            linewidths=2.6 if end else 1.4, alpha=0.95 if end else 0.3 + 0.3 * number / len(postures),
-            capstyle="round", zorder=6,
-        ))  # fmt: skip
-    return np.vstack([list(places.values()) for places in postures])
-
-
-def _draw_legs(axes: Axes3D, track: ComTrack, schedule: ContactSchedule) -> None:
+def _draw_legs(axes: Axes, space: Space, track: ComTrack, schedule: ContactSchedule) -> None:
     """Join the point mass to the contacts held in the middle of each phase; thick where they are fewer."""
     most = max(len(phase.stance) for phase in schedule.sequence)
     colours = colours_of(schedule.sequence.effectors)
@@ -198,86 +200,8 @@ def _draw_legs(axes: Axes3D, track: ComTrack, schedule: ContactSchedule) -> None
     for place, phase in zip(track.at(middles), schedule.sequence, strict=True):
         if not len(phase.stance):
             continue
-        axes.add_collection3d(Line3DCollection(
-            [[place, contact.position] for contact in phase.stance],
+        axes.add_collection(LineCollection(
+            [space.camera.project(np.array([place, contact.position])) for contact in phase.stance],
             colors=[colours[contact.effector] for contact in phase.stance],
             linewidths=2.0 if len(phase.stance) < most else 0.8, alpha=0.7, zorder=6,
-        ))  # fmt: skip
-
-
-def _label_heads(axes: Axes3D, moments: Moments) -> None:
-    """Write the time above each head, the ends first, leaving out what would overlap."""
-    projection = axes.get_proj()
-    taken: list[FloatArray] = []
-    for instant, places in [moments[0], *moments[-1:], *moments[1:-1]]:
-        head = places.get("effector/head")
-        if head is None:
-            continue
-        seen = np.array(proj_transform(head[0], head[1], head[2], projection)[:2])
-        if any(np.all(np.abs(seen - other) < (0.008, 0.005)) for other in taken):
-            continue
-        taken.append(seen)
-        axes.text(
-            head[0], head[1], head[2] + 0.05, f"{instant:.2f} s", fontsize=7.5, ha="center",
-            color=COLOURS["ink"], zorder=9, path_effects=[style.white_edge()],
-        )  # fmt: skip
-
-
-def _sticks(body: BodyModel) -> list[tuple[str, str]]:
-    """Pairs of joints to be joined: every segment with its parent, the hands' and the head's ends."""
-    sticks = [(segment.parent, segment.name) for segment in body.segments if segment.parent is not None]
-    free = [e for e in body.effectors.values() if "foot" not in e.name and e.segment != body.segments[0].name]
-    return sticks + [(effector.segment, f"effector/{effector.name}") for effector in free]
-
-
-def draw_scene(axes: Axes3D, scene: Scene | None) -> FloatArray:
-    """Draw every finite obstacle; return the corners of their bounds."""
-    corners = [np.zeros((0, 3))]
-    for obstacle in [] if scene is None else views.finite_obstacles(scene):
-        if isinstance(obstacle.shape, Box):
-            faces = obstacle.to_world(views.BOX_CORNERS * obstacle.shape.size / 2)[_QUADS]
-        else:
-            faces = np.asarray(obstacle.to_trimesh().triangles)
-        low, high = obstacle.bounds
-        look = {"facecolor": COLOURS["obstacle"], "edgecolor": "#8D94A0", "alpha": 0.25, "zorder": 2}
-        axes.add_collection3d(Poly3DCollection(faces, linewidths=0.6, **look))
-        axes.text(high[0], low[1], high[2], f" {obstacle.name}", fontsize=8, color="#666C77", zorder=3)
-        corners.append(np.array([low, high]))
-    return np.vstack(corners)
-
-
-def draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:
-    """Draw every contact of a schedule in three dimensions; return its points."""
-    contacts = views.distinct_contacts(schedule)
-    colours = colours_of(contact.effector for contact in contacts)
-    for contact in contacts:
-        colour = colours[contact.effector]
-        if len(contact.points) > 2:
-            sole = Poly3DCollection([contact.points_in_world], facecolor=colour, edgecolor=colour, alpha=0.4)
-            sole.set_zorder(4)
-            axes.add_collection3d(sole)
-        else:
-            axes.scatter(*contact.position, s=22, marker="s", color=colour, zorder=4, depthshade=False)
-    return np.vstack([contact.points_in_world for contact in contacts])
-
-
-def frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
-    """Limit the axes to the motion and to the obstacles within a metre of it."""
-    low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
-    if len(corners):
-        low = np.minimum(low, np.maximum(corners.min(axis=0), low - 1.0))
-        high = np.maximum(high, np.minimum(corners.max(axis=0), high + 1.0))
-    low[2] = min(low[2] + 0.1, 0.0)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    longest = float(np.max(high - low) / np.linalg.norm(high - low))
-    zoom: Any = 1.16 * min(1.0, 0.85 / longest)  # the annotation says int, the function takes any number
-    axes.set_box_aspect(high - low, zoom=zoom)
-    spans = zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", (high - low) / (high - low).max(), strict=True)
-    for axis, name, share in spans:
-        axis.set_label_text(f"{name} [m]", fontsize=9)
-        axis.labelpad = 4.0 if longest < 0.85 else 12.0  # numbers along a long axis hang lower
-        axis.set_major_locator(MaxNLocator(max(round(MOST_TICKS * float(share)), 1)))
-        axis.set_tick_params(labelsize=7)
-        axis.pane.set_facecolor("#FAFBFC")
-        axis.pane.set_edgecolor("#D5D9DF")
-        axis._axinfo["grid"].update(color="#E3E6EA", linewidth=0.5)  # there is no public way
+        ), autolim=False)  # fmt: skip

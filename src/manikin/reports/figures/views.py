@@ -1,22 +1,23 @@
 """Views of a scene along a world axis: projected contacts, obstacles and bodies."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
-from manikin.body import BodyModel, Shape, ShapeKind
+from manikin.body import BodyModel
 from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.numerics.polytope import convex_polygon
 from manikin.numerics.spatial import FloatArray
-from manikin.runtime.display import COLOURS, side_colour
-from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
+from manikin.reports.figures.raster import Camera, hiding, picture
+from manikin.reports.solids import body_solid, finite_obstacles, scene_solids
+from manikin.runtime.display import COLOURS
+from manikin.scene import Box, Mesh, Scene
 
 _LINE = 1e-4
 """Projected areas below this are lines [m^2]."""
@@ -24,7 +25,8 @@ _APART = 0.05
 """Contacts nearer to each other than this cannot be told apart [m]."""
 BOX_CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
 """(8, 3) corners of a cube with an edge of 2 about the origin."""
-_CIRCLE = np.column_stack([np.cos(a := np.linspace(0.0, 2.0 * np.pi, 17)[:-1]), np.sin(a)])
+PICTURE = 320
+"""Pixels of a picture of one body, along its longer side."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,15 @@ class View:
     def moved(self, right: float, up: float) -> "View":
         """The same view, drawn elsewhere."""
         return replace(self, offset=(right, up))
+
+    @property
+    def camera(self) -> Camera:
+        """Parallel rays; places in its picture are those of :meth:`__call__` without the offset.
+
+        Seen from +z or +x, but from -y, so that x points to the right.
+        """
+        axes = np.eye(3)[[*self.axes, self.depth]]
+        return Camera(axes * [[1.0], [1.0], [-1.0 if self.name == "xz" else 1.0]], np.zeros(3))
 
     @property
     def labels(self) -> tuple[str, str]:
@@ -125,32 +136,29 @@ def draw_contact(axes: Axes, contact: Contact, view: View, colour: str, *, held:
         axes.plot(*place, "s", color=colour, markerfacecolor=face, markersize=6, zorder=2)
 
 
-def finite_obstacles(
-    scene: Scene, low: FloatArray | None = None, high: FloatArray | None = None
-) -> Iterator[Obstacle]:
-    """Obstacles that end somewhere; only those near the box between two corners (3,) [m] if it is given."""
-    for obstacle in scene:
-        if not isinstance(obstacle.shape, (HalfSpace, Plane)):
-            below, above = obstacle.bounds
-            if low is None or high is None or not (np.any(below > high) or np.any(above < low)):
-                yield obstacle
-
-
 def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: FloatArray) -> None:
-    """Draw the outlines of the finite obstacles near the box between two corners (3,) [m], and the floor."""
-    outlines = []
+    """Draw the outlines of the finite obstacles near the box between two corners (3,) [m], and the floor.
+
+    Of a mesh, which need not be convex, all triangles that face the eye are drawn.
+    """
+    outlines, widths = list[FloatArray](), list[float]()
     for obstacle in finite_obstacles(scene, low, high):
         shape = obstacle.shape
+        if isinstance(shape, Mesh):
+            triangles = view.camera.project(obstacle.to_world(shape.vertices))[shape.faces]
+            facing = np.array([polygon_area(corners) > 0.0 for corners in triangles])
+            outlines += list(triangles[facing] + view.offset)
+            widths += [0.0] * int(facing.sum())
+            continue
         if isinstance(shape, Box):
             points = obstacle.to_world(BOX_CORNERS * shape.size / 2)
-        elif isinstance(shape, Mesh):
-            points = obstacle.to_world(shape.vertices)
         else:
             points = np.asarray(obstacle.to_trimesh().vertices)
         outlines.append(convex_polygon(view(points)))
+        widths.append(0.7)
     (left, bottom), (right, top) = view(low), view(high)
     look: dict[str, Any] = {"facecolor": COLOURS["obstacle"], "edgecolor": COLOURS["soft"], "zorder": 0.5}
-    patches = PolyCollection(outlines, linewidth=0.7, alpha=0.3, **look)
+    patches = PolyCollection(outlines, linewidths=widths or 0.7, alpha=0.3, **look)
     axes.add_collection(patches, autolim=False)
     patches.set_clip_path(Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData))
     if view.name != "xy" and scene.floor_height is not None:
@@ -159,22 +167,29 @@ def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: 
             axes.hlines(level, left, right, color=COLOURS["soft"], linewidth=0.9, zorder=0.6)
 
 
-def draw_body(axes: Axes, body: BodyModel, q: FloatArray, view: View) -> None:
-    """Draw the silhouettes of a body's shapes in a configuration (nq,), the farthest first."""
-    data = body.pinocchio.createData()
-    pin.framesForwardKinematics(body.pinocchio, data, np.asarray(q))
-    drawn = []
-    for segment in body.segments:
-        placement = data.oMf[body.segment_frame(segment.name)]
-        for shape in segment.shapes:
-            centre = placement.translation + placement.rotation @ shape.translation
-            outline = _outline(shape, placement.rotation @ shape.rotation, centre, view)
-            # Seen from +z or +x, but from -y, so that x points to the right.
-            depth = centre[view.depth] * (-1.0 if view.name == "xz" else 1.0)
-            drawn.append((depth, outline, side_colour(segment.name)))
-    _, outlines, colours = zip(*sorted(drawn, key=lambda item: item[0]), strict=True)
-    look: dict[str, Any] = {"edgecolors": "white", "linewidths": 0.4, "alpha": 0.85, "zorder": 3}
-    axes.add_collection(PolyCollection(outlines, facecolors=colours, **look), autolim=False)
+def draw_body(
+    axes: Axes,
+    scene: Scene | None,
+    body: BodyModel,
+    q: FloatArray,
+    view: View,
+    box: tuple[FloatArray, FloatArray],
+) -> None:
+    """Draw a body in a configuration (nq,) and the obstacles in a box [m] as a shaded picture."""
+    low, high = box
+    (left, bottom), (right, top) = view.camera.project(np.array(box))
+    solid = body_solid(body, q)
+    bodies = [] if solid is None else [solid]
+    obstacles = [] if scene is None else scene_solids(scene, low, high)
+    window, dots = (left, right, bottom, top), PICTURE / max(right - left, top - bottom)
+    clear = hiding(bodies, obstacles, view.camera, window)
+    image = picture([*bodies, *obstacles], view.camera, window, dots, clear=clear, shadows=False)
+    (x, y) = view.offset
+    place = (left + x, right + x, bottom + y, top + y)
+    axes.imshow(image, extent=place, interpolation="antialiased", zorder=0.5)
+    if scene is not None and scene.floor_height is not None and low[2] <= scene.floor_height <= high[2]:
+        level = scene.floor_height + y
+        axes.hlines(level, left + x, right + x, color=COLOURS["soft"], linewidth=0.9, zorder=0.6)
 
 
 def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list[float], list[str]]:
@@ -200,12 +215,3 @@ def sections(values: np.ndarray) -> list[slice]:
     """Stretches of equal values; each but the last includes the first sample of the next."""
     edges = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
     return [slice(start, min(stop + 1, len(values))) for start, stop in pairwise(edges)]
-
-
-def _outline(shape: Shape, rotation: FloatArray, centre: FloatArray, view: View) -> FloatArray:
-    if shape.kind is ShapeKind.BOX:
-        return convex_polygon(view(centre + (BOX_CORNERS * shape.size / 2) @ rotation.T))
-    radius = float(shape.size[0])
-    half = shape.size[1] / 2 * rotation[:, 2] if shape.kind is ShapeKind.CAPSULE else np.zeros(3)
-    ends = view(np.array([centre - half, centre + half]))
-    return convex_polygon(np.vstack([end + radius * _CIRCLE for end in ends]))
