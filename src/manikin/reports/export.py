@@ -268,7 +268,7 @@ COMPARISON = "comparison.json"
 def write_outputs(
     directory: str | Path, progress: Callable[[str, float], object] = lambda _stage, _share: None
 ) -> list[Path]:
-    """Draw the figures of a finished run and write its BVH file, if it has joints; return the files.
+    """Draw the figures of a finished run and write its BVH and GLB files, if it has joints; return the files.
 
     Args:
         progress: Told the stage ``"figures"`` and the share that is done.
@@ -283,7 +283,7 @@ def write_outputs(
     make_directory(folder / FIGURES)
     written = write_figures(record, folder / FIGURES, lambda share: progress("figures", 0.9 * share))
     if record.motions and record.body is not None and not record.body.is_point_mass:
-        written.append(export_motion(record.content, folder, "bvh"))
+        written += [export_motion(record.content, folder, kind) for kind in ("bvh", "glb")]
     progress("figures", 1.0)
     return written
 

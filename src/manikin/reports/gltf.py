@@ -67,7 +67,7 @@ def to_glb(body: BodyModel, motion: Motion, scene: Scene | None = None) -> bytes
     """
     if motion.joint_names != body.joint_names:
         raise MotionFileError("motion has other joints than the body; valid: the body's own motion")
-    skin = skin_of(body) or _shapes(body)
+    skin = surface_of(body)
     buffer, meshes = _Buffer(), list[dict[str, Any]]()
     materials = [
         {"name": str(name), "doubleSided": True,
@@ -107,6 +107,15 @@ def to_glb(body: BodyModel, motion: Motion, scene: Scene | None = None) -> bytes
         "accessors": buffer.accessors,
     }  # fmt: skip
     return _packed(document, bytes(buffer.data))
+
+
+def surface_of(body: BodyModel) -> Skin:
+    """Surface of a person, or the shapes of another body.
+
+    Raises:
+        MotionFileError: If the body has nothing to draw.
+    """
+    return skin_of(body) or _shapes(body)
 
 
 def _shapes(body: BodyModel) -> Skin:
@@ -185,7 +194,7 @@ def _animation(
             inverse = rotations[:, parent].transpose(0, 2, 1)
             turns = inverse @ turns
             places = np.einsum("nij,nj->ni", inverse, places - origins[:, parent])
-        keys = _continuous(Rotation.from_matrix(turns).as_quat())
+        keys = continuous(Rotation.from_matrix(turns).as_quat())
         nodes[number] |= {"translation": places[0].tolist(), "rotation": keys[0].tolist()}
         tracks = [("rotation", buffer.add(keys, "VEC4"))]
         if segment.parent is None:
@@ -196,7 +205,7 @@ def _animation(
     return {"name": "motion", "samplers": samplers, "channels": channels}
 
 
-def _continuous(quaternions: FloatArray) -> FloatArray:
+def continuous(quaternions: FloatArray) -> FloatArray:
     """Quaternions (n, 4) with signs by which each is nearest to the one before."""
     jumps = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     signs = np.concatenate(([1.0], np.where(np.cumsum(jumps) % 2 == 1, -1.0, 1.0)))

@@ -4,18 +4,24 @@ Their text and layout are the Jinja templates in the folder ``templates``.
 """
 
 import base64
+import shlex
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cache
+from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from PIL import Image, UnidentifiedImageError
 
 from manikin.analysis import Analysis
-from manikin.pipeline.run_directory import REPORT, read_summary
+from manikin.pipeline.run_directory import REPORT, SCENARIO, RunRecord, read_run, read_summary
 from manikin.pipeline.study import PAGE
 from manikin.reports.figures import png_of
 from manikin.reports.figures.study_maps import VERDICTS, study_maps
+from manikin.reports.player import player_data
 from manikin.reports.summary_table import FAMILY_HEADER, family_rows, verdict_line
 from manikin.runtime import __version__
 from manikin.runtime.display import readable
@@ -26,6 +32,29 @@ FIRST = ("scene", "postures", "margin", "com", "contacts")
 """Figures that come first, in this order; the others follow by name."""
 LEFT_OUT = ("requirements", "failure", "verdict", "planned", "proved", "succeeded")
 """Keys of the summary that the page says in other words."""
+
+
+COLOURS_OF_A_PICTURE = 160
+"""Colours of a picture in a page."""
+KEY_NUMBERS = {
+    "centroidal.limiting_contact": "limiting contact",
+    "execution.min_margin": "least margin, executed [N.m]",
+    "wholebody.min_margin": "least margin, planned [N.m]",
+    "execution.min_force_at_com_N": "least force that ends balance, executed [N]",
+    "wholebody.min_clearance_m": "least clearance [m]",
+    "wholebody.closest_pair": "nearest to each other",
+    "wholebody.max_torque_share": "largest share of a joint's strength",
+    "wholebody.max_torque_joint": "at",
+    "execution.friction.max_share": "largest share of friction, executed",
+    "ergonomics.rula_max": "RULA, largest",
+    "ergonomics.reba_max": "REBA, largest",
+    "ergonomics.owas_max": "OWAS, largest",
+    "ergonomics.l5s1_max_compression_N": "largest compression at L5/S1 [N]",
+    "ergonomics.l5s1_level": "low back",
+    "ergonomics.capable_min_share.male": "share of men strong enough",
+    "ergonomics.capable_min_share.female": "share of women strong enough",
+}
+"""What of the summary stands on a run's page before the figures, by its words there."""
 
 
 def render(template: str, **values: Any) -> str:
@@ -80,12 +109,60 @@ def write_run_page(directory: str | Path) -> Path:
 
 
 def run_page(folder: Path, summary: Mapping[str, Any]) -> str:
-    """HTML of a run in a folder: verdict, requirements, figures and all numbers."""
+    """HTML of a run in a folder: verdict, requirements, motion to be played, contacts, figures, numbers."""
     files = {file.stem: file for file in sorted((folder / FIGURES).glob("*.png"))}
     names = dict.fromkeys([*FIRST, *files])
-    pictures = {readable(name): files[name].read_bytes() for name in names if name in files}
+    pictures = {readable(name): _smaller(files[name].read_bytes()) for name in names if name in files}
     values = dict(_flat({key: value for key, value in summary.items() if key not in LEFT_OUT}))
-    return render("run", summary=summary, verdict=verdict_line(summary), pictures=pictures, values=values)
+    record = read_run(folder) if (folder / SCENARIO).exists() else None
+    return render(
+        "run", summary=summary, verdict=verdict_line(summary), pictures=pictures, values=values,
+        motion=_motion(record), contacts=_contacts(record), key_numbers=_key_numbers(values),
+        commands="" if record is None else _commands(folder, summary),
+    )  # fmt: skip
+
+
+def _smaller(png: bytes) -> bytes:
+    """The picture of a PNG file in :data:`COLOURS_OF_A_PICTURE` colours, which takes a third of the bytes."""
+    content = BytesIO()
+    with suppress(UnidentifiedImageError):
+        image = (
+            Image.open(BytesIO(png)).convert("RGB").quantize(COLOURS_OF_A_PICTURE, Image.Quantize.FASTOCTREE)
+        )
+        image.save(content, format="png", compress_level=6)
+    return content.getvalue() or png
+
+
+def _motion(record: RunRecord | None) -> dict[str, Any] | None:
+    """What the player shows of the last motion of a run, or None without a body to show."""
+    if record is None or not record.motions or record.body is None or record.body.is_point_mass:
+        return None
+    return player_data(record.body, list(record.motions.values())[-1], record.scene, record.schedule)
+
+
+def _contacts(record: RunRecord | None) -> list[dict[str, Any]]:
+    """One row for each phase: its begin and end [s], and what is held in it."""
+    if record is None or record.schedule is None:
+        return []
+    edges = pairwise(record.schedule.instants.tolist())
+    return [
+        {"start": start, "end": end, "held": ", ".join(map(readable, phase.stance.effectors)) or "flight"}
+        for (start, end), phase in zip(edges, record.schedule.sequence, strict=True)
+    ]
+
+
+def _key_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of :data:`KEY_NUMBERS` that a run has, by their words."""
+    return {words: values[key] for key, words in KEY_NUMBERS.items() if values.get(key) is not None}
+
+
+def _commands(folder: Path, summary: Mapping[str, Any]) -> str:
+    """Commands that run the scenario again, play its motion and export it."""
+    place, seed = shlex.quote(str(folder)), summary.get("seed", 0)
+    return "\n".join((
+        f"manikin run {shlex.quote(str(folder / SCENARIO))} --seed {seed} --out again",
+        f"manikin view {place}", f"manikin export {place} --format glb",
+    ))  # fmt: skip
 
 
 def analysis_page(
