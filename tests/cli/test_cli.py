@@ -193,7 +193,7 @@ def test_run_leaves_a_whole_directory(capfd, tmp_path, monkeypatch):
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     files.remove(LOCK)
     assert files == {
-        "scenario.yaml", "motion.h5", "motion.bvh", "summary.json", "report.html",
+        "scenario.yaml", "motion.h5", "motion.bvh", "motion.glb", "summary.json", "report.html",
         *(f"figures/{name}.png" for name in FIGURES if name != "walk_paths"),
     }  # fmt: skip
 

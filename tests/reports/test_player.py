@@ -71,9 +71,8 @@ def test_a_scene_of_too_many_triangles_is_shown_by_bounds(finished_run):
 
 def test_a_page_with_the_player_needs_no_other_file_and_is_small(data):
     summary = {"scenario": "a", "succeeded": True, "requirements": []}
-    page = render(
-        "run", summary=summary, verdict="proved", pictures={}, values={}, motion=data, contacts=[], key_numbers={}, commands="",
-    )  # fmt: skip
+    rest = {"pictures": {}, "values": {}, "contacts": [], "key_numbers": {}, "commands": ""}
+    page = render("run", summary=summary, verdict="proved", motion=data, **rest)
     assert "http" not in page
     assert len(page) < 2.5e6
 
