@@ -58,6 +58,21 @@ def test_scrubbing_places_the_body_as_the_kinematics_do(session, finished_run):
     assert session.time == motion.time[-1]
 
 
+def test_a_person_is_shown_by_the_surface_and_on_request_by_the_shapes(session, finished_run):
+    """The bones of the surface stand where the segments do."""
+    session.show(1.0)
+    shapes = session._shapes
+    assert len(shapes._surface) == 5
+    for mesh in shapes._surface:
+        places = [bone.position for bone in mesh.bones]
+        frames = [shapes.frames[segment.name].position for segment in finished_run.body.segments]
+        np.testing.assert_allclose(places, frames, atol=1e-12)
+    for wanted in (False, True):
+        session.show_shapes(wanted)
+        assert all(frame.visible == wanted for frame in shapes.frames.values())
+        assert all(mesh.visible != wanted for mesh in shapes._surface)
+
+
 def test_forces_are_drawn_at_the_contacts_that_carry_load(session, finished_run):
     session.show(0.5)  # phase 2: right foot only
     assert not session._arrows["left_foot"].visible
@@ -158,9 +173,9 @@ def test_a_recording_is_shown_beside_its_plan(finished_run):
             apart = np.asarray(frame.position) - np.asarray(viewer._shapes.frames[name].position)
             assert np.linalg.norm(apart[:2]) == pytest.approx(BESIDE, abs=1e-9)
             assert apart[2] == pytest.approx(0.0, abs=1e-12)
-            assert frame.visible
+        assert all(mesh.visible for mesh in viewer._second._surface)
         viewer.put_beside("nothing")
-        assert not any(frame.visible for frame in viewer._second.frames.values())
+        assert not any(item.visible for item in (*viewer._second.frames.values(), *viewer._second._surface))
         with pytest.raises(InputError, match="valid here: nothing, recorded, planned, executed"):
             viewer.put_beside("replayed")
     finally:

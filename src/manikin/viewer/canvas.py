@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import viser
+from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
+from manikin.body.flesh import MATERIALS
 from manikin.body.segments import segment_triangles
+from manikin.body.skin import Skin, skin_of
 from manikin.numerics.spatial import FloatArray
+from manikin.runtime.display import MATERIAL_COLOURS
 from manikin.scene import HalfSpace, Plane, Scene
 from manikin.viewer.door import Door
 
@@ -88,7 +92,7 @@ def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: 
         mesh = obstacle.to_trimesh()
         server.scene.add_mesh_simple(
             f"/scene/{obstacle.name}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
-            color=COLOURS["obstacle"], opacity=0.55, flat_shading=True, side="double",
+            color=COLOURS["obstacle"], opacity=0.85, flat_shading=True, side="double",
         )  # fmt: skip
     if scene is not None and scene.floor_height is not None:
         server.scene.add_grid(
@@ -116,18 +120,23 @@ def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) ->
     camera.position = middle + max(1.0, size / WHOLE) * VIEW
 
 
+OPAQUE = 0.7
+"""A surface is drawn opaque from this opacity of the shapes on."""
+
+
 class BodyShapes:
-    """The shapes of a body on the page.
+    """A body on the page: a person by the surface, any body by its shapes.
 
     Attributes:
         frames: One frame for each segment with shapes.
         data: Pinocchio's data of the configuration shown.
+        has_surface: Whether there is a surface beside the shapes.
     """
 
     def __init__(
         self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7, root: str = "/body"
     ) -> None:
-        """Draw the body, called ``root`` on the page, with an opacity in [0, 1]."""
+        """Draw the body, called ``root`` on the page, with an opacity in [0, 1]; of a person the surface."""
         self._body, self.data = body, body.pinocchio.createData()
         self.frames: dict[str, viser.FrameHandle] = {}
         self._meshes: list[viser.MeshHandle] = []
@@ -138,19 +147,30 @@ class BodyShapes:
             self.frames[segment.name] = server.scene.add_frame(name, show_axes=False)
             mesh = server.scene.add_mesh_simple(f"{name}/shape", *triangles, color=colour, opacity=opacity)
             self._meshes.append(mesh)
+        skin = skin_of(body)
+        self._surface = [] if skin is None else _add_surface(server, skin, f"{root}/surface", opacity)
+        self.has_surface = bool(self._surface)
+        self._visible, self._shapes_wanted = True, False
+        self._show()
 
     def paint(self, colour: tuple[int, int, int]) -> None:
-        """Give all shapes one colour, other than those of the sides of a body."""
-        for mesh in self._meshes:
+        """Give the whole body one colour, other than those of its sides or clothes."""
+        for mesh in (*self._meshes, *self._surface):
             mesh.color = colour
 
     def place(self, q: FloatArray) -> None:
         """Show the configuration (nq,)."""
         pin.framesForwardKinematics(self._body.pinocchio, self.data, q)
         for name, frame in self.frames.items():
-            placement = self.data.oMf[self._body.segment_frame(name)]
-            x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-            frame.wxyz, frame.position = (w, x, y, z), placement.translation
+            frame.wxyz, frame.position = self._placement(name)
+        for mesh in self._surface:
+            for bone, segment in zip(mesh.bones, self._body.segments, strict=True):
+                bone.wxyz, bone.position = self._placement(segment.name)
+
+    def _placement(self, name: str) -> tuple[tuple[float, float, float, float], FloatArray]:
+        placement = self.data.oMf[self._body.segment_frame(name)]
+        x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+        return (w, x, y, z), placement.translation
 
     def top(self) -> FloatArray:
         """(3,) above the highest origin of a segment as the body is placed [m]."""
@@ -159,8 +179,40 @@ class BodyShapes:
 
     def show(self, visible: bool) -> None:
         """Draw the body, or hide it."""
+        self._visible = visible
+        self._show()
+
+    def show_shapes(self, wanted: bool) -> None:
+        """Draw the collision shapes of a person, or the surface."""
+        self._shapes_wanted = wanted
+        self._show()
+
+    def _show(self) -> None:
+        shapes = self._shapes_wanted or not self.has_surface
         for frame in self.frames.values():
-            frame.visible = visible
+            frame.visible = self._visible and shapes
+        for mesh in self._surface:
+            mesh.visible = self._visible and not shapes
+
+
+def _add_surface(
+    server: viser.ViserServer, skin: Skin, name: str, opacity: float
+) -> list[viser.MeshSkinnedHandle]:
+    """Draw the surface of a person, one mesh for each material, on bones that are its segments."""
+    turned = Rotation.from_matrix(skin.rotations).as_quat()[:, [3, 0, 1, 2]]
+    weights = np.zeros((len(skin.vertices), len(skin.segments)))
+    np.add.at(weights, (np.arange(len(weights))[:, None], skin.bones), skin.weights)
+    result = []
+    for material in MATERIALS:
+        used, faces = np.unique(skin.faces_of(material), return_inverse=True)
+        colour = MATERIAL_COLOURS[material]
+        result.append(server.scene.add_mesh_skinned(
+            f"{name}/{material}", skin.vertices[used], faces.reshape(-1, 3), bone_wxyzs=turned,
+            bone_positions=skin.origins, skin_weights=weights[used], side="double",
+            color=np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]),
+            opacity=None if opacity >= OPAQUE else opacity,
+        ))  # fmt: skip
+    return result
 
 
 def side_colour(name: str) -> tuple[int, int, int]:

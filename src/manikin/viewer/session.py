@@ -123,6 +123,12 @@ class ViewerSession(Page):
                 self._second.paint(COLOURS[name])
             self.show(self.time)
 
+    def show_shapes(self, wanted: bool) -> None:
+        """Show the collision shapes of the bodies instead of their surfaces."""
+        with self._lock:
+            for shapes in (self._shapes, self._second, *(item for item, _ in self._others)):
+                shapes.show_shapes(wanted)
+
     def play(self) -> None:
         """Let time run, from the beginning when it is at the end."""
         with self._lock:
@@ -230,6 +236,8 @@ class ViewerSession(Page):
             motions = gui.add_dropdown("motion", tuple(self.content.motions), initial_value=self.chosen)
             beside = gui.add_dropdown("beside", (NOTHING, *self.content.motions), initial_value=self.beside)
             self._forces = gui.add_checkbox("contact forces", initial_value=True)
+            shapes = gui.add_checkbox("collision shapes", initial_value=not self._shapes.has_surface)
+            shapes.visible = self._shapes.has_surface
         with gui.add_folder("Now"):
             self._text = gui.add_markdown("")
         with gui.add_folder("Margin"):
@@ -241,6 +249,7 @@ class ViewerSession(Page):
         motions.on_update(lambda _: self.choose(motions.value))
         beside.on_update(lambda _: self.put_beside(beside.value))
         self._forces.on_update(lambda _: self.show(self.time))
+        shapes.on_update(lambda _: self.show_shapes(shapes.value))
 
     def _build_plot(self) -> None:
         motions = self.content.motions.values()

@@ -104,7 +104,7 @@
   const lines = buffer(new Float32Array(grid));
 
   // The eye: turned about the middle by dragging, nearer by the wheel, moved aside with the shift key.
-  const eye = { azimuth: data.azimuth, height: 0.25, distance: 1.5 * data.reach + 1.2, middle: [mx, my, mz] };
+  const eye = { azimuth: data.azimuth, height: 0.25, distance: 1.1 * data.reach + 0.9, middle: [mx, my, mz] };
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const axes = () => {
