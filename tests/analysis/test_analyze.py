@@ -171,6 +171,8 @@ def test_a_shift_that_does_not_lead_to_balance_is_not_believed(recordings_folder
     assert (margin["motion"], margin["share_in_contact"]) == ("recorded", 0.0)
     assert margin["share_positive_in_contact"] is None
     assert "None" not in analysis_page(leap, summary_of(leap), "", {})
+    # Where the sheet is drawn the motion can be played.
+    assert 'id="player-data"' in analysis_page(leap, summary_of(leap), "<svg></svg>", {})
 
 
 @pytest.mark.parametrize(

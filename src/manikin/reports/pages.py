@@ -174,6 +174,7 @@ def analysis_page(
     """
     missing = [f"{part}: {reason}" for part, reason in summary["ergonomics"]["missing"].items()]
     shown = {"name": analysis.name, "sheet": sheet, "pictures": pictures, "missing": missing}
+    shown["motion"] = player_data(analysis.body, analysis.motion) if sheet else None
     return render("analysis", summary=summary, **shown)
 
 
