@@ -149,7 +149,7 @@ def test_verdicts_groups_and_pages(study, monkeypatch):
     refused[0]["failure"]["stage"] = "scenario"
     (person, *_), groups = judged(study, refused)["people"], judged(study, refused)["groups"]
     assert person["verdict"] == "undecided"
-    assert (groups[0]["undecided"], groups[0]["share"]) == (1, None)
+    assert (groups[0]["undecided"], groups[0]["share"]) == (1, 0.0)
 
 
 def test_only_draws_have_an_interval_of_the_population(study, tmp_path):
@@ -168,6 +168,10 @@ def test_only_draws_have_an_interval_of_the_population(study, tmp_path):
         assert groups[name]["interval"] == wilson_interval(can, 20, 0.95)
     assert groups["random, all"]["interval"] == wilson_interval(sum(expected), 40, 0.95)
     assert groups["percentiles, male"]["interval"] is None
+    late = [fake(job) | {"timed_out": not fake(job)["succeeded"]} for job in jobs]
+    female = next(group for group in judged(drawn, late)["groups"] if group["group"] == "random, female")
+    assert (female["can"], female["undecided"]) == (expected[0], 20 - expected[0])
+    assert female["interval"] == (wilson_interval(expected[0], 20, 0.95)[0], 1.0)
     assert len(study.bodies) == 2
 
 

@@ -4,7 +4,7 @@ A job is one body at one setting of the swept values with one seed. A person *ca
 seeds succeeds: its motion is proved, or with ``stage: contacts`` its contacts are certified by an independent
 check. A person *cannot* if every job ended in an explained failure: the planner found nothing, which is no
 proof that nobody could. All others, whose scenario is refused, whose time is over, or who meet a defect, are
-*undecided* and count in no share.
+*undecided*: a share leaves them out of those who can, and its interval holds whether they can or not.
 
 ::
 
@@ -200,8 +200,9 @@ def judged(study: Study, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]
         and ``reason`` of the failure that is met most often, None for who can.
 
         ``groups``, for each setting, one for each family and sex and one for all random draws: ``group``,
-        ``setting``, ``people``, ``can``, ``cannot``, ``undecided``, ``share`` of those decided, and its
-        ``interval``, None for bodies that were chosen and not drawn, of which it says nothing.
+        ``setting``, ``people``, ``can``, ``cannot``, ``undecided``, ``share`` who are known to be able, and
+        ``interval`` from the lower end if nobody undecided can to the upper end if all of them can; None for
+        bodies that were chosen and not drawn, of which it says nothing.
     """
     bodies = {body.name: body for body in study.bodies}
     together: dict[tuple[int, str], list[Mapping[str, Any]]] = {}
@@ -305,10 +306,13 @@ def _group(
     name: str, setting: int, members: Sequence[Mapping[str, Any]], confidence: float
 ) -> dict[str, Any]:
     verdicts = Counter(person["verdict"] for person in members)
-    can, decided = verdicts["can"], verdicts["can"] + verdicts["cannot"]
-    sampled = all(person["drawn"] for person in members)
+    can, count = verdicts["can"], len(members)
+    interval = None
+    if all(person["drawn"] for person in members):
+        least = wilson_interval(can, count, confidence)
+        most = wilson_interval(can + verdicts["undecided"], count, confidence)
+        interval = (least[0], most[1]) if least and most else None
     return {
-        "group": name, "setting": setting, "people": len(members), "can": can, "cannot": verdicts["cannot"],
-        "undecided": verdicts["undecided"], "share": can / decided if decided else None,
-        "interval": wilson_interval(can, decided, confidence) if sampled else None,
+        "group": name, "setting": setting, "people": count, "can": can, "cannot": verdicts["cannot"],
+        "undecided": verdicts["undecided"], "share": can / count, "interval": interval,
     }  # fmt: skip
