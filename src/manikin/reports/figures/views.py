@@ -186,10 +186,10 @@ def draw_body(
     image = picture([*bodies, *obstacles], view.camera, window, dots, clear=clear, shadows=False)
     (x, y) = view.offset
     place = (left + x, right + x, bottom + y, top + y)
-    axes.imshow(image, extent=place, interpolation="antialiased", zorder=0.5)
+    axes.imshow(image, extent=place, interpolation="antialiased", zorder=1.6)
     if scene is not None and scene.floor_height is not None and low[2] <= scene.floor_height <= high[2]:
         level = scene.floor_height + y
-        axes.hlines(level, left + x, right + x, color=COLOURS["soft"], linewidth=0.9, zorder=0.6)
+        axes.hlines(level, left + x, right + x, color=COLOURS["soft"], linewidth=0.9, zorder=1.7)
 
 
 def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list[float], list[str]]:
