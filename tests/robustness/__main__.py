@@ -50,18 +50,23 @@ def main() -> int:
             (name, given.seed, at, min(BATCH, each - at)) for name in kinds for at in range(0, each, BATCH)
         ]
     began, count, done = time.monotonic(), 0, 0
-    with ProcessPoolExecutor(given.jobs, get_context("spawn"), max_tasks_per_child=4) as pool:
-        waiting = {pool.submit(batch_of, *batch): batch for batch in batches}
-        for future in as_completed(waiting):
-            batch = waiting[future]
-            try:
-                findings = future.result()
-                done += batch[3]
-            except BrokenProcessPool:
-                findings = [Finding(batch[0], batch[1], batch[2], f"a process ended; cases {batch[2:]}")]
-            count += len(findings)
-            for finding in findings:
-                print(f"{finding.format} seed {finding.seed} case {finding.case}: {finding.what}", flush=True)
+    group = 4 * (given.jobs or 1)  # processes that are replaced one by one may wait for ever (CPython 115634)
+    for at in range(0, len(batches), group):
+        with ProcessPoolExecutor(given.jobs, get_context("spawn")) as pool:
+            waiting = {pool.submit(batch_of, *batch): batch for batch in batches[at : at + group]}
+            for future in as_completed(waiting):
+                batch = waiting[future]
+                try:
+                    findings = future.result()
+                    done += batch[3]
+                except BrokenProcessPool:
+                    findings = [Finding(batch[0], batch[1], batch[2], f"a process ended; cases {batch[2:]}")]
+                count += len(findings)
+                for finding in findings:
+                    print(
+                        f"{finding.format} seed {finding.seed} case {finding.case}: {finding.what}",
+                        flush=True,
+                    )
     print(f"{done} damaged files, {count} findings, {time.monotonic() - began:.0f} s")
     return 1 if count else 0
 
