@@ -14,25 +14,25 @@ from identify_objective import HEADING_LENGTH, RecordedWalk, identify_objective,
 from inverse import Clip, centimetres, clips, row
 from scipy.stats import binomtest
 
-from manikin.errors import SolverError
+from manikin.errors import InputError, SolverError
 from manikin.numerics.spatial import FloatArray
 from manikin.walking import RECORDED_WALKS
 from manikin.walking.path.path_models import COMPARED, OptimalModel, PathModel
-from manikin.walking.path.walking_model import FURTHER_TERMS, TERMS
+from manikin.walking.path.walking_model import TERMS
 
 PAGE = Path(__file__).with_name("path-models.md")
-FOLDS = 5
-TOLERANCE = 1e-3
+FOLDS = 3
+TOLERANCE = 1e-2
 """Of the logarithms of fitted weights."""
-FIRST_FURTHER = {"speed": 0.05, "turning": 0.05, "jerk": 0.05, "work": 0.05}
+FIRST_FURTHER = {"jerk": 0.05, "speed": 0.05, "work": 0.05, "turning": 0.05}
 """Where the weights of further terms begin."""
 
 TEXT = """# Models of walking paths
 
 How far do models of the way that somebody walks come from where people walked? The {count} recorded walks are
 those of [the weights](inverse.md): reduced to the middle of the shoulders without the sway of the steps.
-Every model is told where a walk begins and ends and the velocities there. Weights are fitted to four fifths
-of the walks, and the other fifth is predicted, in turn: no number below is of a walk that was fitted.
+Every model is told where a walk begins and ends and the velocities there. Weights are fitted to two thirds
+of the walks, and the other third is predicted, in turn: no number below is of a walk that was fitted.
 *Error*: mean distance between recorded and predicted place at equal shares of both durations; the people of
 the thesis differ among themselves by 14 cm (4.4). By `docs/path_models.py`.
 
@@ -42,6 +42,13 @@ MODELS = """## Models
 Models of optimal control are one objective with different weights (`manikin.walking.path.path_models`), each
 with the weight of time 1; the weights named are fitted. Fajen and Warren's steering has its published
 numbers, clothoid words have none.
+
+"""
+MODELS_END = """
+The criterion has the least median and is the nearest in turns, where heading and way part. Minimum jerk has
+the least mean and is nearer in the walks without a turn that was asked for; over all walks the difference is
+within chance. A price of changes of speed adds nothing to it: its weight ends at the least that is tried.
+Steering and clothoid words have nothing that is fitted; where heading and way part, words make detours.
 
 """
 FURTHER = """
@@ -70,7 +77,7 @@ class Prediction:
 
 
 def cross_validated(walks: Sequence[RecordedWalk], model: PathModel) -> Prediction:
-    """Every fifth walk is predicted by the model as the others say."""
+    """Every third walk is predicted by the model as the others say."""
     errors, weights = np.full(len(walks), np.nan), []
     for fold in range(FOLDS):
         fitted = model
@@ -102,7 +109,7 @@ def error(walk: RecordedWalk, model: PathModel) -> float:
     """At equal shares [m]; nan where the model has no walk."""
     try:
         return float(share_errors([walk], [model.walk(task_of(walk, RECORDED_WALKS))])[0])
-    except SolverError as failure:
+    except (InputError, SolverError) as failure:
         print(failure, file=sys.stderr)
         return float("nan")
 
@@ -163,8 +170,8 @@ def further(found: Sequence[Clip], without: Prediction) -> Iterator[str]:
     walks = [clip.walk for clip in found]
     yield from row("added term", "weights by fold", *PARTS, "median", "nearer than without", "p", "verdict")
     yield from row("none", told(without, TERMS[1:]), *cells(without, PARTS, found), "", "", "", head=False)
-    for name in FURTHER_TERMS[: len(FIRST_FURTHER)]:
-        objective = replace(RECORDED_WALKS, **{name: FIRST_FURTHER[name]})
+    for name, weight in FIRST_FURTHER.items():
+        objective = replace(RECORDED_WALKS, **{name: weight})
         one = cross_validated(walks, OptimalModel(objective, (*TERMS[1:], name)))
         wins, count, odds = nearer(one.errors, without.errors)
         better = np.nanmean(one.errors) < np.nanmean(without.errors) and odds < 0.05 and 2 * wins > count
@@ -179,9 +186,12 @@ def main(folder: Path) -> None:
     """Write the page."""
     found = list(clips(folder))
     ours, table = models(found)
-    text = TEXT.format(count=len(found)) + MODELS + "\n".join(table) + "\n"
+    text = TEXT.format(count=len(found)) + MODELS + "\n".join(table) + "\n" + MODELS_END
     PAGE.write_text(text + THANKS)
-    PAGE.write_text(text + FURTHER + "\n".join(further(found, ours)) + "\n" + END + THANKS)
+    text += FURTHER
+    for line in further(found, ours):
+        text += line + "\n"
+        PAGE.write_text(text + END + THANKS)
 
 
 if __name__ == "__main__":
