@@ -119,3 +119,11 @@ def test_a_recording_is_planned_anew_beside_it(standing_file, tmp_path, capsys):
     assert main(["analyze", str(standing_file), "--plan", "quickly", "--json"]) == BAD_INPUT
     assert "'--plan': 'quickly' is not one of 'keyframes', 'timing-free'" in capsys.readouterr().err
     assert main(["analyze", str(standing_file), "--execute", "--json"]) == BAD_INPUT
+
+
+def test_a_map_of_markers_is_checked_before_any_recording(standing_file, tmp_path, capsys):
+    file = tmp_path / "map.yaml"
+    file.write_text("left_asis: M1\nleft_knee_latral: M2\n")
+    assert main(["analyze", str(standing_file), "--markers", str(file), "--json"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "map.yaml:2: 'left_knee_latral' is no landmark or segment; valid: left_knee_lateral" in line

@@ -29,6 +29,7 @@ from manikin.recordings.dynamics.recorded_dynamics import (
 from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
 from manikin.recordings.dynamics.shifted_motion import least_shift
 from manikin.recordings.readers import READERS, read_recording
+from manikin.recordings.readers.marker_map import MarkerMap
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
@@ -117,6 +118,7 @@ class AnalysisOptions:
         load: Carried in the hand ``"left"``, ``"right"`` or ``"both"`` [kg]: part of the masses, and of RULA
             and REBA.
         as_recorded: Whether no shifted motion is looked for, to stand beside the recorded one.
+        markers: Marker map or its file, for names of markers that do not say what they mark.
     """
 
     frames: tuple[int, int] | None = None
@@ -126,6 +128,7 @@ class AnalysisOptions:
     load: float = 0.0
     load_hand: str = "both"
     as_recorded: bool = False
+    markers: MarkerMap | str | Path | None = None
 
     def __post_init__(self) -> None:
         if self.mass is not None:
@@ -151,7 +154,7 @@ def analyze_file(path: str | Path, options: AnalysisOptions | None = None) -> An
     """
     given = options or AnalysisOptions()
     began = clock.perf_counter()
-    recording = read_recording(path, given.frames)
+    recording = read_recording(path, given.frames, given.markers)
     try:
         found = analyze(recording, given, Path(path).stem)
     except InputError as error:

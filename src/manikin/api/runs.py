@@ -335,14 +335,17 @@ class Drawing:
         write_result(path, self.svg)
 
 
-def read(path: str | Path, frames: tuple[int, int] | None = None) -> RecordedMotion:
+def read(
+    path: str | Path, frames: tuple[int, int] | None = None, markers: str | Path | None = None
+) -> RecordedMotion:
     """Read a recording of a person.
 
     Args:
         path: C3D or TRC for markers, BVH or AMC for a skeleton; InputError if it cannot be read.
         frames: First frame and the one after the last; None for all.
+        markers: Marker map, a YAML file, for names of markers that do not say what they mark.
     """
-    return RecordedMotion(read_recording(path, frames), Path(path))
+    return RecordedMotion(read_recording(path, frames, markers), Path(path))
 
 
 def analyze(path: str | Path, **options: Any) -> MeasuredRecording:
@@ -351,4 +354,4 @@ def analyze(path: str | Path, **options: Any) -> MeasuredRecording:
     Raises:
         InputError: If it cannot be read, or is not a person's motion that can be measured.
     """
-    return read(path, options.get("frames")).analyze(**options)
+    return read(path, options.get("frames"), options.get("markers")).analyze(**options)

@@ -37,6 +37,9 @@ def analyze(
         tuple[int, int] | None,
         option("FIRST STOP", "Frames from FIRST up to, not with, STOP; counted from 0."),
     ] = None,
+    markers: Annotated[
+        Path | None, option("MAP.yaml", "What markers mark, where their names do not say it.")
+    ] = None,
     mass: Annotated[
         float | None, option("KG", "Mass of the person. Default: the file's, or the plates'.")
     ] = None,
@@ -64,10 +67,12 @@ def analyze(
         console.refuse(plan is not None or execute, "--plan", "there are several files")
         console.refuse(frames is not None, "--frames", "there are several files")
     from manikin.analysis import AnalysisOptions, recordings_in
+    from manikin.recordings import read_marker_map
 
+    marker_map = None if markers is None else read_marker_map(markers)
     options = AnalysisOptions(
         frames=frames, mass=mass, sex=sex or "male", friction=friction, load=load,
-        load_hand=load_hand or "both", as_recorded=as_recorded,
+        load_hand=load_hand or "both", as_recorded=as_recorded, markers=marker_map,
     )  # fmt: skip
     paths = recordings_in(sources)
     if not single:

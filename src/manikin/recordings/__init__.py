@@ -27,6 +27,7 @@ from manikin.recordings.readers import read_recording
 from manikin.recordings.readers.acclaim import read_amc, read_asf
 from manikin.recordings.readers.bvh import read_bvh
 from manikin.recordings.readers.c3d import read_c3d
+from manikin.recordings.readers.marker_map import MarkerMap, read_marker_map
 from manikin.recordings.readers.markers import Event, ForcePlate, MarkerRecording
 from manikin.recordings.readers.opensim import read_mot, read_trc
 from manikin.recordings.readers.skeleton_recording import Recording, Subject
@@ -66,15 +67,16 @@ from manikin.recordings.supports.recorded_stances import recorded_schedule
 from manikin.recordings.supports.supports import TimingError, supports_of, timing_errors
 
 __all__ = [
-    "Event", "ForcePlate", "GroupStatistics", "LeastShift", "MarkerRecording", "Origin", "Overhead",
-    "PhaseSequence", "PlateComparison", "PlateForces", "Reconstruction", "RecordedClip",
+    "Event", "ForcePlate", "GroupStatistics", "LeastShift", "MarkerMap", "MarkerRecording", "Origin",
+    "Overhead", "PhaseSequence", "PlateComparison", "PlateForces", "Reconstruction", "RecordedClip",
     "RecordedDynamics", "RecordedMargins", "RecordedSupports", "Recording", "StatisticsSettings",
     "Subject", "Support", "SupportPhase", "SupportPlacement", "TimingError", "com_extreme",
     "compare_with_plates", "dynamics_of", "first_stance", "largest_distances", "least_shift",
     "mass_on_plates", "motion_of", "motion_on_contacts", "passages", "person_of", "phase_durations",
     "plate_forces", "published_consistency", "published_distances", "published_heights",
     "published_phases", "published_statistics", "read_amc", "read_asf", "read_bvh", "read_c3d",
-    "read_mot", "read_recording", "read_trc", "reconstruct", "recorded_margins", "recorded_schedule",
-    "sequence_consistency", "shares_within", "smoothed", "statistics_of", "support_distances",
-    "support_placements", "supports_of", "timing_errors", "touch_downs_of", "whole_passage", "with_mass",
+    "read_marker_map", "read_mot", "read_recording", "read_trc", "reconstruct", "recorded_margins",
+    "recorded_schedule", "sequence_consistency", "shares_within", "smoothed", "statistics_of",
+    "support_distances", "support_placements", "supports_of", "timing_errors", "touch_downs_of",
+    "whole_passage", "with_mass",
 ]  # fmt: skip

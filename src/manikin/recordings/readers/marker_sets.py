@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import numpy as np
+
 from manikin.errors import InputError
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
@@ -86,11 +88,33 @@ _CENTRAL: tuple[tuple[str, str, str], ...] = (
     (r"tophead|headtop|topofhead|backofhead|ari|glab\w*|vertex|hv|occ|sel|tete[hdg]", "", "head"),
 )
 
+_MIDLINE = frozenset({"pelvis", "thorax", "head"})
+_SIDES = (("left", "left"), ("right", "right"), ("l", "left"), ("r", "right"))
+
+SIDES = ("left", "right")
+
+
+def _sided(segment: str, side: str) -> str:
+    return segment if segment in _MIDLINE else f"{side}_{segment}"
+
+
+LANDMARKS: Mapping[str, str] = MappingProxyType(
+    {role: segment for _, role, segment in _CENTRAL if role}
+    | {f"{side}_{role}": _sided(segment, side) for side in SIDES for _, role, segment in _SIDED if role}
+)
+"""Segment of each place that a marker may mark."""
+
+SEGMENTS = tuple(
+    dict.fromkeys(_sided(segment, side) for side in SIDES for *_, segment in (*_CENTRAL, *_SIDED))
+)
+"""Segments that markers are on."""
+
+UNUSED = "unused"
+"""What a marker map says of a marker that marks nothing."""
+
 FEWEST_WITH_PREFIX = 8
 """Markers from which a beginning that all names share is taken for the subject's."""
 
-_MIDLINE = frozenset({"pelvis", "thorax", "head"})
-_SIDES = (("left", "left"), ("right", "right"), ("l", "left"), ("r", "right"))
 _COMPUTED = "oalp"
 """Ends of the names of origin and axes that Plug-in Gait computes: ``LFEO``, ``LFEA``, ``LFEL``, ``LFEP``."""
 
@@ -111,20 +135,19 @@ class MarkerSet:
 
 
 def marker_set(recording: MarkerRecording) -> MarkerSet:
-    """Recognise the markers of a recording that are seen at all."""
+    """Recognise the markers of a recording that are seen at all, by its marker map or by their names."""
     plain = _plain(recording.marker_names)
     computed = _computed(set(plain.values())) | _below_knees(set(plain.values()))
     roles: dict[str, str] = {}
     segments: dict[str, str] = {}
-    numbers = sorted(range(len(plain)), key=lambda k: not _is_study(recording.marker_names[k]))
-    for number in numbers:
-        name = recording.marker_names[number]
-        letters = plain[name]
-        if (
-            letters not in computed
-            and recording.seen[:, number].any()
-            and (found := next(_places(name, letters), None))
-        ):
+    told = recording.marker_map
+    names = [recording.marker_names[k] for k in np.flatnonzero(recording.seen.any(axis=0))]
+    for name in sorted(names, key=lambda name: (name not in told, not _is_study(name))):
+        if name in told:
+            found = _told(told[name])
+        else:
+            found = None if plain[name] in computed else next(_places(name, plain[name]), None)
+        if found is not None:
             role, segments[name] = found
             if role:
                 roles.setdefault(role, name)
@@ -154,6 +177,13 @@ def is_known(name: str) -> bool:
     return next(_places(name, _plain([name])[name]), None) is not None
 
 
+def _told(place: str) -> tuple[str, str] | None:
+    """Role and segment by what a marker map says."""
+    if place in LANDMARKS:
+        return place, LANDMARKS[place]
+    return ("", place) if place in SEGMENTS else None
+
+
 def _is_study(name: str) -> bool:
     """Whether it is a marker that OpenCap adds to the centres of joints, whose names say the same."""
     return name.lower().endswith("_study")
@@ -173,7 +203,7 @@ def _places(name: str, plain: str) -> Iterator[tuple[str, str]]:
     for side, stem in _sides(name, plain):
         for pattern, role, segment in _SIDED:
             if re.fullmatch(pattern, stem):
-                yield role and f"{side}_{role}", segment if segment in _MIDLINE else f"{side}_{segment}"
+                yield role and f"{side}_{role}", _sided(segment, side)
 
 
 def _sides(name: str, plain: str) -> Iterator[tuple[str, str]]:
@@ -190,8 +220,6 @@ def _computed(names: set[str]) -> set[str]:
     axes = {name for name in names if len(name) > 2 and name[-1] in _COMPUTED}
     return {name for name in axes if names.issuperset(name[:-1] + end for end in _COMPUTED)}
 
-
-SIDES = ("left", "right")
 
 JOINTS: Mapping[str, tuple[str, ...]] = {
     # Names on skeletons of CMU (ASF, then the BVH made of them) and of ACCAD.

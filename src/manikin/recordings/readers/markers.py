@@ -1,8 +1,9 @@
 """Recorded markers at an even rate, their gaps, and the force plates and events recorded with them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +152,8 @@ class MarkerRecording(Displayed):
         events: In the order of time.
         subject: What the file says about the person.
         remarks: What the file says wrongly, or what of it was not read; a line each.
+        marker_map: Landmark or segment of markers whose names do not say it, by name; see
+            :class:`~manikin.recordings.readers.marker_map.MarkerMap`.
     """
 
     name: str
@@ -162,6 +165,7 @@ class MarkerRecording(Displayed):
     events: tuple[Event, ...] = ()
     subject: Subject = UNKNOWN
     remarks: tuple[str, ...] = ()
+    marker_map: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         where = f"recording {self.name!r}"
@@ -184,6 +188,7 @@ class MarkerRecording(Displayed):
             raise InputError(f"{where} has {place} in frame {frame}, counted from 0; valid: {valid}")
         positions.setflags(write=False)
         object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "marker_map", MappingProxyType(dict(self.marker_map)))
         object.__setattr__(self, "events", tuple(sorted(self.events, key=lambda event: event.time)))
 
     def __len__(self) -> int:

@@ -65,7 +65,8 @@ def pelvis_axes(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
     for side in SIDES:
         if f"{side}_asis" not in marks:
             wrong = f"no marker that is known as the {side} ASIS"
-            raise InputError(f"{where} has {wrong}; valid: both, and PSIS or sacrum")
+            valid = "both, and PSIS or sacrum (a marker map says what markers mark: --markers)"
+            raise InputError(f"{where} has {wrong}; valid: {valid}")
     y = marks["left_asis"] - marks["right_asis"]
     x = middle(marks, "asis") - _back(marks, where)
     axes = frames(np.cross(x, y), y, keep_y=True)
