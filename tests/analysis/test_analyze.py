@@ -1,5 +1,7 @@
 """One recording measured from beginning to end."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -233,3 +235,22 @@ def test_plates_that_carry_another_mass_than_the_file_tells_are_remarked(recordi
     assert any("carry 61.3 kg, not 66.5 kg" in line for line in found.remarks)
     lighter = analyze_file(path, AnalysisOptions(mass=61.3))
     assert not any("carry" in line for line in lighter.remarks)
+
+
+def test_one_marker_five_metres_off_leaves_the_least_margin_as_it_was(recordings_folder):
+    """The filling of one frame of a walk is within a millimetre: margins stay to 1 N.m and 1 %."""
+    recording = read_recording(recordings_folder / "grf/btkdata/FunctionalWalk.c3d").cut(150, 300)
+    positions = np.array(recording.positions)
+    positions[75, recording.marker_index("RTHI"), 0] += 5.0
+    options = AnalysisOptions(as_recorded=True)
+    clean, found = (
+        analyze(one, options).as_dict() for one in (recording, replace(recording, positions=positions))
+    )
+    (repair,) = (one for one in found["cleaning"] if one["kind"] != "gap")
+    assert (repair["marker"], repair["kind"], repair["first_frame"], repair["stop_frame"]) == (
+        "RTHI", "spike", 75, 76,
+    )  # fmt: skip
+    assert repair["start_s"] == pytest.approx(recording.time[75])
+    assert any("cleaned" in remark and "RTHI" in remark for remark in found["remarks"])
+    assert not any(one["kind"] != "gap" for one in clean["cleaning"])
+    assert found["margin"]["min"] == pytest.approx(clean["margin"]["min"], rel=0.01, abs=1.0)

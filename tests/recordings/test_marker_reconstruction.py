@@ -420,3 +420,97 @@ def test_a_c3d_file_tells_of_its_person(recordings_folder):
     assert found.marker_radius is None
     assert astuple(found)[:6] == pytest.approx((66.5, 1.79, 0.115, 0.07, 0.08, 0.05))
     assert read_recording(folder / "Gait.c3d").subject == Subject()
+
+
+# --- markers that are not where their names say ------------------------------------------------
+
+JOINTS_FOLLOWED = [f"{s}_{p}" for s in ("left", "right") for p in ("thigh", "leg", "foot", "forearm", "hand")]
+
+
+def joints_apart(one, other):
+    """Largest distance of joints of two reconstructions [m]."""
+    both = [places(found.body, found.q, JOINTS_FOLLOWED) for found in (one, other)]
+    return np.linalg.norm(both[0] - both[1], axis=2).max()
+
+
+def test_a_clean_recording_needs_no_repair(followed):
+    assert followed.repairs == ()
+
+
+@pytest.mark.parametrize(
+    ("marker", "off", "frames"),
+    [
+        ("RANK", (0.0, 3.0, 4.0), (20, 21)),
+        ("LASI", (0.3, 0.0, 0.4), (11, 13)),
+        ("C7", (0.05, 0.0, 0.0), (7, 8)),
+    ],
+)
+def test_spikes_are_taken_out_and_filled(walk, followed, marker, off, frames):
+    """The filling is a cubic spline: joints come back to 3 mm, and nothing else is repaired."""
+    place = walk.marker_names.index(marker)
+
+    def spike(positions):
+        positions[slice(*frames), place] += off
+
+    found = reconstruct(with_positions(walk, spike))
+    (repair,) = found.repairs
+    assert (repair.marker, repair.kind, repair.outcome) == (marker, "spike", "filled")
+    assert (repair.first, repair.stop) == frames
+    assert repair.distance == pytest.approx(np.linalg.norm(off), abs=0.01)
+    assert joints_apart(found, followed) < 0.003
+
+
+@pytest.mark.parametrize(
+    ("pair", "frames"),
+    [(("LKNE", "LANK"), (12, 30)), (("LASI", "RASI"), (25, 40)), (("RHEE", "LTOE"), (5, 9))],
+)
+def test_swapped_markers_are_exchanged(walk, followed, pair, frames):
+    """Once exchanged the recording is the clean one, so that postures are the same."""
+    one, other = (walk.marker_names.index(name) for name in pair)
+
+    def swap(positions):
+        positions[slice(*frames), [one, other]] = positions[slice(*frames), [other, one]]
+
+    found = reconstruct(with_positions(walk, swap))
+    (repair,) = found.repairs
+    assert {repair.marker, repair.other} == set(pair)
+    assert (repair.kind, repair.outcome, repair.first, repair.stop) == ("swap", "exchanged", *frames)
+    assert joints_apart(found, followed) < 1e-9
+
+
+@pytest.mark.parametrize("kind", ["frozen", "displaced"])
+def test_a_marker_that_is_off_for_longer_does_not_count(walk, followed, kind):
+    """The other markers of both legs hold the posture to a centimetre."""
+    place, frames = walk.marker_names.index("LKNE"), slice(15, 27)
+
+    def off(positions):
+        positions[frames, place] = (
+            positions[14, place] if kind == "frozen" else positions[frames, place] + 0.12
+        )
+
+    found = reconstruct(with_positions(walk, off))
+    (repair,) = found.repairs
+    assert (repair.marker, repair.kind, repair.outcome) == ("LKNE", kind, "left out")
+    assert (repair.first, repair.stop) == (15, 27)
+    assert joints_apart(found, followed) < 0.01
+
+
+def test_gaps_are_listed_with_what_became_of_them(walk):
+    place = walk.marker_names.index("RTIB")
+
+    def unseen(positions):
+        positions[10:13, place] = np.nan
+        positions[20:30, place] = np.nan
+
+    gaps = reconstruct(with_positions(walk, unseen)).repairs
+    assert [(one.kind, one.first, one.stop, one.outcome) for one in gaps] == [
+        ("gap", 10, 13, "filled"), ("gap", 20, 30, "left out"),
+    ]  # fmt: skip
+
+
+def test_most_markers_that_jump_away_for_long_are_refused_with_their_frames(walk):
+    def away(positions):
+        positions[10:20] += 20.0
+
+    with pytest.raises(InputError, match="markers jump away in frames 10 to 19; valid: frames without"):
+        reconstruct(with_positions(walk, away))

@@ -62,6 +62,10 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         lines.append(
             f"{len(found.others)} markers are not used, for their names say nothing known: {names}{more}"
         )
+    if repaired := [one for one in found.repairs if one.kind != "gap"]:
+        names = ", ".join(dict.fromkeys(one.marker for one in repaired))
+        runs = f"{len(repaired)} run{'s' if len(repaired) > 1 else ''} of frames"
+        lines.append(f"cleaned: markers off their places in {runs} are not used as recorded: {names}")
     dropped = len(recording) - len(found.time)
     if dropped > 0:
         lines.append(f"{dropped} of {len(recording)} frames at the ends show too little of the person")
@@ -358,6 +362,14 @@ class Analysis(Displayed):
             "margin": self._margin(),
             "force_plates": None if self.plates is None else self.plates.as_dict(),
             "ergonomics": _later(self.ergonomics.as_dict(), self.supports.start),
+            "cleaning": [
+                {"marker": one.marker, "kind": one.kind, "other": one.other or None,
+                 "first_frame": one.first, "stop_frame": one.stop,
+                 "start_s": start + (one.first - self.found.first_frame) / self.rate,
+                 "end_s": start + (one.stop - self.found.first_frame) / self.rate,
+                 "distance_m": one.distance, "outcome": one.outcome}
+                for one in self.found.repairs
+            ],
             "remarks": list(self.remarks), "wall_s": self.wall,
         }  # fmt: skip
 

@@ -213,8 +213,11 @@ class PostureCost:
 
     def distances(self, q: FloatArray, wanted: FloatArray) -> FloatArray:
         """(n, k) distances of the points from their targets (n, k, 3) [m], NaN where one is not seen."""
-        points = self._placed(q)[1].transpose(2, 0, 1)
-        return np.linalg.norm(q[:, None, :3] + points - wanted, axis=2)
+        return np.linalg.norm(self.points(q) - wanted, axis=2)
+
+    def points(self, q: FloatArray) -> FloatArray:
+        """(n, k, 3) the points in the world in (n, nq) postures [m]."""
+        return q[:, None, :3] + self._placed(q)[1].transpose(2, 0, 1)
 
     def at(self, q: FloatArray, held: FloatArray, wanted: FloatArray) -> Evaluation:
         """The cost of (n, nq) postures drawn to angles ``held``, with targets (n, k, 3) [m]."""

@@ -32,6 +32,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.recordings.readers.marker_sets import SIDES, MarkerSet, marker_set
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Subject
+from manikin.recordings.reconstruction.cleaning import Cleaning, Repair, gaps_of, without_jumps
 from manikin.recordings.reconstruction.orientation_targets import placing_targets
 from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle, unit
 
@@ -236,9 +237,25 @@ def reconstruct_markers(
 ) -> Reconstruction:
     """Motion of our human that follows markers; see ``reconstruct``.
 
-    Short gaps are filled; in longer ones a marker does not count. Frames at the ends that see less than half
+    Markers that are not where their names say are taken out or exchanged first
+    (:mod:`manikin.recordings.reconstruction.cleaning`), a recording without any is followed as it is. Short
+    gaps are filled; in longer ones a marker does not count. Frames at the ends that see less than half
     of the markers are left out. Segments without markers stay as in standing.
     """
+    calm = without_jumps(recording, tuple(marker_set(recording).segments))
+    found, filled = _followed(calm, body, sex, mass)
+    cleaning = Cleaning(recording, calm, found.body, found.targets, found.q, found.first_frame)
+    repairs: tuple[Repair, ...] = ()
+    if cleaning.needed or calm is not recording:
+        found, filled = _followed(cleaning.repaired(), body, sex, mass)
+        repairs = cleaning.repairs(filled)
+    return replace(found, repairs=repairs + gaps_of(recording, filled, found.joints))
+
+
+def _followed(
+    recording: MarkerRecording, body: BodyModel | None, sex: str, mass: float | None
+) -> tuple[Reconstruction, MarkerRecording]:
+    """A recording as it is, followed, and the same with its gaps filled."""
     marked, subject = _Marked(recording), recording.subject
     if body is None:
         body = human_of(marked.centres, sex, subject.mass if mass is None else mass, subject.stature)
@@ -252,12 +269,13 @@ def reconstruct_markers(
     wanted = replace(placed, positions=filled[first:stop])
     q, residual = follow(body, wanted, _starts(body, marked)[first:stop], recording.rate)
     recorded = recording.chosen(placed.names).positions[first:stop]
-    return Reconstruction(
+    found = Reconstruction(
         body, np.arange(stop - first) / recording.rate, q, replace(placed, positions=recorded),
         np.where(np.isnan(recorded[..., 0]), np.nan, residual), first,
         tuple(name for name in recording.marker_names if name not in placed.names),
         tuple(s.name for s in body.segments if s.hinges and not _is_marked(body, s.name, {*placed.segments})),
     )  # fmt: skip
+    return found, marked.recording
 
 
 class _Marked:

@@ -16,6 +16,7 @@ from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.recordings.readers.marker_sets import SIDES, joint_of
 from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.cleaning import Repair
 from manikin.runtime.display import Displayed
 
 CENTRES = tuple(
@@ -127,6 +128,7 @@ class Reconstruction(Displayed):
         first_frame: Frame of the recording that is the first instant.
         others: Markers that are not followed, for their names say nothing or they are never seen with others.
         neutral: Segments about which the recording says nothing; their joints are as in standing.
+        repairs: Frames in which a marker was not used as recorded.
     """
 
     body: BodyModel
@@ -137,6 +139,7 @@ class Reconstruction(Displayed):
     first_frame: int = 0
     others: tuple[str, ...] = ()
     neutral: tuple[str, ...] = ()
+    repairs: tuple[Repair, ...] = ()
 
     def __post_init__(self) -> None:
         n, what = len(self.time), "reconstruction"
