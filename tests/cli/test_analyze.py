@@ -2,11 +2,12 @@
 
 import csv
 import json
+import math
 
 import pytest
 
 from manikin.cli import main
-from manikin.cli.console import BAD_INPUT, DONE
+from manikin.cli.console import BAD_INPUT, DONE, FAILED
 from manikin.motion.file import read_motions
 from manikin.runtime.files import LOCK
 
@@ -127,3 +128,24 @@ def test_a_map_of_markers_is_checked_before_any_recording(standing_file, tmp_pat
     assert main(["analyze", str(standing_file), "--markers", str(file), "--json"]) == BAD_INPUT
     (line,) = capsys.readouterr().err.splitlines()
     assert "map.yaml:2: 'left_knee_latral' is no landmark or segment; valid: left_knee_lateral" in line
+
+
+def test_what_no_person_does_is_named_and_is_no_success(standing_file, tmp_path, capsys):
+    """A person who shoots up and down by 0.75 m at 3 Hz needs 1 + 27 body weights: (2 pi 3)^2 0.75 / 9.81."""
+    head, rest = standing_file.read_text().split("Frame Time:")
+    step, *rows = rest.strip().split("\n")
+    moved = []
+    for number, row in enumerate(rows):
+        x, height, *others = row.split()
+        lift = 75.0 * math.sin(2.0 * math.pi * 3.0 * number * float(step))
+        moved.append(" ".join([x, f"{float(height) + lift:.6f}", *others]))
+    file = tmp_path / "shaken.bvh"
+    file.write_text("\n".join([f"{head}Frame Time: {step}", *moved, ""]))
+    out = tmp_path / "out"
+    assert main(["analyze", str(file), "--as-recorded", "--no-figures", "--out", str(out)]) == FAILED
+    told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("implausible: ")]
+    assert len(told) == 1
+    assert "external force of" in told[0]
+    assert "body weights" in told[0]
+    assert json.loads((out / "summary.json").read_text())["implausible"] == [told[0].split(": ", 1)[1]]
+    assert "Implausible" in (out / "report.html").read_text()

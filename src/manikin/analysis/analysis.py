@@ -245,6 +245,7 @@ class Analysis(Displayed):
         cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
         segments: Holonomic and nonholonomic stretches; None without an upright walk.
         ergonomics: Scores, torques against strength, effort; its time is that of the motion.
+        implausible: Results that no person's motion has, a line each: nothing that follows is to be believed.
         remarks: What a reader must know, a line each.
         wall: Time that it took [s].
     """
@@ -266,6 +267,7 @@ class Analysis(Displayed):
     plates: PlateReport | None
     remarks: tuple[str, ...]
     wall: float
+    implausible: tuple[str, ...] = ()
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
@@ -370,7 +372,7 @@ class Analysis(Displayed):
                  "distance_m": one.distance, "outcome": one.outcome}
                 for one in self.found.repairs
             ],
-            "remarks": list(self.remarks), "wall_s": self.wall,
+            "implausible": list(self.implausible), "remarks": list(self.remarks), "wall_s": self.wall,
         }  # fmt: skip
 
     def _phase(self, phase: SupportPhase) -> dict[str, Any]:

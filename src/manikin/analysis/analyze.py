@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from manikin.analysis.analysis import Analysis, MeasuredMotion, PlateReport, plate_report, remarks_on
+from manikin.analysis.plausibility import implausible
 from manikin.balance.zmp import LEAST_LOAD
 from manikin.body.limbs import with_knees_and_elbows
 from manikin.body.strength import HANDS, carrying
@@ -224,6 +225,7 @@ def analyze(
         measured=measured, limiting=recorded.limiting(recorded.lowest),
         cop=_centre_of_pressure(dynamics, motion, min(supports.surfaces, default=0.0)),
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
+        implausible=implausible(dynamics, supports.start),
     )  # fmt: skip
     return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)
 

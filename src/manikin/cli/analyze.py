@@ -110,13 +110,15 @@ def _one(
         console.print_json(summary)
     else:
         console.print_table(_shown(summary))
+        for finding in summary["implausible"]:
+            typer.echo(f"implausible: {finding}", err=True)
         for remark in summary["remarks"]:
             typer.echo(f"note: {remark}", err=True)
         if failure:
             typer.echo(f"no plan: {failure}", err=True)
         view = f"see the motion with: manikin view {directory}"
         typer.echo(f"report in {directory}/report.html; {view}", err=True)
-    return console.FAILED if failure else console.DONE
+    return console.FAILED if failure or summary["implausible"] else console.DONE
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:
@@ -195,6 +197,9 @@ def _several(
             entries[entry.job.path] = entry
             if entry.summary is None:
                 console.complain(entry.refusal, console.BAD_INPUT)
+            else:
+                for finding in entry.summary["implausible"]:
+                    typer.echo(f"implausible: {entry.job.path}: {finding}", err=True)
             progress("analyze", len(entries) / len(work), entry.job.path.name)
     ordered = [entries[path] for path in paths]
     overview = files.overview_of(ordered, clock.perf_counter() - began)
@@ -210,4 +215,6 @@ def _several(
             typer.echo(f"overview in {directory}/index.html", err=True)
     if not measured:
         raise InputError(f"none of the {refused} files could be measured; valid: recordings, see above")
-    return console.BAD_INPUT if refused else console.DONE
+    if refused:
+        return console.BAD_INPUT
+    return console.FAILED if any(one["implausible"] for one in overview["files"]) else console.DONE

@@ -1,0 +1,57 @@
+"""What no person does: results that say that a recording was not read or not followed rightly.
+
+The limits are beyond what people do, so that no motion of a person is refused: forces under sprinters
+and jumpers are some 5 to 10 body weights, the fastest sprinter covers 12.4 m/s, and hands that throw reach
+some 25 m/s.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
+from manikin.recordings.supports.support_levels import effector_places
+
+LARGEST_LOAD, FASTEST_BODY, FASTEST_LIMB = 20.0, 15.0, 30.0
+"""External force per body weight, speeds of the centre of mass, and of hands and feet [m/s]: nobody's."""
+
+LIMBS = ("left_foot", "right_foot", "left_hand", "right_hand")
+
+
+def implausible(dynamics: RecordedDynamics, start: float) -> tuple[str, ...]:
+    """Results beyond people's, a line each with the largest value and its instant.
+
+    Args:
+        dynamics: The motion as recorded and smoothed.
+        start: Instant of its first frame on the recording's clock [s].
+    """
+    return tuple(_findings(dynamics, start))
+
+
+def _findings(dynamics: RecordedDynamics, start: float) -> Iterator[str]:
+    step = float(dynamics.time[1] - dynamics.time[0])
+    load = np.linalg.norm(dynamics.wrench[:, :3], axis=1) / (GRAVITY * dynamics.body.mass)
+    yield from _beyond("external force", load, LARGEST_LOAD, "body weights", dynamics.time + start)
+    speed = np.linalg.norm(np.gradient(dynamics.com, step, axis=0), axis=1)
+    yield from _beyond("speed of the centre of mass", speed, FASTEST_BODY, "m/s", dynamics.time + start)
+    for name, places in _limbs(dynamics.body, dynamics.q):
+        speed = np.linalg.norm(np.gradient(places, step, axis=0), axis=1)
+        yield from _beyond(f"speed of the {name}", speed, FASTEST_LIMB, "m/s", dynamics.time + start)
+
+
+def _limbs(body: BodyModel, q: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    for name, places in zip(LIMBS, effector_places(body, q, LIMBS), strict=True):
+        yield name.replace("_", " "), places
+
+
+def _beyond(what: str, values: FloatArray, most: float, unit: str, time: FloatArray) -> Iterator[str]:
+    """The largest of values that exceed what people reach."""
+    largest = int(np.argmax(values))
+    if values[largest] > most:
+        share = 100.0 * float(np.mean(values > most))
+        yield (
+            f"{what} of {values[largest]:.1f} {unit} at {time[largest]:.2f} s, beyond {most:g} in "
+            f"{share:.1f} % of the frames: no person does that; are markers, units, rate and mass right?"
+        )
