@@ -36,6 +36,7 @@ from manikin.recordings import (
     supports_of,
     touch_downs_of,
     with_mass,
+    without_offsets,
 )
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
 from manikin.recordings.reconstruction.reconstruct import unmeasured_upright
@@ -249,6 +250,31 @@ def test_a_foot_beside_the_plate_is_not_covered(swinging, dynamics):
     assert mass_on_plates(dynamics, measured) is None
     margins = recorded_margins(dynamics, on_feet(swinging))
     assert compare_with_plates(dynamics, margins, measured) is None
+
+
+def test_what_a_plate_reads_while_nobody_touches_it_is_taken_off(swinging, dynamics):
+    """Half a second on the plate, then 2.5 s of flight: the offset is exact, the foot's load is kept."""
+    schedule, on = on_feet(swinging, until=0.5), TIME < 0.5
+    offset = np.array([1.0, -2.0, 70.0, 3.0, 4.0, 0.5])
+    load = np.where(on[:, None], dynamics.wrench, 0.0)
+    plate = ForcePlate("floor", load + offset, np.zeros(3), RATE, corners=SQUARE)
+    (zeroed,), (remark,) = without_offsets([plate], schedule)
+    np.testing.assert_allclose(zeroed.wrenches, load, atol=1e-9)
+    assert "floor reads 70 N while nobody touches it" in remark
+    aside = ForcePlate("aside", np.tile(offset, (FRAMES, 1)), np.zeros(3), RATE, corners=SQUARE + 5.0)
+    (zeroed,), _ = without_offsets([aside], on_feet(swinging))
+    assert not zeroed.wrenches.any()
+
+
+def test_a_plate_that_is_never_free_or_that_others_load_is_left_as_it_is(swinging, dynamics):
+    offset = np.array([0.0, 0.0, 70.0, 0.0, 0.0, 0.0])
+    under = ForcePlate("floor", dynamics.wrench + offset, np.zeros(3), RATE, corners=SQUARE)
+    someone = np.outer(1.0 + np.sin(40.0 * TIME), 4.0 * offset)
+    other = ForcePlate("other", someone, np.zeros(3), RATE, corners=SQUARE + 5.0)
+    (one, two), remarks = without_offsets([under, other], on_feet(swinging))
+    assert remarks == ()
+    np.testing.assert_array_equal(one.wrenches, under.wrenches)
+    np.testing.assert_array_equal(two.wrenches, other.wrenches)
 
 
 def test_a_seat_is_loaded_while_the_feet_lack_weight(script, dynamics, swinging):

@@ -58,6 +58,21 @@ def test_trc_by_hand(trc_file):
     np.testing.assert_allclose(read_trc(trc_file, up="z").marker("R.Heel")[1], [0.11, 0.05, 0.2])
 
 
+@pytest.mark.parametrize("between", [",", ";"])
+def test_plates_in_a_csv_file_are_those_of_the_mot_file(tmp_path, trc_file, between):
+    """The same columns, parted by commas; a file that begins with the markers' name is read along."""
+    text = mot(pressing())
+    (tmp_path / "plates.mot").write_text(text)
+    table = text.split("endheader\n")[1].replace("\t", between)
+    trc_file.with_name("walk plates.csv").write_text(table)
+    trc_file.with_name("walk notes.csv").write_text("what,vx\nnothing,1\n")
+    recording = read_trc(trc_file)
+    (plate,), (wanted,) = recording.plates, read_mot(tmp_path / "plates.mot")
+    np.testing.assert_array_equal(plate.wrenches, wanted.wrenches)
+    assert (plate.rate, plate.start) == (wanted.rate, wanted.start)
+    assert "force plates are those of walk plates.csv" in recording.remarks
+
+
 def test_plates_beside_the_markers_are_read_with_them(trc_file):
     beside = trc_file.with_name("walk_grf.mot")
     beside.write_text(mot(pressing()))

@@ -56,12 +56,17 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
     if found.neutral:
         names = ", ".join(name.replace("_", " ") for name in found.neutral)
         lines.append(f"not recorded, held as in standing: {names}")
-    if found.others:
-        names = ", ".join(found.others[:MOST_NAMED])
-        more = f" and {len(found.others) - MOST_NAMED} more" if len(found.others) > MOST_NAMED else ""
-        lines.append(
-            f"{len(found.others)} markers are not used, for their names say nothing known: {names}{more}"
-        )
+    unseen = _never_seen(recording)
+    for names, why in (
+        (
+            [name for name in found.others if name not in unseen],
+            "are not used, for their names say nothing known",
+        ),
+        ([name for name in found.others if name in unseen], "are in no frame"),
+    ):
+        if names:
+            more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+            lines.append(f"{len(names)} markers {why}: {', '.join(names[:MOST_NAMED])}{more}")
     if repaired := [one for one in found.repairs if one.kind != "gap"]:
         names = ", ".join(dict.fromkeys(one.marker for one in repaired))
         runs = f"{len(repaired)} run{'s' if len(repaired) > 1 else ''} of frames"
@@ -90,6 +95,7 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         )
     if shifted is not None and not shifted.solved:
         lines.append("no shift onto the contacts was found: the postures jump")
+    lines += () if plates is None else plates.remarks
     mass = None if plates is None else plates.mass
     if mass is not None and abs(mass / analysis.body.mass - 1.0) > OTHER_MASS:
         lines.append(
@@ -99,6 +105,13 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
     if plates is not None and not plates.compared.any():
         lines.append("no instant has all supports on force plates: their forces are not compared")
     return tuple(lines)
+
+
+def _never_seen(recording: Recording | MarkerRecording) -> set[str]:
+    """Markers that are in no frame."""
+    if not isinstance(recording, MarkerRecording):
+        return set()
+    return {recording.marker_names[k] for k in np.flatnonzero(~recording.seen.any(axis=0))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +175,7 @@ class PlateReport:
             was on a plate. ``shifted`` are those of it shifted onto its contacts, if a shift was looked for.
         torques: Of the legs, of the motion as recorded; empty where no foot was on a plate of its own.
             ``shifted_torques`` are those of the shifted motion, if that is to be believed.
+        remarks: What was taken off the plates' readings, a line each.
     """
 
     vertical_force: FloatArray
@@ -173,6 +187,7 @@ class PlateReport:
     shifted: PlateComparison | None
     torques: tuple[TorqueComparison, ...]
     shifted_torques: tuple[TorqueComparison, ...]
+    remarks: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready numbers (SI); None where there was nothing to compare."""

@@ -17,7 +17,7 @@ from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, uprig
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
-from manikin.recordings.dynamics.plate_forces import mass_on_plates, plate_forces
+from manikin.recordings.dynamics.plate_forces import mass_on_plates, plate_forces, without_offsets
 from manikin.recordings.dynamics.recorded_dynamics import (
     CUTOFF,
     RecordedDynamics,
@@ -196,8 +196,9 @@ def analyze(
     schedule = recorded_schedule(found, supports, friction=given.friction)
     touch_downs = touch_downs_of(supports)
     dynamics = dynamics_of(found, touch_downs=touch_downs)
-    mass = None
+    mass, zeroed = None, ()
     if plates:
+        plates, zeroed = without_offsets(plates, schedule)
         mass = mass_on_plates(dynamics, plate_forces(plates, dynamics.time + supports.start, schedule))
     if mass is not None and not stated and (weighed := _weighed(found, mass - given.load)) is not None:
         found = weighed
@@ -213,6 +214,7 @@ def analyze(
     report: PlateReport | None = None
     if plates:
         report = plate_report(plates, supports, schedule, measured, (motion, beside), mass)
+        report = replace(report, remarks=zeroed)
     neck = upright_neck(found.body, motion.q)
     upright = 0.0 if neck is None else float(np.degrees(neck))
     ergonomics = ergonomics_of(

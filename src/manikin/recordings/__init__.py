@@ -10,6 +10,7 @@ from manikin.recordings.dynamics.plate_forces import (
     compare_with_plates,
     mass_on_plates,
     plate_forces,
+    without_offsets,
 )
 from manikin.recordings.dynamics.recorded_dynamics import (
     RecordedDynamics,
@@ -78,5 +79,5 @@ __all__ = [
     "read_marker_map", "read_mot", "read_recording", "read_trc", "reconstruct", "recorded_margins",
     "recorded_schedule", "sequence_consistency", "shares_within", "smoothed", "statistics_of",
     "support_distances", "support_placements", "supports_of", "timing_errors", "touch_downs_of",
-    "whole_passage", "with_mass",
+    "whole_passage", "with_mass", "without_offsets",
 ]  # fmt: skip

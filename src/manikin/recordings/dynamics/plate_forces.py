@@ -7,8 +7,9 @@ assumed (:mod:`manikin.recordings.dynamics.recorded_forces`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,9 @@ LEAST_UNLOADED, SHORTEST = 0.1, 0.3
 
 OVERHANG, BESIDE = 0.02, 0.1
 """How far a sole may be beyond the edge of its plate, and its centre of pressure beside a sole [m]."""
+
+LEAST_OFFSET, STEADY = 5.0, 10.0
+"""Reading without load that is taken off and said, and range of the middle half of such readings [N]."""
 
 UNSURE = 0.03
 """Time about a support off the plates whose frames are left out: supports are known that well [s]."""
@@ -115,6 +119,36 @@ def plate_forces(
         frozen_array(wrenches.sum(axis=0), "wrench"), covered, single, names,
         frozen_array(parts, "wrenches of the effectors"), apart,
     )  # fmt: skip
+
+
+def without_offsets(
+    plates: Sequence[ForcePlate], schedule: ContactSchedule
+) -> tuple[tuple[ForcePlate, ...], tuple[str, ...]]:
+    """Plates without what they read while nobody touches them, and a remark on each whose offset is large.
+
+    A plate is not loaded while no contact of the schedule is made above it, or within :data:`UNSURE` of such
+    a time. Its offset is the median of its readings then, if half of these agree to :data:`STEADY`: else
+    something that is not recorded loads it. Plates whose corners are not known are left as they are
+    wherever anything is in contact.
+    """
+    held, found, remarks = _held(schedule), list[ForcePlate](), list[str]()
+    for plate in plates:
+        free = np.ones(len(plate), dtype=bool)
+        for one in held:
+            if any(plate.below(point, BESIDE) for point in one.contact.points_in_world):
+                free &= (plate.time < one.begin - UNSURE) | (plate.time > one.end + UNSURE)
+        free &= (plate.time >= schedule.instants[0]) & (plate.time <= schedule.instants[-1])
+        along, offset = plate.force[free] @ plate.normal, 0.0
+        if (
+            free.sum() >= LEAST_UNLOADED * plate.rate
+            and np.subtract(*np.percentile(along, (75, 25))) < STEADY
+        ):
+            offset = float(np.median(along))
+        if abs(offset) >= LEAST_OFFSET:
+            plate = replace(plate, wrenches=plate.wrenches - np.median(plate.wrenches[free], axis=0))
+            remarks.append(f"{Path(plate.name).name} reads {offset:.0f} N while nobody touches it: zeroed")
+        found.append(plate)
+    return tuple(found), tuple(remarks)
 
 
 def mass_on_plates(dynamics: RecordedDynamics, measured: PlateForces) -> float | None:

@@ -44,7 +44,9 @@ FEWEST_PRESSED = 10
 def read_mot(
     path: str | Path, up: str = "y", moments_about: ArrayLike | None = None
 ) -> tuple[ForcePlate, ...]:
-    """Read the force plates of a MOT or STO file, also those that were never stepped on.
+    """Read the force plates of a MOT, STO or CSV file, also those that were never stepped on.
+
+    A CSV file has the columns of a MOT file, parted by commas or semicolons, and no header but their names.
 
     Args:
         up: The file's axis that points up.
@@ -64,7 +66,10 @@ def _read_mot(
     file = str(path)
     fixed = None if moments_about is None else frozen_array(moments_about, "moments_about", (3,))
     turn = rotation_to_z_up(up, file)
-    names, table, remarks = _mot_table(read_text(path, "MOT"), file)
+    text = read_text(path, "MOT")
+    if Path(path).suffix.lower() == ".csv":  # a line of names and one per instant, parted by commas
+        text = "endheader\n" + text.replace(";", " ").replace(",", " ").replace('"', " ")
+    names, table, remarks = _mot_table(text, file)
     if names[0] != "time" or len(table) < 2:
         raise InputError(f"{file}: no column of time with two instants; valid: time first, a row per instant")
     time = table[:, 0]
@@ -171,9 +176,9 @@ def read_trc(
     columns without a name are left out.
 
     Args:
-        forces: Force plates or their MOT, STO or Cortex ``.forces`` file, with the same axis up; None for
-            ``NAME_grf.mot`` beside ``NAME.trc``, or else another such file whose name begins with ``NAME``.
-            An empty sequence for none.
+        forces: Force plates or their MOT, STO, CSV or Cortex ``.forces`` file, with the same axis up; None
+            for ``NAME_grf.mot`` beside ``NAME.trc``, or else another such file whose name begins with
+            ``NAME``. An empty sequence for none.
         up: The file's axis that points up; None for y, or the one along which the person stands.
 
     Raises:
@@ -217,7 +222,7 @@ def _forces_beside(path: Path, remarks: list[str]) -> Path | tuple[ForcePlate, .
     others = sorted(
         one
         for one in path.parent.iterdir()
-        if one.suffix.lower() in (".mot", ".sto", ".forces") and _holds_forces(one)
+        if one.suffix.lower() in (".mot", ".sto", ".csv", ".forces") and _holds_forces(one)
     )
     stem = path.stem.lower()
     mine = [one for one in others if one.stem.lower().startswith(stem)]
@@ -247,6 +252,9 @@ def _holds_forces(path: Path) -> bool:
             head = file.read(20_000).decode("latin-1").lower()
     except OSError:
         return False
+    if path.suffix.lower() == ".csv":
+        head = head.split("\n", 1)[0]
+        return "vx" in head and head.startswith(("time", '"time"', "\xef\xbb\xbftime"))
     return "[force data]" in head or "vx" in head
 
 
