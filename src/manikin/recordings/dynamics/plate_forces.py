@@ -171,7 +171,8 @@ def compare_with_plates(
 
     The motion has the person's mass; centres of pressure are compared at the plates' height [m].
     """
-    both = measured.covered & measured.single
+    # A plate that is not loaded has no centre of pressure.
+    both = measured.covered & measured.single & (measured.wrench[:, 2] > 0.0)
     if not both.any():
         return None
     weight = GRAVITY * dynamics.body.mass
