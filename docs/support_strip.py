@@ -133,8 +133,11 @@ def _draw_postures(
     pitch, low, high = frame
     colours = colours_of(names)
     for number, sample in enumerate(samples):
-        view: View = ALONG_Y.moved(pitch * number - float(turned[sample, 0]), 0.0)
-        draw_body(axes, found.body, turned[sample], view)
+        q = turned[sample]
+        view: View = ALONG_Y.moved(pitch * number - float(q[0]), 0.0)
+        box = np.array([q[:3], q[:3]]) + 0.5 * pitch * np.array([[-1.0], [1.0]])
+        box[:, 2] = low, high
+        draw_body(axes, None, found.body, q, view, (box[0], box[1]))
         on = [
             one.effector
             for one in supports.supports

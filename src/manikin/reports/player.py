@@ -19,7 +19,7 @@ from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.reports.figures.views import distinct_contacts
 from manikin.reports.gltf import continuous, surface_of
-from manikin.reports.solids import Solid, contact_solids, rgb, scene_solids
+from manikin.reports.solids import DrawnSolid, contact_solids, rgb, scene_solids
 from manikin.runtime.display import COLOURS, MATERIAL_COLOURS
 from manikin.scene import Scene
 
@@ -86,7 +86,7 @@ def _azimuth(q: FloatArray) -> float:
     return float(np.arctan2(ahead[1], ahead[0]) - np.pi / 4.0)
 
 
-def _limited(solids: list[Solid]) -> list[Solid]:
+def _limited(solids: list[DrawnSolid]) -> list[DrawnSolid]:
     total = sum(len(solid.faces) for solid in solids)
     result = list(solids)
     for number in sorted(range(len(solids)), key=lambda k: -len(solids[k].faces)):
@@ -97,15 +97,15 @@ def _limited(solids: list[Solid]) -> list[Solid]:
     return result
 
 
-def _bounds(solid: Solid) -> Solid:
+def _bounds(solid: DrawnSolid) -> DrawnSolid:
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([(a, *pair) for a, b, c, d in quads for pair in ((b, c), (c, d))])
-    return Solid(solid.name, np.where(corners, high, low), faces, np.tile(solid.colours[:1], (12, 1)))
+    return DrawnSolid(solid.name, np.where(corners, high, low), faces, np.tile(solid.colours[:1], (12, 1)))
 
 
-def _triangles(solids: list[Solid]) -> dict[str, Any] | None:
+def _triangles(solids: list[DrawnSolid]) -> dict[str, Any] | None:
     """Flat triangles of the scene, three vertices of their own for each."""
     if not solids:
         return None

@@ -20,7 +20,7 @@ SHEET = 0.004
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solid:
+class DrawnSolid:
     """Triangles of one thing.
 
     Attributes:
@@ -43,7 +43,7 @@ def rgb(colour: str) -> FloatArray:
     return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
 
 
-def body_solid(body: BodyModel, q: FloatArray, marked: Sequence[str] = ()) -> Solid | None:
+def body_solid(body: BodyModel, q: FloatArray, marked: Sequence[str] = ()) -> DrawnSolid | None:
     """A body in a configuration (nq,), or None of a body without shapes.
 
     Args:
@@ -56,22 +56,22 @@ def body_solid(body: BodyModel, q: FloatArray, marked: Sequence[str] = ()) -> So
         colours = np.array([rgb(MATERIAL_COLOURS[material]) for material in MATERIALS])[skin.materials]
         strongest = skin.bones[:, 0][skin.faces[:, 0]]
         colours[np.isin(np.array(skin.segments)[strongest], marked)] = rgb(COLOURS["executed"])
-        return Solid(body.name, vertices, skin.faces, colours, normals)
+        return DrawnSolid(body.name, vertices, skin.faces, colours, normals)
     parts = []
     for name, rotation, origin in zip(names, rotations, origins, strict=True):
         if (found := segment_triangles(body.segment(name), rounds=16)) is not None:
             colour = rgb(COLOURS["executed"] if name in marked else side_colour(name))
             mesh = trimesh.Trimesh(*found, process=False)
             turned = np.array(mesh.vertex_normals) @ rotation.T
-            parts.append(Solid(name, found[0] @ rotation.T + origin, found[1],
+            parts.append(DrawnSolid(name, found[0] @ rotation.T + origin, found[1],
                                np.tile(colour, (len(found[1]), 1)), turned))  # fmt: skip
     return joined(body.name, parts) if parts else None
 
 
-def joined(name: str, parts: Sequence[Solid]) -> Solid:
+def joined(name: str, parts: Sequence[DrawnSolid]) -> DrawnSolid:
     """Several solids with normals as one."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
-    return Solid(
+    return DrawnSolid(
         name, np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
         np.concatenate([part.colours for part in parts]),
@@ -90,7 +90,7 @@ def finite_obstacles(
                 yield obstacle
 
 
-def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
+def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[DrawnSolid]:
     """Finite obstacles as they are, cut at the box between two corners (3,) [m]."""
     result = []
     for obstacle in finite_obstacles(scene, low, high):
@@ -104,11 +104,11 @@ def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]
                     vertices, faces = np.asarray(cut[0]), np.asarray(cut[1])
         if len(faces):
             colours = np.tile(rgb(COLOURS["obstacle"]), (len(faces), 1))
-            result.append(Solid(obstacle.name, vertices, faces, colours))
+            result.append(DrawnSolid(obstacle.name, vertices, faces, colours))
     return result
 
 
-def contact_solids(contacts: Iterable[Contact]) -> list[Solid]:
+def contact_solids(contacts: Iterable[Contact]) -> list[DrawnSolid]:
     """Soles and other flat contacts as sheets in the colours of their effectors."""
     contacts = [contact for contact in contacts if len(contact.points) > 2]
     colours, result = colours_of(contact.effector for contact in contacts), []
@@ -116,5 +116,5 @@ def contact_solids(contacts: Iterable[Contact]) -> list[Solid]:
         corners = contact.points_in_world + SHEET * contact.normal
         faces = np.array([(0, k, k + 1) for k in range(1, len(corners) - 1)])
         tint = np.tile(rgb(colours[contact.effector]), (len(faces), 1))
-        result.append(Solid(contact.effector, corners, faces, tint))
+        result.append(DrawnSolid(contact.effector, corners, faces, tint))
     return result

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from manikin.reports.figures.raster import Camera, hiding, nearness, picture
-from manikin.reports.solids import Solid, body_solid, scene_solids
+from manikin.reports.solids import DrawnSolid, body_solid, scene_solids
 from manikin.scene import Box, Mesh, Obstacle, Scene
 
 AHEAD = Camera.at(0.0, 0.0, np.zeros(3))
@@ -15,7 +15,7 @@ RED, BLUE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 def solid(mesh, colour, name, smooth=False):
     normals = np.array(mesh.vertex_normals) if smooth else None
-    return Solid(
+    return DrawnSolid(
         name, np.array(mesh.vertices), np.array(mesh.faces), np.tile(colour, (len(mesh.faces), 1)), normals
     )
 

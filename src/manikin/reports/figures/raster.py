@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.numerics.spatial import FloatArray
-from manikin.reports.solids import Solid
+from manikin.reports.solids import DrawnSolid
 
 FINER = 2
 """Computed points of a pixel along each side."""
@@ -101,7 +101,7 @@ class _Triangles:
     owners: np.ndarray
 
     @staticmethod
-    def of(solids: Sequence[Solid]) -> "_Triangles":
+    def of(solids: Sequence[DrawnSolid]) -> "_Triangles":
         counts = [len(solid.faces) for solid in solids]
         starts = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
         vertices = np.concatenate([np.zeros((0, 3)), *(solid.vertices for solid in solids)])
@@ -254,13 +254,17 @@ class _Shadows:
         return 1.0 - (inside & (before > seen[:, 2] + _BIAS))
 
 
-def nearness(solids: Sequence[Solid], camera: Camera, window: Window, scale: float) -> np.ndarray:
+def nearness(solids: Sequence[DrawnSolid], camera: Camera, window: Window, scale: float) -> np.ndarray:
     """(h, w) how near the nearest of solids is, with so many points in a metre; minus infinity for none."""
     return _Layer(_Triangles.of(solids), camera, window, scale).near
 
 
 def hiding(
-    bodies: Sequence[Solid], obstacles: Sequence[Solid], camera: Camera, window: Window, points: int = 160
+    bodies: Sequence[DrawnSolid],
+    obstacles: Sequence[DrawnSolid],
+    camera: Camera,
+    window: Window,
+    points: int = 160,
 ) -> set[str]:
     """Names of the obstacles before more than :data:`HIDING` of one of the bodies.
 
@@ -284,7 +288,7 @@ def hiding(
 
 
 def picture(
-    solids: Sequence[Solid], camera: Camera, window: Window, pixels: float, *,
+    solids: Sequence[DrawnSolid], camera: Camera, window: Window, pixels: float, *,
     clear: Collection[str] = (), floor: float | None = None, shadows: bool = True,
 ) -> np.ndarray:  # fmt: skip
     """(h, w, 3) picture, 8 bits a colour, of solids on white.
@@ -319,7 +323,7 @@ def picture(
     return np.round(255.0 * blocks.mean(axis=(1, 3)).clip(0.0, 1.0)).astype(np.uint8)
 
 
-def _extent(solids: Sequence[Solid]) -> tuple[FloatArray, float]:
+def _extent(solids: Sequence[DrawnSolid]) -> tuple[FloatArray, float]:
     """Middle (3,) of solids and how far they reach from there [m]."""
     if not solids:
         return np.zeros(3), 1.0
@@ -328,15 +332,15 @@ def _extent(solids: Sequence[Solid]) -> tuple[FloatArray, float]:
     return (low + high) / 2.0, float(np.linalg.norm(high[:2] - low[:2])) / 2.0
 
 
-def _ground(middle: FloatArray, reach: float, height: float) -> Solid:
+def _ground(middle: FloatArray, reach: float, height: float) -> DrawnSolid:
     side = 2.2 * reach + 1.0
     corners = np.array([[-side, -side, 0.0], [side, -side, 0.0], [side, side, 0.0], [-side, side, 0.0]])
     corners += [middle[0], middle[1], height]
-    return Solid(FLOOR, corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile(_GROUND, (2, 1)))
+    return DrawnSolid(FLOOR, corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile(_GROUND, (2, 1)))
 
 
 def _shaded(
-    solids: Sequence[Solid], camera: Camera, window: Window, scale: float, lamp: _Shadows,
+    solids: Sequence[DrawnSolid], camera: Camera, window: Window, scale: float, lamp: _Shadows,
     middle: FloatArray, reach: float,
 ) -> tuple[FloatArray, np.ndarray]:  # fmt: skip
     triangles = _Triangles.of(solids)

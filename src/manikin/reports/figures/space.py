@@ -14,7 +14,7 @@ from manikin.contact import Contact
 from manikin.numerics.spatial import FloatArray
 from manikin.reports.figures import style
 from manikin.reports.figures.raster import Camera, Window, hiding, nearness, picture
-from manikin.reports.solids import Solid, body_solid, contact_solids, scene_solids
+from manikin.reports.solids import DrawnSolid, body_solid, contact_solids, scene_solids
 from manikin.runtime.display import colours_of, readable
 from manikin.scene import Scene
 
@@ -40,7 +40,7 @@ class Space:
         direction: Azimuth and elevation of the eye [rad]; the best for the bodies when None.
     """
 
-    bodies: Sequence[Solid]
+    bodies: Sequence[DrawnSolid]
     headings: FloatArray
     scene: Scene | None
     contacts: Sequence[Contact]
@@ -67,7 +67,7 @@ class Space:
         return self.seen.min(axis=0) - AROUND, self.seen.max(axis=0) + AROUND
 
     @cached_property
-    def obstacles(self) -> list[Solid]:
+    def obstacles(self) -> list[DrawnSolid]:
         """Obstacles near the motion, cut where they leave it."""
         return [] if self.scene is None else scene_solids(self.scene, *self._box)
 

@@ -24,7 +24,7 @@ from manikin.walking.path.walking_model import FURTHER_TERMS, POWER_BLUR, SPEED_
 DEGREE = 4
 """Degree of the spline: continuous rates of the accelerations."""
 
-_CONVERGED = 1e-7
+_CONVERGED = 1e-10
 """Decrease of the cost that Newton's method still expects, as a share of it; one more step is taken."""
 
 _ITERATIONS = 80
