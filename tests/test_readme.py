@@ -80,6 +80,7 @@ def test_the_example_prints_what_the_readme_says(tmp_path):
     assert (tmp_path / "margin.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_the_notebook_runs_from_top_to_bottom(tmp_path, monkeypatch):
     """Each code cell runs as it stands, and each but the imports ends in a value that a notebook shows."""
     monkeypatch.chdir(tmp_path)

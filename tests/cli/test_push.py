@@ -93,6 +93,7 @@ def untimed(block):
     return {key: value for key, value in block.items() if key not in ("wall_s", "control_step_ms")}
 
 
+@pytest.mark.long
 def test_a_push_is_the_run_of_the_scenario_with_the_same_numbers(capfd, runs):
     """The experiment of the thesis from the side: the same summary, but for its name and wall times."""
     assert main(["push", "--force", "200", "--direction", "90", "--duration", "0.1", "--json"]) == DONE
@@ -121,6 +122,7 @@ def test_a_push_for_people_leaves_a_run_directory(capfd, tmp_path, monkeypatch):
     assert untimed(again["push"]) == untimed(summary["push"])
 
 
+@pytest.mark.long
 def test_a_body_on_one_foot_is_pushed_too(capfd):
     """It holds 3 N.s where it carries itself."""
     options = ["--support", "left", "--feet", "free", "--json"]
@@ -128,6 +130,7 @@ def test_a_body_on_one_foot_is_pushed_too(capfd):
     assert json.loads(capfd.readouterr().out)["push"]["recovered"] is True
 
 
+@pytest.mark.long
 def test_a_body_that_may_step_holds_more_than_its_bound_and_stiff_ankles_raise_that(capfd):
     """45 N.s from the back are beyond the bound without a step; stiff ankles raise that bound."""
     options = ["--direction", "0", "--feet", "free", "--json"]
@@ -286,6 +289,7 @@ def test_maps_with_and_without_a_step_and_stiff_ankles(capfd, tmp_path):
     assert head.split("  ")[-3:] == names
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_real_map_of_one_direction(capfd, tmp_path):
     """Each border was tried: what is held stands again when pushed once more, what is beyond falls."""

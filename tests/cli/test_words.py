@@ -121,6 +121,7 @@ raise SystemExit(main())
 """The command, on some of the thesis' goals that are near."""
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for processes in /proc")
 def test_a_killed_run_leaves_no_process_and_is_gone_on_with(tmp_path):

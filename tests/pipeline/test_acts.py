@@ -40,6 +40,7 @@ def test_a_posture_that_a_later_stage_refuses_is_followed_by_the_next_best(rope)
     assert not all(contact.same_place(after[name]) for name, contact in before.items())
 
 
+@pytest.mark.long
 def test_a_tall_person_gets_to_where_only_a_posture_that_leans_back_has_room():
     """None of the trunk's postures is free with a bar 0.1 m before the feet; that of the goal is known."""
     scenario = load_scenario("pull-rope", "wall").with_body(stature_m=1.88)
@@ -77,6 +78,7 @@ def test_an_act_that_makes_no_sense_is_refused(override, words):
         load_scenario("push-cupboard", None, [override])
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_force_is_held_in_the_physics_engine(runs):
     """200 N within 5 % for two seconds, without falling, sliding palms or an unplanned touch."""

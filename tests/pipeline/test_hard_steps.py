@@ -9,6 +9,8 @@ from manikin.pipeline import runner
 from manikin.scenarios.families import FAMILIES, draw_scene
 from manikin.scene import Proximity
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def beside_a_rail(tmp_path_factory):

@@ -58,6 +58,7 @@ def stride(tmp_path, **changes):
     return file
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_plan_too_high_for_the_legs_is_planned_again_lower_and_executed(tmp_path):
     """Feet 0.74 m apart: legs of 0.9 m cannot carry the CoM at 0.95 m, as the first plan wants it.

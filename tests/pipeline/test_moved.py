@@ -15,7 +15,10 @@ from manikin.scenarios import load_scenario
 
 MOVE = (10.0, -7.0, 37.0)
 
-NAMES = ("platform", "stand-up-chair", "push-back-500", "goal-left")
+NAMES = (
+    pytest.param("platform", marks=pytest.mark.long), "stand-up-chair",
+    pytest.param("push-back-500", marks=pytest.mark.long), "goal-left",
+)  # fmt: skip
 
 
 @pytest.fixture

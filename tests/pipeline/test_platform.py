@@ -129,6 +129,7 @@ def test_the_lowest_margin_is_explained_as_in_the_summary(platform, which):
             assert stands[foot]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_resolved_scenario_runs_again_to_the_same_bits_with_another_seed(platform, runs):
     """A run that draws no numbers says so, and its seed changes nothing, each in its own process."""
@@ -139,6 +140,7 @@ def test_the_resolved_scenario_runs_again_to_the_same_bits_with_another_seed(pla
     assert np.array_equal(again.executed.contact_force, platform.executed.contact_force)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_an_executed_run_is_a_recording_for_the_keyframe_method(platform, tmp_path):
     """Same timing to half a control step, same CoM at the key frames, executed without falling."""

@@ -58,6 +58,7 @@ def test_a_pushed_body_goes_on_to_its_goal(runs):
     assert result.summary["execution"]["final_com_error_m"] < 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_too_strong_a_push_ends_in_a_failure_that_is_explained():
     result = runner.run("platform@pushed-hard")

@@ -122,6 +122,7 @@ def test_the_engine_takes_the_masses_up_and_sets_them_down(body, loaded):
     np.testing.assert_array_equal(mass_matrix(world), before)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_load_of_some_phases_is_planned_proved_and_in_every_force(runs):
     """Contact forces carry the load just while it is carried: their sum is the weight and inertia of both."""

@@ -45,6 +45,7 @@ def test_footprints_lead_from_start_to_goal(variant, way):
     assert np.hypot(*(last - first)[:2]) == pytest.approx(way, abs=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_walk_to_the_platform_goes_on_without_a_seam(runs):
     """No planned sample is farther from the one before than its velocities and accelerations explain."""

@@ -29,6 +29,7 @@ def check(result):
     assert executed["min_margin"] > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_walk_around_is_executed():
     goal = (1.0, 1.0, np.pi / 2)

@@ -144,6 +144,7 @@ def test_a_file_that_is_cut_off_or_not_finite_says_so(tmp_path):
     assert len(load_mesh(tmp_path / "box.stl").faces) == 12
 
 
+@pytest.mark.long
 def test_a_fine_mesh_is_decimated_where_its_surface_stays(tmp_path):
     """A ball of 81,920 triangles keeps its surface; 80,000 random triangles in a cube cannot."""
     ball = trimesh.creation.icosphere(subdivisions=6)

@@ -250,6 +250,7 @@ def test_a_step_without_room_is_not_taken_and_that_is_said():
     assert "no step: " in found.failure
 
 
+@pytest.mark.long
 def test_a_human_steps_as_well():
     """After one of three pushes of 42 to 48 N.s at least.
 

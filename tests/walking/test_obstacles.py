@@ -179,6 +179,7 @@ def test_bad_obstacles_are_refused_in_one_line(make, message):
     assert str(caught.value) == message
 
 
+@pytest.mark.long
 def test_a_path_around_obstacles_does_not_depend_on_where_the_scene_stands():
     """Ways are sought on a grid: with other axes they, and the local optimum they lead to, would differ."""
     transform = PlanarTransform(10.0, -7.0, 37.0)

@@ -76,6 +76,7 @@ def test_a_hand_is_round_a_stile_and_not_through_it(place):
     assert -GRASPED < GRASPING <= min(depths.values()) < 0.0
 
 
+@pytest.mark.long
 def test_forearms_are_as_far_from_stiles_as_a_refined_motion_has_to_keep_them():
     """Its parts end in these postures; one with a forearm 1 mm beside a stile could not be kept."""
     context, found = planned(2418)

@@ -13,6 +13,7 @@ from manikin.planning.contacts import LimbSettings
 from manikin.scenarios.families import FAMILIES, draw_scene
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1621])
 def test_a_quadruped_goes_with_fewer_contacts_where_they_last(monkeypatch, tmp_path, seed):
     """Over rubble; each change is of one contact, and the body gets as far."""

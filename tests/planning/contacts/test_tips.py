@@ -56,6 +56,7 @@ def test_the_inner_place_is_halfway_to_the_middle_of_the_support(ahead):
     np.testing.assert_allclose(inner, 0.5 * (outer + corners.mean(axis=0)), atol=1e-6)
 
 
+@pytest.mark.long
 def test_steep_stairs_need_few_postures():
     """Three steps of 0.19 m for legs 0.5 m long.
 

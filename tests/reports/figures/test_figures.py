@@ -76,6 +76,7 @@ def applicable(record):
     return found
 
 
+@pytest.mark.long
 def test_only_what_a_run_has_is_drawn(run, planned_only, walls, seated, failed):
     """No walk: no ways. No execution: no tracking. On walls: no feet, no ZMP. Nothing planned: nothing."""
     every = set(FIGURES) - {"walk_paths"}
