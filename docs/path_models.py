@@ -61,7 +61,7 @@ more walks than chance allows (sign test below 5 %).
 
 """
 END = """
-No term is kept. With `speed` the mean falls and so does the error of turns, but 27 of 42 walks are farther;
+No term is kept. With `speed` the mean falls and so does the error of turns, but most walks are farther;
 its weight is not zero as in the thesis. `turning` ends at next to nothing. With `jerk` some predictions are
 far off, which the mean shows and the median does not.
 

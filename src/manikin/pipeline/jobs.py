@@ -8,6 +8,7 @@ import hashlib
 import tempfile
 import time as clock
 import traceback
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -207,7 +208,7 @@ def _failure(stage: str, reason: str, where: str = "") -> dict[str, Any]:
     return {"stage": stage, "reason": " ".join(reason.split()), "time_s": 0.0, "where": where}
 
 
-class JobDirectory(ResultDirectory):
+class JobDirectory(ResultDirectory, ABC):
     """Directory of many jobs; those that are done stay done."""
 
     TASKS: ClassVar[str] = "tasks"
@@ -221,9 +222,9 @@ class JobDirectory(ResultDirectory):
         entry = self.read(file)
         return entry if self.is_same(entry, job) else None
 
+    @abstractmethod
     def is_same(self, entry: Mapping[str, Any], job: Any) -> bool:
         """Whether an entry is that of a job, and not of another one of that name."""
-        raise NotImplementedError
 
     def keep(self, job: NamedJob, entry: Mapping[str, Any]) -> None:
         """Write the entry of a job."""

@@ -65,10 +65,7 @@ def judge_stance_file(path: Path) -> BalanceReport:
     Raises:
         ScenarioError: One line that names the file, the key, what was wrong and what is valid.
     """
-    if not path.is_file():
-        problem = "is a directory" if path.is_dir() else "there is no such file"
-        raise ScenarioError(f"{path}: {problem}; valid: a stance file (.yaml)")
-    data, lines = read_yaml(path)
+    data, lines = read_yaml(path, "stance")
     file, where = validate(StanceFile, data, str(path), lines), place(str(path), ("contacts",), lines)
     try:
         contacts = [build_contact(entry.effector, entry, file.friction, file.sole) for entry in file.contacts]

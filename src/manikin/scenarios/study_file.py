@@ -272,10 +272,7 @@ def load_study(path: Path) -> Study:
     Raises:
         ScenarioError: One line that names the file, the key, what was wrong and what is valid.
     """
-    if not path.is_file():
-        problem = "is a directory" if path.is_dir() else "there is no such file"
-        raise ScenarioError(f"{path}: {problem}; valid: a study file (.yaml)")
-    data, lines = read_yaml(path)
+    data, lines = read_yaml(path, "study")
     file = validate(StudyFile, data, str(path), lines)
 
     def error(key: str | int, text: str, *more: str | int) -> ScenarioError:

@@ -56,11 +56,15 @@ for _kind, _pattern, _first in (
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), list(_first))
 
 
-def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
+def read_yaml(path: Path, kind: str = "") -> tuple[Any, dict[KeyPath, str]]:
     """Content of a YAML document in plain values, and the place of each key and entry: ``"file.yaml:3"``.
 
-    ScenarioError if the file cannot be read, is not YAML or is empty.
+    ScenarioError if the file cannot be read, is not YAML or is empty. Where a ``kind`` of file is named, one
+    that is not there is told to be of that kind.
     """
+    if kind and not path.is_file():
+        problem = "is a directory" if path.is_dir() else "there is no such file"
+        raise ScenarioError(f"{path}: {problem}; valid: a {kind} file (.yaml)")
     data, lines = _parse(_read_text(path), str(path), "key: value lines")
     if data is None:
         raise ScenarioError(f"{path}: is empty; valid: a YAML mapping, see 'manikin scenarios'")
