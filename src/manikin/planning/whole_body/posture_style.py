@@ -140,7 +140,10 @@ def plan_guide(
         loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
         near = replace(problem, clearance=NEAR * distance)
         ways = (problem, near, replace(near, placements=loose))[: 3 if flying else 2]
-        result = _guide_posture(ways, q, settings, reference[k], manner)
+        # How far apart two postures are is not told by joints that follow the reference in any of them.
+        before = np.array(q)
+        before[exactly] = reference[k][exactly]
+        result = _guide_posture(ways, before, settings, reference[k], manner)
         if not result.succeeded:
             failures.append((instant, result.failure or "posture not found"))
         q = result.q

@@ -161,7 +161,10 @@ def _first_clear(family: Iterator[SwingCurve], clearance: Clearance, limits: Swi
     coarse, dense = list[int](), list[int]()
     for curve in family:
         slack = _least_slack(curve, clearance, limits, least, coarse, 13)
-        if slack >= -TOLERANCE and curve.haste(limits.speed, limits.angular_speed) is None:
+        if slack >= -TOLERANCE:
+            if curve.haste(limits.speed, limits.angular_speed) is not None:
+                # Higher ones are faster still: what slows one down is the optimisation.
+                return check_swing(curve, clearance, limits)
             slack = _least_slack(curve, clearance, limits, least, dense)
             if slack >= -TOLERANCE:
                 return check_swing(curve, clearance, limits)
