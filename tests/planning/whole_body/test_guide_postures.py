@@ -17,7 +17,7 @@ posture_style = importlib.import_module("manikin.planning.whole_body.posture_sty
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 
 
-def guide(person, scene, references):
+def guide(person, scene, references, exact=()):
     """Postures of somebody who stands for a second, 2 cm lower than preferred."""
     feet = [sole(f"{side}_foot", (0.0, y, 0.0), **SIZE) for side, y in (("left", 0.1), ("right", -0.1))]
     schedule = ContactSchedule(StanceSequence([Phase(Stance(feet, 1500.0), 0.5, 1.2)]), [0.0, 1.0])
@@ -26,7 +26,7 @@ def guide(person, scene, references):
     return plan_guide(
         person, Proximity(person, scene), schedule, time, effector_targets(schedule, (), time),
         np.tile(com, (len(time), 1)), ignored_pairs(person, scene, schedule, time), np.array(references),
-        0.028, READY, (), False,
+        0.028, READY, exact, False,
     )  # fmt: skip
 
 
@@ -52,6 +52,24 @@ def test_an_arm_above_a_board_does_not_go_through_it(person):
     for q in found.configurations:
         _, hand = Configuration(person, q).segment_placement("left_hand")
         assert hand[2] > place[2]
+
+
+def test_toes_that_follow_their_roll_make_no_posture_far_from_the_one_before(person, monkeypatch):
+    """Each posture is found at once, although toes turn by twenty of their scales from one to the next."""
+    searches, generate = [], posture_style.generate_posture
+
+    def counted(problem, start, **options):
+        searches.append(start)
+        return generate(problem, start, **options)
+
+    monkeypatch.setattr(posture_style, "generate_posture", counted)
+    toes = [person.joint_index("right_toe_extension")]
+    references = [READY.posture(person) for _ in range(3)]
+    for extension, reference in zip((0.0, 0.2, 0.4), references, strict=True):
+        reference[7 + toes[0]] = extension
+    found = guide(person, Scene(), references, toes)
+    assert found.failures == ()
+    assert len(searches) == len(references)
 
 
 @pytest.fixture
