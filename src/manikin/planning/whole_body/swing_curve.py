@@ -102,11 +102,8 @@ class SwingCurve:
         middle = (1.0 - share) * start.position + share * goal.position
         top = max(float(up @ start.position), float(up @ goal.position)) + height
         point = middle + (top - float(up @ middle)) * up + lateral * left
-        ends = (start.position, _unit(start_normal)), (goal.position, _unit(end_normal))
-        rows, target = _end_conditions(*ends, controls)
-        matrix = np.vstack([rows, block_rows(basis(np.array([apex]), controls))])
-        gain = _least_jerk(controls, matrix.tobytes())
-        positions = (gain @ np.concatenate([target, point])).reshape(controls, 3)
+        gain = _least_jerk(controls, apex, _unit(start_normal).tobytes(), _unit(end_normal).tobytes())
+        positions = (gain @ np.concatenate([start.position, goal.position, point])).reshape(controls, 3)
         return cls(start_time, end_time, positions, _turning(start.rotation, goal.rotation, pitch, controls))
 
     @classmethod
@@ -252,22 +249,6 @@ def jerk_energy(controls: int) -> FloatArray:
     return energy
 
 
-def _end_conditions(
-    start: tuple[FloatArray, FloatArray], goal: tuple[FloatArray, FloatArray], controls: int
-) -> tuple[FloatArray, FloatArray]:
-    """Matrix (8 x 3 + 4, 3 controls) and target that put the end control points where they belong.
-
-    Each end is a place and a normal; the unknowns are the control points, flattened row by row.
-    """
-    across = [np.ascontiguousarray(axes_of_normal(normal)[:, :2].T) for _, normal in (start, goal)]
-    places = [(index, np.eye(3), start[0]) for index in range(RESTING)]
-    places += [(index, np.eye(3), goal[0]) for index in range(controls - RESTING, controls)]
-    places += [(RESTING, across[0], start[0]), (controls - RESTING - 1, across[1], goal[0])]
-    rows = [np.kron(np.eye(controls)[[index]], block) for index, block, _ in places]
-    target = [block @ point for _, block, point in places]
-    return np.asarray(np.vstack(rows), dtype=np.float64), np.concatenate(target)
-
-
 def block_rows(weights: FloatArray) -> FloatArray:
     """(3k, 3n) weights for control points flattened row by row, from (k, n) weights of one coordinate."""
     return np.asarray(np.kron(weights, np.eye(3)), dtype=np.float64)
@@ -283,13 +264,29 @@ def _unit(normal: ArrayLike) -> FloatArray:
 
 
 @lru_cache(maxsize=64)
-def _least_jerk(controls: int, conditions: bytes) -> FloatArray:
-    """(3n, m) linear map from targets to the control points of least jerk that meet ``matrix x = target``."""
-    energy, matrix = jerk_energy(controls), np.frombuffer(conditions).reshape(-1, 3 * controls)
+def _least_jerk(controls: int, apex: float, leaving: bytes, reaching: bytes) -> FloatArray:
+    """(3n, 9) map from the places of both ends and of the apex to the control points of least jerk.
+
+    The first and the last rest at their ends, their neighbours are on the normals there.
+
+    Args:
+        apex: Share of the duration at which the apex is passed.
+        leaving: (3,) unit normal at the start, as bytes.
+        reaching: The same at the end.
+    """
+    across = [axes_of_normal(np.frombuffer(normal))[:, :2].T for normal in (leaving, reaching)]
+    # Control points with the end, 0 or 1, that they share coordinates with.
+    shared = [(index, np.eye(3), 0) for index in range(RESTING)]
+    shared += [(index, np.eye(3), 1) for index in range(controls - RESTING, controls)]
+    shared += [(RESTING, across[0], 0), (controls - RESTING - 1, across[1], 1)]
+    rows = [np.kron(np.eye(controls)[[index]], block) for index, block, _ in shared]
+    places = [np.kron(np.eye(3)[[end]], block) for _, block, end in shared]
+    matrix = np.vstack([*rows, block_rows(basis(np.array([apex]), controls))])
+    target = np.vstack([*places, np.eye(9)[6:]])
+    energy, m = jerk_energy(controls), len(matrix)
     hessian = block_rows(energy / np.trace(energy)) + 1e-12 * np.eye(3 * controls)
-    m = len(matrix)
     system = np.block([[hessian, matrix.T], [matrix, np.zeros((m, m))]])
-    targets = np.vstack([np.zeros((3 * controls, m)), np.eye(m)])
+    targets = np.vstack([np.zeros((3 * controls, 9)), target])
     return np.asarray(np.linalg.solve(system, targets)[: 3 * controls], dtype=np.float64)
 
 
