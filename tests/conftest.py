@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, settings
 from manikin.body import human
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
-from manikin.reports.export import to_bvh
+from manikin.reports.formats.bvh import to_bvh
 
 FEET = ("left_foot", "right_foot")
 

@@ -10,7 +10,7 @@ from manikin.body import human
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.recordings import read_bvh, read_recording
-from manikin.reports.export import to_bvh
+from manikin.reports.formats.bvh import to_bvh
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -12,7 +12,7 @@ from manikin.body import Configuration, human, random_configuration
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.recordings import read_amc, read_asf, read_bvh, read_recording
-from manikin.reports.export import to_bvh
+from manikin.reports.formats.bvh import to_bvh
 
 CMU = 0.0254 / 0.45
 

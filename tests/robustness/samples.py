@@ -14,7 +14,7 @@ import yaml
 from manikin.body import creature_from_urdf
 from manikin.motion.file import MotionFile, read_motions, write_motions
 from manikin.recordings import read_recording
-from manikin.reports.export import to_bvh
+from manikin.reports.formats.bvh import to_bvh
 from manikin.scenarios import load_scenario
 from manikin.scenarios.stance_file import judge_stance_file
 from manikin.scene.mesh import load_mesh

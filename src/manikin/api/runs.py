@@ -1,7 +1,7 @@
 """Runs and recordings: planned, executed, walked, pushed, read, measured; to print, draw and watch."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -102,6 +102,24 @@ class Run(Displayed):
     def view(self, port: int = 8080) -> None:
         """Play the motion in the browser until Ctrl-C, on this computer only."""
         serve(self.record.content, port, print)
+
+    def export(
+        self, format_name: str, out: str | Path | None = None, *, which: str | None = None,
+        rate: float | None = None, **options: Any,
+    ) -> Path:  # fmt: skip
+        """Write the motion for other programs, as ``manikin export`` does, and return the file.
+
+        Args:
+            format_name: One of :data:`manikin.reports.export.FORMATS`, such as ``"mp4"``.
+            out: File to write; beside the motion when omitted.
+            which: ``"planned"`` or ``"executed"``; the executed motion if there is one, when omitted.
+            rate: Samples per second [Hz]; the format's own when omitted.
+            options: Of :class:`manikin.reports.export.ExportOptions`, such as ``size=(320, 240)``.
+
+        Raises:
+            InputError: If a value is not usable, or the run has no such motion.
+        """
+        return _exported(self.record.content, self.directory, format_name, out, which, rate, options)
 
     def simulate(self, *, push: Mapping[str, float] | None = None) -> "Run":
         """Execute the plan in the physics engine; see :func:`simulate`."""
@@ -227,6 +245,21 @@ def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
     return Comparison(compare_runs(*records))
 
 
+def _exported(
+    content: MotionFile, folder: Path, format_name: str, out: str | Path | None, which: str | None,
+    rate: float | None, options: Mapping[str, Any],
+) -> Path:  # fmt: skip
+    from manikin.reports.export import ExportOptions, export_motion
+
+    known = [item.name for item in fields(ExportOptions)]
+    if unknown := sorted(set(options) - set(known)):
+        raise InputError(f"option {unknown[0]!r} is not known; valid: {', '.join(known)}")
+    if not content.motions:
+        raise InputError("there is no motion to export; valid: a run that planned one")
+    chosen = ExportOptions(**options)
+    return export_motion(content, folder, format_name, out=out, which=which, rate=rate, options=chosen)
+
+
 def _drawn(figures: Mapping[str, Callable[[Any], "Figure"]], name: str, data: Any) -> "Figure":
     if name not in figures:
         raise InputError(f"figure is {name!r}; valid: {', '.join(figures)}")
@@ -311,6 +344,21 @@ class MeasuredRecording(Displayed):
         from manikin.reports.analysis_sheet import recording_sheet
 
         return Drawing(recording_sheet(self.analysis, str(self)))
+
+    def export(self, format_name: str, out: str | Path, *, rate: float | None = None, **options: Any) -> Path:
+        """Write the reconstructed motion for other programs and return the file; see :meth:`Run.export`.
+
+        Args:
+            format_name: One of :data:`manikin.reports.export.FORMATS`.
+            out: File to write.
+            rate: Samples per second [Hz]; the format's own when omitted.
+            options: Of :class:`manikin.reports.export.ExportOptions`.
+
+        Raises:
+            InputError: If a value is not usable.
+        """
+        content = MotionFile(recorded=self.analysis.motion, body=self.analysis.body)
+        return _exported(content, Path(out).parent, format_name, out, None, rate, options)
 
     def view(self, port: int = 8080) -> None:
         """Show the measured motion in the browser until Ctrl-C."""

@@ -6,7 +6,7 @@ the other half is its mirror image. The grid is drawn apart around head and hand
 vertex follows the segments near it with weights that sum to one (linear blend skinning).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -67,6 +67,22 @@ class Skin:
     def faces_of(self, material: Material) -> np.ndarray:
         """(k, 3) triangles of one material."""
         return self.faces[self.materials == MATERIALS.index(material)]
+
+    @lru_cache(maxsize=4)  # noqa: B019  # skins are few, and kept anyway
+    def coarser(self, cell: float) -> "Skin":
+        """The same surface with one vertex for all in a cube that follow the same segment most.
+
+        Args:
+            cell: Edge of the cubes [m].
+        """
+        keys = np.column_stack([np.floor(self.vertices / cell).astype(int), self.bones[:, 0]])
+        _, kept, merged = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        faces = merged.reshape(-1)[self.faces]
+        whole = np.all(faces != np.roll(faces, 1, axis=1), axis=1)
+        return replace(
+            self, vertices=self.vertices[kept], normals=self.normals[kept], faces=faces[whole],
+            materials=self.materials[whole], bones=self.bones[kept], weights=self.weights[kept],
+        )  # fmt: skip
 
     def posed(self, rotations: FloatArray, origins: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Vertices (n, 3) [m] and unit normals (n, 3) with the segments' frames at other places in the world.

@@ -79,16 +79,29 @@ def compare(
 
 
 def export(
+    context: typer.Context,
     source: MotionArgument,
-    format: Annotated[Literal["bvh", "csv", "glb"], option("bvh|csv|glb", "File format.", "--format")],
+    format: Annotated[
+        Literal["bvh", "csv", "gif", "glb", "mp4"],
+        option("bvh|csv|gif|glb|mp4", "File format.", "--format"),
+    ],
     out: Annotated[Path | None, option("FILE", "Default: beside the motion.")] = None,
     motion: Annotated[str | None, option("planned|executed", "Default: executed if there is one.")] = None,
     rate: Annotated[
-        float | None, option("HZ", "Samples per second; default: 100 bvh, 60 glb, all csv.")
+        float | None,
+        option("HZ", "Samples per second; default: 100 bvh, 60 glb, 25 mp4, 12.5 gif, all csv."),
     ] = None,
+    size: Annotated[str | None, option("WxH", "Pixels of mp4 and gif; default: 640x480.")] = None,
 ) -> None:
     """Write a motion for other programs."""
     from manikin.motion.file import read_motions
-    from manikin.reports.export import export_motion
+    from manikin.reports.export import ExportOptions, export_motion
+    from manikin.reports.formats.video import SIZE, film_size
 
-    typer.echo(str(export_motion(read_motions(source), source, format, out=out, which=motion, rate=rate)))
+    film = format in ("mp4", "gif")
+    console.refuse(size is not None and not film, "--size", "it is for mp4 and gif")
+    content, pixels = read_motions(source), SIZE if size is None else film_size(size)
+    with console.bars(context.obj) as report:
+        options = ExportOptions(size=pixels, progress=lambda share: report(format, share))
+        path = export_motion(content, source, format, out=out, which=motion, rate=rate, options=options)
+    typer.echo(str(path))

@@ -1,26 +1,20 @@
-"""Files made from results: figures of runs and comparisons, motions as BVH, CSV and GLB for other programs.
+"""Files made from results: figures of runs and comparisons, motions for other programs.
 
-A CSV file has one row per sample, units in the header.
-
-BVH has y up and no unit; programs take it for centimetres. Ours: x to the body's left, y up, z forward,
-centimetres, degrees, ``(X, Y, Z) = 100 (y, z, x)``, a rotation of our world (x forward, y left, z up) and no
-mirror image. Every joint has three rotation channels: the segment's hinges in their order, then the axes it
-does not have, at zero. A BVH rotation is the product of its channels from left to right, like our hinges.
+The formats are those of :mod:`manikin.reports.formats`, GLB (:mod:`manikin.reports.gltf`) and CSV, with one
+row per sample and units in the header.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
-from io import StringIO
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from manikin.body import BodyModel, Segment
-from manikin.body.segments import end_of
+from manikin.body import BodyModel
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
@@ -28,6 +22,8 @@ from manikin.pipeline.run_directory import read_run
 from manikin.planning.contacts.single_contact import ContactAnswer
 from manikin.reports.comparison import RunComparison
 from manikin.reports.figures import ChoicePanel, contact_choice_figure, save_figure, write_figures
+from manikin.reports.formats.bvh import to_bvh
+from manikin.reports.formats.video import SIZE, Film, to_gif, to_mp4
 from manikin.reports.gltf import to_glb
 from manikin.runtime.display import readable
 from manikin.runtime.files import (
@@ -35,9 +31,8 @@ from manikin.runtime.files import (
     ResultDirectory,
     columns_csv,
     make_directory,
-    write_bytes,
+    write_content,
     write_result,
-    writing,
 )
 from manikin.scene import Scene
 
@@ -113,107 +108,76 @@ def _linear(array: FloatArray, before: np.ndarray, share: FloatArray) -> FloatAr
     return np.where(weight == 0.0, array[before], (1.0 - weight) * array[before] + weight * array[after])
 
 
-TO_BVH: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-"""Rotation of our world's axes to BVH's: X = y (left), Y = z (up), Z = x (forward)."""
-TO_BVH.setflags(write=False)
+@dataclass(frozen=True)
+class ExportOptions:
+    """What a caller may say about the file besides its rate.
 
-CENTIMETRES = 100.0
-_ROOT_ORDER = "YXZ"  # yaw, pitch, roll: the singularity is a pelvis that looks straight up or down
-
-
-def to_bvh(body: BodyModel, motion: Motion) -> str:
-    """Text of a BVH file of a motion that is evenly sampled; see :func:`resample`.
-
-    Raises:
-        MotionFileError: If the motion is not the body's, or is not evenly sampled.
+    Attributes:
+        size: Width and height of a film [pixels].
+        progress: Told the share that is done, of a film.
     """
-    if motion.joint_names != body.joint_names:
-        raise MotionFileError("motion has other joints than the body; valid: the body's own motion")
-    text = StringIO()
-    text.write("HIERARCHY\n")
-    order = _write_joint(text, body.segments[0], body, 0)
-    text.write(f"MOTION\nFrames: {len(motion.time)}\nFrame Time: {_frame_time(motion):.9g}\n")
-    position = CENTIMETRES * motion.q[:, :3] @ TO_BVH.T
-    rotation = TO_BVH @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix() @ TO_BVH.T
-    turns = (_angles(segment, body, motion) for segment in order[1:])
-    np.savetxt(text, np.hstack([position, _euler(rotation, _ROOT_ORDER), *turns]), fmt="%.7f")
-    return text.getvalue()
+
+    size: tuple[int, int] = SIZE
+    progress: Callable[[float], object] = lambda _share: None
 
 
-def _frame_time(motion: Motion) -> float:
-    if len(motion.time) == 1:
-        return 0.01
-    steps = np.diff(motion.time)
-    if np.ptp(steps) > 1e-6:
-        every = f"{steps.min():.6g} to {steps.max():.6g} s"
-        raise MotionFileError(f"motion is sampled every {every}; valid: one rate (resample it)")
-    return float(motion.duration / len(steps))
+@dataclass(frozen=True, eq=False)
+class _Export:
+    """A motion, sampled as the format wants it, and where it goes."""
+
+    content: MotionFile
+    motion: Motion
+    rate: float
+    path: Path
+    options: ExportOptions
+
+    @property
+    def body(self) -> BodyModel:
+        assert self.content.body is not None
+        return self.content.body
+
+    @property
+    def film(self) -> Film:
+        return Film(self.body, self.motion, self.content.scene, self.options.size)
 
 
-def _channels(segment: Segment) -> tuple[str, list[float]]:
-    """Rotation axes of a segment's three channels, such as ``"XZY"``, and the signs of its hinges about them.
-
-    No signs where axes are oblique or repeated, which cannot be channels: the whole rotation is split then.
-    """
-    order, signs = "", []
-    for hinge in segment.hinges:
-        axis = TO_BVH @ hinge.axis
-        nearest = int(np.argmax(np.abs(axis)))
-        if not np.isclose(abs(axis[nearest]), 1.0, rtol=0.0, atol=1e-12) or "XYZ"[nearest] in order:
-            return "ZXY", []
-        order += "XYZ"[nearest]
-        signs.append(float(np.sign(axis[nearest])))
-    return order + "".join(axis for axis in "ZXY" if axis not in order), signs + [1.0] * (3 - len(signs))
+def _write_csv(export: _Export) -> None:
+    write_result(export.path, to_csv(export.motion))
 
 
-def _write_joint(text: StringIO, segment: Segment, body: BodyModel, depth: int) -> list[Segment]:
-    """Write a segment and what hangs on it, and return them in the order of the file."""
-    indent, inner = "\t" * depth, "\t" * (depth + 1)
-    root = segment.parent is None
-    order = _ROOT_ORDER if root else _channels(segment)[0]
-    channels = [*(f"{axis}position" for axis in "XYZ" if root), *(f"{axis}rotation" for axis in order)]
-    offset = np.zeros(3) if root else CENTIMETRES * (TO_BVH @ segment.origin)
-    text.write(f"{indent}{'ROOT' if root else 'JOINT'} {segment.name}\n{indent}{{\n")
-    text.write(f"{inner}OFFSET {_numbers(offset)}\n{inner}CHANNELS {len(channels)} {' '.join(channels)}\n")
-    order = [segment]
-    for child in (item for item in body.segments if item.parent == segment.name):
-        order += _write_joint(text, child, body, depth + 1)
-    if len(order) == 1:
-        end = CENTIMETRES * (TO_BVH @ end_of(segment))
-        text.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_numbers(end)}\n{inner}}}\n")
-    text.write(f"{indent}}}\n")
-    return order
+def _write_bvh(export: _Export) -> None:
+    write_result(export.path, to_bvh(export.body, export.motion))
 
 
-def _numbers(values: FloatArray) -> str:
-    return " ".join(f"{value:.7f}" for value in values)
+def _write_glb(export: _Export) -> None:
+    write_content(export.path, to_glb(export.body, export.motion, export.content.scene))
 
 
-def _angles(segment: Segment, body: BodyModel, motion: Motion) -> FloatArray:
-    """(n, 3) channel values of a segment [deg]."""
-    order, signs = _channels(segment)
-    angles = [motion.q[:, 7 + body.joint_index(hinge.name)] for hinge in segment.hinges]
-    if signs:
-        angles += [np.zeros(len(motion.time))] * (3 - len(angles))
-        return np.degrees(np.column_stack(angles) * signs)
-    rotation = np.broadcast_to(np.eye(3), (len(motion.time), 3, 3))
-    for hinge, angle in zip(segment.hinges, angles, strict=True):
-        rotation = rotation @ Rotation.from_rotvec(angle[:, None] * hinge.axis).as_matrix()
-    return _euler(TO_BVH @ rotation @ TO_BVH.T, order)
+def _write_mp4(export: _Export) -> None:
+    write_content(export.path, to_mp4(export.film, export.rate, export.options.progress))
 
 
-def _euler(rotation: FloatArray, order: str) -> FloatArray:
-    """(n, 3) intrinsic angles [deg] without jumps of a turn between samples."""
-    with warnings.catch_warnings():
-        # At the singularity SciPy sets the third angle to zero: one of the right answers.
-        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
-        angles = Rotation.from_matrix(rotation).as_euler(order)
-    return np.degrees(np.unwrap(angles, axis=0))
+def _write_gif(export: _Export) -> None:
+    write_content(export.path, to_gif(export.film, export.rate, export.options.progress))
 
 
-FORMATS = ("bvh", "csv", "glb")
-BVH_RATE, GLB_RATE = 100.0, 60.0
-"""Samples per second of a BVH file unless the caller says otherwise [Hz]."""
+@dataclass(frozen=True)
+class _Format:
+    """How a format is written, and its samples per second unless the caller says otherwise [Hz]."""
+
+    write: Callable[[_Export], None]
+    rate: float | None
+    needs_body: bool = True
+
+
+_FORMATS: Mapping[str, _Format] = {
+    "bvh": _Format(_write_bvh, 100.0),
+    "csv": _Format(_write_csv, None, needs_body=False),
+    "glb": _Format(_write_glb, 60.0),
+    "mp4": _Format(_write_mp4, 25.0),
+    "gif": _Format(_write_gif, 12.5),
+}
+FORMATS = tuple(_FORMATS)
 
 
 def pick_motion(content: MotionFile, which: str | None = None) -> Motion:
@@ -230,36 +194,34 @@ def pick_motion(content: MotionFile, which: str | None = None) -> Motion:
 
 def export_motion(
     content: MotionFile, source: str | Path, format_name: str, *, out: str | Path | None = None,
-    which: str | None = None, rate: float | None = None,
+    which: str | None = None, rate: float | None = None, options: ExportOptions | None = None,
 ) -> Path:  # fmt: skip
     """Write a motion in another format, atomically, and return the file.
 
     Args:
+        content: What the motion file holds.
         source: The run directory or motion file it came from.
         format_name: One of :data:`FORMATS`.
         out: File to write; ``motion.FORMAT`` beside the motion file when omitted.
         which: ``"planned"`` or ``"executed"``; see :func:`pick_motion`.
-        rate: Samples per second [Hz]; 100 for BVH, 60 for GLB and every sample for CSV when omitted.
+        rate: Samples per second [Hz]; when omitted the format's own, of CSV every sample.
+        options: Further choices; defaults when None.
 
     Raises:
-        InputError: If the format, the motion or the rate is not available.
-        MotionFileError: If the file cannot be written, or BVH or GLB is wanted without a body.
+        InputError: If the format, the motion, the rate or a library is not available.
+        MotionFileError: If the file cannot be written, or a body is needed and there is none.
     """
     if format_name not in FORMATS:
         raise InputError(f"format is {format_name!r}; valid: {', '.join(FORMATS)}")
-    motion = pick_motion(content, which)
+    motion, kind = pick_motion(content, which), _FORMATS[format_name]
     folder = Path(source) if Path(source).is_dir() else Path(source).parent
     path = Path(out) if out is not None else folder / f"motion.{format_name}"
-    if format_name == "csv":
-        return write_result(path, to_csv(resample(motion, rate)))
-    if content.body is None:
+    if kind.needs_body and content.body is None:
         raise MotionFileError(f"{source}: holds no body; valid: a motion file with a body for {format_name}")
-    if format_name == "glb":
-        sampled = resample(motion, GLB_RATE if rate is None else rate)
-        with writing(path):
-            write_bytes(path, to_glb(content.body, sampled, content.scene))
-        return path
-    return write_result(path, to_bvh(content.body, resample(motion, BVH_RATE if rate is None else rate)))
+    rate = kind.rate if rate is None else rate
+    sampled = resample(motion, rate)
+    kind.write(_Export(content, sampled, rate or 0.0, path, options or ExportOptions()))
+    return path
 
 
 COMPARISON = "comparison.json"

@@ -43,15 +43,19 @@ def rgb(colour: str) -> FloatArray:
     return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
 
 
-def body_solid(body: BodyModel, q: FloatArray, marked: Sequence[str] = ()) -> DrawnSolid | None:
+def body_solid(
+    body: BodyModel, q: FloatArray, marked: Sequence[str] = (), coarse: float | None = None
+) -> DrawnSolid | None:
     """A body in a configuration (nq,), or None of a body without shapes.
 
     Args:
         marked: Segments that have the colour of the executed motion.
+        coarse: Edge of the cells in which vertices of a person's surface become one [m]; None for none.
     """
     rotations, origins = segment_frames(body, q)
     names = [segment.name for segment in body.segments]
     if (skin := skin_of(body)) is not None:
+        skin = skin if coarse is None else skin.coarser(coarse)
         vertices, normals = skin.posed(rotations, origins)
         colours = np.array([rgb(MATERIAL_COLOURS[material]) for material in MATERIALS])[skin.materials]
         strongest = skin.bones[:, 0][skin.faces[:, 0]]

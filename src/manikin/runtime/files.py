@@ -140,6 +140,13 @@ def write_result(path: str | Path, content: str | Mapping[str, Any]) -> Path:
     return Path(path)
 
 
+def write_content(path: str | Path, data: bytes) -> Path:
+    """Write bytes atomically; MotionFileError if they cannot be written."""
+    with writing(Path(path)):
+        write_bytes(path, data)
+    return Path(path)
+
+
 def read_json(path: Path, valid: str = "as written by manikin") -> dict[str, Any]:
     """JSON object in a file; MotionFileError, with what is ``valid``, if it is none or cannot be read."""
     try:

@@ -9,7 +9,7 @@ import pytest
 from manikin.body import BodyModel, Hinge, Segment, human, random_configuration
 from manikin.errors import MotionFileError
 from manikin.motion import Motion
-from manikin.reports.export import CENTIMETRES, TO_BVH, to_bvh
+from manikin.reports.formats.bvh import CENTIMETRES, TO_BVH, to_bvh
 
 
 def make_motion(body, q, time=None):

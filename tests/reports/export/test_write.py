@@ -48,7 +48,7 @@ def test_files_go_beside_the_motion_or_where_they_are_wanted(finished_run, tmp_p
 
 
 def test_bad_requests_give_one_line(finished_run, tmp_path):
-    for format_name in ("gltf", "mp4", "BVH", ""):
+    for format_name in ("gltf", "avi", "BVH", ""):
         with pytest.raises(InputError, match="valid: bvh, csv"):
             export_motion(finished_run, tmp_path, format_name)
     with pytest.raises(InputError, match="rate"):

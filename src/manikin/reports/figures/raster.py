@@ -14,7 +14,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.reports.solids import DrawnSolid
 
 FINER = 2
-"""Computed points of a pixel along each side."""
+"""Computed points of a pixel along each side, of a figure."""
 CLEAR = 0.22
 """Opacity of what is seen through."""
 HIDING = 0.08
@@ -230,7 +230,7 @@ class _Layer:
 class _Shadows:
     """What the lamp does not reach."""
 
-    def __init__(self, triangles: _Triangles, camera: Camera) -> None:
+    def __init__(self, triangles: _Triangles, camera: Camera, points: float) -> None:
         places = triangles.vertices
         azimuth = float(np.arctan2(camera.towards[1], camera.towards[0])) - 0.75
         self.lamp = Camera.at(azimuth, 0.95, places.mean(axis=0) if len(places) else np.zeros(3))
@@ -238,7 +238,7 @@ class _Shadows:
         if len(places):
             seen = self.lamp.project(places)
             (left, bottom), (right, top) = seen.min(axis=0) - 0.02, seen.max(axis=0) + 0.02
-            self._scale = _SHADOW_POINTS / max(right - left, top - bottom)
+            self._scale = min(points, _SHADOW_POINTS) / max(right - left, top - bottom)
             self._corner = left, top
             self._layer = _Layer(triangles, self.lamp, (left, right, bottom, top), self._scale)
 
@@ -289,7 +289,7 @@ def hiding(
 
 def picture(
     solids: Sequence[DrawnSolid], camera: Camera, window: Window, pixels: float, *,
-    clear: Collection[str] = (), floor: float | None = None, shadows: bool = True,
+    clear: Collection[str] = (), floor: float | None = None, shadows: bool = True, finer: int = FINER,
 ) -> np.ndarray:  # fmt: skip
     """(h, w, 3) picture, 8 bits a colour, of solids on white.
 
@@ -301,14 +301,16 @@ def picture(
         clear: Names of solids that are seen through, and cast no shadow.
         floor: Height of the floor [m]; None for none.
         shadows: Whether the lamp casts shadows.
+        finer: Computed points of a pixel along each side.
     """
-    scale = FINER * pixels
+    scale = finer * pixels
     opaque = [solid for solid in solids if solid.name not in clear]
     casting = _Triangles.of(opaque) if shadows else _Triangles.of([])
-    lamp = _Shadows(casting, camera)
+    left, right, bottom, top = window
+    lamp = _Shadows(casting, camera, 1.2 * scale * max(right - left, top - bottom))
     middle, reach = _extent(solids)
     shown = [*opaque, *([] if floor is None else [_ground(middle, reach, floor)])]
-    image, near = _shaded(shown, camera, window, scale, lamp, middle, reach)
+    image, near = _shaded(shown, camera, window, scale, lamp, middle, reach, finer)
     glass = [solid for solid in solids if solid.name in clear]
     if glass:
         triangles = _Triangles.of(glass)
@@ -318,8 +320,8 @@ def picture(
         tint = _lit_colours(layer, triangles, rows, columns, lamp, None)
         image[rows, columns] += CLEAR * (tint - image[rows, columns])
         _draw_edges(image, layer, triangles, 0.55)
-    height, width = (side // FINER * FINER for side in image.shape[:2])
-    blocks = image[:height, :width].reshape(height // FINER, FINER, width // FINER, FINER, 3)
+    height, width = (side // finer * finer for side in image.shape[:2])
+    blocks = image[:height, :width].reshape(height // finer, finer, width // finer, finer, 3)
     return np.round(255.0 * blocks.mean(axis=(1, 3)).clip(0.0, 1.0)).astype(np.uint8)
 
 
@@ -341,7 +343,7 @@ def _ground(middle: FloatArray, reach: float, height: float) -> DrawnSolid:
 
 def _shaded(
     solids: Sequence[DrawnSolid], camera: Camera, window: Window, scale: float, lamp: _Shadows,
-    middle: FloatArray, reach: float,
+    middle: FloatArray, reach: float, finer: int,
 ) -> tuple[FloatArray, np.ndarray]:  # fmt: skip
     triangles = _Triangles.of(solids)
     layer = _Layer(triangles, camera, window, scale)
@@ -352,7 +354,7 @@ def _shaded(
     image[rows, columns] = _lit_colours(layer, triangles, rows, columns, lamp, layer.world(rows, columns))
     rows, columns = np.nonzero(owners == ground)
     if len(rows):
-        image[rows, columns] = _floor_colours(layer.world(rows, columns), lamp, middle, reach, scale)
+        image[rows, columns] = _floor_colours(layer.world(rows, columns), lamp, middle, reach, scale / finer)
     _draw_edges(image, layer, triangles, 0.45, ground)
     return image, layer.near
 
@@ -372,11 +374,11 @@ def _lit_colours(
 
 
 def _floor_colours(
-    places: FloatArray, lamp: _Shadows, middle: FloatArray, reach: float, scale: float
+    places: FloatArray, lamp: _Shadows, middle: FloatArray, reach: float, pixels: float
 ) -> FloatArray:
-    """Colours of the floor with its lines and shadows, which fades into the paper."""
+    """Colours of the floor with its lines, a pixel wide, and shadows, which fades into the paper."""
     away = np.abs(places[:, :2] / TILE - np.round(places[:, :2] / TILE)) * TILE
-    line = np.clip(1.6 - away.min(axis=1) * scale / FINER, 0.0, 1.0)[:, None]
+    line = np.clip(1.6 - away.min(axis=1) * pixels, 0.0, 1.0)[:, None]
     colours = _GROUND + line * (_LINES - _GROUND)
     colours *= (0.80 + 0.20 * lamp.lit(places))[:, None]
     far = np.linalg.norm(places[:, :2] - middle[:2], axis=1) / (1.6 * reach + 0.6)

@@ -1,0 +1,1 @@
+"""Motions in the formats of other programs, one module for each kind of file."""
