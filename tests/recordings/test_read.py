@@ -12,7 +12,7 @@ from manikin.body import Configuration, human, random_configuration
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.recordings import read_amc, read_asf, read_bvh, read_recording
-from manikin.reports.formats.bvh import to_bvh
+from manikin.reports.formats.bvh import rest_rotations, to_bvh
 
 CMU = 0.0254 / 0.45
 
@@ -96,7 +96,8 @@ def test_our_own_bvh_comes_back(tmp_path):
             joint = found.joint_names.index(segment.name)
             rotation, position = state.segment_placement(segment.name)
             np.testing.assert_allclose(found.positions[frame, joint], position, atol=1e-7)
-            np.testing.assert_allclose(found.world_rotations[frame, joint], rotation, atol=1e-7)
+            turned = found.world_rotations[frame, joint] @ rest_rotations(body)[segment.name]
+            np.testing.assert_allclose(turned, rotation, atol=1e-7)
 
 
 # --- broken files -------------------------------------------------------------------------------

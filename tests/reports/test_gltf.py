@@ -69,6 +69,8 @@ def test_skinned_vertices_are_those_of_the_motion(swinging):
     assert len(skin["joints"]) == len(body.segments) == 19
     mesh = next(node["mesh"] for node in nodes if "skin" in node)
     parts = document["meshes"][mesh]["primitives"]
+    used = {primitive["material"] for item in document["meshes"] for primitive in item["primitives"]}
+    assert used == set(range(len(document["materials"])))
     names = parts[0]["attributes"]
     places, bones, weights = (array(names[key]) for key in ("POSITION", "JOINTS_0", "WEIGHTS_0"))
     assert np.abs(weights.sum(axis=1) - 1.0).max() < 1e-6

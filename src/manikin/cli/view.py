@@ -82,8 +82,8 @@ def export(
     context: typer.Context,
     source: MotionArgument,
     format: Annotated[
-        Literal["bvh", "csv", "gif", "glb", "mp4"],
-        option("bvh|csv|gif|glb|mp4", "File format.", "--format"),
+        Literal["bvh", "csv", "gif", "glb", "mjcf", "mp4", "urdf"],
+        option("bvh|csv|gif|glb|mjcf|mp4|urdf", "File format.", "--format"),
     ],
     out: Annotated[Path | None, option("FILE", "Default: beside the motion.")] = None,
     motion: Annotated[str | None, option("planned|executed", "Default: executed if there is one.")] = None,
@@ -92,6 +92,10 @@ def export(
         option("HZ", "Samples per second; default: 100 bvh, 60 glb, 25 mp4, 12.5 gif, all csv."),
     ] = None,
     size: Annotated[str | None, option("WxH", "Pixels of mp4 and gif; default: 640x480.")] = None,
+    names: Annotated[
+        Literal["manikin", "cmu", "mixamo", "vrm"], option("manikin|cmu|mixamo|vrm", "Joint names of bvh.")
+    ] = "manikin",
+    up: Annotated[Literal["y", "z"], option("y|z", "Axis of bvh that points up.")] = "y",
 ) -> None:
     """Write a motion for other programs."""
     from manikin.motion.file import read_motions
@@ -100,8 +104,10 @@ def export(
 
     film = format in ("mp4", "gif")
     console.refuse(size is not None and not film, "--size", "it is for mp4 and gif")
+    console.refuse(names != "manikin" and format != "bvh", "--names", "it is for bvh")
+    console.refuse(up != "y" and format != "bvh", "--up", "it is for bvh")
     content, pixels = read_motions(source), SIZE if size is None else film_size(size)
     with console.bars(context.obj) as report:
-        options = ExportOptions(size=pixels, progress=lambda share: report(format, share))
+        options = ExportOptions(pixels, names, up, progress=lambda share: report(format, share))
         path = export_motion(content, source, format, out=out, which=motion, rate=rate, options=options)
     typer.echo(str(path))

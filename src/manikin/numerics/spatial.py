@@ -4,6 +4,7 @@ Rotations are 3x3 matrices or xyzw quaternions; ``rotation_a_to_b`` maps coordin
 """
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import ge, gt, le
@@ -150,6 +151,16 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> FloatArray:
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
     about_y = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
     return rotation_from_yaw(yaw) @ about_y @ about_x
+
+
+def euler_angles(rotation: FloatArray, order: str) -> FloatArray:
+    """(..., 3) angles [rad] of rotations (..., 3, 3) about three axes, named as in SciPy's ``as_euler``.
+
+    At the singularity the third angle is zero, one of the right answers.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
+        return Rotation.from_matrix(rotation).as_euler(order)
 
 
 def rotation_from_normal(normal: ArrayLike, yaw: float = 0.0) -> FloatArray:

@@ -22,7 +22,8 @@ from manikin.pipeline.run_directory import read_run
 from manikin.planning.contacts.single_contact import ContactAnswer
 from manikin.reports.comparison import RunComparison
 from manikin.reports.figures import ChoicePanel, contact_choice_figure, save_figure, write_figures
-from manikin.reports.formats.bvh import to_bvh
+from manikin.reports.formats.bvh import scene_obj, to_bvh
+from manikin.reports.formats.robots import scene_urdf, to_mjcf, to_urdf
 from manikin.reports.formats.video import SIZE, Film, to_gif, to_mp4
 from manikin.reports.gltf import to_glb
 from manikin.runtime.display import readable
@@ -114,10 +115,16 @@ class ExportOptions:
 
     Attributes:
         size: Width and height of a film [pixels].
+        names: Whose names the joints of a BVH file have, see :data:`manikin.reports.formats.bvh.NAMES`.
+        up: Axis of a BVH file that points up, ``"y"`` or ``"z"``.
+        beside: Whether files of the scene are written beside BVH and URDF files.
         progress: Told the share that is done, of a film.
     """
 
     size: tuple[int, int] = SIZE
+    names: str = "manikin"
+    up: str = "y"
+    beside: bool = True
     progress: Callable[[float], object] = lambda _share: None
 
 
@@ -137,6 +144,13 @@ class _Export:
         return self.content.body
 
     @property
+    def scene(self) -> Scene | None:
+        return self.content.scene if self.options.beside else None
+
+    def beside(self, ending: str) -> Path:
+        return self.path.with_name(self.path.stem + ending)
+
+    @property
     def film(self) -> Film:
         return Film(self.body, self.motion, self.content.scene, self.options.size)
 
@@ -146,7 +160,26 @@ def _write_csv(export: _Export) -> None:
 
 
 def _write_bvh(export: _Export) -> None:
-    write_result(export.path, to_bvh(export.body, export.motion))
+    options = export.options
+    write_result(export.path, to_bvh(export.body, export.motion, options.names, options.up))
+    if export.scene is not None:
+        write_result(export.beside("_scene.obj"), scene_obj(export.scene, options.up))
+
+
+def _write_mjcf(export: _Export) -> None:
+    write_result(export.path, to_mjcf(export.body, export.motion, export.content.scene))
+
+
+def _write_urdf(export: _Export) -> None:
+    write_result(export.path, to_urdf(export.body))
+    if export.scene is not None:
+        folder = export.beside("_meshes")
+        text, meshes = scene_urdf(export.scene, folder.name)
+        write_result(export.beside("_scene.urdf"), text)
+        if meshes:
+            make_directory(folder)
+        for name, data in meshes.items():
+            write_content(folder / name, data)
 
 
 def _write_glb(export: _Export) -> None:
@@ -163,11 +196,17 @@ def _write_gif(export: _Export) -> None:
 
 @dataclass(frozen=True)
 class _Format:
-    """How a format is written, and its samples per second unless the caller says otherwise [Hz]."""
+    """How a format is written.
+
+    Attributes:
+        rate: Samples per second unless the caller says otherwise [Hz]; None for every sample.
+        ending: Of the file's name; the format's own when empty.
+    """
 
     write: Callable[[_Export], None]
     rate: float | None
     needs_body: bool = True
+    ending: str = ""
 
 
 _FORMATS: Mapping[str, _Format] = {
@@ -176,6 +215,8 @@ _FORMATS: Mapping[str, _Format] = {
     "glb": _Format(_write_glb, 60.0),
     "mp4": _Format(_write_mp4, 25.0),
     "gif": _Format(_write_gif, 12.5),
+    "mjcf": _Format(_write_mjcf, None, ending="xml"),
+    "urdf": _Format(_write_urdf, None),
 }
 FORMATS = tuple(_FORMATS)
 
@@ -215,7 +256,7 @@ def export_motion(
         raise InputError(f"format is {format_name!r}; valid: {', '.join(FORMATS)}")
     motion, kind = pick_motion(content, which), _FORMATS[format_name]
     folder = Path(source) if Path(source).is_dir() else Path(source).parent
-    path = Path(out) if out is not None else folder / f"motion.{format_name}"
+    path = Path(out) if out is not None else folder / f"motion.{kind.ending or format_name}"
     if kind.needs_body and content.body is None:
         raise MotionFileError(f"{source}: holds no body; valid: a motion file with a body for {format_name}")
     rate = kind.rate if rate is None else rate
@@ -245,7 +286,8 @@ def write_outputs(
     make_directory(folder / FIGURES)
     written = write_figures(record, folder / FIGURES, lambda share: progress("figures", 0.9 * share))
     if record.motions and record.body is not None and not record.body.is_point_mass:
-        written += [export_motion(record.content, folder, kind) for kind in ("bvh", "glb")]
+        plain = ExportOptions(beside=False)
+        written += [export_motion(record.content, folder, kind, options=plain) for kind in ("bvh", "glb")]
     progress("figures", 1.0)
     return written
 

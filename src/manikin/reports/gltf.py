@@ -98,10 +98,15 @@ def to_glb(body: BodyModel, motion: Motion, scene: Scene | None = None) -> bytes
         nodes.append({"name": obstacle.name, "mesh": len(meshes) - 1})
         tops.append(len(nodes) - 1)
     nodes.append({"name": "z_up_to_y_up", "rotation": _quaternion(TO_GLTF), "children": tops})
+    primitives = [primitive for mesh in meshes for primitive in mesh["primitives"]]
+    used = sorted({primitive["material"] for primitive in primitives})
+    for primitive in primitives:
+        primitive["material"] = used.index(primitive["material"])
     document = {
         "asset": {"version": "2.0", "generator": "manikin"}, "scene": 0,
         "scenes": [{"nodes": [len(nodes) - 1, skinned]}],
-        "nodes": nodes, "meshes": meshes, "materials": materials, "animations": [animation],
+        "nodes": nodes, "meshes": meshes, "animations": [animation],
+        "materials": [materials[number] for number in used],
         "skins": [{"joints": list(range(len(names))), "skeleton": root, "inverseBindMatrices": inverse}],
         "buffers": [{"byteLength": len(buffer.data)}], "bufferViews": buffer.views,
         "accessors": buffer.accessors,

@@ -286,6 +286,14 @@ def compile_model(
         SceneError: If a mesh is too large to simulate.
     """
     options = options or PhysicsOptions()
+    return SimulationModel(body, scene, options, model_spec(body, scene, options, held).compile())
+
+
+def model_spec(
+    body: BodyModel, scene: Scene | None, options: PhysicsOptions,
+    held: Mapping[str, tuple[FloatArray, FloatArray]] | None = None,
+) -> Any:  # fmt: skip
+    """The ``mujoco.MjSpec`` that :func:`compile_model` compiles, of the same arguments."""
     spec = mujoco.MjSpec()
     spec.modelname = body.name
     spec.compiler.degree = False
@@ -305,7 +313,7 @@ def compile_model(
         add_scene(spec, scene, _contact(options, scenery=True), options.crossed)
     for name, (rotation, position) in (held or {}).items():
         _hold(spec, body, name, rotation, position)
-    return SimulationModel(body, scene, options, spec.compile())
+    return spec
 
 
 def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:

@@ -1,15 +1,28 @@
 """BVH files, read back by a reader of our own and compared with Pinocchio."""
 
 import warnings
+from io import BytesIO
 
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
-from manikin.body import BodyModel, Hinge, Segment, human, random_configuration
-from manikin.errors import MotionFileError
+from manikin.body import BodyModel, Configuration, Hinge, Segment, human, quadruped, random_configuration
+from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
-from manikin.reports.formats.bvh import CENTIMETRES, TO_BVH, to_bvh
+from manikin.recordings.readers import read_recording
+from manikin.recordings.readers.marker_sets import JOINTS, joint_of
+from manikin.reports.formats.bvh import (
+    AXES,
+    CENTIMETRES,
+    NAMES,
+    joint_names,
+    rest_rotations,
+    scene_obj,
+    to_bvh,
+)
+from manikin.scene import Box, Obstacle, Scene
 
 
 def make_motion(body, q, time=None):
@@ -73,24 +86,86 @@ def forward_kinematics(joints, frame):
     return {j["name"]: p for j, p in zip(joints, placements, strict=True) if j["name"]}
 
 
-def assert_same_placements(body, q):
-    joints, frames, _ = read_bvh(to_bvh(body, make_motion(body, q)))
-    data = body.pinocchio.createData()
+def assert_same_placements(body, q, **options):
+    axes, own = AXES[options.get("up", "y")], joint_names(body, options.get("names", "manikin"))
+    joints, frames, _ = read_bvh(to_bvh(body, make_motion(body, q), **options))
+    assert len({tuple(joint["channels"][-3:]) for joint in joints if joint["name"]}) == 1
+    data, rest = body.pinocchio.createData(), rest_rotations(body)
     for configuration, frame in zip(q, frames, strict=True):
         found = forward_kinematics(joints, frame)
         pin.framesForwardKinematics(body.pinocchio, data, configuration)
-        assert set(found) == {segment.name for segment in body.segments}
-        for name, (position, rotation) in found.items():
-            placement = data.oMf[body.segment_frame(name)]
+        assert set(found) == set(own.values())
+        for segment, name in own.items():
+            position, rotation = found[name]
+            placement = data.oMf[body.segment_frame(segment)]
             # 7 decimals: 1e-9 m of rounding per offset and 1e-9 rad per angle over 2 m of chain.
-            np.testing.assert_allclose(TO_BVH.T @ position / CENTIMETRES, placement.translation, atol=1e-7)
-            np.testing.assert_allclose(TO_BVH.T @ rotation @ TO_BVH, placement.rotation, atol=1e-7)
+            np.testing.assert_allclose(axes.T @ position / CENTIMETRES, placement.translation, atol=1e-7)
+            turned = axes.T @ rotation @ axes @ rest[segment]
+            np.testing.assert_allclose(turned, placement.rotation, atol=1e-7)
 
 
-def test_written_file_puts_every_segment_where_pinocchio_does():
+@pytest.mark.parametrize("up", AXES)
+@pytest.mark.parametrize("names", NAMES)
+def test_written_file_puts_every_segment_where_pinocchio_does(names, up):
     body = human()
     rng = np.random.default_rng(0)
-    assert_same_placements(body, np.array([random_configuration(body, rng) for _ in range(20)]))
+    q = np.array([random_configuration(body, rng) for _ in range(6)])
+    assert_same_placements(body, q, names=names, up=up)
+
+
+def test_rest_is_a_person_with_the_arms_aside():
+    """All channels zero: hands at the height of the shoulders, feet below the hips, toes forward."""
+    body = human()
+    joints, frames, _ = read_bvh(to_bvh(body, make_motion(body, body.standing_posture()[None])))
+    place = {name: at[0] for name, at in forward_kinematics(joints, np.zeros(frames.shape[1])).items()}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        shoulder, elbow, hand = (place[f"{side}_{part}"] for part in ("upper_arm", "forearm", "hand"))
+        np.testing.assert_allclose(hand[1:], shoulder[1:], atol=1e-6)
+        assert sign * hand[0] > sign * elbow[0] > sign * shoulder[0] > 0.0
+        assert place[f"{side}_foot"][1] < place[f"{side}_thigh"][1] - 50.0
+        assert place[f"{side}_toes"][2] > place[f"{side}_foot"][2]
+
+
+def test_own_reader_finds_the_joints_again(tmp_path):
+    """By the names of CMU, within 0.1 mm."""
+    body = human()
+    rng = np.random.default_rng(4)
+    motion = make_motion(body, np.array([random_configuration(body, rng) for _ in range(3)]))
+    file = tmp_path / "motion.bvh"
+    file.write_text(to_bvh(body, motion, "cmu"))
+    recording = read_recording(file)
+    for segment in JOINTS:
+        found = recording.positions[:, joint_of(recording, segment)]
+        wanted = [Configuration(body, q).segment_placement(segment)[1] for q in motion.q]
+        np.testing.assert_allclose(found, wanted, atol=1e-4)
+
+
+def test_angles_are_continuous_where_a_hip_passes_the_right_angle():
+    body = human()
+    q = np.tile(body.standing_posture(), (60, 1))
+    q[:, 7 + body.joint_index("left_hip_flexion")] = np.linspace(0.2, 2.0, 60)
+    q[:, 7 + body.joint_index("left_hip_rotation")] = 0.3
+    q[:, 7 + body.joint_index("left_hip_abduction")] = 0.2
+    _, frames, _ = read_bvh(to_bvh(body, make_motion(body, q)))
+    # 1.8 rad in 59 steps are 1.75 degrees each; near the singularity two angles turn faster together.
+    assert np.abs(np.diff(frames, axis=0)).max() < 30.0
+
+
+def test_scene_beside_has_the_axes_and_the_unit_of_the_motion():
+    box = Obstacle("low wall", Box([0.2, 1.0, 0.4]), translation=[2.0, 0.5, 0.2])
+    mesh = trimesh.load(BytesIO(scene_obj(Scene((box,))).encode()), file_type="obj", force="mesh")
+    np.testing.assert_allclose(mesh.bounds, [[0.0, 0.0, 190.0], [100.0, 40.0, 210.0]], atol=1e-6)
+
+
+def test_names_of_people_are_for_people():
+    body = quadruped()
+    q = body.standing_posture()[None]
+    with pytest.raises(InputError, match="have none for"):
+        to_bvh(body, make_motion(body, q), "vrm")
+    with pytest.raises(InputError, match="valid: manikin, cmu, mixamo, vrm"):
+        joint_names(human(), "maya")
+    with pytest.raises(InputError, match="valid: y, z"):
+        to_bvh(body, make_motion(body, q), up="x")
 
 
 def test_pelvis_looking_straight_down_is_no_special_case():

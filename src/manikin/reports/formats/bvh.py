@@ -1,14 +1,19 @@
-"""A motion as a BVH file.
+"""A motion as a BVH file, ready to be retargeted, and the scene beside it.
 
-BVH has y up and no unit; programs take it for centimetres. Ours: x to the body's left, y up, z forward,
-centimetres, degrees, ``(X, Y, Z) = 100 (y, z, x)``, a rotation of our world (x forward, y left, z up) and no
-mirror image. Every joint has three rotation channels: the segment's hinges in their order, then the axes it
-does not have, at zero. A BVH rotation is the product of its channels from left to right, like our hinges.
+BVH has no unit; programs take it for centimetres. Ours: x to the body's left, y up, z forward, centimetres,
+degrees, ``(X, Y, Z) = 100 (y, z, x)``, a rotation of our world (x forward, y left, z up) and no mirror image;
+with z up our world's own axes. All channels zero is a person with the arms stretched aside, palms down, toes
+forward (T-pose), or the zero posture of another body. All joints have the same three rotation channels.
+
+With ``R`` the rotation of a segment in our world, ``T`` that in the T-pose and ``A`` the axes' change, a
+segment is turned by ``A R T^T A^T`` from the rest of the file.
 """
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from io import StringIO
 
 import numpy as np
@@ -16,35 +21,175 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel, Segment
 from manikin.body.segments import end_of
-from manikin.errors import MotionFileError
+from manikin.body.skin import segment_frames
+from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, euler_angles
+from manikin.reports.solids import finite_obstacles
+from manikin.scene import Scene
 
 TO_BVH: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """Rotation of our world's axes to BVH's: X = y (left), Y = z (up), Z = x (forward)."""
 TO_BVH.setflags(write=False)
 
 CENTIMETRES = 100.0
-_ROOT_ORDER = "YXZ"  # yaw, pitch, roll: the singularity is a pelvis that looks straight up or down
+ORDERS: Mapping[str, str] = {"y": "ZXY", "z": "XYZ"}
+"""Order of the rotation channels by the axis that points up: about forward, left and up."""
+AXES: Mapping[str, FloatArray] = {"y": TO_BVH, "z": np.eye(3)}
+"""Rotation of our world's axes to the file's, by the file's axis that points up."""
+
+_TRUNK: Mapping[str, Mapping[str, str]] = {
+    "cmu": {"pelvis": "Hips", "lumbar": "LowerBack", "thorax": "Spine1", "neck": "Neck", "head": "Head"},
+    "mixamo": {"pelvis": "Hips", "lumbar": "Spine", "thorax": "Spine2", "neck": "Neck", "head": "Head"},
+    "vrm": {"pelvis": "hips", "lumbar": "spine", "thorax": "chest", "neck": "neck", "head": "head"},
+}
+_LIMBS: Mapping[str, Mapping[str, str]] = {
+    "cmu": {"upper_arm": "Arm", "forearm": "ForeArm", "hand": "Hand", "thigh": "UpLeg", "leg": "Leg",
+            "foot": "Foot", "toes": "ToeBase"},
+    "vrm": {"upper_arm": "UpperArm", "forearm": "LowerArm", "hand": "Hand", "thigh": "UpperLeg",
+            "leg": "LowerLeg", "foot": "Foot", "toes": "Toes"},
+}  # fmt: skip
+NAMES = ("manikin", *_TRUNK)
+"""Whose names the joints may have."""
 
 
-def to_bvh(body: BodyModel, motion: Motion) -> str:
-    """Text of a BVH file of a motion that is evenly sampled; see :func:`resample`.
+def joint_names(body: BodyModel, names: str) -> dict[str, str]:
+    """Name of each segment's joint by the segment.
+
+    Args:
+        body: Whose segments they are.
+        names: One of :data:`NAMES`.
+
+    Raises:
+        InputError: If the names are not known, or a segment has none among them.
+    """
+    if names not in NAMES:
+        raise InputError(f"names are {names!r}; valid: {', '.join(NAMES)}")
+    own = [segment.name for segment in body.segments]
+    if names == "manikin":
+        return {name: name for name in own}
+    before = "mixamorig:" if names == "mixamo" else ""
+    limbs = _LIMBS["vrm" if names == "vrm" else "cmu"]
+    sides = {"left": "left", "right": "right"} if names == "vrm" else {"left": "Left", "right": "Right"}
+    known = dict(_TRUNK[names]) | {
+        f"{side}_{part}": word + limb for side, word in sides.items() for part, limb in limbs.items()
+    }
+    if missing := [name for name in own if name not in known]:
+        raise InputError(f"names {names!r} have none for {missing[0]!r}; valid: manikin, or a human")
+    return {name: before + known[name] for name in own}
+
+
+def to_bvh(body: BodyModel, motion: Motion, names: str = "manikin", up: str = "y") -> str:
+    """Text of a BVH file of a motion that is evenly sampled.
+
+    Args:
+        body: Whose motion it is.
+        motion: At one rate.
+        names: Whose names the joints have, one of :data:`NAMES`.
+        up: Axis of the file that points up, ``"y"`` or ``"z"``.
 
     Raises:
         MotionFileError: If the motion is not the body's, or is not evenly sampled.
+        InputError: If names or axis are not known, or the names are not those of the body's parts.
     """
     if motion.joint_names != body.joint_names:
         raise MotionFileError("motion has other joints than the body; valid: the body's own motion")
-    text = StringIO()
-    text.write("HIERARCHY\n")
-    order = _write_joint(text, body.segments[0], body, 0)
-    text.write(f"MOTION\nFrames: {len(motion.time)}\nFrame Time: {_frame_time(motion):.9g}\n")
-    position = CENTIMETRES * motion.q[:, :3] @ TO_BVH.T
-    rotation = TO_BVH @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix() @ TO_BVH.T
-    turns = (_angles(segment, body, motion) for segment in order[1:])
-    np.savetxt(text, np.hstack([position, _euler(rotation, _ROOT_ORDER), *turns]), fmt="%.7f")
+    if up not in AXES:
+        raise InputError(f"up is {up!r}; valid: {', '.join(AXES)}")
+    return _BvhText(body, motion, joint_names(body, names), up).text()
+
+
+def scene_obj(scene: Scene, up: str = "y") -> str:
+    """Text of an OBJ file of a scene's finite obstacles, in the unit and the axes of the BVH file."""
+    text, count = StringIO(), 1
+    text.write("# centimetres\n")
+    for obstacle in finite_obstacles(scene):
+        mesh = obstacle.to_trimesh()
+        text.write(f"o {'_'.join(obstacle.name.split())}\n")
+        np.savetxt(text, CENTIMETRES * np.asarray(mesh.vertices) @ AXES[up].T, fmt="v %.7f %.7f %.7f")
+        np.savetxt(text, np.asarray(mesh.faces) + count, fmt="f %d %d %d")
+        count += len(mesh.vertices)
     return text.getvalue()
+
+
+def rest_rotations(body: BodyModel) -> dict[str, FloatArray]:
+    """(3, 3) rotation of each segment in the T-pose, by its name; of no arm the identity."""
+    turned = {"left": 0.5 * np.pi, "right": -0.5 * np.pi}
+    arms = {
+        f"{side}_{part}": Rotation.from_euler("x", angle).as_matrix()
+        for side, angle in turned.items() for part in ("upper_arm", "forearm", "hand")
+    }  # fmt: skip
+    human = body.stature is not None
+    return {s.name: arms.get(s.name, np.eye(3)) if human else np.eye(3) for s in body.segments}
+
+
+@dataclass(frozen=True, eq=False)
+class _BvhText:
+    """A BVH file in the making."""
+
+    body: BodyModel
+    motion: Motion
+    names: dict[str, str]
+    up: str
+
+    @cached_property
+    def _axes(self) -> FloatArray:
+        return AXES[self.up]
+
+    @cached_property
+    def _rest(self) -> dict[str, FloatArray]:
+        return rest_rotations(self.body)
+
+    def text(self) -> str:
+        result = StringIO()
+        result.write("HIERARCHY\n")
+        order = self._write_joint(result, self.body.segments[0], 0)
+        count, step = len(self.motion.time), _frame_time(self.motion)
+        result.write(f"MOTION\nFrames: {count}\nFrame Time: {step:.9g}\n")
+        position = CENTIMETRES * self.motion.q[:, :3] @ self._axes.T
+        angles = _continuous_angles(self._turns(order), ORDERS[self.up])
+        table = np.hstack([position, np.degrees(angles).reshape(count, -1)])
+        np.savetxt(result, table, fmt="%.7f")
+        return result.getvalue()
+
+    def _write_joint(self, text: StringIO, segment: Segment, depth: int) -> list[Segment]:
+        """Write a segment and what hangs on it, and return them in the order of the file."""
+        indent, inner = "\t" * depth, "\t" * (depth + 1)
+        root = segment.parent is None
+        channels = [f"{axis}position" for axis in "XYZ" if root]
+        channels += [f"{axis}rotation" for axis in ORDERS[self.up]]
+        offset = np.zeros(3) if segment.parent is None else self._offset(segment.parent, segment.origin)
+        text.write(f"{indent}{'ROOT' if root else 'JOINT'} {self.names[segment.name]}\n{indent}{{\n")
+        text.write(
+            f"{inner}OFFSET {_numbers(offset)}\n{inner}CHANNELS {len(channels)} {' '.join(channels)}\n"
+        )
+        order = [segment]
+        for child in (item for item in self.body.segments if item.parent == segment.name):
+            order += self._write_joint(text, child, depth + 1)
+        if len(order) == 1:
+            end = self._offset(segment.name, end_of(segment))
+            text.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_numbers(end)}\n{inner}}}\n")
+        text.write(f"{indent}}}\n")
+        return order
+
+    def _offset(self, segment: str, point: FloatArray) -> FloatArray:
+        """(3,) point of a segment's frame [m] as an offset in the file's rest."""
+        return CENTIMETRES * (self._axes @ self._rest[segment] @ point)
+
+    def _turns(self, order: list[Segment]) -> FloatArray:
+        """(n, s, 3, 3) rotations of the segments, each in its parent's frame, from the file's rest."""
+        index = {segment.name: number for number, segment in enumerate(self.body.segments)}
+        rest = np.array([self._rest[name] for name in index])
+        world = np.array([segment_frames(self.body, q)[0] for q in self.motion.q])
+        turned = self._axes @ world @ rest.transpose(0, 2, 1) @ self._axes.T
+        parents = [None if s.parent is None else turned[:, index[s.parent]].transpose(0, 2, 1) for s in order]
+        return np.stack(
+            [
+                turned[:, index[segment.name]] if parent is None else parent @ turned[:, index[segment.name]]
+                for segment, parent in zip(order, parents, strict=True)
+            ],
+            axis=1,
+        )
 
 
 def _frame_time(motion: Motion) -> float:
@@ -57,62 +202,18 @@ def _frame_time(motion: Motion) -> float:
     return float(motion.duration / len(steps))
 
 
-def _channels(segment: Segment) -> tuple[str, list[float]]:
-    """Rotation axes of a segment's three channels, such as ``"XZY"``, and the signs of its hinges about them.
-
-    No signs where axes are oblique or repeated, which cannot be channels: the whole rotation is split then.
-    """
-    order, signs = "", []
-    for hinge in segment.hinges:
-        axis = TO_BVH @ hinge.axis
-        nearest = int(np.argmax(np.abs(axis)))
-        if not np.isclose(abs(axis[nearest]), 1.0, rtol=0.0, atol=1e-12) or "XYZ"[nearest] in order:
-            return "ZXY", []
-        order += "XYZ"[nearest]
-        signs.append(float(np.sign(axis[nearest])))
-    return order + "".join(axis for axis in "ZXY" if axis not in order), signs + [1.0] * (3 - len(signs))
-
-
-def _write_joint(text: StringIO, segment: Segment, body: BodyModel, depth: int) -> list[Segment]:
-    """Write a segment and what hangs on it, and return them in the order of the file."""
-    indent, inner = "\t" * depth, "\t" * (depth + 1)
-    root = segment.parent is None
-    order = _ROOT_ORDER if root else _channels(segment)[0]
-    channels = [*(f"{axis}position" for axis in "XYZ" if root), *(f"{axis}rotation" for axis in order)]
-    offset = np.zeros(3) if root else CENTIMETRES * (TO_BVH @ segment.origin)
-    text.write(f"{indent}{'ROOT' if root else 'JOINT'} {segment.name}\n{indent}{{\n")
-    text.write(f"{inner}OFFSET {_numbers(offset)}\n{inner}CHANNELS {len(channels)} {' '.join(channels)}\n")
-    order = [segment]
-    for child in (item for item in body.segments if item.parent == segment.name):
-        order += _write_joint(text, child, body, depth + 1)
-    if len(order) == 1:
-        end = CENTIMETRES * (TO_BVH @ end_of(segment))
-        text.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_numbers(end)}\n{inner}}}\n")
-    text.write(f"{indent}}}\n")
-    return order
-
-
 def _numbers(values: FloatArray) -> str:
-    return " ".join(f"{value:.7f}" for value in values)
+    return " ".join(f"{value:.7f}" for value in values + 0.0)
 
 
-def _angles(segment: Segment, body: BodyModel, motion: Motion) -> FloatArray:
-    """(n, 3) channel values of a segment [deg]."""
-    order, signs = _channels(segment)
-    angles = [motion.q[:, 7 + body.joint_index(hinge.name)] for hinge in segment.hinges]
-    if signs:
-        angles += [np.zeros(len(motion.time))] * (3 - len(angles))
-        return np.degrees(np.column_stack(angles) * signs)
-    rotation = np.broadcast_to(np.eye(3), (len(motion.time), 3, 3))
-    for hinge, angle in zip(segment.hinges, angles, strict=True):
-        rotation = rotation @ Rotation.from_rotvec(angle[:, None] * hinge.axis).as_matrix()
-    return _euler(TO_BVH @ rotation @ TO_BVH.T, order)
-
-
-def _euler(rotation: FloatArray, order: str) -> FloatArray:
-    """(n, 3) intrinsic angles [deg] without jumps of a turn between samples."""
-    with warnings.catch_warnings():
-        # At the singularity SciPy sets the third angle to zero: one of the right answers.
-        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
-        angles = Rotation.from_matrix(rotation).as_euler(order)
-    return np.degrees(np.unwrap(angles, axis=0))
+def _continuous_angles(rotations: FloatArray, order: str) -> FloatArray:
+    """(n, s, 3) angles [rad] of rotations (n, s, 3, 3), of both triples that nearer to the sample before."""
+    first = euler_angles(rotations, order)
+    other = first * [1.0, -1.0, 1.0] + np.pi
+    result = first.copy()
+    for sample in range(1, len(result)):
+        both = np.stack([first[sample], other[sample]])
+        both += 2.0 * np.pi * np.round((result[sample - 1] - both) / (2.0 * np.pi))
+        nearer = np.abs(both - result[sample - 1]).max(axis=2).argmin(axis=0)
+        result[sample] = both[nearer, np.arange(both.shape[1])]
+    return result
