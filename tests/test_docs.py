@@ -47,14 +47,19 @@ def keys_of(value):
             yield from keys_of(item)
 
 
+def script(name):
+    """A script of the folder as a module."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 @pytest.fixture(scope="module")
 def generator():
     """The script ``docs/generate.py``."""
-    for name in ("result_tables", "generate"):  # the second imports the first
-        spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
-        module = sys.modules[name] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return module
+    script("result_tables")  # imported by the other
+    return script("generate")
 
 
 @pytest.fixture(scope="module")
@@ -199,3 +204,22 @@ def test_every_page_is_in_the_navigation():
 
 def test_ci_builds_the_documentation_strictly():
     assert "mkdocs build --strict" in (ROOT / ".ci/run").read_text(encoding="utf-8")
+
+
+def test_formulas_become_mathml():
+    """A fraction and a relation, without the marks of TeX and of the Markdown extension."""
+    pytest.importorskip("latex2mathml", reason="the extra docs is not installed")
+    mathml = script("mathml").as_mathml('<p>If <span class="arithmatex">\\(\\frac{a}{b} &lt; 1\\)</span></p>')
+    assert "<mfrac><mi>a</mi><mi>b</mi></mfrac>" in mathml.replace("<mrow>", "").replace("</mrow>", "")
+    assert "&lt;" in mathml or "&#x0003C;" in mathml
+    assert "arithmatex" not in mathml
+    assert "\\" not in mathml
+
+
+def test_pages_fetch_nothing_from_other_sites():
+    """What the theme would fetch is in the repository; ``docs/screenshots/shoot.mjs`` watches whole pages."""
+    settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert "font: false" in settings
+    assert not re.search(r"https?://", settings)
+    (shim,) = re.findall(r"polyfills: \[(\S+)\]", settings)
+    assert (DOCS / shim).is_file()

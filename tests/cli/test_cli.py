@@ -93,9 +93,18 @@ def assert_refused(capfd, arguments, *says):
 def test_version_and_help(capfd):
     assert main(["--version"]) == DONE
     assert capfd.readouterr().out == f"manikin {manikin.__version__}\n"
-    for arguments in ([], ["--help"], ["run", "--help"]):
+    for arguments in (["--help"], ["run", "--help"]):
         assert main(arguments) == DONE
         assert "Usage" in capfd.readouterr().out
+
+
+def test_a_command_with_nothing_to_do_says_what_to_do_next(capfd):
+    """A few commands with a line each; every one of them is a command, with arguments that it takes."""
+    assert main([]) == DONE
+    lines = [line.split() for line in capfd.readouterr().out.splitlines() if line.startswith("  manikin ")]
+    assert 4 <= len(lines) <= 6
+    for _, command, *_ in lines:
+        assert main([command] if command == "--help" else [command, "--help"]) == DONE
 
 
 def test_one_thread_unless_the_user_says_otherwise(monkeypatch):

@@ -32,6 +32,17 @@ from manikin.runtime.child import end_as_told
 __all__ = ["main"]
 
 
+WHAT_NEXT = """manikin plans how a person moves through a cluttered scene and proves it in a physics engine.
+
+  manikin scenarios                  List what can be run at once.
+  manikin run platform               Plan and prove a motion; its report is in runs/platform.
+  manikin view runs/platform         Watch it in the browser.
+  manikin ergonomics runs/platform   Judge its postures and loads.
+  manikin analyze RECORDING          Measure a recorded motion (.c3d .trc .bvh .amc).
+  manikin --help                     List every command; 'manikin COMMAND --help' has its options."""
+"""What the command says that is given nothing to do."""
+
+
 app = typer.Typer(
     name="manikin",
     help="Plans how a person moves through a cluttered scene and proves it in a physics engine.",
@@ -76,7 +87,7 @@ def _root(
     if version:
         typer.echo(f"manikin {__version__}")
     elif context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+        typer.echo(WHAT_NEXT)
 
 
 @app.command()
