@@ -1,7 +1,8 @@
 """Re-plan recorded motions and execute them: writes ``replanning.md`` and its figures.
 
-Run ``python docs/replanning.py FOLDER``, where FOLDER holds the recordings named below: walks over force
-plates (btk, OpenSim, OpenCap) and motions of the ACCAD Open Motion Project and the CMU Graphics Lab.
+Run ``python docs/replanning.py FOLDER``, with ``--figures`` for the figures alone, where FOLDER holds the
+recordings named below: walks over force plates (btk, OpenSim, OpenCap) and motions of the ACCAD Open Motion
+Project and the CMU Graphics Lab.
 """
 
 import sys
@@ -299,24 +300,17 @@ def posture_figure(plan: Replan, count: int = 9) -> Figure:
     return figure
 
 
-def main(folder: Path) -> None:
-    """Measure everything and write page and figures."""
-    near, ran, against, shown = [], [], [], {}
-    for path in (*WALKS, *OTHERS):
-        toes, end = OTHERS.get(path, (True, np.inf))
-        found, supports = crop(*read(folder / path), 0.0, end)
-        name = Path(path).stem
-        print(name, file=sys.stderr)
-        rolling = adapt_recording(found, supports, execute=True, rolling=toes)
-        ran.append(executed_row(name, rolling))
-        if path not in WALKS:
-            continue
-        whole = adapt_recording(found, supports, rolling=False)
-        near.append(near_row(name, whole, rolling))
-        free = adapt_recording(found, supports, method="timing-free", rolling=False)
-        against.append(against_row(name, free))
-        if path == SHOWN:
-            shown = {"near": whole, "free": free, "ran": rolling}
+def adapted(found: Reconstruction, supports: RecordedSupports) -> dict[str, Replan]:
+    """A walk re-planned near its key frames, and executed with toes that roll, and free of its timing."""
+    return {
+        "near": adapt_recording(found, supports, rolling=False),
+        "free": adapt_recording(found, supports, method="timing-free", rolling=False),
+        "ran": adapt_recording(found, supports, execute=True, rolling=True),
+    }
+
+
+def draw(shown: dict[str, Replan]) -> None:
+    """Write the figures of the walk that is shown."""
     for name, figure in (
         ("keyframes", key_frame_figure(shown["near"])),
         ("planes", compare_planes_figure(compare_with_recording(shown["free"]))),
@@ -325,6 +319,24 @@ def main(folder: Path) -> None:
         ("timing", compare_timing_figure(compare_with_recording(shown["free"]))),
     ):
         save_figure(figure, IMAGES / f"replanning-{name}.png")
+
+
+def main(folder: Path) -> None:
+    """Measure everything and write page and figures."""
+    near, ran, against, shown = [], [], [], {}
+    for path, (toes, end) in (dict.fromkeys(WALKS, (True, np.inf)) | OTHERS).items():
+        found, supports = crop(*read(folder / path), 0.0, end)
+        name = Path(path).stem
+        print(name, file=sys.stderr)
+        if path not in WALKS:
+            ran.append(executed_row(name, adapt_recording(found, supports, execute=True, rolling=toes)))
+            continue
+        walk = adapted(found, supports)
+        ran.append(executed_row(name, walk["ran"]))
+        near.append(near_row(name, walk["near"], walk["ran"]))
+        against.append(against_row(name, walk["free"]))
+        shown = walk if path == SHOWN else shown
+    draw(shown)
     PAGE.write_text(
         TEXT
         + head("walk", "duration [s]", "exact", "key frames", "of them added", "RMS, whole soles [mm]",
@@ -342,4 +354,7 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    if "--figures" in sys.argv:
+        draw(adapted(*crop(*read(Path(sys.argv[1]) / SHOWN), 0.0, np.inf)))
+    else:
+        main(Path(sys.argv[1]))
