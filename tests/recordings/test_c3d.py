@@ -142,6 +142,17 @@ def test_plate_by_hand(c3d_file):
     assert read_c3d(c3d_file, plates=False).plates == ()
 
 
+def test_a_missing_rate_of_the_channels_is_that_of_the_samples_of_a_frame(tmp_path, c3d_file):
+    """Points, gaps and plates are those of the file with its rate, and a remark says what was missing."""
+    file = tmp_path / "without.c3d"
+    file.write_bytes(c3d_bytes(*small(), extra=[(("ANALOG", "RATE"), reals([0.0], ()))]))
+    found, known = read_c3d(file), read_c3d(c3d_file)
+    np.testing.assert_array_equal(found.positions, known.positions)
+    np.testing.assert_allclose(found.plates[0].wrenches, known.plates[0].wrenches, atol=1e-9)
+    assert (found.plates[0].rate, found.marker_names) == (200.0, known.marker_names)
+    assert found.remarks == ("ANALOG:RATE is missing: 200 Hz by the samples of a frame",)
+
+
 def test_the_axis_that_points_up_is_turned_to_z(tmp_path):
     """Markers and plate alike, whether the file declares the axis or the caller does."""
     points, analogs = small()

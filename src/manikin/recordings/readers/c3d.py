@@ -14,7 +14,7 @@ import numpy as np
 
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, wrench_about
-from manikin.recordings.readers.c3d_layout import C3dLayout, c3d_layout, plate_load
+from manikin.recordings.readers.c3d_layout import C3dLayout, c3d_frames, c3d_layout, plate_load
 from manikin.recordings.readers.marker_sets import is_known
 from manikin.recordings.readers.markers import (
     LEAST_FORCE,
@@ -64,10 +64,17 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     except (OSError, RuntimeError, ValueError, IndexError, KeyError, TypeError, MemoryError) as error:
         reason = " ".join(str(error).split())[:100]
         raise InputError(f"{file}: cannot be read ({reason}); valid: a complete C3D file") from None
-    parameters, points = found["parameters"], found["data"]["points"]
-    if points.shape != (4, layout.points, layout.frames):
+    remarks, parameters = list[str](), found["parameters"]
+    if layout.without_analog_rate:
+        with np.errstate(all="ignore"):  # damaged numbers are found below
+            points, analogs = c3d_frames(content, layout)
+        remarks.append(
+            f"ANALOG:RATE is missing: {layout.rate * layout.samples:g} Hz by the samples of a frame"
+        )
+    else:
+        points, analogs = found["data"]["points"], found["data"]["analogs"][0]
+    if points.shape[1:] != (layout.points, layout.frames):
         raise layout.error(f"data of shape {points.shape}", f"{layout.frames} frames, {layout.points} points")
-    remarks = list[str]()
     if ("POINT", "RATE") not in layout.parameters:
         remarks.append(f"POINT:RATE is missing: {layout.rate:g} Hz as in the header")
     unit = _unit(parameters, points, file, remarks)
@@ -79,7 +86,7 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     names, positions = _within_reach(names, positions, remarks)
     forces = ()
     if with_plates:
-        forces = _plates(parameters, found["data"]["analogs"][0], layout, unit, turn, remarks)
+        forces = _plates(parameters, analogs, layout, unit, turn, remarks)
     recording = MarkerRecording(
         Path(path).name, names, positions, rate, (layout.first_frame - 1) / rate, forces,
         _events(parameters, layout), _subject(parameters, unit), tuple(remarks),

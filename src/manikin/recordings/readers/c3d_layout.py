@@ -90,6 +90,8 @@ class C3dLayout:
         first_frame: Number of the first frame, counted from 1.
         processor: Kind of processor whose numbers these are: 84 Intel, 85 DEC, 86 MIPS.
         header_rate: Frames per second by the header [Hz].
+        begin: First byte of the frames.
+        reals: Whether the frames hold reals, else whole numbers to be scaled.
         parameters: By group and name, both in upper case.
     """
 
@@ -101,7 +103,9 @@ class C3dLayout:
     frames: int
     processor: int
     parameters: Mapping[tuple[str, str], Parameter]
-    header_rate: float = 0.0
+    header_rate: float
+    begin: int
+    reals: bool
 
     @property
     def rate(self) -> float:
@@ -110,6 +114,14 @@ class C3dLayout:
         Where it is 0 the library divides by it.
         """
         return self.real("POINT", "RATE") if ("POINT", "RATE") in self.parameters else self.header_rate
+
+    @property
+    def without_analog_rate(self) -> bool:
+        """Whether the file has channels and ``ANALOG:RATE`` is missing or 0.
+
+        The library then takes the channels for points. The samples of a frame are in the header.
+        """
+        return bool(self.channels) and self.real("ANALOG", "RATE") == 0.0
 
     def integers(self, group: str, name: str) -> NDArray[np.int64]:
         """(n,) values of a whole-numbered parameter, none where it is missing; InputError for other types."""
@@ -147,9 +159,40 @@ class C3dLayout:
 
 def _real(raw: bytes, processor: int) -> float:
     """Real number of four bytes."""
+    return float(_reals(raw[:4], processor)[0])
+
+
+def _reals(raw: bytes, processor: int) -> FloatArray:
+    """(n,) real numbers of four bytes each."""
     if processor == _DEC:  # the halves exchanged, the exponent greater by two
-        return float(np.frombuffer(raw[2:4] + raw[:2], "<f4")[0]) / 4.0
-    return float(np.frombuffer(raw[:4], ">f4" if processor == _MIPS else "<f4")[0])
+        halves = np.frombuffer(raw, "<u2").reshape(-1, 2)[:, ::-1]
+        return np.frombuffer(halves.tobytes(), "<f4").astype(np.float64) / 4.0
+    return np.frombuffer(raw, ">f4" if processor == _MIPS else "<f4").astype(np.float64)
+
+
+def c3d_frames(content: bytes, layout: C3dLayout) -> tuple[FloatArray, FloatArray]:
+    """(3, m, n) points in the file's unit, NaN where not seen, and (c, n s) channels, scaled.
+
+    For files that the library cannot take apart, see :attr:`C3dLayout.without_analog_rate`.
+    """
+    points, channels, samples = layout.points, layout.channels, layout.samples
+    count = layout.frames * (4 * points + channels * samples)
+    if layout.reals:
+        factor, numbers = 1.0, _reals(content[layout.begin : layout.begin + 4 * count], layout.processor)
+    else:
+        kind = ">i2" if layout.processor == _MIPS else "<i2"
+        numbers = np.frombuffer(content[layout.begin : layout.begin + 2 * count], kind).astype(np.float64)
+        factor = abs(layout.real("POINT", "SCALE"))
+    numbers = numbers.reshape(layout.frames, -1)
+    places = numbers[:, : 4 * points].reshape(layout.frames, points, 4)
+    places = np.where(places[..., 3:] < 0.0, np.nan, factor * places[..., :3])
+    raw = numbers[:, 4 * points :].reshape(-1, channels).T
+    scale = layout.parameters["ANALOG", "SCALE"]
+    if scale.kind != _REAL:
+        raise layout.error("ANALOG:SCALE is no real number", "real numbers")
+    factors = layout.real("ANALOG", "GEN_SCALE") * _reals(scale.raw, layout.processor)[:channels, None]
+    offset = layout.integers("ANALOG", "OFFSET")[:channels, None].astype(np.int16)
+    return places.transpose(2, 1, 0), factors * (raw - offset)
 
 
 def c3d_layout(content: bytes, file: str) -> C3dLayout:
@@ -170,16 +213,16 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
     big_endian = processor == _MIPS
     words = np.frombuffer(content[:20], ">u2" if big_endian else "<u2").astype(int)
     points, measured, first, last, samples = (int(words[k]) for k in (1, 2, 3, 4, 9))
+    begin = (int(words[8]) - 1) * BLOCK
+    # The sign of the scale says whether data are whole numbers or reals.
+    negative = bool(content[{_INTEL: 15, _DEC: 13, _MIPS: 12}[processor]] & 0x80)
     layout = C3dLayout(
         file, points, measured // max(samples, 1), samples, max(first, 1), last - first + 1, processor,
         MappingProxyType(_parameters(content[:end], start + 4, big_endian, file)),
-        _real(content[20:24], processor),
+        _real(content[20:24], processor), begin, negative,
     )  # fmt: skip
-    # The sign of the scale says whether data are whole numbers or reals.
-    negative = bool(content[{_INTEL: 15, _DEC: 13, _MIPS: 12}[processor]] & 0x80)
-    _check_counts(layout, measured, negative)
+    _check_counts(layout, measured)
     wanted = layout.frames * (4 * points + measured) * (4 if negative else 2)
-    begin = (int(words[8]) - 1) * BLOCK
     if begin < end:
         raise layout.error(f"frames begin at byte {begin}, within the parameters", f"at least {end}")
     if begin + wanted > len(content):
@@ -190,8 +233,8 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
     return layout
 
 
-def _check_counts(layout: C3dLayout, measured: int, reals: bool) -> None:
-    """Header and parameters have to say the same; ``reals`` need no scale, and rates may be the header's."""
+def _check_counts(layout: C3dLayout, measured: int) -> None:
+    """Header and parameters have to say the same; reals need no scale, and rates may be the header's."""
     if layout.points < 1 or layout.frames < 1:
         raise layout.error(f"{layout.points} points in {layout.frames} frames", "at least one of each")
     if layout.channels * layout.samples != measured:
@@ -206,10 +249,10 @@ def _check_counts(layout: C3dLayout, measured: int, reals: bool) -> None:
     rate, analog_rate = layout.rate, layout.real("ANALOG", "RATE")
     if not 0.0 < rate < _FASTEST:
         raise layout.error(f"POINT:RATE is {rate:g} Hz", f"> 0 and < {_FASTEST:g}")
-    # Without the rates the library takes the channels for points: only files without channels do without.
-    if layout.channels and not abs(analog_rate / rate - layout.samples) < 0.5:
+    agrees = abs(analog_rate / rate - layout.samples) < 0.5
+    if layout.channels and not layout.without_analog_rate and not agrees:
         raise layout.error(f"ANALOG:RATE is {analog_rate:g} Hz", f"{rate * layout.samples:g}")
-    if not reals and not layout.count("POINT", "SCALE"):
+    if not layout.reals and not layout.count("POINT", "SCALE"):
         raise layout.error("no POINT:SCALE of whole numbers", "a complete file")
     for name in ("UNITS", "SCALE"):
         if ("POINT", name) in layout.parameters and not layout.count("POINT", name):
