@@ -65,7 +65,7 @@ def test_stances_of_a_runner_are_when_the_force_is(stance, flight, late, longer)
         for number, (name, start, end) in enumerate(steps)
         if number != 4
     ]
-    supports = sorted(by_the_force(given, found, soles, [0.0]), key=lambda one: (one.start, one.effector))
+    supports = sorted(by_the_force(given, found, soles, [0.0])[0], key=lambda one: (one.start, one.effector))
     assert [one.effector for one in supports] == [name for name, _, _ in steps]
     for one, (_, start, end) in list(zip(supports, steps, strict=True))[1:-1]:
         # Two frames, and what the low-pass leaves of a half-sine at its ends.
@@ -84,7 +84,7 @@ def test_who_does_not_fall_keeps_all_supports():
     soles = {"left_foot": (still, still + TOES), "right_foot": (still, still + TOES)}
     last = float(time[-1])
     given = [support("left_foot", 0.0, 1.6, last), support("right_foot", 1.5, last, last)]
-    assert by_the_force(given, found, soles, [0.0]) == tuple(given)
+    assert by_the_force(given, found, soles, [0.0])[0] == tuple(given)
 
 
 @pytest.mark.parametrize(("stance", "flight"), [(0.3, 0.05), (0.27, 0.1), (0.22, 0.13), (0.17, 0.13)])
@@ -134,7 +134,7 @@ def test_a_drop_jump_lands_and_leaves_when_the_plates_say(recordings_folder):
     found = supports_of(reconstruct(recording), start=recording.start)
     errors = [abs(one.error) for one in timing_errors(found, recording.plates)]
     # Two frames of 100 Hz; by the feet alone 40 to 50 ms.
-    assert len(errors) == 4
+    assert len(errors) == 6
     assert max(errors) <= 0.025
 
 
@@ -148,4 +148,4 @@ def test_feet_that_swing_in_the_air_carry_nothing():
     swing = np.cos(2.0 * np.pi * time / 1.5)
     heel = np.column_stack([1.0 * swing, 0.0 * time, 0.28 + 0.25 * swing])
     soles = {"left_foot": (heel, heel + TOES), "right_foot": (heel * [-1.0, 1.0, 1.0], heel + TOES)}
-    assert by_the_force((), found, soles, (0.0,)) == ()
+    assert by_the_force((), found, soles, (0.0,))[0] == ()

@@ -79,8 +79,6 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
             f"{recording.rate:g} frames per second: instants are known to {0.5e3 / recording.rate:.0f} ms, "
             "and the forces of quick steps are cut off"
         )
-    if not supports.supports:
-        lines.append("no support was found: nothing rests near the ground for long enough")
     flights = [one.duration for one in supports.phases if not one.effectors]
     if supports.supports and max(flights, default=0.0) > LONG_FLIGHT:
         lines.append(

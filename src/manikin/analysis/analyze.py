@@ -31,13 +31,14 @@ from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
 from manikin.recordings.dynamics.shifted_motion import least_shift
 from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.marker_map import MarkerMap
-from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import reconstruct
 from manikin.recordings.supports.recorded_stances import FRICTION, recorded_schedule
 from manikin.recordings.supports.support_levels import effector_places
 from manikin.recordings.supports.supports import supports_of
+from manikin.recordings.supports.treadmill import belt_velocity, from_the_belt, plates_from_the_belt
 from manikin.walking.segmentation import PathSegments, ShoulderPaths, segment_path
 
 UPRIGHT = 0.5
@@ -190,6 +191,7 @@ def analyze(
     found = replace(found, body=carrying(found.body, given.load, given.load_hand))
     if len(found.time) < FEWEST_FRAMES:
         raise InputError(f"{where} shows the person in {len(found.time)} frame(s); {enough}")
+    found, plates, notes = _on_still_ground(found, plates, start)
     supports = supports_of(found, start=start)
     if not {one.effector for one in supports.supports} <= set(found.body.effectors):
         found = replace(found, body=with_knees_and_elbows(found.body))
@@ -227,9 +229,26 @@ def analyze(
         measured=measured, limiting=recorded.limiting(recorded.lowest),
         cop=_centre_of_pressure(dynamics, motion, min(supports.surfaces, default=0.0)),
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
-        implausible=implausible(dynamics, supports.start),
+        implausible=implausible(dynamics, supports),
     )  # fmt: skip
-    return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)
+    remarks = (*notes, *remarks_on(analysis, recording))
+    return replace(analysis, remarks=remarks, wall=clock.perf_counter() - began)
+
+
+def _on_still_ground(
+    found: Reconstruction, plates: tuple[ForcePlate, ...], start: float
+) -> tuple[Reconstruction, tuple[ForcePlate, ...], tuple[str, ...]]:
+    """Motion and plates as seen from the belt of a treadmill, with a remark; as they are without one."""
+    velocity = belt_velocity(found)
+    if velocity is None:
+        return found, plates, ()
+    speed = float(np.linalg.norm(velocity))
+    remark = (
+        f"treadmill: feet that carry move at {speed:.2f} m/s while the person stays; places and the centre "
+        "of pressure are those seen from the belt, as in a walk over the ground"
+    )
+    moved = plates_from_the_belt(plates, velocity, start + found.first_frame / found.rate)
+    return from_the_belt(found, velocity), moved, (remark,)
 
 
 def _weighed(found: Reconstruction, mass: float) -> Reconstruction | None:

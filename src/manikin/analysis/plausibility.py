@@ -12,22 +12,36 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
+from manikin.recordings.supports.body_supports import RecordedSupports
 from manikin.recordings.supports.support_levels import effector_places
 
 LARGEST_LOAD, FASTEST_BODY, FASTEST_LIMB = 20.0, 15.0, 30.0
 """External force per body weight, speeds of the centre of mass, and of hands and feet [m/s]: nobody's."""
 
+LONGEST_FALL = 0.5
+"""Time without any support that a jump of a person may last [s]."""
+
 LIMBS = ("left_foot", "right_foot", "left_hand", "right_hand")
 
 
-def implausible(dynamics: RecordedDynamics, start: float) -> tuple[str, ...]:
+def implausible(dynamics: RecordedDynamics, supports: RecordedSupports) -> tuple[str, ...]:
     """Results beyond people's, a line each with the largest value and its instant.
 
     Args:
         dynamics: The motion as recorded and smoothed.
-        start: Instant of its first frame on the recording's clock [s].
+        supports: What was found to carry it, on the recording's clock.
     """
-    return tuple(_findings(dynamics, start))
+    return (*_findings(dynamics, supports.start), *_unsupported(supports))
+
+
+def _unsupported(supports: RecordedSupports) -> Iterator[str]:
+    """Whether nothing is found to carry for the whole of a recording."""
+    duration = supports.end - supports.start
+    if not supports.supports and duration > LONGEST_FALL:
+        yield (
+            f"no support was found in {duration:.2f} s: nobody stays in the air for so long; forces, margins "
+            "and torques are those of a body in flight; are the feet recorded, and is the ground level?"
+        )
 
 
 def _findings(dynamics: RecordedDynamics, start: float) -> Iterator[str]:

@@ -10,6 +10,9 @@ was found, the feet before and after carry, the later one from where it is the s
 the lowest foot carries, if it is low. Where the same foot is on both sides, and the lowest as well, the gap
 stays: the foot stepped on the spot. In a walk the body never falls, so that only gaps change.
 
+Feet of sprinters never come to rest in low-passed positions, so that no surface is known: it is then at the
+median height of the lowest foot in the times between falls, if these agree (:func:`surface_of_a_run`).
+
 Within half a period of the cutoff from an end of the recording the force is not known, and the value at that
 distance is taken.
 """
@@ -75,15 +78,16 @@ SHORTEST, SHORTEST_KEPT = 0.08, 0.04
 def by_the_force(
     supports: Sequence[Support], found: Reconstruction,
     soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float], start: float = 0.0,
-) -> tuple[Support, ...]:  # fmt: skip
-    """Supports of feet cut at falls and extended to where the body is carried; missing ones are added.
+) -> tuple[tuple[Support, ...], tuple[float, ...]]:  # fmt: skip
+    """Supports of feet cut at falls and extended to where the body is carried, and heights of surfaces [m].
 
-    Those of other effectors do not change. Of each foot are given (n, 3) heel and (n, 3) toes [m], of the
-    surfaces on which feet stand the heights [m], of the first frame the instant ``start`` [s].
+    Missing supports are added; those of other effectors do not change. Of each foot are given (n, 3) heel and
+    (n, 3) toes [m], of the surfaces on which feet stand the heights [m], of the first frame the instant
+    ``start`` [s].
     """
     n, rate = len(found.time), found.rate
-    if rate <= 2.0 * CUTOFF or not surfaces:
-        return tuple(supports)
+    if rate <= 2.0 * CUTOFF:
+        return tuple(supports), tuple(surfaces)
     force = 1.0 + vertical_acceleration(found, CUTOFF) / GRAVITY
     edge = min(round(AT_END * rate), (n - 1) // 2)
     force[:edge], force[n - edge :] = force[edge], force[n - edge - 1]
@@ -91,10 +95,29 @@ def by_the_force(
     for first, stop in mask_runs(force < FALLING):
         falls[first:stop] = stop - first >= SHORTEST_FALL * rate
     feet = {name: RecordedSole.of(both, rate, CUTOFF) for name, both in soles.items()}
+    surfaces = tuple(surfaces) or surface_of_a_run(list(feet.values()), falls)
+    if not surfaces:
+        return tuple(supports), ()
     table = _Table(feet, list(supports), np.array(surfaces), rate, start, n)
     table.cut(falls)
     table.fill(falls)
-    return tuple(table.supports)
+    return tuple(table.supports), surfaces
+
+
+FEWEST_STEPS, LEVEL = 2, 0.15
+"""Times between two falls that make a run, and range of the heights of the lowest foot in them [m]."""
+
+
+def surface_of_a_run(feet: Sequence[RecordedSole], falls: NDArray[np.bool_]) -> tuple[float, ...]:
+    """Height of the surface under a runner whose feet never rest [m]; none if there is no run on level ground.
+
+    It is the median of the lowest heights of the lower foot in each time between two of the falls (n,).
+    """
+    lowest = np.min([foot.lowest for foot in feet], axis=0)
+    between = [span for span in mask_runs(~falls) if span[0] > 0 and span[1] < len(falls)]
+    heights = [float(lowest[first:stop].min()) for first, stop in between]
+    level = len(heights) >= FEWEST_STEPS and np.ptp(heights) < LEVEL
+    return (float(np.median(heights)),) if level else ()
 
 
 @dataclass(eq=False)

@@ -73,10 +73,11 @@ def supports_of(found: Reconstruction, *, start: float = 0.0, with_force: bool =
     feet = supports_of_points(soles, found.rate, start=begin, lying=lying(found))
     seats, floor = seat_supports(found, soles, begin), floor_under(soles, feet.surfaces)
     others = *ground_supports(found, floor, begin), *hand_supports(found, floor, seats, begin)
-    every = tuple(while_carried((*feet.supports, *seats, *others), found, begin))
+    every, surfaces = tuple(while_carried((*feet.supports, *seats, *others), found, begin)), feet.surfaces
     if with_force:
-        every = by_the_force(every, found, soles, feet.surfaces, begin)
-    return replace(feet, supports=tuple(sorted(every, key=lambda one: (one.start, one.effector))))
+        every, surfaces = by_the_force(every, found, soles, surfaces, begin)
+    ordered = tuple(sorted(every, key=lambda one: (one.start, one.effector)))
+    return replace(feet, supports=ordered, surfaces=surfaces)
 
 
 def supports_of_points(
@@ -207,7 +208,7 @@ def _supports(
         yield support_in(name, (first, stop), touching.shape[1], rate, start, (place, begins, ends))
 
 
-SHORTEST_LOAD, LONGEST_BREAK = 0.2, 0.02
+SHORTEST_LOAD, LONGEST_BREAK = 0.08, 0.02
 """Shorter loads of a plate are no supports, and shorter breaks are noise about the least force [s]."""
 
 SEEN_FOR, REACH = 0.1, 0.3
