@@ -38,7 +38,7 @@ def test_a_walk_seen_from_beside_it_stands_on_a_belt(walk):
 
 
 def test_the_centre_of_pressure_moves_with_the_ground():
-    """A still force under a belt moves backward with it, as seen from the belt: by minus velocity times time."""
+    """A still force under a belt moves backward with it, seen from the belt: by minus velocity times time."""
     force, place = np.array([20.0, -10.0, 700.0]), np.array([0.2, 0.1, 0.0])
     wrenches = np.tile(np.hstack([force, np.cross(place, force)]), (100, 1))
     plate = ForcePlate("belt", wrenches, np.zeros(3), 100.0, 2.0)

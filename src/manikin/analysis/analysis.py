@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.analysis.activity import Activity
+from manikin.analysis.gait_bands import GaitBand, gait_band
+from manikin.analysis.gait_cycles import GaitReport, LegLoads
 from manikin.balance import zero_moment_point
 from manikin.balance.wrench import LimitingConstraint
 from manikin.body import BodyModel
@@ -23,6 +26,7 @@ from manikin.recordings.dynamics.plate_forces import (
     plate_forces,
 )
 from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics, RecordedMargins
+from manikin.recordings.dynamics.recorded_forces import torques_of
 from manikin.recordings.dynamics.shifted_motion import LeastShift
 from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
@@ -173,6 +177,7 @@ class PlateReport:
             was on a plate. ``shifted`` are those of it shifted onto its contacts, if a shift was looked for.
         torques: Of the legs, of the motion as recorded; empty where no foot was on a plate of its own.
             ``shifted_torques`` are those of the shifted motion, if that is to be believed.
+        leg_loads: Torques by the plates, and which feet are on plates of their own.
         remarks: What was taken off the plates' readings, a line each.
     """
 
@@ -185,6 +190,7 @@ class PlateReport:
     shifted: PlateComparison | None
     torques: tuple[TorqueComparison, ...]
     shifted_torques: tuple[TorqueComparison, ...]
+    leg_loads: LegLoads
     remarks: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -234,10 +240,14 @@ def plate_report(
         moved = compare_with_plates(shifted.dynamics, shifted.margins, forces, height)
         if motions[1] is not None:
             moved_torques = compare_torques(shifted.dynamics, motions[1], forces)
+    loads = LegLoads(
+        torques_of(measured.recorded, forces.effectors, forces.of_effector),
+        dict(zip(forces.effectors, forces.alone.T, strict=True)),
+    )
     return PlateReport(
         forces.wrench[:, 2], cop, forces.covered, mass, timing_errors(supports, plates),
         compare_with_plates(measured.recorded, measured.recorded_margins, forces, height), moved,
-        compare_torques(measured.recorded, motions[0], forces), moved_torques,
+        compare_torques(measured.recorded, motions[0], forces), moved_torques, loads,
     )  # fmt: skip
 
 
@@ -256,7 +266,9 @@ class Analysis(Displayed):
         measured: The motion as recorded, and shifted, with the margins of both.
         limiting: What limits the lowest margin; None if no margin is known.
         cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
-        segments: Holonomic and nonholonomic stretches; None without an upright walk.
+        activity: What the person does.
+        gait: Gait cycles and steps; None where the activity has none.
+        segments: Holonomic and nonholonomic stretches of an upright walk; None of other activities.
         ergonomics: Scores, torques against strength, effort; its time is that of the motion.
         implausible: Results that no person's motion has, a line each: nothing that follows is to be believed.
         remarks: What a reader must know, a line each.
@@ -275,6 +287,8 @@ class Analysis(Displayed):
     measured: MeasuredMotion
     limiting: LimitingConstraint | None
     cop: FloatArray
+    activity: Activity
+    gait: GaitReport | None
     segments: PathSegments | None
     ergonomics: Ergonomics
     plates: PlateReport | None
@@ -298,6 +312,11 @@ class Analysis(Displayed):
     def time(self) -> FloatArray:
         """(n,) instants [s]."""
         return self.supports.start + self.motion.time
+
+    @cached_property
+    def gait_band(self) -> GaitBand:
+        """Curves of the people beside whose gait the person's is shown."""
+        return gait_band(self.body.stature or 1.7)
 
     @property
     def weight(self) -> float:
@@ -370,6 +389,7 @@ class Analysis(Displayed):
             "com_height_min_m": float(self.com_height[lowest]),
             "com_height_min_at_s": float(self.time[lowest]),
             "reconstruction_residual_m": {"median": self.found.median, "max": self.found.worst},
+            "activity": self.activity.as_dict(), "gait": self._gait(),
             "segments": None if self.segments is None else [
                 {"kind": one.kind, "start_s": start + one.start, "end_s": start + one.end}
                 for one in self.segments.segments
@@ -387,6 +407,13 @@ class Analysis(Displayed):
             ],
             "implausible": list(self.implausible), "remarks": list(self.remarks), "wall_s": self.wall,
         }  # fmt: skip
+
+    def _gait(self) -> dict[str, Any] | None:
+        if self.gait is None:
+            return None
+        return self.gait.as_dict() | {
+            "people": self.gait_band.as_dict(self.gait) if self.gait.cycles else None
+        }
 
     def _phase(self, phase: SupportPhase) -> dict[str, Any]:
         shifted, is_floor = self.measured.lowest_shifted(self.frames_of(phase))

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from manikin.analysis.activity import recognise
 from manikin.analysis.analysis import Analysis, MeasuredMotion, PlateReport, plate_report, remarks_on
+from manikin.analysis.gait_cycles import gait_report
 from manikin.analysis.plausibility import implausible
 from manikin.balance.zmp import LEAST_LOAD
 from manikin.body.limbs import with_knees_and_elbows
@@ -40,6 +42,9 @@ from manikin.recordings.supports.support_levels import effector_places
 from manikin.recordings.supports.supports import supports_of
 from manikin.recordings.supports.treadmill import belt_velocity, from_the_belt, plates_from_the_belt
 from manikin.walking.segmentation import PathSegments, ShoulderPaths, segment_path
+
+WALKS = ("walking", "carrying", "running", "stepping", "standing", "uneven ground")
+"""Activities that are cut into holonomic and nonholonomic stretches."""
 
 UPRIGHT = 0.5
 """Height of the shoulders above the pelvis, per that in standing, below which no walk is segmented."""
@@ -223,13 +228,18 @@ def analyze(
         found.body, motion, given=Circumstances(load_kg=given.load, neck_upright_deg=upright),
         untold=found.neutral, lowest=_lowest(motion, recorded),
     )  # fmt: skip
+    activity, gait = recognise(found, supports, motion), None
+    if activity.is_gait:
+        loads, timing = (None, ()) if report is None else (report.leg_loads, report.timing)
+        gait = gait_report(supports, motion, found.body.own_mass, timing, loads)
     analysis = Analysis(
         name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
         supports=supports, motion=motion, shifted_motion=beside, point_mass_margin=recorded.point_mass,
         measured=measured, limiting=recorded.limiting(recorded.lowest),
         cop=_centre_of_pressure(dynamics, motion, min(supports.surfaces, default=0.0)),
-        segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
-        implausible=implausible(dynamics, supports),
+        activity=activity, gait=gait,
+        segments=walked_segments(found) if activity.kind in WALKS else None, ergonomics=ergonomics,
+        plates=report, remarks=(), wall=0.0, implausible=implausible(dynamics, supports),
     )  # fmt: skip
     remarks = (*notes, *remarks_on(analysis, recording))
     return replace(analysis, remarks=remarks, wall=clock.perf_counter() - began)

@@ -30,6 +30,7 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.pipeline.run_directory import MOTION, SUMMARY, ComTrack, RunRecord, point_mass_track
 from manikin.reports.analysis_sheet import recording_sheet
 from manikin.reports.comparison import RunComparison, compare_runs
+from manikin.reports.gait_sheet import gait_columns, gait_sheet
 from manikin.reports.pages import analysis_page, render
 from manikin.runtime.files import ResultDirectory, columns_csv, csv_text, make_directory, write_result
 from manikin.runtime.parallel import side_by_side
@@ -101,6 +102,8 @@ SHEET = "Postures, supports, forces, margins, height and scores over time"
 """Alternative text of the drawing of a report."""
 REPORT = "report.html"
 SERIES = "series.csv"
+CYCLES = "cycles.csv"
+CYCLES_SHEET = "Angles, moments and powers of both legs over the gait cycle"
 OVERVIEW = "index.html"
 TABLE = "analyses.csv"
 ANALYSES = "analyses.json"
@@ -111,6 +114,7 @@ COLUMNS: tuple[tuple[str, str, str, float, int], ...] = (
     ("stature_m", "stature_m", "stature [m]", 1.0, 2),
     ("mass_kg", "mass_kg", "mass [kg]", 1.0, 1),
     ("residual_median_m", "reconstruction_residual_m.median", "residual, median [mm]", 1e3, 1),
+    ("activity", "activity.kind", "", 1.0, 0),
     ("supports", "supports", "supports", 1, 0),
     ("phases", "phase_durations_s", "phases", 1, 0),
     ("com_height_min_m", "com_height_min_m", "lowest CoM [m]", 1.0, 3),
@@ -168,7 +172,12 @@ def write_analysis(
     content = replace(content, recorded=analysis.motion, shifted=analysis.shifted_motion)
     write_motions(directory / MOTION, content)
     write_result(directory / SERIES, columns_csv(analysis.series(), 6))
-    write_result(directory / REPORT, analysis_page(analysis, summary, sheet, pictures))
+    cycles = ""
+    if analysis.gait is not None and analysis.gait.cycles:
+        band = analysis.gait_band
+        write_result(directory / CYCLES, columns_csv(gait_columns(analysis.gait, band), 5))
+        cycles = gait_sheet(analysis.gait, band, CYCLES_SHEET) if draw else ""
+    write_result(directory / REPORT, analysis_page(analysis, summary, (sheet, cycles), pictures))
     write_result(directory / SUMMARY, summary)
 
 

@@ -38,6 +38,10 @@ class SvgDrawing:
         """Lines (k, 2) from point to point."""
         self._stroke([_way(line[:, 0], line[:, 1]) for line in lines], colour, width)
 
+    def area(self, x: FloatArray, y: FloatArray, colour: str, opacity: float) -> None:
+        """A filled polygon through points (n,) and (n,), all finite."""
+        self._parts.append(f'<path d="{_way(x, y)}z" fill="{colour}" fill-opacity="{opacity:g}"/>')
+
     def bar(self, x: float, y: float, width: float, height: float, colour: str) -> None:
         """A filled rectangle with its upper left corner at (x, y)."""
         left, top, across, down = (_tenths(item) for item in (x, y, width, height))

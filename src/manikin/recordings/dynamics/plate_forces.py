@@ -54,6 +54,7 @@ class PlateForces:
         single: (n,) whether one foot alone supports.
         of_effector: (n, c, 6) the part of it on each effector of the schedule; 0 where no plate has it.
         apart: (n,) whether the load of each is known: all is covered, and no plate carries two of them.
+        alone: (n, c) whether an effector stands on a plate that carries nothing else then.
     """
 
     wrench: FloatArray
@@ -62,6 +63,7 @@ class PlateForces:
     effectors: tuple[str, ...]
     of_effector: FloatArray
     apart: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -109,15 +111,19 @@ def plate_forces(
             covered[(times > begin - UNSURE) & (times < end + UNSURE)] = False
     names = schedule.sequence.effectors
     parts, apart = np.zeros((len(times), len(names), 6)), covered.copy()
+    mine = np.zeros((len(times), len(names)), dtype=bool)
     for ones, each in ((ones, each) for ones, each in zip(carried, wrenches, strict=True) if ones):
         # A plate may be loaded a moment before its foot is found on it, and after.
         away = np.array([np.maximum(np.maximum(one.begin - times, times - one.end), 0.0) for one in ones])
-        apart &= ~((np.sum(away == 0.0, axis=0) > 1) & each.any(axis=1))
+        several = (np.sum(away == 0.0, axis=0) > 1) & each.any(axis=1)
+        apart &= ~several
+        for one, off in zip(ones, away, strict=True):
+            mine[:, names.index(one.contact.effector)] |= (off == 0.0) & ~several
         owner = np.array([names.index(one.contact.effector) for one in ones])[np.argmin(away, axis=0)]
         parts[np.arange(len(times)), owner] += each
     return PlateForces(
         frozen_array(wrenches.sum(axis=0), "wrench"), covered, single, names,
-        frozen_array(parts, "wrenches of the effectors"), apart,
+        frozen_array(parts, "wrenches of the effectors"), apart, mine,
     )  # fmt: skip
 
 

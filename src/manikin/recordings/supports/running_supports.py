@@ -109,7 +109,7 @@ FEWEST_STEPS, LEVEL = 2, 0.15
 
 
 def surface_of_a_run(feet: Sequence[RecordedSole], falls: NDArray[np.bool_]) -> tuple[float, ...]:
-    """Height of the surface under a runner whose feet never rest [m]; none if there is no run on level ground.
+    """Height of the surface under a runner whose feet never rest [m]; none if there is no level run.
 
     It is the median of the lowest heights of the lower foot in each time between two of the falls (n,).
     """

@@ -13,8 +13,8 @@ import numpy as np
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.recordings.readers.markers import ForcePlate
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.supports import sole_points
 from manikin.recordings.supports.support_levels import track
+from manikin.recordings.supports.supports import sole_points
 
 LOW, LOWEST = 0.02, 0.05
 """Height above its own lowest heights up to which a heel or toes may carry [m], and share of them."""
