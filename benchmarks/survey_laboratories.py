@@ -3,11 +3,12 @@
 `python benchmarks/survey_laboratories.py FOLDER RESULTS` analyses every C3D and TRC file below FOLDER, each
 in its own process with a time limit, and keeps one JSON file per trial in RESULTS: a second run does
 the missing ones. It then prints a table. `--refused` does those again that were refused or took too long.
+`docs/laboratories.py` makes a page of RESULTS.
 """
 
 import json
+import multiprocessing
 import re
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -39,6 +40,8 @@ def one(path: Path) -> dict:
         "stage": "reconstructed", "stature_m": summary["stature_m"], "mass_kg": summary["mass_kg"],
         "residual_median_m": residual["median"], "residual_max_m": residual["max"],
         "supports": len(summary["supports"]), "remarks": summary["remarks"],
+        "activity": summary["activity"]["kind"], "implausible": summary["implausible"],
+        "cycles": len(summary["gait"]["cycles"]) if summary["gait"] else 0,
     }  # fmt: skip
     if plates is not None:
         found["force_plates"] = {key: value for key, value in plates.items() if "torques" not in key}
@@ -54,22 +57,46 @@ def trials(folder: Path) -> list[Path]:
 
 def survey(folder: Path, results: Path, again: bool) -> None:
     """Do what is missing."""
+    import manikin.analysis.analyze  # noqa: F401  once, before the processes are forked
+
     results.mkdir(parents=True, exist_ok=True)
     for path in trials(folder):
         kept = results / ("__".join(path.relative_to(folder).parts) + ".json")
         if kept.exists() and not (again and json.loads(kept.read_text())["stage"] in ("refused", "read")):
             continue
         began = time.perf_counter()
-        command = [sys.executable, __file__, "--one", str(path)]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
-            lines = done.stdout.splitlines()
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            found = json.loads(lines[-1]) if lines else {"stage": "refused", "reason": f"FAULT: {last}"}
-        except subprocess.TimeoutExpired:
-            found = {"stage": "refused", "reason": f"FAULT: longer than {LIMIT:g} s"}
+        found = _apart(path)
         found |= {"trial": str(path.relative_to(folder)), "process_s": time.perf_counter() - began}
         kept.write_text(json.dumps(found, indent=1) + "\n")
+
+
+def _apart(path: Path) -> dict:
+    """What becomes of one trial in a process of its own, which a fault or the time limit ends.
+
+    It is forked, so that it need not import anything again.
+    """
+    context = multiprocessing.get_context("fork")
+    mine, its = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(path, its))
+    process.start()
+    its.close()
+    try:
+        if not mine.poll(LIMIT):
+            process.kill()
+            return {"stage": "refused", "reason": f"FAULT: longer than {LIMIT:g} s"}
+        return mine.recv()
+    except EOFError:
+        return {"stage": "refused", "reason": "FAULT: the process ended without a result"}
+    finally:
+        process.join()
+
+
+def _send(path: Path, pipe) -> None:
+    """Measure a trial and send what comes of it, a fault's last line too."""
+    try:
+        pipe.send(one(path))
+    except Exception as error:
+        pipe.send({"stage": "refused", "reason": f"FAULT: {type(error).__name__}: {error}"})
 
 
 def table(results: Path) -> str:
@@ -95,9 +122,6 @@ def table(results: Path) -> str:
 
 def main() -> None:
     """Command line."""
-    if sys.argv[1:2] == ["--one"]:
-        print(json.dumps(one(Path(sys.argv[2]))))
-        return
     folders = [Path(word) for word in sys.argv[1:] if not word.startswith("--")]
     if len(folders) != 2 or not folders[0].is_dir():
         raise SystemExit("usage: python benchmarks/survey_laboratories.py FOLDER RESULTS [--refused]")

@@ -24,6 +24,7 @@ from manikin.recordings.reconstruction.marker_reconstruction import (
     landmarks,
     marker_centres,
     pelvis_axes,
+    sides_exchanged,
 )
 
 PELVIS = {"ASI": (0.10, 0.125, 0.09), "PSI": (-0.09, 0.05, 0.10)}
@@ -310,6 +311,29 @@ def test_bad_recordings_are_refused_in_one_line(walk):
         with pytest.raises(InputError, match=message) as caught:
             reconstruct(recording)
         assert "\n" not in str(caught.value)
+
+
+def test_exchanged_names_of_all_sides_are_exchanged_back(walk, followed):
+    """The names do not say where markers are, so postures are those of the recording with the right names."""
+    other = {"L": "R", "R": "L"}
+    names = tuple(
+        name if name in ("C7", "CLAV", "STRN") else other[name[0]] + name[1:] for name in walk.marker_names
+    )
+    found = sides_exchanged(replace(walk, marker_names=names))
+    assert joints_apart(reconstruct(found), followed) < 1e-9
+    assert "exchanged" in found.remarks[-1]
+    assert sides_exchanged(walk) is walk
+
+
+def test_a_mirrored_axis_gives_the_mirrored_person(walk, followed):
+    """Of a walk along x with y mirrored: the left knee does what the right one did.
+
+    Markers are placed by an iteration; 0.1 degree is far below what a marker's error makes.
+    """
+    found = reconstruct(sides_exchanged(replace(walk, positions=walk.positions * [1.0, -1.0, 1.0])))
+    np.testing.assert_allclose(found.q[:, :3], followed.q[:, :3] * [1.0, -1.0, 1.0], atol=1e-3)
+    left, right = (7 + found.body.joint_index(f"{side}_knee_flexion") for side in ("left", "right"))
+    np.testing.assert_allclose(found.q[:, left], followed.q[:, right], atol=np.deg2rad(0.1))
 
 
 def test_a_marker_farther_away_than_any_laboratory_is_refused_by_its_name(walk):

@@ -40,6 +40,9 @@ LARGE_RESIDUAL, OTHER_MASS = 0.02, 0.03
 """Median distance between the body and what was recorded above which the body does not fit [m], and share by
 which the mass of a person is not that on the plates."""
 
+CHILD = 1.4
+"""Stature below which tables of adults are said to be used [m]."""
+
 MOST_NAMED = 40
 """Markers that are not used and named in a remark."""
 
@@ -56,6 +59,11 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         lines.append(
             f"the body does not fit the recording: residual {1e3 * found.median:.0f} mm (median); "
             "are its units, or the names of its markers, right?"
+        )
+    if (stature := analysis.body.stature or CHILD) < CHILD:
+        lines.append(
+            f"a person of {stature:.2f} m: lengths are the recording's, but shares of the segments' masses and "
+            "strength are those of adults"
         )
     if found.neutral:
         names = ", ".join(name.replace("_", " ") for name in found.neutral)

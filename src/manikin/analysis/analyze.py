@@ -35,6 +35,7 @@ from manikin.recordings.readers import READERS, read_recording
 from manikin.recordings.readers.marker_map import MarkerMap
 from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.marker_reconstruction import sides_exchanged
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.reconstruction.reconstruct import reconstruct
 from manikin.recordings.supports.recorded_stances import FRICTION, recorded_schedule
@@ -191,6 +192,7 @@ def analyze(
         raise InputError(f"{where} {wrong}; valid: more than {2.0 * CUTOFF:g}")
     start, plates, stated = 0.0, (), given.mass
     if isinstance(recording, MarkerRecording):
+        recording = sides_exchanged(recording)
         start, plates, stated = recording.start, recording.plates, given.mass or recording.subject.mass
     found = reconstruct(recording, sex=given.sex, mass=given.mass)
     found = replace(found, body=carrying(found.body, given.load, given.load_hand))

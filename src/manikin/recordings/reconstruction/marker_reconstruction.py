@@ -207,6 +207,45 @@ def check_sides(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -
             raise InputError(f"{where} has left and right {name} swapped; valid: left on the person's left")
 
 
+def sides_exchanged(recording: MarkerRecording) -> MarkerRecording:
+    """A recording whose left is the person's left; the same one where it is, or where that is not known.
+
+    Left ASIS, back and the way up make a left-handed frame if the names of all sides are exchanged, or if an
+    axis of the file is mirrored. What is called left is then taken for right, by a marker map, and a remark
+    says so. Where only some markers are exchanged nothing is changed: :func:`check_sides` refuses them.
+    """
+    where, found = f"recording {recording.name!r}", marker_set(recording)
+    marks = landmarks(recording, found)
+    try:
+        axes, up = pelvis_axes(marks, where), _upward(marks)
+    except InputError:  # said when the person is reconstructed
+        return recording
+    along = np.zeros(1) if up is None else np.sum(axes[:, :, 2] * up, axis=1)
+    if np.isnan(along).all() or np.nanmedian(along) >= 0.0:
+        return recording
+    roles = {name: role for role, name in found.roles.items()}
+    told = {name: _other_side(roles.get(name, segment)) for name, segment in found.segments.items()}
+    remark = (
+        "left and right are exchanged, or an axis is mirrored: what the file calls left is taken for the "
+        "person's right (if an axis is mirrored, the person is shown mirrored)"
+    )
+    exchanged = replace(recording, marker_map=told, remarks=(*recording.remarks, remark))
+    try:
+        marks = landmarks(exchanged, marker_set(exchanged))
+        check_sides(marks, pelvis_axes(marks, where), where)
+    except InputError:
+        return recording
+    return exchanged
+
+
+def _other_side(name: str) -> str:
+    """Name of a landmark or segment of the other side; that of the middle stays."""
+    for side, other in zip(SIDES, SIDES[::-1], strict=True):
+        if name.startswith(f"{side}_"):
+            return f"{other}_{name.removeprefix(f'{side}_')}"
+    return name
+
+
 def _upward(marks: Mapping[str, FloatArray]) -> FloatArray | None:
     pelvis = middle(marks, "asis")
     if "left_shoulder" in marks and "right_shoulder" in marks:
