@@ -61,7 +61,8 @@ class ActivityMeasures:
     """What the rules look at.
 
     Attributes:
-        speed: Net way of the pelvis over the ground per time [m/s]; ``way`` is the net way [m].
+        speed: Way of the pelvis over the ground per time [m/s].
+        way: Sum of its ways from touch-down to touch-down of the feet, from first to last frame [m].
         steps: Touch-downs of feet seen.
         flights: Times of at least :data:`FLIGHT` between two supports without any; the longest one [s].
         stairs_up: Steps at least :data:`STAIR` higher than the one before; ``stairs_down`` lower.
@@ -159,8 +160,10 @@ def _kind(one: ActivityMeasures) -> str:
 def _measures(found: Reconstruction, supports: RecordedSupports, motion: Motion) -> ActivityMeasures:
     body, q = found.body, motion.q
     stature, duration = body.stature or 1.7, supports.end - supports.start
-    way = float(np.linalg.norm(q[-1, :2] - q[0, :2]))
     feet = sorted((*supports.of("left_foot"), *supports.of("right_foot")), key=lambda one: one.start)
+    instants = [0.0, *(one.start - supports.start for one in feet if one.start_seen), duration]
+    path = np.stack([np.interp(instants, motion.time, q[:, axis]) for axis in range(2)], axis=1)
+    way = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     heights = [float(b.place[2] - a.place[2]) for a, b in pairwise(feet) if a.effector != b.effector]
     flights = [
         one.duration

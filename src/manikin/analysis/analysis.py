@@ -62,8 +62,8 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         )
     if (stature := analysis.body.stature or CHILD) < CHILD:
         lines.append(
-            f"a person of {stature:.2f} m: lengths are the recording's, but shares of the segments' masses and "
-            "strength are those of adults"
+            f"a person of {stature:.2f} m: lengths are the recording's, but shares of the segments' masses "
+            "and strength are those of adults"
         )
     if found.neutral:
         names = ", ".join(name.replace("_", " ") for name in found.neutral)

@@ -208,8 +208,11 @@ def _supports(
         yield support_in(name, (first, stop), touching.shape[1], rate, start, (place, begins, ends))
 
 
-SHORTEST_LOAD, LONGEST_BREAK = 0.08, 0.02
+SHORTEST_LOAD, LONGEST_BREAK = 0.2, 0.02
 """Shorter loads of a plate are no supports, and shorter breaks are noise about the least force [s]."""
+
+SHORTEST_RUN, RUN_FORCE = 0.08, 500.0
+"""Time from which a load is a support if it exceeds a force, as under a runner [s, N]."""
 
 SEEN_FOR, REACH = 0.1, 0.3
 """Time after a plate's start, and before its end, whose centre of pressure identifies the foot [s], and
@@ -260,7 +263,9 @@ def plate_loads(plate: ForcePlate) -> Iterator[PlateLoad]:
             pressed[first:stop] = True
     tenth = max(int(SEEN_FOR * plate.rate), 1)
     for first, stop in mask_runs(pressed):
-        if stop - first >= SHORTEST_LOAD * plate.rate:
+        highest = float((plate.force[first:stop] @ plate.normal).max())
+        shortest = SHORTEST_RUN if highest > RUN_FORCE else SHORTEST_LOAD
+        if stop - first >= shortest * plate.rate:
             cop, end = plate.cop[first:stop], float(plate.time[min(stop, count - 1)])
             begins, ends = np.nanmean(cop[:tenth], axis=0), np.nanmean(cop[-tenth:], axis=0)
             yield PlateLoad(float(plate.time[first]), end, begins, ends, first > 0, stop < count)

@@ -1,0 +1,211 @@
+"""Every trial at hand read, reconstructed and compared with plates, or why not: writes ``laboratories.md``.
+
+Run ``python docs/laboratories.py RESULTS TRIALS CODE``: RESULTS is the folder that
+``python benchmarks/survey_laboratories.py FOLDER RESULTS`` filled, TRIALS the table of the trials (``file``,
+``lab/source repo``, ``licence``), CODE which code it was and when.
+"""
+
+import csv
+import json
+import sys
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PAGE = Path(__file__).with_suffix(".md")
+
+Trial = Mapping[str, Any]
+
+BARS = {"timing_median_s": 0.020, "vertical_rms_body_weight": 0.06, "cop_rms_m": 0.035}
+"""Bars of trials with clean plates: median of the events [s], vertical force [body weight], CoP [m]."""
+
+GAITS = ("walking", "carrying", "running", "jumping", "stairs up", "stairs down")
+"""Activities that the bars are for."""
+
+TOLD = (
+    "plates carry", "no instant", "does not fit", "treadmill", "exchanged", "nothing supports",
+    "frames per second", "is not read", "are not read", "tables", "those of adults", "missing",
+)  # fmt: skip
+"""Words of the remarks that are shown with a trial."""
+
+TEXT = """# Recordings of other laboratories
+
+Every C3D and TRC file at hand, as its laboratory delivered it, measured by `manikin analyze` without a map of
+its markers or any other help. {code}
+
+* *Read*: the file is read. *Reconstructed*, or followed: our human follows it. *Compared*: with force plates.
+* *Residual*: median distance of a marker from its place on the body.
+* *Events*: median of the absolute errors of touch-downs and lift-offs against the plates, and their number.
+* *Vertical*: root mean square error of the vertical force of the motion, as recorded, in frames whose
+  supports are all on plates. *CoP*: the same of the centre of pressure in single support; *shifted*: of the
+  shifted motion.
+* *Activity*: [what the person does](analysis.md#what-a-recording-is).
+
+"""
+
+THANKS = """
+## Sources
+
+Numbers above are computed from the recordings of these sources; no file of theirs is part of manikin.
+
+"""
+
+
+def main() -> None:
+    """Command line."""
+    if len(sys.argv) != 4 or not Path(sys.argv[1]).is_dir():
+        raise SystemExit("usage: python docs/laboratories.py RESULTS TRIALS CODE")
+    trials = [json.loads(path.read_text()) for path in sorted(Path(sys.argv[1]).glob("*.json"))]
+    PAGE.write_text(page(trials, sources(Path(sys.argv[2])), sys.argv[3]))
+
+
+def sources(table: Path) -> dict[str, tuple[str, str]]:
+    """Whose recordings they are, and their terms, by folder."""
+    found: dict[str, tuple[str, str]] = {
+        "grf/btkdata": ("BTKData, Biomechanical ToolKit", "BSD-3-Clause"),
+        "grf/opensim_core": ("OpenSim", "Apache-2.0"),
+        "grf/nimble_opencap_s4": ("test copies in nimblephysics of OpenCap's data", "for checks only"),
+        "grf/nimble_camargo_circle": ("test copies in nimblephysics of Camargo et al.", "for checks only"),
+    }
+    with table.open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            folder = "laboratories/" + row["file"].rpartition("/")[0]
+            origin = row["lab/source repo"].partition(";")
+            found.setdefault(folder, (origin[0].strip(), row["licence"].partition("[")[0].strip()))
+    return found
+
+
+def page(trials: list[Trial], known: Mapping[str, tuple[str, str]], code: str) -> str:
+    """The whole page."""
+    parts = [TEXT.format(code=code), summary(trials), by_source(trials), every(trials), THANKS]
+    used = sorted({folder_of(one) for one in trials})
+    lines = ["| folder | source | terms |", "|---|---|---|"]
+    lines += [row(folder, *known.get(folder, ("", ""))) for folder in used]
+    return "".join(parts) + "\n".join(lines) + "\n"
+
+
+def folder_of(trial: Trial) -> str:
+    """Folder of a trial, which stands for its source."""
+    return str(trial["trial"]).rpartition("/")[0]
+
+
+def plates_of(trial: Trial) -> Mapping[str, Any]:
+    """Errors against plates; none without."""
+    return trial.get("force_plates") or {}
+
+
+def summary(trials: list[Trial]) -> str:
+    """Counts, and how many trials keep each bar."""
+    count = defaultdict(int)
+    for one in trials:
+        count[one["stage"]] += 1
+    faults = sum(one["reason"].startswith("FAULT") for one in trials)
+    refused, read = count["refused"], count["read"]
+    told = (
+        f"Of {len(trials)} trials {len(trials) - refused} are read, "
+        f"{count['reconstructed'] + count['compared']} reconstructed and {count['compared']} compared with "
+        f"plates; {refused} cannot be read, {read} are read and not reconstructed, for the reasons below. "
+        f"{faults} ended in a fault or took too long.\n\n"
+    )
+    gaits = [one for one in trials if one.get("activity") in GAITS]
+    lines = [
+        "| walks, runs, jumps, stairs with plates | median | 90 % | trials | within the bar |",
+        "|---|---|---|---|---|",
+    ]
+    names = {
+        "timing_median_s": ("events", 1e3, "ms"), "vertical_rms_body_weight": ("vertical", 1e2, "% BW"),
+        "cop_rms_m": ("CoP", 1e3, "mm"), "cop_rms_shifted_m": ("CoP, shifted", 1e3, "mm"),
+    }  # fmt: skip
+    for key, (name, factor, unit) in names.items():
+        values = np.array(values_of(gaits, key))
+        if len(values):
+            bar = BARS.get(key, BARS["cop_rms_m"])
+            kept = f"{np.sum(values <= bar)} of {len(values)} ({factor * bar:g} {unit})"
+            shown = (f"{factor * np.quantile(values, share):.1f} {unit}" for share in (0.5, 0.9))
+            lines.append(row(name, *shown, str(len(values)), kept))
+    return told + "\n".join(lines) + "\n\n"
+
+
+def values_of(trials: Iterable[Trial], key: str) -> list[float]:
+    """Values of the trials that have one."""
+    found = [plates_of(one).get(key) for one in trials]
+    return [value for value in found if value is not None and np.isfinite(value)]
+
+
+def by_source(trials: list[Trial]) -> str:
+    """A row for each source."""
+    groups: dict[str, list[Trial]] = defaultdict(list)
+    for one in trials:
+        groups[folder_of(one)].append(one)
+    lines = [
+        "## By source\n",
+        "Medians over the trials of a source that have the number.\n",
+        "| source | trials | read | followed | compared | residual | events | vertical | CoP | shifted |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for folder, ones in sorted(groups.items()):
+        stages = [one["stage"] for one in ones]
+        done = sum(stage in ("reconstructed", "compared") for stage in stages)
+        residual = [one["residual_median_m"] for one in ones if "residual_median_m" in one]
+        keys = (
+            ("timing_median_s", 1e3, " ms"), ("vertical_rms_body_weight", 1e2, " %"),
+            ("cop_rms_m", 1e3, " mm"), ("cop_rms_shifted_m", 1e3, " mm"),
+        )  # fmt: skip
+        cells = [median(values_of(ones, key), factor, unit) for key, factor, unit in keys]
+        lines.append(
+            row(
+                folder, str(len(ones)), str(len(ones) - stages.count("refused")), str(done),
+                str(stages.count("compared")), median(residual, 1e3, " mm"), *cells,
+            )
+        )  # fmt: skip
+    return "\n".join(lines) + "\n\n"
+
+
+def median(values: list[float], factor: float, unit: str) -> str:
+    """Median with its unit, or a dash."""
+    return f"{factor * float(np.median(values)):.0f}{unit}" if values else "-"
+
+
+def every(trials: list[Trial]) -> str:
+    """A row for each trial."""
+    lines = [
+        "## Every trial\n",
+        "| trial | activity | person | residual | events | vertical | CoP, shifted | remarks, or why not |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for one in trials:
+        if one["stage"] in ("refused", "read"):
+            lines.append(row(one["trial"], one["stage"], "", "", "", "", "", one["reason"]))
+            continue
+        plates = plates_of(one)
+        timing, vertical = plates.get("timing_median_s"), plates.get("vertical_rms_body_weight")
+        cop = [plates.get(key) for key in ("cop_rms_m", "cop_rms_shifted_m")]
+        known = [f"{1e3 * value:.0f}" if value is not None and np.isfinite(value) else "-" for value in cop]
+        lines.append(
+            row(
+                one["trial"], one.get("activity", ""), f"{one['stature_m']:.2f} m, {one['mass_kg']:.0f} kg",
+                f"{1e3 * one['residual_median_m']:.0f} mm",
+                "-" if timing is None else f"{1e3 * timing:.0f} ms ({plates['events']})",
+                "-" if vertical is None else f"{1e2 * vertical:.1f} %",
+                "-" if vertical is None else f"{', '.join(known)} mm", notes(one),
+            )
+        )  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def notes(trial: Trial) -> str:
+    """What was found implausible, and the remarks that matter for the numbers."""
+    told = [one for one in trial["remarks"] if any(word in one for word in TOLD)]
+    return "; ".join([*(f"implausible: {one}" for one in trial.get("implausible", ())), *told])
+
+
+def row(*cells: str) -> str:
+    """A row of a table."""
+    return f"| {' | '.join(cell.replace('|', '/').replace(chr(10), ' ') for cell in cells)} |"
+
+
+if __name__ == "__main__":
+    main()
