@@ -18,6 +18,7 @@ from manikin.analysis.contact_adaptation import (
     within_toe_strength,
     without_remnants,
 )
+from manikin.analysis.motion_transfer import MotionOnContacts, carried_over
 from manikin.analysis.posture_adaptation import AdaptedMotion, adapt_postures, rate_on_contacts, rate_on_plan
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, StanceSequence
@@ -25,7 +26,7 @@ from manikin.control import ControlSettings, TaskWeights
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, PlanarTransform
 from manikin.planning.com import (
     BentSurface,
     CentroidalProblem,
@@ -133,25 +134,36 @@ that keeps arms off the trunk while they make up for what the contacts do not gi
 
 
 @dataclass(frozen=True, eq=False)
-class Replan:
-    """A recording, its new plan and what became of it; what was not asked for, or failed, is None.
+class Adaptation:
+    """A recording, its plan on a body in a place, and what became of it; what failed is None.
 
     Attributes:
         method: Of the centre of mass.
-        scene: A floor, and blocks under what stands or sits higher.
-        recording: The recorded centre of mass on the stances.
+        source: The recorded motion on its contacts.
+        carried: The same on the body and in the place it is adapted to, before it is balanced.
+        recording: Centre of mass of ``carried`` on its stances.
         recorded: The recorded motion, smoothed, its time 0 at the first instant.
-        adapted: The recorded postures on the planned centre of mass.
+        adapted: The postures on the planned centre of mass.
     """
 
     method: Method
-    body: BodyModel
-    scene: Scene
+    source: MotionOnContacts
+    carried: MotionOnContacts
     recording: RecordedCom
     recorded: Motion
     com: CentroidalResult
     adapted: AdaptedMotion | None = None
     execution: Execution | None = None
+
+    @property
+    def body(self) -> BodyModel:
+        """Who makes the motion."""
+        return self.carried.body
+
+    @property
+    def scene(self) -> Scene:
+        """Where it is made."""
+        return self.carried.scene
 
     @property
     def planned(self) -> Motion | None:
@@ -225,46 +237,71 @@ class Replan:
 
 
 def adapt_recording(
-    found: Reconstruction, supports: RecordedSupports, *, method: Method = "keyframes",
-    execute: bool = False, rolling: bool = True, friction: float = FRICTION,
-) -> Replan:  # fmt: skip
-    """Re-plan a recorded motion on the stances it was recorded on, and execute it if asked to.
+    found: Reconstruction, supports: RecordedSupports, *, body: BodyModel | None = None,
+    scene: Scene | None = None, transform: PlanarTransform | None = None, pace: float = 1.0,
+    method: Method = "keyframes", execute: bool = False, rolling: bool = True, friction: float = FRICTION,
+) -> Adaptation:  # fmt: skip
+    """Adapt a recorded motion to another body or another place, and execute it if asked to.
+
+    Without either it is re-planned on the stances it was recorded on.
 
     Args:
         found: The postures, not yet smoothed.
+        supports: What the person stood, sat or leaned on.
+        body: Who makes the motion; the recorded person if None.
+        scene: Where; a floor and blocks under what stands or sits higher if None.
+        transform: From the frame of the recording to that of the scene; none if None.
+        pace: Duration as a multiple of the recorded one, or of a dynamically similar one.
+        method: Of the centre of mass.
         execute: Whether the recorded postures are adapted to the plan and executed.
         rolling: Whether a foot may stand on its toes alone; without, it stands on its whole sole.
         friction: Coefficient of feet and seat.
 
     Raises:
-        InputError: If the method is unknown, or the recording has no support at some time.
+        InputError: If the method is unknown, the recording has no support at some time, or the body is no
+            human.
+        NoPlaceError: If a contact finds no surface in the scene.
     """
     if method not in METHODS:
         raise InputError(f"replan method is {method!r}; valid: {', '.join(METHODS)}")
-    even, recorded, time = smoothed(found), motion_of(found), supports.start + found.time
+    recorded = recorded_on_contacts(found, supports, rolling=rolling, friction=friction)
+    carried = carried_over(recorded, body, scene, transform).slowed(pace)
+    carried = replace(carried, schedule=within_toe_strength(carried.schedule, carried.body))
+    time, stances = carried.time, carried.schedule
+    recording = RecordedCom(time, carried.com, stances.sequence, stances.instants)
+    velocity = np.gradient(carried.com, time, axis=0, edge_order=2)[[0, -1]]
+    if method == "keyframes":
+        recording = _with_turning(carried, recording)
+    com = plan_recorded_com(carried.body.mass, recording, velocity, method)
+    result = Adaptation(method, recorded, carried, recording, motion_of(found), com)
+    return _executed(result) if execute else result
+
+
+def recorded_on_contacts(
+    found: Reconstruction, supports: RecordedSupports, *, rolling: bool = True, friction: float = FRICTION
+) -> MotionOnContacts:
+    """The recorded motion, smoothed, on stances that a body of stiff segments can use.
+
+    Raises:
+        InputError: If the body has no feet with soles, or there are no two instants.
+    """
+    even, time = smoothed(found), supports.start + found.time
     stances = recorded_schedule(even, supports, friction=friction, rolling=rolling)
     stances = on_one_seat(landing_flat(stances, found.body))
     stances = leaving_with_the_hinge(stances, found.body, time, even.q)
     stances = rising_at_once(stances, found.body, time, even.q)
-    stances = within_toe_strength(without_remnants(stances), found.body)
-    recording = RecordedCom(time, recorded.com, stances.sequence, stances.instants)
-    velocity = np.gradient(recorded.com, recorded.time, axis=0, edge_order=2)[[0, -1]]
-    scene = scene_under(stances, supports.surfaces[0] if supports.surfaces else 0.0)
-    if method == "keyframes":
-        recording = _with_turning(found.body, scene, recording, (even.time, even.q))
-    com = plan_recorded_com(found.body.mass, recording, velocity, method)
-    result = Replan(method, found.body, scene, recording, recorded, com)
-    return _executed(result, even) if execute else result
+    stances = without_remnants(stances)
+    floor = supports.surfaces[0] if supports.surfaces else 0.0
+    return MotionOnContacts(found.body, scene_under(stances, floor), stances, time, even.q, floor)
 
 
-def _with_turning(
-    body: BodyModel, scene: Scene, recording: RecordedCom, recorded: tuple[FloatArray, FloatArray]
-) -> RecordedCom:
+def _with_turning(carried: MotionOnContacts, recording: RecordedCom) -> RecordedCom:
     """Recording with a rate of the angular momentum that the body can follow.
 
     First that of the recorded postures on their contacts; and then that of the postures which are fitted to
     the plan it leads to, for the fit compromises between both.
     """
+    body, scene, recorded = carried.body, carried.scene, (carried.own_time, carried.q)
     recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
     com = plan_near_recorded_com(body.mass, recording)
     if com.trajectory is None:
@@ -273,11 +310,12 @@ def _with_turning(
     return recording.with_angular_momentum_rate(rate)
 
 
-def _executed(result: Replan, even: Reconstruction) -> Replan:
+def _executed(result: Adaptation) -> Adaptation:
     body, scene, trajectory = result.body, result.scene, result.com.trajectory
     if trajectory is None:
         return result
     clock = trajectory.schedule.instants, result.recording.key_times
-    adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, (even.time, even.q), clock)
+    recorded = result.carried.own_time, result.carried.q
+    adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, recorded, clock)
     execution = execute(body, scene, adapted.motion, trajectory.schedule, settings=SETTINGS, hold=0.0)
     return replace(result, adapted=adapted, execution=execution)
