@@ -1,8 +1,11 @@
-"""A recorded motion, or a part of it, re-planned on its own stances and executed ([Qiu2012]_ 5.3.3, 7.3).
+"""A recorded motion adapted to another body or place, balanced and executed ([Qiu2012]_ 5.3.3, 7.3).
+
+On its own stances, with the same body, it is re-planned.
 
 The centre of mass is planned by either method of [Qiu2012]_ chapter 5.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
@@ -166,6 +169,11 @@ class Adaptation:
         return self.carried.scene
 
     @property
+    def planned_duration(self) -> float:
+        """Duration of the plan, or of what it was to follow [s]."""
+        return float(self.schedule.instants[-1] - self.schedule.instants[0])
+
+    @property
     def planned(self) -> Motion | None:
         """The planned whole-body motion."""
         return None if self.adapted is None else self.adapted.motion
@@ -262,19 +270,41 @@ def adapt_recording(
             human.
         NoPlaceError: If a contact finds no surface in the scene.
     """
+    source = recorded_on_contacts(found, supports, rolling=rolling, friction=friction)
+    carried = carried_over(source, body, scene, transform)
+    return adapt_carried(source, carried, motion_of(found), pace=pace, method=method, execute=execute)
+
+
+def adapt_carried(
+    source: MotionOnContacts, carried: MotionOnContacts, recorded: Motion, *, pace: float = 1.0,
+    method: Method = "keyframes", execute: bool = False, padded: Sequence[str] = (),
+) -> Adaptation:  # fmt: skip
+    """Balance a motion that was carried over, and execute it if asked to.
+
+    Args:
+        source: The recorded motion on its contacts.
+        carried: The same on the body and in the place it is adapted to.
+        recorded: The recorded motion, smoothed.
+        pace: Duration as a multiple of that of ``carried``.
+        method: Of the centre of mass.
+        execute: Whether the postures are adapted to the plan and executed.
+        padded: Names of the obstacles that any part of the body may lean on.
+
+    Raises:
+        InputError: If the method is unknown, or there is no support at some time.
+    """
     if method not in METHODS:
-        raise InputError(f"replan method is {method!r}; valid: {', '.join(METHODS)}")
-    recorded = recorded_on_contacts(found, supports, rolling=rolling, friction=friction)
-    carried = carried_over(recorded, body, scene, transform).slowed(pace)
-    carried = replace(carried, schedule=within_toe_strength(carried.schedule, carried.body))
-    time, stances = carried.time, carried.schedule
-    recording = RecordedCom(time, carried.com, stances.sequence, stances.instants)
-    velocity = np.gradient(carried.com, time, axis=0, edge_order=2)[[0, -1]]
+        raise InputError(f"method is {method!r}; valid: {', '.join(METHODS)}")
+    timed = carried.slowed(pace)
+    timed = replace(timed, schedule=within_toe_strength(timed.schedule, timed.body))
+    stances = timed.schedule
+    recording = RecordedCom(timed.time, timed.com, stances.sequence, stances.instants)
+    velocity = np.gradient(timed.com, timed.time, axis=0, edge_order=2)[[0, -1]]
     if method == "keyframes":
-        recording = _with_turning(carried, recording)
-    com = plan_recorded_com(carried.body.mass, recording, velocity, method)
-    result = Adaptation(method, recorded, carried, recording, motion_of(found), com)
-    return _executed(result) if execute else result
+        recording = _with_turning(timed, recording)
+    com = plan_recorded_com(timed.body.mass, recording, velocity, method)
+    result = Adaptation(method, source, timed, recording, recorded, com)
+    return _executed(result, padded) if execute else result
 
 
 def recorded_on_contacts(
@@ -310,12 +340,14 @@ def _with_turning(carried: MotionOnContacts, recording: RecordedCom) -> Recorded
     return recording.with_angular_momentum_rate(rate)
 
 
-def _executed(result: Adaptation) -> Adaptation:
+def _executed(result: Adaptation, padded: Sequence[str]) -> Adaptation:
     body, scene, trajectory = result.body, result.scene, result.com.trajectory
     if trajectory is None:
         return result
     clock = trajectory.schedule.instants, result.recording.key_times
     recorded = result.carried.own_time, result.carried.q
     adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, recorded, clock)
-    execution = execute(body, scene, adapted.motion, trajectory.schedule, settings=SETTINGS, hold=0.0)
+    execution = execute(
+        body, scene, adapted.motion, trajectory.schedule, settings=SETTINGS, hold=0.0, padded=padded
+    )
     return replace(result, adapted=adapted, execution=execution)

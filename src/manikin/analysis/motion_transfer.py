@@ -7,7 +7,7 @@ been left moves with the contacts that are held: the seat's way counts before th
 fitted to the contacts later (:mod:`manikin.analysis.posture_adaptation`). All this is our own.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from manikin.body.limbs import with_knees_and_elbows
 from manikin.contact import Contact, ContactKind, ContactModel, ContactSchedule, Phase, Stance, StanceSequence
 from manikin.errors import InputError, ManikinError
 from manikin.numerics.signals import mask_runs
-from manikin.numerics.spatial import FloatArray, PlanarTransform, frozen_array
+from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.recordings.supports.body_supports import SEAT
 from manikin.scene import Scene, Surface
 
@@ -57,6 +57,7 @@ class MotionOnContacts:
         time: (n,) instants on the clock of the schedule [s].
         q: (n, nq) postures.
         floor: Height of the ground [m].
+        transform: From the frame of the recording to the scene's.
     """
 
     body: BodyModel
@@ -65,6 +66,7 @@ class MotionOnContacts:
     time: FloatArray
     q: FloatArray
     floor: float
+    transform: PlanarTransform = IDENTITY
 
     @cached_property
     def com(self) -> FloatArray:
@@ -131,14 +133,13 @@ def body_like(
     if body.stature is None or body.sex is None:
         raise InputError(f"body is {body.name!r}; valid: a human")
     share = 1.0 if stature is None else stature / body.stature
-    other = human(
+    return human(
         body.stature * share, body.own_mass * share**2 if mass is None else mass, sex or body.sex,
         age=body.age if age is None else age, strength=body.strength if strength is None else strength,
         sole_length=_scaled(body.sole_length, share), sole_width=_scaled(body.sole_width, share),
         lengths={name: share * length for name, length in body.lengths.items()},
         off_axis_masses=body.off_axis_masses,
     )  # fmt: skip
-    return other
 
 
 def carried_over(
@@ -164,12 +165,10 @@ def carried_over(
     anchor = _anchor(moved)
     along = 1.0 if anchor is None else scale
     centre = np.zeros(3) if anchor is None else anchor
-    places = {
-        hold: centre + (hold.contact.position - centre) * [along, along, 1.0] for hold in moved.holds
-    }
+    places = {hold: centre + (hold.contact.position - centre) * [along, along, 1.0] for hold in moved.holds}
     if scene is not None:
         places = _on_surfaces(moved, other, scene, places)
-    schedule = _schedule(moved, other, places)
+    schedule = with_places(moved, places, other)
     floor = moved.floor if scene is None else _floor_of(scene, moved.floor)
     q = np.tile(other.zero_posture(), (len(moved.q), 1))
     q[:, :2] = centre[:2] + along * (moved.q[:, :2] - centre[:2])
@@ -177,8 +176,9 @@ def carried_over(
     q[:, 3:7] = moved.q[:, 3:7]
     q[:, 7:] = np.clip(moved.q[:, _hinges(moved.body, other)], other.lower, other.upper)
     carried = MotionOnContacts(
-        other, scene_under(schedule, floor) if scene is None else scene, schedule, moved.time, q, floor
-    )
+        other, scene_under(schedule, floor) if scene is None else scene, schedule, moved.time, q, floor,
+        moved.transform,
+    )  # fmt: skip
     q[:, :3] += _way(moved, carried, np.array([along, along, scale]), BLENDING)
     return carried.slowed(float(np.sqrt(scale)))
 
@@ -204,8 +204,9 @@ def _transformed(motion: MotionOnContacts, transform: PlanarTransform) -> Motion
     ]
     schedule = ContactSchedule(StanceSequence(phases), motion.schedule.instants)
     return replace(
-        motion, schedule=schedule, q=transform.poses(motion.q), scene=scene_under(schedule, motion.floor)
-    )
+        motion, schedule=schedule, q=transform.poses(motion.q), scene=scene_under(schedule, motion.floor),
+        transform=transform,
+    )  # fmt: skip
 
 
 def _with_effectors(body: BodyModel, schedule: ContactSchedule) -> BodyModel:
@@ -251,9 +252,9 @@ def _on_surfaces(
     for hold in motion.holds:
         contact, place = hold.contact, places[hold]
         if contact.kind is ContactKind.GRASP:
-            found[hold] = place + [0.0, 0.0, rise]
+            found[hold] = place + np.array([0.0, 0.0, rise])
             continue
-        expected = place + [0.0, 0.0, base if hold.effector == SEAT else rise]
+        expected = place + np.array([0.0, 0.0, base if hold.effector == SEAT else rise])
         points = _resized(contact, motion.body, body).points @ contact.rotation_contact_to_world.T
         lies = _nearest_place(surfaces, expected, points)
         if lies is None:
@@ -295,18 +296,19 @@ def _nearest_place(
     return np.array([*(expected + ways[first])[:2], tops[first]])
 
 
-def _schedule(motion: MotionOnContacts, body: BodyModel, places: dict[Hold, FloatArray]) -> ContactSchedule:
-    """The schedule with contacts of another body's size, at other places."""
-    at = {(hold.effector, k): places[hold] for hold in motion.holds for k in range(hold.first, hold.stop)}
-    weight, phases = body.mass / motion.body.mass, []
+def with_places(
+    motion: MotionOnContacts, places: Mapping[Hold, FloatArray], body: BodyModel | None = None
+) -> ContactSchedule:
+    """The schedule with contacts at other places (3,) [m], and of another body's size."""
+    other = motion.body if body is None else body
+    at = {(hold.effector, k): place for hold, place in places.items() for k in range(hold.first, hold.stop)}
+    weight, phases = other.mass / motion.body.mass, []
     for number, phase in enumerate(motion.schedule.sequence):
-        contacts = [
-            replace(
-                _resized(contact, motion.body, body),
-                position=frozen_array(at[contact.effector, number], "contact position [m]", (3,)),
-            )
-            for contact in phase.stance
-        ]
+        contacts = []
+        for contact in phase.stance:
+            place = at.get((contact.effector, number), contact.position)
+            position = frozen_array(place, "contact position [m]", (3,))
+            contacts.append(replace(_resized(contact, motion.body, other), position=position))
         model, cap = phase.stance.model, phase.stance.normal_force_cap
         model = model if cap is None else ContactModel(model.friction, weight * cap)
         phases.append(replace(phase, stance=Stance(contacts, model=model)))
@@ -323,9 +325,7 @@ def _resized(contact: Contact, body: BodyModel, other: BodyModel) -> Contact:
     return replace(contact, points=points)
 
 
-def _way(
-    motion: MotionOnContacts, carried: MotionOnContacts, scale: FloatArray, width: float
-) -> FloatArray:
+def _way(motion: MotionOnContacts, carried: MotionOnContacts, scale: FloatArray, width: float) -> FloatArray:
     """(n, 3) way of the body beyond the scaled one, from what its contacts lack in postures of both [m]."""
     n, step = len(motion.time), float(np.median(np.diff(motion.time)))
     total, ways = np.full(n, 1e-12), np.zeros((n, 3))

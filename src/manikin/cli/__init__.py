@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from manikin.cli import console
+from manikin.cli.adapt import adapt
 from manikin.cli.analyze import analyze
 from manikin.cli.balance import balance, contact
 from manikin.cli.benchmark import benchmark
@@ -108,7 +109,7 @@ def scenarios(json: JsonOption = False) -> None:
 
 
 for _command in (
-    run, benchmark, study, analyze, push, walk, words, ergonomics, statistics, compare, view, balance,
+    run, benchmark, study, analyze, adapt, push, walk, words, ergonomics, statistics, compare, view, balance,
     contact, export, doctor,
 ):  # fmt: skip
     app.command()(_command)

@@ -16,9 +16,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from manikin.errors import InputError
+from manikin.limits import AGE_RANGE, MASS_RANGE, STATURE_RANGE
 from manikin.reports.summary_table import verdict_lines
 
 if TYPE_CHECKING:
+    from manikin.pipeline.stages import RunResult
     from manikin.scenarios import Scenario
 
 
@@ -113,6 +115,18 @@ LoadHandOption = Annotated[
     Literal["left", "right", "both"] | None,
     option("left|right|both", "Hand that carries --load-kg. Default: both."),
 ]
+
+
+def of_a_person(metavar: str, name: str, unit: str, valid: tuple[float, float]) -> Any:
+    """Option with another size or age of the person."""
+    low, high = valid
+    return option(metavar, f"Other {name}, {low:g} to {high:g} {unit}.", min=low, max=high)
+
+
+StatureOption = Annotated[float | None, of_a_person("M", "stature", "m", STATURE_RANGE)]
+MassOption = Annotated[float | None, of_a_person("KG", "mass", "kg", MASS_RANGE)]
+AgeOption = Annotated[float | None, of_a_person("YEARS", "age", "years", AGE_RANGE)]
+StrengthOption = Annotated[float | None, option("X", "Torque limits over those of a healthy adult.")]
 MotionArgument = Annotated[Path, argument("DIR|FILE", "Run directory or motion file (.h5).")]
 
 
@@ -133,11 +147,33 @@ def run_job(
         part: Of the summary, whose values ``shown`` are printed after the verdict and the requirements.
         beside: Defaults of the part's values, which then stand in the JSON beside those of the summary.
     """
-    directory = directory_of(out, job.name, json=json)
-    with bars(interruption) as progress:
-        from manikin.pipeline import runner
+    from manikin.pipeline import runner
 
-        result = runner.run(job, out=directory, seed=job.seed, progress=progress)
+    directory = directory_of(out, job.name, json=json)
+    return report_run(
+        lambda progress: runner.run(job, out=directory, seed=job.seed, progress=progress), directory,
+        interruption, draw=draw, json=json, part=part, shown=shown, beside=beside,
+    )  # fmt: skip
+
+
+def report_run(
+    make: "Callable[[Callable[..., None]], RunResult]", directory: Path | None, interruption: Interruption,
+    *, draw: bool, json: bool, part: str = "", shown: Sequence[str] = (),
+    beside: Mapping[str, Any] | None = None, table: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
+) -> int:  # fmt: skip
+    """Make a run with bars on standard error, print its summary, and return the exit status.
+
+    Args:
+        make: Makes the run; told what reports its progress.
+        directory: Where its files are, or None.
+        draw: Whether figures are drawn into the directory.
+        part: Of the summary, as in :func:`run_job`.
+        shown: Keys of the part that are printed.
+        beside: Defaults of the part's values.
+        table: Makes further rows to be printed of a finished summary.
+    """
+    with bars(interruption) as progress:
+        result = make(progress)
         interruption.check()
         page = None
         if directory is not None:
@@ -155,6 +191,8 @@ def run_job(
             typer.echo(line)
         if shown:
             print_table({key: summary[part].get(key) for key in shown})
+        if table is not None and (rows := table(summary)):
+            print_table(rows)
         if directory is not None and result.motion is not None:
             typer.echo(f"watch it with: manikin view {directory}")
         if page is not None:

@@ -7,17 +7,20 @@ import typer
 
 from manikin.cli import console
 from manikin.cli.console import (
+    AgeOption,
     FiguresOption,
     Interruption,
     JobsOption,
     JsonOption,
     LoadHandOption,
+    MassOption,
     OutOption,
     SexOption,
+    StatureOption,
+    StrengthOption,
     argument,
     option,
 )
-from manikin.limits import AGE_RANGE, MASS_RANGE, STATURE_RANGE
 
 ALL = "all"
 """In place of a scenario: every built-in one with its variants."""
@@ -29,23 +32,17 @@ _UNCERTAINTY = "How far these worlds are from the believed one, relative to the 
 _MOVED = "Move the scenario's origin to X Y [m], turned [deg]."
 
 
-def _of_a_person(metavar: str, name: str, unit: str, valid: tuple[float, float]) -> Any:
-    """Option with another size or age of the person."""
-    low, high = valid
-    return option(metavar, f"Other {name}, {low:g} to {high:g} {unit}.", min=low, max=high)
-
-
 def run(
     context: typer.Context,
     scenario: Annotated[str, argument("NAME|FILE.yaml|all", _SCENARIO)],
     out: OutOption = None,
     seed: Annotated[int | None, option("N", "Seed; default: the scenario's.")] = None,
     json: JsonOption = False,
-    stature: Annotated[float | None, _of_a_person("M", "stature", "m", STATURE_RANGE)] = None,
-    mass: Annotated[float | None, _of_a_person("KG", "mass", "kg", MASS_RANGE)] = None,
+    stature: StatureOption = None,
+    mass: MassOption = None,
     sex: SexOption = None,
-    age: Annotated[float | None, _of_a_person("YEARS", "age", "years", AGE_RANGE)] = None,
-    strength: Annotated[float | None, option("X", "Torque limits over those of a healthy adult.")] = None,
+    age: AgeOption = None,
+    strength: StrengthOption = None,
     load_kg: Annotated[float | None, option("KG", "Load in the hands during the whole motion.")] = None,
     load_hand: LoadHandOption = None,
     variant: Annotated[str | None, option("V", "One of the scenario's variants; also NAME@V.")] = None,

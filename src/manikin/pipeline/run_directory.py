@@ -7,6 +7,7 @@
     DIR/contacts.json      contacts that were planned, with their postures (manikin.verification)
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
     DIR/motion-NAME.h5     planned motion of another walker
+    DIR/adaptation.json    what has changed from the recording, of an adapted one
     DIR/summary.json       written when every stage is done
     DIR/report.html        verdict, requirements, figures and numbers in one page that needs no other file
     DIR/motion.bvh         drawn from the files above, for animation programs
@@ -244,6 +245,8 @@ def _first_phases(sequence: StanceSequence, count: int) -> StanceSequence:
 
 SCENARIO = "scenario.yaml"
 CONTACT_PLAN = "contacts.json"
+ADAPTATION = "adaptation.json"
+"""What has changed from a recording in its adaptation."""
 MOTION = "motion.h5"
 BVH = "motion.bvh"
 OTHERS = "motion-*.h5"
@@ -280,7 +283,17 @@ class RunDirectory(ResultDirectory):
         """
         super().__init__(path)
         # The summary goes first: without it the directory is known to be incomplete.
-        old = SUMMARY, CONTACT_PLAN, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS
+        old = (
+            SUMMARY,
+            CONTACT_PLAN,
+            ADAPTATION,
+            MOTION,
+            BVH,
+            REPORT,
+            f"{STAGES}/*.json",
+            f"{FIGURES}/*.png",
+            OTHERS,
+        )
         self.remove(*old)
 
 

@@ -158,10 +158,12 @@ def _key_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _commands(folder: Path, summary: Mapping[str, Any]) -> str:
     """Commands that run the scenario again, play its motion and export it."""
-    place, seed = shlex.quote(str(folder)), summary.get("seed", 0)
+    place, seed, adapted = shlex.quote(str(folder)), summary.get("seed", 0), summary.get("adaptation")
+    again = f"run {shlex.quote(str(folder / SCENARIO))} --seed {seed}"
+    if adapted is not None:  # the scenario has no recording: it plans the same way by itself
+        again = f"adapt {shlex.quote(adapted['recording'])}"
     return "\n".join((
-        f"manikin run {shlex.quote(str(folder / SCENARIO))} --seed {seed} --out again",
-        f"manikin view {place}", f"manikin export {place} --format glb",
+        f"manikin {again} --out again", f"manikin view {place}", f"manikin export {place} --format glb",
     ))  # fmt: skip
 
 

@@ -172,6 +172,24 @@ def load_scenario(
     return scenario.with_overrides(overrides)
 
 
+def load_scene(name_or_path: str | Path) -> Scenario:
+    """Read a scenario of which the scene matters, by name or path; a file may have a scene and nothing else.
+
+    Raises:
+        ScenarioError: One line that names the file, the key, what was wrong and what is valid.
+    """
+    path, named = find_scenario(name_or_path)
+    tree = read_extended(path)
+    if named is not None or not isinstance(tree.data, Mapping) or "scene" not in tree.data:
+        return load_scenario(name_or_path)
+    rest = {"name": path.stem} | ({} if "task" in tree.data or "recovery" in tree.data else SOME_TASK)
+    return _build(Tree({**rest, **tree.data}, tree.lines), path)
+
+
+SOME_TASK: Mapping[str, Any] = {"task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
+"""Task of a file that has none."""
+
+
 def _build(tree: Tree, path: Path) -> Scenario:
     resolved = tree.without(VARIANTS)
     file = validate(ScenarioFile, resolved.data, str(path), resolved.lines)
