@@ -1,10 +1,11 @@
 """Recorded clips adapted to other bodies and places: how many are proved, and why the others are not.
 
 ``python benchmarks/sweep_adaptations.py FOLDER CLIPS.csv OUT.jsonl [FIRST STOP]`` takes the clips of a table
-(columns ``file``, ``first_frame0``, ``end_frame0``, ``fps``) below FOLDER, without those that run, in parts of :data:`LONGEST`. Every clip is made as recorded, by a person a fifth heavier, by one
-10 cm taller or shorter, and where one foot stands 3 cm higher, or the seat is 5 cm lower. Each result is one
-line of OUT.jsonl; what is there already is not made again. ``python benchmarks/sweep_adaptations.py
-OUT.jsonl`` prints shares and reasons of what is there.
+(columns ``class``, ``file``, ``first_frame0``, ``end_frame0``, ``fps``) below FOLDER, without those that run,
+in parts. Every part is made as recorded, by a person a fifth heavier, by one 10 cm taller or shorter, and
+where one foot stands 3 cm higher, or the seat is 5 cm lower. Each result is one line of OUT.jsonl; what is
+there already is not made again. ``python benchmarks/sweep_adaptations.py OUT.jsonl`` prints shares and
+reasons of what is there.
 """
 
 import csv
@@ -63,7 +64,7 @@ def changed(found, supports, change, number):
     feet = [hold for hold in source.holds if hold.effector.endswith("foot")]
     landed = [hold for hold in feet if hold.first > 0] or feet
     moved = dict.fromkeys(seats, -0.05) or {landed[0]: 0.03}
-    places = {hold: hold.contact.position + [0.0, 0.0, rise] for hold, rise in moved.items()}
+    places = {hold: hold.contact.position + np.array([0.0, 0.0, rise]) for hold, rise in moved.items()}
     return {"scene": scene_under(with_places(source, places), source.floor)}
 
 
