@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.analysis.adaptation import Replan, adapt_recording, crop
+from manikin.analysis.adaptation import Adaptation, adapt_recording, crop
 from manikin.motion.file import MotionFile
 from manikin.pipeline.run_directory import RunRecord
 from manikin.planning.com import KeyframeProblem, plan_com_through_key_frames
@@ -170,7 +170,7 @@ def read(path: Path) -> tuple[Reconstruction, RecordedSupports]:
     return found, supports_of(found)
 
 
-def exact(plan: Replan) -> str:
+def exact(plan: Adaptation) -> str:
     """What becomes of the method that passes every key frame."""
     com = plan.recorded.com
     velocity = np.gradient(com, plan.recorded.time, axis=0, edge_order=2)
@@ -194,7 +194,7 @@ def head(*cells: str) -> str:
     return row(*cells) + row("---", *["--:"] * (len(cells) - 1))
 
 
-def near_row(name: str, whole: Replan, rolling: Replan) -> str:
+def near_row(name: str, whole: Adaptation, rolling: Adaptation) -> str:
     """Numbers of the key frame method on one walk."""
     made = rolling.as_dict()
     return row(
@@ -204,7 +204,7 @@ def near_row(name: str, whole: Replan, rolling: Replan) -> str:
     )  # fmt: skip
 
 
-def executed_row(name: str, plan: Replan) -> str:
+def executed_row(name: str, plan: Adaptation) -> str:
     """Numbers of one execution."""
     made = plan.as_dict()
     fit, ran = made["wholebody"], made["execution"]
@@ -219,7 +219,7 @@ def executed_row(name: str, plan: Replan) -> str:
     )  # fmt: skip
 
 
-def against_row(name: str, plan: Replan) -> str:
+def against_row(name: str, plan: Adaptation) -> str:
     """Numbers of one timing-free plan."""
     made = plan.as_dict()
     if not made["succeeded"]:
@@ -234,7 +234,7 @@ def against_row(name: str, plan: Replan) -> str:
     )  # fmt: skip
 
 
-def phase_table(plan: Replan) -> str:
+def phase_table(plan: Adaptation) -> str:
     """Key instants of recording and plan, as Table 7.7."""
     made = plan.as_dict()
     theirs, mine = plan.recording.key_times, plan.schedule.instants
@@ -248,7 +248,7 @@ def phase_table(plan: Replan) -> str:
     return "".join(lines)
 
 
-def key_frame_figure(plan: Replan) -> Figure:
+def key_frame_figure(plan: Adaptation) -> Figure:
     """Recorded and planned CoM with the key frames, and both margins (Fig. 5.3 and 5.5)."""
     figure, grid = new_grid(9.0, 9.0, "A recorded centre of mass and the plan near its key frames", 4, 1)
     axes = [figure.add_subplot(grid[number]) for number in range(4)]
@@ -270,7 +270,7 @@ def key_frame_figure(plan: Replan) -> Figure:
     return figure
 
 
-def posture_figure(plan: Replan, count: int = 9) -> Figure:
+def posture_figure(plan: Adaptation, count: int = 9) -> Figure:
     """Recorded, planned and executed postures at the same instants, seen from the side."""
     kinds = {"recorded": plan.recorded, "planned": plan.planned, "executed": plan.executed}
     motions = {name: motion for name, motion in kinds.items() if motion is not None}

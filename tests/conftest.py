@@ -45,7 +45,7 @@ APART = frozenset({
 LONG = frozenset({
     "test_batch.py", "test_contact_model.py", "test_execute.py", "test_key_planes.py",
     "test_limb_contacts.py", "test_obstacles.py", "test_parts.py", "test_push_map.py", "test_pushed.py",
-    "test_readme.py", "test_recover.py", "test_replan.py", "test_timing_free.py", "test_walking.py",
+    "test_readme.py", "test_recover.py", "test_adaptation.py", "test_timing_free.py", "test_walking.py",
     "test_walls.py",
 })  # fmt: skip
 """Modules without slow tests that take fifteen seconds and more."""

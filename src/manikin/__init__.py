@@ -11,6 +11,7 @@ from manikin.runtime import __version__
 
 if TYPE_CHECKING:
     from manikin.api import (
+        adapt,
         analyze,
         balance,
         compare,
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "__version__", "analyze", "balance", "compare", "creature", "grasp", "human", "plan", "point", "push",
-    "read", "run", "scene", "simulate", "sole", "stance", "walk",
+    "__version__", "adapt", "analyze", "balance", "compare", "creature", "grasp", "human", "plan", "point",
+    "push", "read", "run", "scene", "simulate", "sole", "stance", "walk",
 ]  # fmt: skip
 
 

@@ -14,7 +14,6 @@ from manikin.numerics.spatial import GRAVITY
 from manikin.recordings import read_recording
 from manikin.recordings.dynamics.shifted_motion import LARGEST_RMS
 from manikin.recordings.supports.recorded_stances import STRONGEST
-from manikin.reports.analysis_directory import summary_of
 from manikin.reports.pages import analysis_page
 
 
@@ -131,7 +130,7 @@ def test_the_motion_as_recorded_leads_and_the_shifted_one_stands_beside_it(recor
     assert plain.as_dict()["margin"]["shifted"] is None
     assert plain.as_dict()["force_plates"]["torques_shifted"] == {}
     assert not {"shifted_margin_Nm", "shift_m"} & set(plain.series())
-    for page in (analysis_page(one, summary_of(one), ("", ""), {}) for one in (both, plain)):
+    for page in (analysis_page(one, one.as_dict(), ("", "")) for one in (both, plain)):
         assert "lowest margin, as recorded" in page
     assert "imposed floor" not in page
 
@@ -152,7 +151,7 @@ def test_no_number_that_the_shift_imposed_is_given_as_a_result(recordings_folder
         assert (one["shifted_margin_min_Nm"] is None) == one["shifted_at_floor"]
         recorded = found.motion.margin[(found.time >= one["start_s"]) & (found.time < one["end_s"])]
         assert one["margin_min_Nm"] == recorded.min()
-    page = analysis_page(found, summary_of(found), ("", ""), {})
+    page = analysis_page(found, found.as_dict(), ("", ""))
     assert page.count("at the imposed floor") == len(held) + 1
     assert f"{told['margin']['shifted']['floor_Nm']:.1f} N.m" in page
 
@@ -172,9 +171,9 @@ def test_a_shift_that_does_not_lead_to_balance_is_not_believed(recordings_folder
     margin = leap.as_dict()["margin"]
     assert (margin["motion"], margin["share_in_contact"]) == ("recorded", 0.0)
     assert margin["share_positive_in_contact"] is None
-    assert "None" not in analysis_page(leap, summary_of(leap), ("", ""), {})
+    assert "None" not in analysis_page(leap, leap.as_dict(), ("", ""))
     # Where the sheet is drawn the motion can be played.
-    assert 'id="player-data"' in analysis_page(leap, summary_of(leap), ("<svg></svg>", ""), {})
+    assert 'id="player-data"' in analysis_page(leap, leap.as_dict(), ("<svg></svg>", ""))
 
 
 @pytest.mark.parametrize(

@@ -105,23 +105,6 @@ def test_options_of_one_file_are_refused_of_several(standing_file, tmp_path, cap
     assert "there is no such file" in capsys.readouterr().err
 
 
-def test_a_recording_is_planned_anew_beside_it(standing_file, tmp_path, capsys):
-    """Who stands is planned to stand: the centre of mass stays within a millimetre, the margin above 0."""
-    out = tmp_path / "out"
-    options = ["--plan", "keyframes", "--execute", "--out", str(out), "--json"]
-    assert main(["analyze", str(standing_file), *options]) == DONE
-    plan = json.loads(capsys.readouterr().out)["plan"]
-    assert plan["com_rms_m"] < 1e-3
-    assert plan["min_margin"] > 0.0
-    assert plan["execution"]["fell"] is False
-    found = read_motions(out)
-    assert list(found.motions) == ["shifted", "recorded", "planned", "executed"]
-    assert (out / "report.html").read_text().count("data:image/png;base64") >= 3
-    assert main(["analyze", str(standing_file), "--plan", "quickly", "--json"]) == BAD_INPUT
-    assert "'--plan': 'quickly' is not one of 'keyframes', 'timing-free'" in capsys.readouterr().err
-    assert main(["analyze", str(standing_file), "--execute", "--json"]) == BAD_INPUT
-
-
 def test_a_map_of_markers_is_checked_before_any_recording(standing_file, tmp_path, capsys):
     file = tmp_path / "map.yaml"
     file.write_text("left_asis: M1\nleft_knee_latral: M2\n")

@@ -23,6 +23,7 @@ from manikin.errors import InputError, ManikinError
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.recordings.supports.body_supports import SEAT
+from manikin.runtime.display import Displayed
 from manikin.scene import Scene, Surface
 
 SAME_PLACE = 0.3
@@ -48,8 +49,8 @@ class NoPlaceError(ManikinError):
     """A contact finds no surface that could carry it near where it was."""
 
 
-@dataclass(frozen=True, eq=False)
-class MotionOnContacts:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionOnContacts(Displayed):
     """Postures of a body in time, the contacts that they are made on, and what these lie on.
 
     Attributes:
@@ -74,6 +75,11 @@ class MotionOnContacts:
         model = self.body.pinocchio
         data = model.createData()
         return np.array([pin.centerOfMass(model, data, one).copy() for one in self.q])
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        lasts = f"{self.time[-1] - self.time[0]:.2f} s"
+        return {"body": self.body.name, "duration": lasts, "contacts": str(len(self.holds))}
 
     @property
     def own_time(self) -> FloatArray:
@@ -210,7 +216,9 @@ def _transformed(motion: MotionOnContacts, transform: PlanarTransform) -> Motion
 
 
 def _with_effectors(body: BodyModel, schedule: ContactSchedule) -> BodyModel:
-    """With knees and elbows that may touch where the motion is made on them."""
+    """With knees and elbows that may touch where the motion is made on them; InputError of no human."""
+    if body.stature is None or body.sex is None:
+        raise InputError(f"body is {body.name!r}; valid: a human")
     return body if set(schedule.sequence.effectors) <= set(body.effectors) else with_knees_and_elbows(body)
 
 

@@ -5,6 +5,7 @@ from manikin.api.runs import (
     Comparison,
     RecordedMotion,
     Run,
+    adapt,
     analyze,
     compare,
     plan,
@@ -16,6 +17,6 @@ from manikin.api.runs import (
 from manikin.body import human
 
 __all__ = [
-    "Balance", "Comparison", "RecordedMotion", "Run", "analyze", "balance", "compare", "creature",
-    "grasp", "human", "plan", "point", "push", "read", "scene", "simulate", "sole", "stance", "walk",
+    "Balance", "Comparison", "RecordedMotion", "Run", "adapt", "analyze", "balance", "compare",
+    "creature", "grasp", "human", "plan", "point", "push", "read", "scene", "simulate", "sole", "stance", "walk",
 ]  # fmt: skip

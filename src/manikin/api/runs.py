@@ -7,19 +7,19 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from manikin.analysis import Analysis, AnalysisOptions
+from manikin.analysis import Analysis, AnalysisOptions, analyze_file
 from manikin.analysis import analyze as measure
 from manikin.body import BodyModel
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
-from manikin.pipeline.run_directory import RunRecord, read_run
+from manikin.pipeline.run_directory import SCENARIO, RunRecord, read_run
 from manikin.recordings.readers import read_recording
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.runtime.display import Displayed
 from manikin.runtime.files import write_result
-from manikin.scenarios import Scenario, load_scenario
+from manikin.scenarios import Scenario, load_scenario, load_scene
 from manikin.viewer import serve
 
 if TYPE_CHECKING:
@@ -231,6 +231,36 @@ def push(
     model = "kudoh" if body is None else "human"
     job = push_task(force, direction, duration=duration, body={"model": model}, recovery=recovery)
     return _run(_with_body(job, body), seed=seed, out=out)
+
+
+def adapt(
+    path: str | Path, *, body: BodyModel | None = None, scene: str | Path | Scenario | None = None,
+    at: Place | None = None, pace: float | None = None, window: tuple[float, float] | None = None,
+    out: str | Path | None = None, **options: Any,
+) -> Run:  # fmt: skip
+    """Make a recorded motion with another body or in another place, and execute it; InputError if unusable.
+
+    What has changed from the recording is ``summary["adaptation"]``.
+
+    Args:
+        path: Recording, as of :func:`read`.
+        body: A human; the recorded person when omitted.
+        scene: Scenario, or its name or file, whose scene it is made in; where it was recorded when omitted.
+        at: Where in the scene the motion begins; the recording's coordinates when omitted.
+        pace: Duration as a multiple of the recorded one; 1, or slower if needed, when omitted.
+        window: Start and end of the part that is taken [s].
+        options: Those of :class:`manikin.analysis.AnalysisOptions`.
+    """
+    from manikin.pipeline.adapt import AdaptationTask
+    from manikin.pipeline.adapt import adapt as adapted
+
+    place = scene if scene is None or isinstance(scene, Scenario) else load_scene(scene)
+    analysis = analyze_file(path, AnalysisOptions(**{"as_recorded": True} | options))
+    kept = None if out is not None else TemporaryDirectory(prefix="manikin-")
+    folder = Path(kept.name) / Path(path).stem if kept is not None else Path(str(out))
+    task = AdaptationTask(scene=place, at=at, pace=pace, window=window)
+    result = adapted(analysis, task, body=body, friction=options.get("friction"), out=folder)
+    return Run(result.summary, folder, load_scenario(folder / SCENARIO), kept)
 
 
 def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:

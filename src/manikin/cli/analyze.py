@@ -3,7 +3,7 @@
 import time as clock
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
@@ -20,9 +20,6 @@ from manikin.cli.console import (
     option,
 )
 from manikin.errors import InputError
-
-if TYPE_CHECKING:
-    from manikin.analysis.adaptation import Method
 
 
 def analyze(
@@ -50,13 +47,6 @@ def analyze(
     as_recorded: Annotated[
         bool, flag("--as-recorded", "Look for no shifted motion to stand beside the recorded one.")
     ] = False,
-    plan: Annotated[
-        Literal["keyframes", "timing-free"] | None,
-        option("keyframes|timing-free", "Re-plan the recording on its own stances."),
-    ] = None,
-    execute: Annotated[
-        bool, flag("--execute", "With --plan: the whole body, executed in the physics engine.")
-    ] = False,
     jobs: JobsOption = None,
     figures: FiguresOption = True,
     json: JsonOption = False,
@@ -64,7 +54,6 @@ def analyze(
     """Measure recorded people: supports, timing, balance, forces, effort; one report for each file."""
     single = len(sources) == 1 and not sources[0].is_dir()
     if not single:
-        console.refuse(plan is not None or execute, "--plan", "there are several files")
         console.refuse(frames is not None, "--frames", "there are several files")
     from manikin.analysis import AnalysisOptions, recordings_in
     from manikin.recordings import read_marker_map
@@ -79,33 +68,21 @@ def analyze(
         directory = console.directory_of(out, "analysis", json=json)
         return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
     console.refuse(jobs is not None, "--jobs", "there is one file")
-    console.refuse(execute and plan is None, "--execute", "it needs --plan")
     directory = console.directory_of(out, f"analysis/{paths[0].stem}", json=json)
-    return _one(paths[0], directory, options, (plan, execute), draw=figures, json=json)
+    return _one(paths[0], directory, options, draw=figures, json=json)
 
 
-def _one(
-    path: Path, directory: Path | None, options: Any, plan: "tuple[Method | None, bool]", *, draw: bool,
-    json: bool,
-) -> int:  # fmt: skip
-    method, execute = plan
+def _one(path: Path, directory: Path | None, options: Any, *, draw: bool, json: bool) -> int:
     with console.stdout_kept_clean():
         from manikin.analysis import analyze_file
-        from manikin.reports.analysis_directory import AnalysisDirectory, summary_of, write_analysis
+        from manikin.reports.analysis_directory import AnalysisDirectory, write_analysis
 
         if directory is not None:
             AnalysisDirectory(directory)
-        result, planned = analyze_file(path, options), None
-        if method is not None:
-            from manikin.analysis.adaptation import adapt_recording
-
-            planned = adapt_recording(
-                result.found, result.supports, method=method, execute=execute, friction=options.friction
-            )
+        result = analyze_file(path, options)
         if directory is not None:
-            write_analysis(result, directory, draw=draw, plan=planned)
-    summary = summary_of(result, planned)
-    failure = None if planned is None else summary["plan"]["failure"]
+            write_analysis(result, directory, draw=draw)
+    summary = result.as_dict()
     if json:
         console.print_json(summary)
     else:
@@ -114,11 +91,9 @@ def _one(
             typer.echo(f"implausible: {finding}", err=True)
         for remark in summary["remarks"]:
             typer.echo(f"note: {remark}", err=True)
-        if failure:
-            typer.echo(f"no plan: {failure}", err=True)
         view = f"see the motion with: manikin view {directory}"
         typer.echo(f"report in {directory}/report.html; {view}", err=True)
-    return console.FAILED if failure or summary["implausible"] else console.DONE
+    return console.FAILED if summary["implausible"] else console.DONE
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:
@@ -157,11 +132,6 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     if (strength := effort["strength"]) is not None:
         share, joint = 100.0 * strength["max_share"], strength["max_joint"]
         shown["largest torque"] = f"{share:.0f} % of strength, {joint} at {strength['max_at_s']:.2f} s"
-    if (plan := summary["plan"]) is not None and plan["duration_s"] is not None:
-        shown["plan"] = (
-            f"{plan['duration_s']:.2f} s, CoM {1e3 * plan['com_rms_m']:.1f} mm from the recorded one (RMS), "
-            f"margin at least {plan['min_margin']:.2f} {plan['margin_unit']}"
-        )
     plates = summary["force_plates"]
     if plates is None:
         return shown

@@ -16,7 +16,7 @@ from manikin.control.edge_forces import ContactGeometry, contact_geometry, segme
 from manikin.control.partings import SelfWatch
 from manikin.control.plan_return import Deviation, PlanClock, deviation_from_plan, returning_acceleration
 from manikin.control.reference import Reference, ReferenceSample
-from manikin.control.settings import ControlSettings
+from manikin.control.settings import ControlSettings, Impedance
 from manikin.control.supports import SupportMode, SupportState, SupportSwitch
 from manikin.control.tasks import AccelerationTask, ForceWish, landing_reference, lifted, swing_task
 from manikin.motion import Motion
@@ -32,6 +32,13 @@ to leave, relative to the weight: of three points none can be spared, and one th
 
 RAISED = 0.006
 """Points this far above the lowest one of a contact that settles may carry load, twice as far none [m]."""
+
+RAISED_TOES, BOUNCED = 0.001, 0.05
+"""The same of the tips of toes [m], and their angle from the plan from which they have bounced off [rad]."""
+
+TOES_BACK = Impedance(10000.0, 250.0)
+"""Gains with which toes that have bounced off come down. The engine's toes have a least inertia, some six
+times their own, of which the controller does not know; and the edge behind their hinge jams on the floor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +213,9 @@ class Controller:
             tasks.posture_task("posture", state, reference, gains.posture, weights.posture, self._others)
         )
         for name, toes in self._toes.items():  # followed as their foot is
-            gain = gains.posture if supports[name].mode is SupportMode.STANCE else gains.swing
+            rests = supports[name].mode is SupportMode.STANCE
+            off = np.abs(state.q[7:][toes] - reference.q[7:][toes]).max(initial=0.0) > BOUNCED
+            gain = (TOES_BACK if off else gains.posture) if rests else gains.swing
             if toes:
                 wanted.append(
                     tasks.posture_task(f"toes of {name}", state, reference, gain, weights.effectors, toes)
@@ -272,6 +281,8 @@ class Controller:
         upper = basis.upper
         if support.settling:
             upper = np.minimum(upper, cap * self._low_shares(geometry, contact, state, edges))
+        elif (lifted_toes := self._lifted_toes(geometry, contact, state, edges)) is not None:
+            upper = np.minimum(upper, cap * lifted_toes)
         if support.fades:
             upper = np.minimum(upper, state.mass * GRAVITY * self._point_shares(support, contact, edges))
         return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
@@ -298,13 +309,28 @@ class Controller:
 
     @staticmethod
     def _low_shares(
-        geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int
+        geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int, raised: float = RAISED
     ) -> FloatArray:
-        """(e k,) share of the load that each point may carry: those that a tilt has raised carry none."""
+        """(e k,) share of the load that each point may carry: those ``raised`` by a tilt [m] carry none."""
         patches = [(state.frames[segment_key(segment)], points) for segment, points in geometry.patches]
         places = ((frame.position + points @ frame.rotation.T) @ contact.normal for frame, points in patches)
         height = np.concatenate(list(places))
-        return np.repeat(np.clip(2.0 - (height - height.min()) / RAISED, 0.0, 1.0), edges)
+        return np.repeat(np.clip(2.0 - (height - height.min()) / raised, 0.0, 1.0), edges)
+
+    @classmethod
+    def _lifted_toes(
+        cls, geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int
+    ) -> FloatArray | None:
+        """(e k,) shares of the load as of :meth:`_low_shares`, where toes are off the ground; else None.
+
+        Toes are light: those that bounce off as a foot lands would be thrown back by the torque for a load
+        that they do not carry. What is behind their hinge keeps its share.
+        """
+        if len(geometry.patches) < 2 or contact.part is not SolePart.FULL:
+            return None
+        shares = cls._low_shares(geometry, contact, state, edges, RAISED_TOES)
+        shares[: edges * len(geometry.patches[0][1])] = 1.0
+        return shares if np.any(shares < 1.0) else None
 
     def _point_shares(self, support: SupportState, contact: Contact, edges: int) -> FloatArray:
         """(e k,) body weights that each point's variables may carry while the touching part changes."""

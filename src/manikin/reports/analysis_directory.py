@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from manikin.analysis import Analysis, AnalysisEntry, AnalysisJob, AnalysisOptions, analyze_file
-from manikin.analysis.adaptation import Replan
+from manikin.analysis.adaptation import Adaptation
 from manikin.balance import motion_margin, pseudo_wrench
 from manikin.errors import ManikinError
 from manikin.motion.file import MotionFile, write_motions
@@ -72,7 +72,7 @@ def directories_for(paths: Sequence[Path], out: Path) -> list[Path]:
     return [out / name.relative_to(shared) for name in names]
 
 
-def compare_with_recording(found: Replan) -> RunComparison:
+def compare_with_recording(found: Adaptation) -> RunComparison:
     """Compare plan and recording as two runs: timing, centre of mass and margins; the recording comes first.
 
     Margins of both are those of a point mass: with the recorded acceleration, and as planned. Of a plan that
@@ -88,7 +88,7 @@ def compare_with_recording(found: Replan) -> RunComparison:
     return compare_runs(first, second)
 
 
-def _recorded_track(found: Replan) -> ComTrack:
+def _recorded_track(found: Adaptation) -> ComTrack:
     time, com, schedule = found.recording.time, found.recording.com, found.recording.schedule
     velocity = np.gradient(com, time, axis=0, edge_order=2)
     acceleration = np.gradient(velocity, time, axis=0, edge_order=2)
@@ -148,28 +148,15 @@ class AnalysisDirectory(ResultDirectory):
     kind, marks = "analysis", (REPORT, OVERVIEW, SUMMARY)
 
 
-def summary_of(analysis: Analysis, plan: Replan | None = None) -> dict[str, Any]:
-    """Content of ``summary.json``: the analysis, and ``plan`` where one was made."""
-    return analysis.as_dict() | {"plan": None if plan is None else plan.as_dict()}
-
-
-def write_analysis(
-    analysis: Analysis, directory: Path, *, draw: bool = True, plan: Replan | None = None
-) -> None:
-    """Write the files of one recording and of its plan, with figures or without; the summary comes last.
+def write_analysis(analysis: Analysis, directory: Path, *, draw: bool = True) -> None:
+    """Write the files of one recording, with figures or without; the summary comes last.
 
     Raises:
         MotionFileError: If they cannot be written.
     """
     make_directory(directory)
-    summary = summary_of(analysis, plan)
-    sheet, pictures = recording_sheet(analysis, SHEET) if draw else "", {}
-    if draw and plan is not None and plan.com.trajectory is not None:
-        from manikin.reports.figures import comparison_pictures
-
-        pictures = comparison_pictures(compare_with_recording(plan))
-    content = MotionFile(body=analysis.body) if plan is None else plan.content
-    content = replace(content, recorded=analysis.motion, shifted=analysis.shifted_motion)
+    summary, sheet = analysis.as_dict(), recording_sheet(analysis, SHEET) if draw else ""
+    content = MotionFile(body=analysis.body, recorded=analysis.motion, shifted=analysis.shifted_motion)
     write_motions(directory / MOTION, content)
     write_result(directory / SERIES, columns_csv(analysis.series(), 6))
     cycles = ""
@@ -177,7 +164,7 @@ def write_analysis(
         band = analysis.gait_band
         write_result(directory / CYCLES, columns_csv(gait_columns(analysis.gait, band), 5))
         cycles = gait_sheet(analysis.gait, band, CYCLES_SHEET) if draw else ""
-    write_result(directory / REPORT, analysis_page(analysis, summary, (sheet, cycles), pictures))
+    write_result(directory / REPORT, analysis_page(analysis, summary, (sheet, cycles)))
     write_result(directory / SUMMARY, summary)
 
 

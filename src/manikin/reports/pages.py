@@ -167,23 +167,15 @@ def _commands(folder: Path, summary: Mapping[str, Any]) -> str:
     ))  # fmt: skip
 
 
-def analysis_page(
-    analysis: Analysis, summary: Mapping[str, Any], sheets: tuple[str, str], pictures: Mapping[str, bytes]
-) -> str:
-    """HTML of a measured recording with its numbers, and PNG files of the plan by what they show.
+def analysis_page(analysis: Analysis, summary: Mapping[str, Any], sheets: tuple[str, str]) -> str:
+    """HTML of a measured recording with its numbers.
 
     The ``sheets`` are SVG of :func:`manikin.reports.analysis_sheet.recording_sheet` and
     :func:`manikin.reports.gait_sheet.gait_sheet`; empty for none.
     """
     sheet, cycles = sheets
     missing = [f"{part}: {reason}" for part, reason in summary["ergonomics"]["missing"].items()]
-    shown = {
-        "name": analysis.name,
-        "sheet": sheet,
-        "cycles": cycles,
-        "pictures": pictures,
-        "missing": missing,
-    }
+    shown = {"name": analysis.name, "sheet": sheet, "cycles": cycles, "missing": missing}
     shown["motion"] = player_data(analysis.body, analysis.motion) if sheet else None
     return render("analysis", summary=summary, **shown)
 
