@@ -22,6 +22,7 @@ from manikin.pipeline.stages import ExecutionRequirements, Progress, Report, Run
 from manikin.pipeline.stages.contact_stage import plan_contacts, plan_contacts_again, slower
 from manikin.pipeline.stages.context import StageFailure
 from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, execute_motion
+from manikin.pipeline.stages.operation_stage import run_operations
 from manikin.pipeline.stages.recovery_stage import recover_from_push
 from manikin.pipeline.stages.refinement_stage import from_rest_to_rest, is_hard, refine_contacts
 from manikin.pipeline.stages.walking_stage import walk_on_footprints, walk_to_goal
@@ -82,6 +83,8 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     """The whole road; contacts are planned where the scenario lists none, and none for a body that stays."""
     if context.scenario.file.recovery is not None:
         return RunResult.of(report, recovery=recover_from_push(context, report))
+    if context.scenario.file.task.operations is not None:
+        return run_operations(context, report, requirements, _follow_the_road)
     walking = context.scenario.file.walking
     if walking is not None and not walking.is_planned(context.scenario.file.supports):
         return RunResult.of(report, planned=walk_to_goal(context, report))

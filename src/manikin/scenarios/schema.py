@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from manikin.scenarios.sections.operation_sections import TaskSection, refused_operations
 from manikin.scenarios.sections.planning_sections import (
     WORDS,
     BodySection,
@@ -23,7 +24,6 @@ from manikin.scenarios.sections.task_sections import (
     ObstacleSection,
     PushSection,
     RecoverySection,
-    TaskSection,
     WalkingSection,
 )
 from manikin.scenarios.validation import (
@@ -146,6 +146,7 @@ class ScenarioFile(Section):
             act, limbs = self.task.act, self.contacts is not None and self.contacts.limbs
             refuse_if(act.on not in names, "task.act.on", f"is {act.on!r}; valid: {one_of}")
             refuse_if(limbs, "contacts.limbs", "are given beside task.act; valid: one of them")
+        self._check_operations()
         self._check_execution()
         self._check_recovery()
         self._check_walking()
@@ -174,6 +175,25 @@ class ScenarioFile(Section):
     def _refuse_given(self, keys: Sequence[str], problem: str, parent: str = "") -> None:
         for key in (parent + key for key in keys):
             refuse_if(attrgetter(key)(self) is not None, key, problem)
+
+    def _check_operations(self) -> None:
+        """Refuse operations in a wrong order, on what is not there, or beside another way to go."""
+        operations = self.task.operations
+        if operations is None:
+            return
+        if self.body.model != "human":
+            raise self._inapplicable("task.operations")
+        given = "is given beside task.operations; valid: one of them"
+        self._refuse_given(("supports", "walking", "recovery", "push", "task.act", "body.load"), given)
+        limbs = self.contacts is not None and self.contacts.limbs
+        refuse_if(limbs, "contacts.limbs", "are given beside task.operations; valid: leave them out")
+        refuse_if(
+            self.wholebody.method == "refine", "wholebody.method", "is refine; valid: follow, for operations"
+        )
+        refuse_if(self.execution.trials > 0, "execution.trials", "are asked for beside operations; valid: 0")
+        seated = self.task.start.posture == "seated"
+        for key, problem in refused_operations(operations, self.scene, seated):
+            raise refuse(f"task.{key}", problem)
 
     def _check_execution(self) -> None:
         """Refuse an execution of what cannot be executed, and none of what is nothing else."""

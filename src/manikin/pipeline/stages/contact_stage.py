@@ -23,6 +23,7 @@ from manikin.pipeline.stages.refinement_stage import HOLDING_ACCELERATION, HOLDI
 from manikin.planning import contacts, guide
 from manikin.planning.contacts import ContactPlan, Endpoint, Endpoints, Extension, Stage, WalkSearch
 from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
+from manikin.planning.whole_body import FREE_HANDS, Handling
 from manikin.planning.whole_body.posture_style import LADDER, posture_style_of
 from manikin.scenarios import Scenario
 from manikin.scenarios.found_supports import Pace, with_supports, without_rests
@@ -72,9 +73,13 @@ class _ContactSearch:
 class _FootSearch(_ContactSearch):
     """Search for the contacts of a human on its feet."""
 
-    def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
+    def __init__(
+        self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator,
+        begin: Stage | None = None, handling: Handling = FREE_HANDS,
+    ) -> None:  # fmt: skip
         super().__init__(scenario, body, scene, rng)
-        self._reference = posture_style_of(scenario.file.manner).posture(body)
+        self._begin = begin
+        self._reference = handling.applied(body, posture_style_of(scenario.file.manner).posture(body))
         asked = replace(self._asked(), forearms_beside=False)
         self._poser = contacts.PostureFinder(body, scene, self._reference, asked)
         self._places = self._endpoints(self._poser)
@@ -84,7 +89,7 @@ class _FootSearch(_ContactSearch):
         self._seat: Stage | None = None
 
     def run(self) -> ContactSearch:
-        start = stage_at(self._places, self._scenario, "start")
+        start = self._begin or stage_at(self._places, self._scenario, "start")
         if isinstance(start, str):
             return self._tally.failed(start, "start")
         goal = self._goal(start)
@@ -346,15 +351,21 @@ def _kind(body: BodyModel, limb: Limb) -> ContactKind:
 
 
 def find_supports(
-    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
-) -> ContactSearch:
+    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator,
+    begin: Stage | None = None, handling: Handling = FREE_HANDS,
+) -> ContactSearch:  # fmt: skip
     """Plan the contacts of a scenario that gives start and goal alone.
+
+    Args:
+        begin: Contacts and posture at the start, of a body on its feet; found when omitted.
+        handling: Joints that stay.
 
     Raises:
         BodyError: If the scenario names a limb that the body has not.
     """
-    search = _FootSearch if scenario.contact_limbs is None else _LimbSearch
-    return search(scenario, body, scene, rng).run()
+    if scenario.contact_limbs is None:
+        return _FootSearch(scenario, body, scene, rng, begin, handling).run()
+    return _LimbSearch(scenario, body, scene, rng).run()
 
 
 def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
@@ -367,7 +378,8 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     if scenario.contact_limbs is not None and not scenario.refines:
         raise scenario.error(("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs")
     report.progress("contacts", 0.0)
-    result = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
+    rng = np.random.default_rng(scenario.seed)
+    result = find_supports(scenario, context.body, context.scene, rng, context.start, context.handling)
     planned = _with_contacts(context, report, result)
     if planned is None or result.plan is None or scenario.contact_limbs is not None or scenario.refines:
         return planned

@@ -25,8 +25,14 @@ from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, SCENARIO, STAGES, SUMMARY, RunDirectory
 from manikin.pipeline.stages.contact_guides import ContactSearch
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
-from manikin.planning.contacts import ContactPlan
-from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings
+from manikin.planning.contacts import ContactPlan, Stage
+from manikin.planning.whole_body import (
+    FREE_HANDS,
+    Handling,
+    RefineResult,
+    WholeBodyResult,
+    WholeBodySettings,
+)
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
@@ -154,6 +160,8 @@ class RunContext:
         plan: The contacts that were found from start and goal, or None.
         search_again: Searches on for other contacts without the change of a phase, which failed for a reason.
         passing: How the body passes changes of contact without rests; None where it rests at all of them.
+        start: Contacts and posture with which a motion before ended; None to find them.
+        handling: What the hands do, and what the motion takes over from the one before.
     """
 
     given: Scenario
@@ -166,6 +174,8 @@ class RunContext:
     plan: ContactPlan | None = None
     search_again: Callable[[int, str], ContactSearch] | None = None
     passing: "Passing | None" = None
+    start: Stage | None = None
+    handling: Handling = FREE_HANDS
 
     @property
     def resting(self) -> "RunContext | None":
@@ -303,7 +313,8 @@ class Report:
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "verdict": "failed", "planned": False, "proved": False, "succeeded": False, "failure": None,
             "requirements": [], "contacts": None, "centroidal": None, "wholebody": None, "act": None,
-            "execution": None, "trials": None, "push": None, "walk": None, "ergonomics": None, "wall_s": 0.0,
+            "operations": None, "execution": None, "trials": None, "push": None, "walk": None,
+            "ergonomics": None, "wall_s": 0.0,
         }  # fmt: skip
 
     @property
@@ -350,6 +361,10 @@ class Report:
     def require(self, stage: str, table: RequirementTable) -> None:
         """Take the requirements of a stage's result into the summary, in place of earlier ones."""
         self._tables[stage] = table
+
+    def table(self, stage: str) -> RequirementTable:
+        """Requirements of a stage's result; empty where there are none."""
+        return self._tables.get(stage, RequirementTable(()))
 
     def finish(self, stage: str, block: Mapping[str, Any]) -> None:
         """Take a stage's block into the summary, and keep it."""
@@ -413,11 +428,15 @@ class Report:
             self.directory.write(SUMMARY, self.summary)
         return self.summary
 
-    def judge(self) -> None:
-        """A run that broke a requirement, or did not come to what was asked for, has failed."""
+    def judge_requirements(self) -> None:
+        """A run that broke a requirement has failed."""
         for stage, table in self._tables.items():
             if self.failure is None and (broken := table.first_broken) is not None:
                 self.fail(stage, broken.reason, broken.time_s or 0.0, broken.where)
+
+    def judge(self) -> None:
+        """A run that broke a requirement, or did not come to what was asked for, has failed."""
+        self.judge_requirements()
         required = self._context.scenario.execution_required
         if self.failure is None and not (self.proved if required else self.planned):
             stage = "execution" if required else "wholebody"

@@ -11,7 +11,7 @@ from manikin.pipeline.stages.whole_body_stage import certificate_summary, report
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.contacts.contact_plan import Paces
 from manikin.planning.contacts.footsteps import HIGHEST
-from manikin.planning.whole_body import RefineResult, RefineScales, RefineSettings, refine_motion
+from manikin.planning.whole_body import FREE_HANDS, RefineResult, RefineScales, RefineSettings, refine_motion
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.swing_planner import with_mid_flights
 from manikin.scenarios.planned import STATURE
@@ -55,6 +55,8 @@ HOLDING_PACE, HOLDING_ACCELERATION = 1.0, 1.0
 def from_rest_to_rest(context: RunContext) -> RunContext | None:
     """The task of a person on whole soles and hands with time to rest at every change of them, or None."""
     plan, scenario = context.plan, context.scenario
+    if context.handling is not FREE_HANDS:  # the refinement knows nothing of hands that hold something
+        return None
     if plan is None or context.body.stature is None or scenario.contacts.forefoot_m is not None:
         return None
     names = set[str]().union(*(stage.contacts for stage in plan.stages))

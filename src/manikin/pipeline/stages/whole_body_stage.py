@@ -294,7 +294,7 @@ def follow_centre_of_mass(
     result = plan_whole_body(
         context.body, context.scene, trajectory, rng=rng, settings=context.settings,
         padded=context.padded, waypoints=plan.postures,
-        known=_known_postures(context, plan, trajectory.schedule),
+        known=_known_postures(context, plan, trajectory.schedule), handling=context.handling,
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     if result.trajectory is not trajectory:

@@ -7,6 +7,7 @@ from manikin.planning.whole_body.certificate import (
     WholeBodyRequirements,
 )
 from manikin.planning.whole_body.fit_scales import FitScales, RefineScales
+from manikin.planning.whole_body.handling import FREE_HANDS, HandCourse, Handling, HeldObject
 from manikin.planning.whole_body.key_postures import (
     Eligibility,
     KeyPosture,
@@ -21,8 +22,9 @@ from manikin.planning.whole_body.seated import SeatedContinuation, continue_seat
 from manikin.planning.whole_body.swing_planner import PlannedSwing
 
 __all__ = [
-    "Eligibility", "FitScales", "KeyPosture", "KeyPostures", "MotionCertificate", "PlannedSwing",
-    "RefineMeasures", "RefineRequirements", "RefineResult", "RefineScales", "RefineSettings",
-    "SeatedContinuation", "WholeBodyFailure", "WholeBodyRequirements", "WholeBodyResult", "WholeBodySettings",
-    "continue_seated", "find_eligible_plan", "find_key_postures", "plan_whole_body", "refine_motion",
+    "FREE_HANDS", "Eligibility", "FitScales", "HandCourse", "Handling", "HeldObject", "KeyPosture",
+    "KeyPostures", "MotionCertificate", "PlannedSwing", "RefineMeasures", "RefineRequirements",
+    "RefineResult", "RefineScales", "RefineSettings", "SeatedContinuation", "WholeBodyFailure", "WholeBodyRequirements",
+    "WholeBodyResult", "WholeBodySettings", "continue_seated", "find_eligible_plan", "find_key_postures",
+    "plan_whole_body", "refine_motion",
 ]  # fmt: skip

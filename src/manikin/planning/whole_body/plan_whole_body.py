@@ -36,6 +36,7 @@ from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_targets import (
     FLAT_TOES,
+    EffectorTarget,
     FitTargets,
     LowFlights,
     effector_targets,
@@ -44,6 +45,7 @@ from manikin.planning.whole_body.fit_targets import (
     lay_toes_flat,
     toe_angles,
 )
+from manikin.planning.whole_body.handling import FREE_HANDS, Handling
 from manikin.planning.whole_body.key_postures import KeyPostures
 from manikin.planning.whole_body.posture_style import (
     CLOSE,
@@ -72,6 +74,9 @@ again."""
 
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
+
+HELD_JOINT = 2.0e-3
+"""Deviation of a joint that stays from its angle that costs one unit [rad]."""
 
 STRENGTH_STEP = 0.05
 """By how much less of the strength a fit may use where the one before was too strong all the same."""
@@ -144,7 +149,7 @@ def plan_whole_body(
     body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, *, rng: np.random.Generator,
     settings: WholeBodySettings | None = None, padded: Sequence[str] = (),
     known: Guide | None = None, waypoints: KeyPostures | None = None,
-    progress: Progress | None = None,
+    handling: Handling = FREE_HANDS, progress: Progress | None = None,
 ) -> WholeBodyResult:  # fmt: skip
     """Find a whole-body motion that keeps contacts, centre of mass and distances.
 
@@ -158,6 +163,7 @@ def plan_whole_body(
             manner's when omitted.
         waypoints: Postures of the plan's key instants, which lead the motion where one that is led by
             the manner is caught on the wrong side of an obstacle.
+        handling: What the hands do, and the posture in which the motion begins.
         progress: Called now and then with the share done.
 
     Returns:
@@ -172,7 +178,10 @@ def plan_whole_body(
     keys = [] if known is None else resting_keys(body, trajectory, known)
     if known is not None and len(keys) > 2:
         known = known.resting(trajectory.schedule.instants[keys])
-    planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), leaning, known, led)
+    if known is not None and handling.begin is not None:
+        known = known.through(trajectory.schedule.instants[0], handling.begin)
+    settings = settings or WholeBodySettings()
+    planner = _Planner(body, scene, trajectory, rng, settings, leaning, known, led, handling)
     if len(keys) > 2:
         return _in_parts(planner, keys, began, tell)
     return planner.run(planner.swings(), began, tell)
@@ -208,7 +217,7 @@ class _Goal:
         begin, end = planner.instants[[0, -1]].tolist()
         time = np.linspace(begin, end, max(2, round((end - begin) / planner.settings.sampling) + 1))
         motion, wrench = full_motion(planner.body, schedule, planner.polytopes, time, *spline.evaluate(time))
-        ignored = ignored_pairs(planner.body, planner.scene, schedule, time)
+        ignored = planner.ignored(time)
         if planner.leaning:
             ignored = tuple(pairs | planner.leaning for pairs in ignored)
         return motion, certify(
@@ -238,13 +247,15 @@ class _Goal:
             reference[:, 7 + joint] *= 1.0 - flat
             scale[:, 6 + joint] *= (FLAT_TOES / scale[:, 6 + joint]) ** flat
         lay_toes_flat(planner.toes(self.swings, time), reference, scale)
+        reference = planner.handling.applied(planner.body, reference)
+        scale[:, [6 + joint for joint in planner.handling.angles(planner.body)]] = HELD_JOINT
         return FitTargets(
-            time, schedule, effector_targets(schedule, self.swings, time), trajectory.position(time),
+            time, schedule, planner.effectors(self.swings, time), trajectory.position(time),
             # Importance of a centre of mass that only shows the way.
             com_weight=np.where(trajectory.binds(time), 1.0, 0.01),
             com_acceleration=trajectory.acceleration(time), margin=planner.planned_margins(time),
             reference=reference, reference_scale=scale,
-            ignored=ignored_pairs(planner.body, planner.scene, schedule, time),
+            ignored=planner.ignored(time),
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             ends=planner.ends, settles=planner.settles,
@@ -262,10 +273,10 @@ class _Planner:
     def __init__(
         self, body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, rng: np.random.Generator,
         settings: WholeBodySettings, leaning: Ignored = frozenset(), known: Guide | None = None,
-        waypoints: Guide | None = None,
+        waypoints: Guide | None = None, handling: Handling = FREE_HANDS,
     ) -> None:  # fmt: skip
-        self.ends: Ends = (None, None)
-        self.settles, self.rng = False, rng
+        self.ends: Ends = (handling.begin, None)
+        self.settles, self.rng, self.handling = handling.settles, rng, handling
         self.instants = trajectory.schedule.instants
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
         self.leaning, self.known, self.waypoints = leaning, known, waypoints
@@ -301,8 +312,9 @@ class _Planner:
             None if guide is None else guide.retimed(before, after) for guide in (self.known, self.waypoints)
         )
         return _Planner(
-            self.body, self.scene, trajectory, self.rng, self.settings, self.leaning, known, waypoints
-        )
+            self.body, self.scene, trajectory, self.rng, self.settings, self.leaning, known, waypoints,
+            self.handling,
+        )  # fmt: skip
 
     def swings(self) -> tuple[PlannedSwing, ...]:
         """Every flight that the motion has to do with; a foot rolls in the phases beside its flight."""
@@ -408,15 +420,30 @@ class _Planner:
         time = split_spans(self.instants, self.settings.guide_spacing)
         toes, reference = self.toes(swings, time), self._reference(time, manner, known)
         lay_toes_flat(toes, reference)
+        reference, held = self.handling.applied(self.body, reference), self.handling.angles(self.body)
         # A guide that lags behind postures at rest at their ends would have to catch up there.
-        exact = tuple(toes) if known is None or known.rates is None else range(self.body.nq - 7)
+        exact = (*toes, *held) if known is None or known.rates is None else range(self.body.nq - 7)
         com = self.trajectory.position(time)
         com[~self.trajectory.binds(time)] = np.nan  # The body is safe without one.
         return plan_guide(
-            self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time), com,
-            ignored_pairs(self.body, self.scene, schedule, time), reference,
+            self.body, self.proximity, schedule, time, self.effectors(swings, time), com,
+            self.ignored(time), reference,
             self.settings.fit.safe_distance, manner, exact, restarts,
         )  # fmt: skip
+
+    def ignored(self, time: FloatArray) -> tuple[Ignored, ...]:
+        """Pairs that may touch at each time (n,) [s]: of contacts, and of hands with an object."""
+        touches, pairs = self.handling.touches, ignored_pairs(
+            self.body, self.scene, self.trajectory.schedule, time
+        )  # fmt: skip
+        return tuple(found | touches for found in pairs) if touches else pairs
+
+    def effectors(self, swings: tuple[PlannedSwing, ...], time: FloatArray) -> dict[str, EffectorTarget]:
+        """Target of every effector that has a task: on contacts, in flight, or on an object."""
+        begin, end = self.trajectory.schedule.instants[[0, -1]].tolist()
+        return effector_targets(self.trajectory.schedule, swings, time) | self.handling.targets(
+            time, begin, end
+        )
 
     def toes(self, swings: tuple[PlannedSwing, ...], time: FloatArray) -> dict[int, FloatArray]:
         """Angles (n,) of the joints of toes that stay flat [rad], see :func:`toe_angles`."""

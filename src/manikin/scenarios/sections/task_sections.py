@@ -175,6 +175,7 @@ class ObstacleSection(Section):
     padded: Annotated[bool, Field(strict=True)] = preset(
         False, "whether any part of the body may lean on it, as on a seat"
     )
+    mass_kg: Positive | None = optional("mass of a box that operations may take up [kg]")
     position: Annotated[Vector3, FrameMoves.POINT] = preset((0.0, 0.0, 0.0), "origin in the world [m]")
     rpy_deg: Annotated[Vector3, FrameMoves.ORIENTATION] = preset(
         (0.0, 0.0, 0.0), "fixed-axis roll, pitch, yaw [deg]"
@@ -368,26 +369,3 @@ class ActSection(Section):
         if not any(direction) or direction[2] != 0.0:
             raise rule_error("a direction that is level (its z 0) and not zero")
         return direction
-
-
-class TaskSection(Section):
-    """From where to where, and what is done there."""
-
-    start: StateSection = required("state at the beginning, at rest")
-    goal: StateSection = required(
-        "state at the end, at rest; found, and may be left out, with an act and no supports"
-    )
-    act: ActSection | None = optional(
-        "what the hands do to an object at the end; where to stand for it is found"
-    )
-    pace: Literal["slow", "comfortable", "brisk"] = preset(
-        "comfortable", "how fast a body goes on its feet between contacts that are found"
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _goal_of_act(cls, data: Any) -> Any:
-        """Leave the goal of an act to the planner."""
-        if isinstance(data, dict) and data.get("act") is not None and "goal" not in data and "start" in data:
-            return {**data, "goal": data["start"]}
-        return data
