@@ -168,7 +168,7 @@ def _palms(body: BodyModel, part: OperationMotion, begin: float) -> Iterator[Req
 
 
 def _palm_error(body: BodyModel, part: OperationMotion, row: int) -> float:
-    """Distance of palms from their places in a sample; of what they hold, how far from it they are apart [m]."""
+    """Distance of palms from their places in a sample, or of their distance from a breadth [m]."""
     state = Configuration(body, part.q[row])
     if part.held is not None:
         left, right = (state.effector_placement(hand)[1] for hand in ("left_hand", "right_hand"))

@@ -24,7 +24,7 @@ from manikin.planning.whole_body.swing_planner import PlannedSwing
 __all__ = [
     "FREE_HANDS", "Eligibility", "FitScales", "HandCourse", "Handling", "HeldObject", "KeyPosture",
     "KeyPostures", "MotionCertificate", "PlannedSwing", "RefineMeasures", "RefineRequirements",
-    "RefineResult", "RefineScales", "RefineSettings", "SeatedContinuation", "WholeBodyFailure", "WholeBodyRequirements",
-    "WholeBodyResult", "WholeBodySettings", "continue_seated", "find_eligible_plan", "find_key_postures",
-    "plan_whole_body", "refine_motion",
+    "RefineResult", "RefineScales", "RefineSettings", "SeatedContinuation", "WholeBodyFailure",
+    "WholeBodyRequirements", "WholeBodyResult", "WholeBodySettings", "continue_seated",
+    "find_eligible_plan", "find_key_postures", "plan_whole_body", "refine_motion",
 ]  # fmt: skip
