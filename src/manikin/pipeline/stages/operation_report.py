@@ -1,7 +1,7 @@
 """Motions of operations as one motion: measured, certified and reported, with the interval of each one."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -117,9 +117,18 @@ def _load(body: BodyModel, part: OperationMotion) -> CarriedLoad:
 
 
 def report_operations(
-    report: Report, body: BodyModel, parts: Sequence[OperationMotion], motion: Motion
-) -> None:
-    """Report the worst value of every requirement, and the interval, load and margins of each operation."""
+    report: Report, body: BodyModel, parts: Sequence[OperationMotion], motion: Motion,
+    placed: Iterable[PlacedObject],
+) -> None:  # fmt: skip
+    """Report the worst value of every requirement, and the interval, load and margins of each operation.
+
+    Args:
+        report: Of the whole run.
+        body: With empty hands.
+        parts: Motions of the operations.
+        motion: All of them as one.
+        placed: Objects where they were set down.
+    """
     for stage in ("centroidal", "wholebody"):
         worst = dict[str, Requirement]()
         for begin, part in zip(begins(parts)[:-1], parts, strict=True):
@@ -128,7 +137,16 @@ def report_operations(
                 if row.key not in worst or _slack(row) < _slack(worst[row.key]):
                     worst[row.key] = row
         report.require(stage, RequirementTable(tuple(worst.values())))
-    report.finish("operations", {"list": list(_intervals(body, parts, motion))})
+    transform = report.transform
+    objects = [
+        {
+            "name": item.thing.name, "mass_kg": item.thing.mass,
+            "position": transform.points(item.place[:3]).tolist(),
+            "yaw_deg": transform.turned(math.degrees(item.yaw)),
+        }
+        for item in placed
+    ]  # fmt: skip
+    report.finish("operations", {"list": list(_intervals(body, parts, motion)), "objects": objects})
 
 
 def _timed(row: Requirement, part: OperationMotion, begin: float) -> Requirement:

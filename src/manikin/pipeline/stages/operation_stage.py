@@ -95,7 +95,7 @@ def run_operations(
     if not job.parts:
         return RunResult.of(report)
     planned, executed = joined(context.body, job.parts), context.scenario.execution_required
-    report_operations(report, context.body, job.parts, planned.motion)
+    report_operations(report, context.body, job.parts, planned.motion, job.placed)
     report.planned = report.failure is None
     report.keep_motions(planned.schedule, planned.motion)
     report.judge_requirements()
@@ -126,6 +126,11 @@ class _Operations:
         self._placed: dict[str, PlacedObject] = {}
         self._number, self._name = 0, ""
         self.parts, self.acting = list[OperationMotion](), None
+
+    @property
+    def placed(self) -> list[PlacedObject]:
+        """Objects that were set down, where they rest."""
+        return list(self._placed.values())
 
     def plan(self) -> None:
         """Plan every operation; _Refused at the first that cannot be done."""
