@@ -8,8 +8,8 @@ from manikin.planning.whole_body.handling import (
     ASIDE,
     CourseKind,
     HandCourse,
-    HeldObject,
     Handling,
+    HeldObject,
     held_arms,
     minimum_jerk,
 )
@@ -56,7 +56,7 @@ def test_what_is_held_moves_as_a_rigid_thing():
 
 @pytest.mark.parametrize("rises_first", [True, False])
 def test_a_box_is_taken_off_and_put_on_a_surface_vertically(rises_first):
-    """While it moves level by less than a millimetre, it has left, or will still come down, by centimetres."""
+    """While it moves level by less than a millimetre, it moves up, or down, by centimetres."""
     place = course(rises_first=rises_first).object_at(SHARE)
     np.testing.assert_allclose(place[[0, -1]], [START, END], atol=1e-12)
     end = START if rises_first else END
