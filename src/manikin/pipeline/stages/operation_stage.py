@@ -99,8 +99,9 @@ def run_operations(
     report.planned = report.failure is None
     report.keep_motions(planned.schedule, planned.motion)
     report.judge_requirements()
+    # The engine has what is taken up as masses in the hands alone.
+    context = replace(job.acting or context, scene=job.fixed_scene())
     if report.failure is None and job.acting is not None:
-        context = job.acting
         planned = append_act(context, report, planned)
     if report.failure is not None or not executed:
         return RunResult.of(report, planned=planned.motion)
@@ -131,6 +132,17 @@ class _Operations:
     def placed(self) -> list[PlacedObject]:
         """Objects that were set down, where they rest."""
         return list(self._placed.values())
+
+    def fixed_scene(self) -> Scene:
+        """The scene without anything that is taken up."""
+        scenario = self._context.scenario
+        taken = {item.content.object for item in scenario.file.task.operations or [] if item.grasp}
+        rest = [
+            item.model_dump(mode="json", exclude_none=True)
+            for item in scenario.file.scene if item.name not in taken
+        ]  # fmt: skip
+        standing = {"start": self._standing, "goal": self._standing}
+        return scenario.replaced(scene=rest, task=standing).build_scene()
 
     def plan(self) -> None:
         """Plan every operation; _Refused at the first that cannot be done."""
