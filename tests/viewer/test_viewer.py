@@ -101,6 +101,71 @@ def test_playing_runs_at_the_chosen_speed_and_stops_at_the_end(session):
     assert not session.playing
 
 
+def test_a_loop_begins_again_and_a_step_stops(session):
+    session.looping = True
+    session.play()
+    session.advance(100.0)
+    assert (session.time, session.playing) == (session.motion.time[0], True)
+    session.step(0.25)
+    assert (session.time, session.playing) == (0.25, False)
+    session.step(-1.0)
+    assert session.time == session.motion.time[0]
+
+
+class Visitor:
+    """A browser's camera, as the server knows it."""
+
+    def __init__(self):
+        self.up_direction = (0.0, 0.0, 1.0)
+        self.position, self.look_at = np.array([3.0, 0.0, 1.0]), np.zeros(3)
+        self.camera = self
+
+
+def test_cameras_look_from_where_they_are_asked_and_follow_the_body(session, monkeypatch):
+    """From the front the camera is ahead on the way; then it keeps its place relative to the CoM."""
+    visitor = Visitor()
+    monkeypatch.setattr(session.server, "get_clients", lambda: {0: visitor})
+    com, way = session.motion.com, session.motion.com[-1] - session.motion.com[0]
+    session.show(0.0)
+    for view, sign in (("front", 1.0), ("behind", -1.0)):
+        session.look(view)
+        np.testing.assert_allclose(visitor.look_at, com[0])
+        assert sign * (visitor.position - com[0])[:2] @ way[:2] > 0.0
+    session.show(1.0)
+    np.testing.assert_allclose(visitor.position[:2] - com[0][:2], (visitor.position - visitor.look_at)[:2])
+    session.following, before = True, visitor.position - com[session._sample(session.motion)]
+    session.show(3.0)
+    np.testing.assert_allclose(visitor.position - com[session._sample(session.motion)], before, atol=1e-12)
+    with pytest.raises(InputError, match="valid: front, behind, left, right, above"):
+        session.look("below")
+
+
+def test_segments_are_coloured_by_the_largest_share_of_their_joints(finished_run):
+    """A knee at its limit is red, one without torque grey; else the sides have their colours."""
+    from manikin.viewer.canvas import SHARES, side_colour
+    from manikin.viewer.session import ViewerSession
+
+    body, motion = finished_run.body, finished_run.executed
+    knee = body.joint_index("left_knee_flexion")
+    tau = np.zeros_like(motion.tau)
+    tau[:, 6 + knee] = body.torque_upper[knee]
+    viewer = ViewerSession(replace(finished_run, executed=replace(motion, tau=tau)), Door(0))
+    try:
+        viewer.show_torques(True)
+        colours = dict(zip(viewer._shapes.frames, (m.color for m in viewer._shapes._meshes), strict=True))
+        assert tuple(colours["left_leg"]) == tuple(SHARES[2])
+        assert tuple(colours["right_leg"]) == tuple(SHARES[0])
+        assert all(frame.visible for frame in viewer._shapes.frames.values())
+        viewer.plot("left_knee_flexion")
+        np.testing.assert_allclose(viewer._plot_values[-1], 1.0)
+        viewer.show_torques(False)
+        assert tuple(viewer._shapes._meshes[0].color) == side_colour(next(iter(colours)))
+        with pytest.raises(InputError, match="valid: margin, "):
+            viewer.plot("knee")
+    finally:
+        viewer.close()
+
+
 def test_motions_can_be_switched(session):
     session.show(1.0)
     session.choose("planned")

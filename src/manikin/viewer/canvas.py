@@ -120,6 +120,25 @@ def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) ->
     camera.position = middle + max(1.0, size / WHOLE) * VIEW
 
 
+def look_from(server: viser.ViserServer, middle: FloatArray, offset: FloatArray) -> None:
+    """Let every visitor look at a point (3,) from there and an offset (3,) [m]."""
+    for camera in _cameras(server):
+        camera.up_direction = (0.0, 0.0, 1.0)
+        camera.position = middle + offset
+        camera.look_at = middle
+
+
+def carry_cameras(server: viser.ViserServer, offset: FloatArray) -> None:
+    """Move every visitor's camera, with what it looks at, by an offset (3,) [m]."""
+    for camera in _cameras(server):
+        camera.position = camera.position + offset
+
+
+def _cameras(server: viser.ViserServer) -> list[viser.CameraHandle]:
+    """Cameras of the visitors; the server knows those whose browser has said where its camera is."""
+    return [client.camera for client in server.get_clients().values()]
+
+
 OPAQUE = 0.7
 """A surface is drawn opaque from this opacity of the shapes on."""
 
@@ -157,6 +176,20 @@ class BodyShapes:
         """Give the whole body one colour, other than those of its sides or clothes."""
         for mesh in (*self._meshes, *self._surface):
             mesh.color = colour
+
+    def paint_shares(self, shares: FloatArray | None) -> None:
+        """Colour the shapes by the largest share of the joints of each segment.
+
+        Args:
+            shares: (nv - 6,) torques over their limits, or None for the colours of the sides.
+        """
+        index = self._body.joint_index
+        for name, mesh in zip(self.frames, self._meshes, strict=True):
+            if shares is None:
+                mesh.color = side_colour(name)
+            else:
+                joints = [index(hinge.name) for hinge in self._body.segment(name).hinges]
+                mesh.color = share_colour(float(shares[joints].max(initial=0.0)))
 
     def place(self, q: FloatArray) -> None:
         """Show the configuration (nq,)."""
@@ -218,3 +251,14 @@ def _add_surface(
 def side_colour(name: str) -> tuple[int, int, int]:
     """Colour of what belongs to a side of the body, by its name."""
     return next((COLOURS[side] for side in ("left", "right") if name.startswith(side)), COLOURS["trunk"])
+
+
+SHARES = np.array([(196, 202, 210), (240, 200, 60), (215, 48, 39), (110, 0, 30)])
+"""Colours of no torque, of half of the limit, of the limit, and of half more; between them it is blended."""
+
+
+def share_colour(share: float) -> tuple[int, int, int]:
+    """Colour of a torque over its limit."""
+    at = np.linspace(0.0, 1.5, len(SHARES))
+    red, green, blue = (round(float(np.interp(share, at, channel))) for channel in SHARES.T)
+    return red, green, blue

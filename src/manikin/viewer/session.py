@@ -1,9 +1,12 @@
 """One viewer in the browser: the scene, the body, the controls and their state."""
 
+import io
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import viser
+from PIL import Image
 from viser import uplot
 
 from manikin.errors import InputError
@@ -12,7 +15,17 @@ from manikin.motion.file import MotionFile
 from manikin.motion.motion import effector_positions
 from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import readable
-from manikin.viewer.canvas import COLOURS, BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
+from manikin.viewer.canvas import (
+    COLOURS,
+    BodyShapes,
+    Page,
+    add_arrow,
+    add_scene,
+    carry_cameras,
+    look_at,
+    look_from,
+    side_colour,
+)
 from manikin.viewer.door import Door
 
 FRAME_RATE = 30.0
@@ -27,6 +40,13 @@ BESIDE = 1.2
 """Distance of the motion beside from the motion shown [m]."""
 NOTHING = "nothing"
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
+STEPS = {"-0.1 s": -0.1, "-0.01 s": -0.01, "+0.01 s": 0.01, "+0.1 s": 0.1}
+MARGIN = "margin"
+VIEWS = {"front": (2.8, 0.0, 0.4), "behind": (-2.8, 0.0, 0.6), "left": (0.0, 2.8, 0.2),
+         "right": (0.0, -2.8, 0.2), "above": (-0.05, 0.0, 4.0)}  # fmt: skip
+"""Where the camera stands from the centre of mass: ahead on the way, to its left, upward [m]."""
+LARGEST_PICTURE = (1080, 1920)
+"""Height and width of a picture, at most [pixels]."""
 
 
 class ViewerSession(Page):
@@ -37,6 +57,8 @@ class ViewerSession(Page):
         time: Instant shown [s].
         playing: Whether time runs.
         speed: Seconds of motion per second.
+        looping: Whether time begins again at the end.
+        following: Whether the cameras go along with the centre of mass.
     """
 
     def __init__(
@@ -56,7 +78,8 @@ class ViewerSession(Page):
         self.content, self._body = content, content.body
         self.chosen = list(content.motions)[-1]
         self.beside = "recorded" if content.recorded is not None and self.chosen != "recorded" else NOTHING
-        self.playing, self.speed = False, 1.0
+        self.playing, self.speed, self.looping, self.following = False, 1.0, False, False
+        self._torques, self.plotted = False, MARGIN
         self._feet: dict[str, FloatArray] = {}
         if content.body.is_point_mass:
             names = self.motion.contact_names
@@ -82,10 +105,15 @@ class ViewerSession(Page):
         """Show the instant ``time`` [s], held inside the motion."""
         with self._lock:
             motion = self.motion
+            before = motion.com[self._sample(motion)]
             self.time = float(np.clip(time, motion.time[0], motion.time[-1]))
             index = self._sample(motion)
+            if self.following:
+                carry_cameras(self.server, motion.com[index] - before)
             with self.server.atomic():
                 self._shapes.place(motion.q[index])
+                if self._torques:
+                    self._shapes.paint_shares(self._body.torque_share(motion.tau[index, 6:]))
                 self._place_legs(motion, index)
                 self._place_forces(motion, index)
                 self._com.position = motion.com[index]
@@ -124,10 +152,10 @@ class ViewerSession(Page):
             self.show(self.time)
 
     def show_shapes(self, wanted: bool) -> None:
-        """Show the collision shapes of the bodies instead of their surfaces."""
+        """Show the collision shapes of the bodies instead of their surfaces; torques are shown on shapes."""
         with self._lock:
             for shapes in (self._shapes, self._second, *(item for item, _ in self._others)):
-                shapes.show_shapes(wanted)
+                shapes.show_shapes(wanted or (shapes is self._shapes and self._torques))
 
     def play(self) -> None:
         """Let time run, from the beginning when it is at the end."""
@@ -149,8 +177,66 @@ class ViewerSession(Page):
             if not self.playing:
                 return
             self.show(self.time + seconds * self.speed)
-            if self.time >= self.motion.time[-1]:
+            if self.time >= self.motion.time[-1] and self.looping:
+                self.show(float(self.motion.time[0]))
+            elif self.time >= self.motion.time[-1]:
                 self.pause()
+
+    def step(self, seconds: float) -> None:
+        """Stop, and show what is so much later, or earlier if it is negative [s]."""
+        self.pause()
+        self.show(self.time + seconds)
+
+    def look(self, view: str) -> None:
+        """Let every visitor look from one of :data:`VIEWS`.
+
+        Raises:
+            InputError: If there is no such view.
+        """
+        if view not in VIEWS:
+            raise InputError(f"view is {view!r}; valid: {', '.join(VIEWS)}")
+        with self._lock:
+            left = _across(self.motion.com)
+            ahead = np.array([left[1], -left[0]])
+            forward, aside, up = VIEWS[view]
+            middle = self.motion.com[self._sample(self.motion)]
+            look_from(self.server, middle, np.append(forward * ahead + aside * left, up))
+
+    def show_torques(self, wanted: bool) -> None:
+        """Colour the shapes of the body by the shares of the joints' torques, or as they are."""
+        with self._lock:
+            self._torques = wanted
+            if not wanted:
+                self._shapes.paint_shares(None)
+            self.show_shapes(self._shapes_box.value)
+            self.show(self.time)
+
+    def plot(self, quantity: str) -> None:
+        """Plot the margin, or the torque of a joint over its limit, of all motions of the file.
+
+        Raises:
+            InputError: If the body has no such joint.
+        """
+        if quantity not in (MARGIN, *self._body.joint_names):
+            joints = ", ".join(self._body.joint_names)
+            raise InputError(f"quantity is {quantity!r}; valid: {MARGIN}, {joints}")
+        with self._lock:
+            self.plotted = quantity
+            self._plot.remove()
+            self._build_plot()
+            self.show(self.time)
+
+    def send_picture(self, client: viser.ClientHandle) -> None:
+        """Let a visitor's browser draw what it shows as a PNG file, and keep it."""
+        height, width = (
+            min(seen, most)
+            for seen, most in zip(
+                (client.camera.image_height, client.camera.image_width), LARGEST_PICTURE, strict=True
+            )
+        )
+        file = io.BytesIO()
+        Image.fromarray(client.get_render(height, width, transport_format="png")).save(file, "PNG")
+        client.send_file_download(f"{self.chosen}-{self.time:.3f}s.png", file.getvalue())
 
     # --- what stands still ---------------------------------------------------------------
 
@@ -232,31 +318,63 @@ class ViewerSession(Page):
         with gui.add_folder("Playback"):
             self._slider = gui.add_slider("time [s]", min=0.0, max=last, step=0.001, initial_value=self.time)
             self._button = gui.add_button("Play")
+            steps = gui.add_button_group("step", tuple(STEPS))
             speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+            loop = gui.add_checkbox("loop", initial_value=False)
             motions = gui.add_dropdown("motion", tuple(self.content.motions), initial_value=self.chosen)
             beside = gui.add_dropdown("beside", (NOTHING, *self.content.motions), initial_value=self.beside)
+        with gui.add_folder("View"):
+            views = gui.add_button_group("from", tuple(VIEWS))
+            follow = gui.add_checkbox("follow the body", initial_value=False)
             self._forces = gui.add_checkbox("contact forces", initial_value=True)
-            shapes = gui.add_checkbox("collision shapes", initial_value=not self._shapes.has_surface)
-            shapes.visible = self._shapes.has_surface
+            self._shapes_box = gui.add_checkbox(
+                "collision shapes", initial_value=not self._shapes.has_surface
+            )
+            self._shapes_box.visible = self._shapes.has_surface
+            torques = gui.add_checkbox("colour by torque", initial_value=False)
+            torques.hint = "Torque over its limit: grey none, yellow half, red all of it, dark more"
+            picture = gui.add_button("Save a picture")
         with gui.add_folder("Now"):
             self._text = gui.add_markdown("")
-        with gui.add_folder("Margin"):
-            self._build_plot()
+        self._plot_folder = gui.add_folder("Over time")
+        with self._plot_folder:
+            plotted = gui.add_dropdown(
+                "of", (MARGIN, *self._body.joint_names), initial_value=MARGIN,
+                hint="The margin, or the torque of a joint over its limit.",
+            )  # fmt: skip
+        self._build_plot()
         # The slider is followed unless it was this session that moved it.
         self._slider.on_update(lambda event: None if event.client is None else self.show(self._slider.value))
         self._button.on_click(lambda _: self.pause() if self.playing else self.play())
+        steps.on_click(lambda _: self.step(STEPS[steps.value]))
         speed.on_update(lambda _: setattr(self, "speed", float(speed.value)))
+        loop.on_update(lambda _: setattr(self, "looping", loop.value))
         motions.on_update(lambda _: self.choose(motions.value))
         beside.on_update(lambda _: self.put_beside(beside.value))
+        views.on_click(lambda _: self.look(views.value))
+        follow.on_update(lambda _: setattr(self, "following", follow.value))
         self._forces.on_update(lambda _: self.show(self.time))
-        shapes.on_update(lambda _: self.show_shapes(shapes.value))
+        self._shapes_box.on_update(lambda _: self.show_shapes(self._shapes_box.value))
+        torques.on_update(lambda _: self.show_torques(torques.value))
+        picture.on_click(lambda event: None if event.client is None else self.send_picture(event.client))
+        plotted.on_update(lambda _: self.plot(plotted.value))
+
+    def _quantity(self, motion: Motion) -> FloatArray:
+        """(n,) what is plotted of a motion."""
+        if self.plotted == MARGIN:
+            return motion.margin
+        return self._body.torque_share(motion.tau[:, 6:])[:, self._body.joint_index(self.plotted)]
 
     def _build_plot(self) -> None:
         motions = self.content.motions.values()
         start, end = min(motion.time[0] for motion in motions), max(motion.time[-1] for motion in motions)
         self._plot_time, outside = np.linspace(start, end, PLOT_POINTS), {"left": np.nan, "right": np.nan}
-        self._plot_margins = [np.interp(self._plot_time, of.time, of.margin, **outside) for of in motions]
-        known = np.concatenate([motion.margin for motion in motions])
+        values = [self._quantity(motion) for motion in motions]
+        self._plot_values = [
+            np.interp(self._plot_time, of.time, value, **outside)
+            for of, value in zip(motions, values, strict=True)
+        ]
+        known = np.concatenate(values)
         known = known[np.isfinite(known)]
         low, high = float(known.min(initial=0.0)), float(known.max(initial=1.0))
         self._plot_range = (low - 0.05 * (high - low), high + 0.05 * (high - low))
@@ -264,19 +382,21 @@ class ViewerSession(Page):
         series: list[Any] = [uplot.Series(label="time [s]")]
         series += [uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in colours.items()]
         series.append(uplot.Series(label="now", stroke="#555555", width=1.0, points={"show": False}))
-        margins = uplot.Scale(auto=False, range=self._plot_range)
-        self._plot = self.server.gui.add_uplot(
-            self._plot_data(self._plot_time[0]), tuple(series), aspect=1.35,
-            scales={"x": uplot.Scale(time=False, auto=True), "y": margins},
-            axes=(uplot.Axis(label="time [s]"), uplot.Axis(label=f"margin [{self.motion.margin_unit}]")),
-        )  # fmt: skip
+        scale = uplot.Scale(auto=False, range=self._plot_range)
+        label = f"margin [{self.motion.margin_unit}]" if self.plotted == MARGIN else "torque / limit"
+        with self._plot_folder:
+            self._plot = self.server.gui.add_uplot(
+                self._plot_data(self._plot_time[0]), tuple(series), aspect=1.35,
+                scales={"x": uplot.Scale(time=False, auto=True), "y": scale},
+                axes=(uplot.Axis(label="time [s]"), uplot.Axis(label=label)),
+            )  # fmt: skip
 
     def _plot_data(self, time: float) -> tuple[FloatArray, ...]:
-        """Time, margins, and a last row that stands up at the instant shown, as a cursor."""
+        """Time, values, and a last row that stands up at the instant shown, as a cursor."""
         low, high = self._plot_range
         cursor = np.full(PLOT_POINTS, low)
         cursor[int(np.argmin(np.abs(self._plot_time - time)))] = high
-        return (self._plot_time, *self._plot_margins, cursor)
+        return (self._plot_time, *self._plot_values, cursor)
 
     def _show_numbers(self, motion: Motion, index: int) -> None:
         self._slider.value = round(self.time, 3)
