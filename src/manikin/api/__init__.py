@@ -18,5 +18,6 @@ from manikin.body import human
 
 __all__ = [
     "Balance", "Comparison", "RecordedMotion", "Run", "adapt", "analyze", "balance", "compare",
-    "creature", "grasp", "human", "plan", "point", "push", "read", "scene", "simulate", "sole", "stance", "walk",
+    "creature", "grasp", "human", "plan", "point", "push", "read", "scene", "simulate", "sole", "stance",
+    "walk",
 ]  # fmt: skip

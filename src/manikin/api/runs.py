@@ -255,7 +255,8 @@ def adapt(
     from manikin.pipeline.adapt import adapt as adapted
 
     place = scene if scene is None or isinstance(scene, Scenario) else load_scene(scene)
-    analysis = analyze_file(path, AnalysisOptions(**{"as_recorded": True} | options))
+    options.setdefault("as_recorded", True)
+    analysis = analyze_file(path, AnalysisOptions(**options))
     kept = None if out is not None else TemporaryDirectory(prefix="manikin-")
     folder = Path(kept.name) / Path(path).stem if kept is not None else Path(str(out))
     task = AdaptationTask(scene=place, at=at, pace=pace, window=window)

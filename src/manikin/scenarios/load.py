@@ -182,8 +182,8 @@ def load_scene(name_or_path: str | Path) -> Scenario:
     tree = read_extended(path)
     if named is not None or not isinstance(tree.data, Mapping) or "scene" not in tree.data:
         return load_scenario(name_or_path)
-    rest = {"name": path.stem} | ({} if "task" in tree.data or "recovery" in tree.data else SOME_TASK)
-    return _build(Tree({**rest, **tree.data}, tree.lines), path)
+    rest = {} if "task" in tree.data or "recovery" in tree.data else SOME_TASK
+    return _build(Tree({"name": path.stem, **rest, **tree.data}, tree.lines), path)
 
 
 SOME_TASK: Mapping[str, Any] = {"task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}

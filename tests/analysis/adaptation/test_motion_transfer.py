@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.analysis.adaptation.conftest import nodding
 
 from manikin.analysis.adaptation import adapt_recording, recorded_on_contacts
 from manikin.analysis.adaptation_changes import AdaptationLimits, changes_of, flat_changes
@@ -20,7 +21,6 @@ from manikin.body import quadruped
 from manikin.errors import InputError
 from manikin.numerics.spatial import PlanarTransform
 from manikin.scene import Box, Obstacle, Scene
-from tests.analysis.adaptation.conftest import nodding
 
 STEP = 0.03
 
@@ -29,6 +29,12 @@ STEP = 0.03
 def source():
     """A person who stands and nods, on contacts."""
     return recorded_on_contacts(*nodding())
+
+
+def replace_placement(item, transform):
+    """The same obstacle, where it is in another frame."""
+    turn, place = transform.rotations(item.rotation), transform.points(item.translation)
+    return Obstacle(item.name, item.shape, turn, place)
 
 
 def raised(source, foot, height):
@@ -104,10 +110,7 @@ def test_a_foot_without_a_surface_says_so(source):
 def test_nothing_depends_on_where_the_origin_lies(source):
     """Carried to a place 10 m away and turned by 70 degrees, the motion is the same there."""
     transform, scene = PlanarTransform(10.0, -3.0, 70.0), raised(source, "left_foot", STEP)
-    turned = [
-        Obstacle(item.name, item.shape, transform.rotations(item.rotation), transform.points(item.translation))
-        for item in scene.obstacles if isinstance(item.shape, Box)
-    ]  # fmt: skip
+    turned = [replace_placement(item, transform) for item in scene.obstacles if isinstance(item.shape, Box)]
     there = carried_over(source, None, Scene(turned, floor_height=source.floor), transform)
     here = carried_over(source, None, scene)
     np.testing.assert_allclose(there.q, transform.poses(here.q), atol=1e-9)
