@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 from manikin.analysis.contact_adaptation import RAISED, effector_placements, scene_under
 from manikin.body import BodyModel, human
 from manikin.body.limbs import with_knees_and_elbows
+from manikin.body.strength import DEFAULT_AGE
 from manikin.contact import Contact, ContactKind, ContactModel, ContactSchedule, Phase, Stance, StanceSequence
 from manikin.errors import InputError, ManikinError
 from manikin.numerics.signals import mask_runs
@@ -121,8 +122,8 @@ def holds_of(schedule: ContactSchedule) -> Iterator[Hold]:
     for name in schedule.sequence.effectors:
         held = np.array([name in phase.stance for phase in schedule.sequence])
         for first, stop in mask_runs(held):
-            contact = schedule.sequence[first].stance[name]
-            yield Hold(name, first, stop, *schedule.instants[[first, stop]].tolist(), contact)
+            start, end = float(schedule.instants[first]), float(schedule.instants[stop])
+            yield Hold(name, first, stop, start, end, schedule.sequence[first].stance[name])
 
 
 def body_like(
@@ -141,7 +142,7 @@ def body_like(
     share = 1.0 if stature is None else stature / body.stature
     return human(
         body.stature * share, body.own_mass * share**2 if mass is None else mass, sex or body.sex,
-        age=body.age if age is None else age, strength=body.strength if strength is None else strength,
+        age=age or body.age or DEFAULT_AGE, strength=body.strength if strength is None else strength,
         sole_length=_scaled(body.sole_length, share), sole_width=_scaled(body.sole_width, share),
         lengths={name: share * length for name, length in body.lengths.items()},
         off_axis_masses=body.off_axis_masses,
