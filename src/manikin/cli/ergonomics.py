@@ -30,6 +30,10 @@ def ergonomics(
     json: JsonOption = False,
     csv: Annotated[Path | None, option("FILE", "Write scores, angles and torque shares over time.")] = None,
     figure: Annotated[Path | None, option("FILE", "Draw scores and torque shares as PNG.")] = None,
+    reach_mesh: Annotated[
+        Path | None,
+        option("FILE", "Write what both hands reach in the first posture as a mesh: STL, OBJ, PLY or GLB."),
+    ] = None,
     load_kg: Annotated[
         float | None, option("KG", "Load in the hands, as a mass. Default: that of the motion.")
     ] = None,
@@ -91,6 +95,10 @@ def ergonomics(
         from manikin.reports.figures import ergonomics_figure, save_figure
 
         save_figure(ergonomics_figure(result, f"Ergonomics of {source.resolve().stem}, {which}"), figure)
+    if reach_mesh is not None:
+        from manikin.reports.export import write_reach
+
+        write_reach(reach_mesh, body, motion.q[0])
     report = {"motion": which} | result.as_dict()
     if json:
         console.print_json(report)

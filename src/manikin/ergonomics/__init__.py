@@ -22,6 +22,7 @@ from manikin.ergonomics.load_report import LoadAssessment, loads_of
 from manikin.ergonomics.low_back import LowBack, low_back_load
 from manikin.ergonomics.owas import Owas, owas_category, owas_of
 from manikin.ergonomics.postural_angles import postural_angles, upright_neck
+from manikin.ergonomics.reach import ReachEnvelope, ReachUse, reach_envelopes, reach_use
 from manikin.ergonomics.report import Ergonomics, LowestMargin, ergonomics_of, lowest_margin
 from manikin.ergonomics.rula_reba import (
     Circumstances,
@@ -32,14 +33,16 @@ from manikin.ergonomics.rula_reba import (
     rula_action_level,
     rula_score,
 )
+from manikin.ergonomics.sight import Sight, sight_of, sight_zone
 from manikin.ergonomics.static_postures import StaticPostures, static_postures
 
 __all__ = [
     "Assessment", "CapableShare", "Circumstances", "Ergonomics", "HandPlace", "JointStrength", "Lift",
-    "LiftingIndex", "LoadAssessment", "LowBack", "LowestMargin", "Multipliers", "Owas", "RebaSteps",
-    "RulaSteps", "StaticPostures", "assess_posture", "bearing_of", "capable_share", "capable_shares",
-    "composite_index", "cumulative_effort", "ergonomics_of", "joint_strength", "lift_of",
-    "lifting_index", "loads_of", "low_back_load", "lowest_margin", "owas_category", "owas_of",
-    "postural_angles", "reba_action_level", "reba_score", "rula_action_level", "rula_score",
-    "static_postures", "upright_neck",
+    "LiftingIndex", "LoadAssessment", "LowBack", "LowestMargin", "Multipliers", "Owas", "ReachEnvelope",
+    "ReachUse", "RebaSteps", "RulaSteps", "Sight", "StaticPostures", "assess_posture", "bearing_of",
+    "capable_share", "capable_shares", "composite_index", "cumulative_effort", "ergonomics_of",
+    "joint_strength", "lift_of", "lifting_index", "loads_of", "low_back_load", "lowest_margin",
+    "owas_category", "owas_of", "postural_angles", "reach_envelopes", "reach_use", "reba_action_level",
+    "reba_score", "rula_action_level", "rula_score", "sight_of", "sight_zone", "static_postures",
+    "upright_neck",
 ]  # fmt: skip

@@ -15,7 +15,9 @@ from manikin.ergonomics.lift_of_motion import carried, heaviest, lift_of
 from manikin.ergonomics.lifting import LiftingIndex, lifting_index
 from manikin.ergonomics.low_back import LowBack, low_back_load
 from manikin.ergonomics.owas import Owas, owas_of
+from manikin.ergonomics.reach import ReachUse, reach_use
 from manikin.ergonomics.rula_reba import Circumstances
+from manikin.ergonomics.sight import ZONES, Sight, sight_of
 from manikin.ergonomics.static_postures import StaticPostures, static_postures
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
@@ -34,7 +36,9 @@ class LoadAssessment:
         lifting: Of a motion with a load in both hands that goes up or down.
         lift_times: Instants of the ends of that lift [s].
         capable: Who has the strength, by sex; of motions with torques.
-        missing: Reason by part: ``"low_back"``, ``"lifting"``, ``"capable"``.
+        missing: Reason by part: ``"low_back"``, ``"lifting"``, ``"capable"``, ``"sight"``.
+        sight: Where the hands are in the field of view, of a human.
+        reach: How much of their reach the hands use, of a human.
     """
 
     owas: Owas | None
@@ -44,6 +48,8 @@ class LoadAssessment:
     lift_times: tuple[float, float] | None
     capable: Mapping[str, CapableShare] | None
     missing: Mapping[str, str]
+    sight: Sight | None = None
+    reach: ReachUse | None = None
 
     def as_dict(self, time: FloatArray) -> dict[str, Any]:
         """JSON-ready values (SI) of a motion at times (n,) [s]."""
@@ -51,9 +57,12 @@ class LoadAssessment:
         lifting = None if self.lifting is None else self.lifting.as_dict()
         if lifting is not None and self.lift_times is not None:
             lifting |= {"from_s": self.lift_times[0], "to_s": self.lift_times[1]}
-        timed = {"owas": self.owas, "static_postures": self.static, "low_back": self.low_back}
+        timed = {
+            "owas": self.owas, "static_postures": self.static, "low_back": self.low_back, "sight": self.sight,
+        }  # fmt: skip
         found = {name: None if one is None else one.as_dict(weight) for name, one in timed.items()}
-        found |= {"lifting": lifting, "capable": None}
+        reach = None if self.reach is None else self.reach.as_dict(time)
+        found |= {"reach": reach, "lifting": lifting, "capable": None}
         if self.capable is not None:
             found["capable"] = {sex: one.as_dict() for sex, one in self.capable.items()}
         return found
@@ -71,6 +80,10 @@ class LoadAssessment:
             columns["l5s1_compression_N"] = self.low_back.compression
             columns["l5s1_shear_N"] = self.low_back.shear
             columns["l5s1_flexion_moment_Nm"] = self.low_back.flexion_moment
+        if self.sight is not None:
+            columns |= {f"{side}_hand_sight_zone": zone for side, zone in self.sight.zones.items()}
+        if self.reach is not None:
+            columns |= {f"{side}_reach_share": share for side, share in self.reach.shares.items()}
         return columns
 
 
@@ -88,8 +101,13 @@ def loads_of(
         schedule: Its contacts, with what is carried in single phases.
     """
     missing: dict[str, str] = {}
-    owas, static, back = None, None, None
+    owas, static, back, sight, reach = None, None, None, None, None
     if posture is not None:
+        reach = reach_use(body, motion.q)
+        try:
+            sight = sight_of(body, motion.q)
+        except BodyError as error:
+            missing["sight"] = str(error)
         owas = owas_of(body, motion, posture.angles, posture.bearing, given.load_kg)
         static = static_postures(motion.time, posture.angles)
         back = _low_back(body, motion, schedule, given, missing)
@@ -102,7 +120,7 @@ def loads_of(
             capable = capable_shares(body, motion.tau[rows, 6:], age=given.people_age)
         except BodyError as error:
             missing["capable"] = str(error)
-    return LoadAssessment(owas, static, back, lifting, instants, capable, missing)
+    return LoadAssessment(owas, static, back, lifting, instants, capable, missing, sight, reach)
 
 
 def _low_back(
@@ -155,6 +173,7 @@ def ergonomics_in_short(
         "l5s1_max_compression_N": None if back is None else back["max_compression_N"],
         "l5s1_level": None if back is None else back["level"],
         "lifting_index": None if lift is None else lift["index"],
+        "reach_max_share": max(found["reach"]["max_share"].values()),
         "capable_min_share": None if capable is None else {sex: capable[sex]["min_share"] for sex in capable},
     }  # fmt: skip
 
@@ -176,6 +195,14 @@ def load_lines(report: Mapping[str, Any]) -> dict[str, str]:
         lines["lifting index"] = (
             f"{index}: {lift['load_kg']:.1f} kg, recommended {lift['recommended_kg']:.1f} kg"
         )
+    if (sight := report["sight"]) is not None:
+        parts = (
+            f"{side} {sum(zones[str(one)] for one in ZONES if one < 2):.0%}" for side, zones in sight.items()
+        )
+        lines["hands seen without turning the head"] = ", ".join(parts) + " of the time"
+    if (reach := report["reach"]) is not None:
+        shares = (f"{side} {share:.0%}" for side, share in reach["max_share"].items())
+        lines["reach used at most"] = ", ".join(shares)
     if (groups := report["capable"]) is not None:
         shares = (
             f"{group['min_share']:.0%} of {name} ({readable(group['joint'])})"

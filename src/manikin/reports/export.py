@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from manikin.body import BodyModel
+from manikin.body import BodyModel, Configuration
+from manikin.ergonomics import reach_envelopes
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
@@ -306,6 +307,37 @@ def write_comparison_outputs(
     folder = ResultDirectory(directory, "comparison")
     folder.write(COMPARISON, comparison.as_dict())
     write_figures(comparison, folder.path, lambda share: progress("figures", share))
+
+
+REACH_FORMATS = (".stl", ".obj", ".ply", ".glb")
+"""Endings of the files of a reach."""
+
+
+def write_reach(path: str | Path, body: BodyModel, q: FloatArray, hand: str = "both") -> Path:
+    """Write what the hands of a person reach in a posture (nq,), the trunk still, as a mesh in the world.
+
+    Args:
+        path: File, one of :data:`REACH_FORMATS`.
+        body: With two arms.
+        q: Posture.
+        hand: ``"left"``, ``"right"`` or ``"both"``, what is within the reach of each.
+
+    Raises:
+        InputError: If the ending is another one.
+        MotionFileError: If the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in REACH_FORMATS:
+        raise InputError(
+            f"reach mesh is {path.name!r}; valid: a name that ends in {', '.join(REACH_FORMATS)}"
+        )
+    envelope = reach_envelopes(body)[hand]
+    to_world, mesh = np.eye(4), envelope.mesh
+    to_world[:3, :3], to_world[:3, 3] = Configuration(body, q).segment_placement(envelope.segment)
+    mesh.apply_transform(to_world)
+    data = mesh.export(file_type=path.suffix[1:].lower())
+    write_content(path, data)
+    return path
 
 
 def write_contact_figure(body: BodyModel, scene: Scene, answer: ContactAnswer, path: str | Path) -> None:
