@@ -28,7 +28,7 @@ from manikin.runtime.display import readable
 from manikin.runtime.files import FIGURES, write_result
 from manikin.scenarios.families import FAMILIES
 
-FIRST = ("scene", "postures", "margin", "com", "contacts")
+FIRST = ("scene", "operations", "postures", "margin", "com", "contacts")
 """Figures that come first, in this order; the others follow by name."""
 LEFT_OUT = ("requirements", "failure", "verdict", "planned", "proved", "succeeded")
 """Keys of the summary that the page says in other words."""

@@ -1,7 +1,7 @@
 """Motions of operations as one motion: measured, certified and reported, with the interval of each one."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.strength import hand_masses
 from manikin.contact import CarriedLoad, ContactSchedule, StanceSequence
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import FloatArray, PlanarTransform, frozen_array
 from manikin.pipeline.stages.context import Report
 from manikin.pipeline.stages.execution_stage import PlannedMotion
 from manikin.planning.whole_body import HandCourse, HeldObject
@@ -118,7 +118,7 @@ def _load(body: BodyModel, part: OperationMotion) -> CarriedLoad:
 
 def report_operations(
     report: Report, body: BodyModel, parts: Sequence[OperationMotion], motion: Motion,
-    placed: Iterable[PlacedObject],
+    places: Sequence[Sequence[PlacedObject]],
 ) -> None:  # fmt: skip
     """Report the worst value of every requirement, and the interval, load and margins of each operation.
 
@@ -127,7 +127,7 @@ def report_operations(
         body: With empty hands.
         parts: Motions of the operations.
         motion: All of them as one.
-        placed: Objects where they were set down.
+        places: Objects that were taken up, where they are at the end of each operation.
     """
     for stage in ("centroidal", "wholebody"):
         worst = dict[str, Requirement]()
@@ -137,16 +137,21 @@ def report_operations(
                 if row.key not in worst or _slack(row) < _slack(worst[row.key]):
                     worst[row.key] = row
         report.require(stage, RequirementTable(tuple(worst.values())))
-    transform = report.transform
-    objects = [
-        {
-            "name": item.thing.name, "mass_kg": item.thing.mass,
-            "position": transform.points(item.place[:3]).tolist(),
-            "yaw_deg": transform.turned(math.degrees(item.yaw)),
-        }
-        for item in placed
-    ]  # fmt: skip
-    report.finish("operations", {"list": list(_intervals(body, parts, motion)), "objects": objects})
+    objects = [[_in_world(item, report.transform) for item in there] for there in places]
+    blocks = [
+        block | {"objects": there}
+        for block, there in zip(_intervals(body, parts, motion), objects, strict=False)
+    ]
+    report.finish("operations", {"list": blocks, "objects": objects[-1] if objects else []})
+
+
+def _in_world(item: PlacedObject, transform_task_to_world: PlanarTransform) -> dict[str, Any]:
+    """An object in plain values, where it is in the world."""
+    return {
+        "name": item.thing.name, "mass_kg": item.thing.mass,
+        "position": transform_task_to_world.points(item.place[:3]).tolist(),
+        "yaw_deg": transform_task_to_world.turned(math.degrees(item.yaw)),
+    }  # fmt: skip
 
 
 def _timed(row: Requirement, part: OperationMotion, begin: float) -> Requirement:

@@ -95,7 +95,7 @@ def run_operations(
     if not job.parts:
         return RunResult.of(report)
     planned, executed = joined(context.body, job.parts), context.scenario.execution_required
-    report_operations(report, context.body, job.parts, planned.motion, job.placed)
+    report_operations(report, context.body, job.parts, planned.motion, job.places)
     report.planned = report.failure is None
     report.keep_motions(planned.schedule, planned.motion)
     report.judge_requirements()
@@ -116,6 +116,7 @@ class _Operations:
     Attributes:
         parts: Motions so far.
         acting: The job of the act with which they end, or None.
+        places: Objects that were taken up, where they are at the end of each operation.
     """
 
     def __init__(
@@ -127,11 +128,7 @@ class _Operations:
         self._placed: dict[str, PlacedObject] = {}
         self._number, self._name = 0, ""
         self.parts, self.acting = list[OperationMotion](), None
-
-    @property
-    def placed(self) -> list[PlacedObject]:
-        """Objects that were set down, where they rest."""
-        return list(self._placed.values())
+        self.places = list[list[PlacedObject]]()
 
     def fixed_scene(self) -> Scene:
         """The scene without anything that is taken up."""
@@ -152,6 +149,8 @@ class _Operations:
             self._number, self._name = number, _name(operation)
             self._report.progress(operation.name, number / len(operations))
             getattr(self, f"_{operation.name}")(operation.content)
+            held = {} if self._held is None else {self._held.thing.name: self._held}
+            self.places.append(list((self._placed | held).values()))
 
     # Operations, by their names in the file
 

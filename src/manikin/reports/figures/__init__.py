@@ -37,7 +37,7 @@ from manikin.reports.figures.contacts import ChoicePanel, contact_choice_figure,
 from manikin.reports.figures.effectors import effectors_figure, flights_figure, tracking_figure
 from manikin.reports.figures.ground import footprint_figure, push_map_figure, zmp_figure
 from manikin.reports.figures.phase_statistics import phase_durations_figure, placements_figure
-from manikin.reports.figures.scene import postures_figure, scene_figure
+from manikin.reports.figures.scene import operations_figure, postures_figure, scene_figure
 from manikin.reports.figures.timeline import ergonomics_figure, margin_figure, timing_figure
 from manikin.reports.figures.walks import (
     equal_paths_figure,
@@ -55,16 +55,17 @@ __all__ = [
     "compare_postures_figure", "compare_scene_figure", "compare_timing_figure", "contact_choice_figure",
     "contacts_figure", "effectors_figure", "equal_paths_figure", "ergonomics_figure", "flights_figure",
     "footprint_figure", "holonomic_ends_figure", "holonomic_zone_figure", "margin_figure",
-    "phase_durations_figure", "placements_figure", "planes_figure", "postures_figure", "published_lowest",
-    "push_map_figure", "scene_figure", "timing_figure", "tracking_figure", "walking_paths_figure",
-    "words_figure", "write_figures", "zmp_figure",
+    "operations_figure", "phase_durations_figure", "placements_figure", "planes_figure", "postures_figure",
+    "published_lowest", "push_map_figure", "scene_figure", "timing_figure", "tracking_figure",
+    "walking_paths_figure", "words_figure", "write_figures", "zmp_figure",
 ]  # fmt: skip
 
 
 FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
     "com": com_figure, "margin": margin_figure, "footprints": footprint_figure,
     "walk_paths": walk_paths_figure, "zmp": zmp_figure, "planes": planes_figure, "contacts": contacts_figure,
-    "timing": timing_figure, "scene": scene_figure, "postures": postures_figure, "flights": flights_figure,
+    "timing": timing_figure, "scene": scene_figure, "operations": operations_figure,
+    "postures": postures_figure, "flights": flights_figure,
     "effectors": effectors_figure, "tracking": tracking_figure,
 }  # fmt: skip
 """Every figure of a run by the name of its file."""

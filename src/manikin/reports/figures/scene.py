@@ -1,6 +1,8 @@
 """A motion in its scene: bodies along the path of the centre of mass, and postures side by side."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,11 +13,13 @@ from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.motion import phases_of, segment_positions
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.pipeline.run_directory import ComTrack, RunRecord
 from manikin.reports.figures import style, views
 from manikin.reports.figures.space import Space
 from manikin.runtime.display import COLOURS, colours_of, side_colour
+from manikin.scene import Obstacle, Scene
+from manikin.scene.scene import FLOOR
 
 MOST = 9
 """Largest number of key instants drawn; of more some are left out, evenly."""
@@ -60,6 +64,50 @@ def postures_figure(record: RunRecord) -> Figure:
         style.dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
     return figure
+
+
+def operations_figure(record: RunRecord) -> Figure:
+    """Draw the body at the end of each operation, with what was taken up where it is then."""
+    operations = style.need((record.summary.get("operations") or {}).get("list"), "operations")
+    motions = style.need(record.motions, "a whole-body motion")
+    name, motion = list(motions.items())[-1]
+    samples = [int(np.argmin(np.abs(motion.time - item["end_s"]))) for item in operations]
+    low, high = _frame(record, motion.com)
+    spans, widest = high - low, float((high - low)[:2].max())
+    scale = max(1.0, 1.85 / widest)
+    figure, grid = style.new_grid(
+        (widest + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
+        f"Postures at the ends of the operations ({name})", 2, 1, top=0.65, between=0.5,
+    )  # fmt: skip
+    for row, view in enumerate((views.ALONG_Y, views.ALONG_X)):
+        axes = figure.add_subplot(grid[row, 0])
+        left, right = view(np.array([low, high]))[:, 0]
+        offsets = [(widest + GAP) * column for column in range(len(samples))]
+        for offset, sample, item in zip(offsets, samples, operations, strict=True):
+            then = replace(record, content=replace(record.content, scene=_scene_with(record.scene, item)))
+            _draw_posture(axes, then, motion, sample, view.moved(offset, 0.0), (low, high))
+            if row == 0:
+                top = offset + (left + right) / 2, high[2]
+                style.note(axes, f"{item['operation']}, {item['end_s']:.1f} s", top, 4, fontsize=9)
+        horizontal, vertical = view.labels
+        style.dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
+        frame_panels(axes, (left, right), (low[2], high[2]), offsets)
+    return figure
+
+
+def _scene_with(scene: Scene | None, operation: Mapping[str, Any]) -> Scene | None:
+    """The scene with the objects where they are at the end of an operation of a run's summary."""
+    if scene is None:
+        return None
+    moved, obstacles = {item["name"]: item for item in operation["objects"]}, list[Obstacle]()
+    for item in scene:
+        there = moved.get(item.name)
+        if there is not None:
+            turn = rotation_from_yaw(float(np.deg2rad(there["yaw_deg"])))
+            obstacles.append(Obstacle(item.name, item.shape, turn, there["position"]))
+        elif item.name != FLOOR:
+            obstacles.append(item)
+    return Scene(obstacles, floor_height=scene.floor_height)
 
 
 def _draw_posture(
