@@ -236,9 +236,10 @@ class _Operations:
                 hand: Placement(target.position[0], target.rotation[0] if course.turns else None, WISHED_TURN)
                 for hand, target in course.targets(np.ones(1)).items()
             }
-        guide = None if course.kind is CourseKind.LEAVE else before.q
-        contacts = before.contacts
-        posed = poser.pose(contacts, contacts, before.q, guide, placements=placements, restarts=True)
+        # Hands that have let go hang as the manner wants; others move the body no more than they have to.
+        leaves, contacts = course.kind is CourseKind.LEAVE, before.contacts
+        first, guide = (poser.standing_at(before.q), None) if leaves else (before.q, before.q)
+        posed = poser.pose(contacts, contacts, first, guide, placements=placements, restarts=True)
         if posed.q is None:
             raise self._refused("contacts", f"no posture: {posed.reason}")
         if weak := poser.strained(posed.q, contacts, 1.0):

@@ -73,6 +73,8 @@ def operations_figure(record: RunRecord) -> Figure:
     name, motion = list(motions.items())[-1]
     samples = [int(np.argmin(np.abs(motion.time - item["end_s"]))) for item in operations]
     low, high = _frame(record, motion.com)
+    for place in (there["position"] for item in operations for there in item["objects"]):
+        low, high = np.minimum(low, np.array(place) - AROUND), np.maximum(high, np.array(place) + AROUND)
     spans, widest = high - low, float((high - low)[:2].max())
     scale = max(1.0, 1.85 / widest)
     figure, grid = style.new_grid(
@@ -173,6 +175,8 @@ def _frame(record: RunRecord, com: FloatArray) -> Corners:
     return low, high
 
 
+AROUND = 0.3
+"""Room around what is taken up in the figure of operations [m]."""
 LEAST_CHANGE = 0.42
 """Bodies in one picture differ at least so much, as the root mean square over the segments [m]."""
 MOST_BODIES = 5
