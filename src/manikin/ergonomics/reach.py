@@ -7,7 +7,7 @@ hands where it is within that of each. What is too near to be reached is not tol
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from manikin.kinematics.limb_kinematics import LimbKinematics
 from manikin.kinematics.point_targets import SegmentPlacements
 from manikin.numerics.spatial import FloatArray, frozen_array
 
-SAMPLES = 20_000
+SAMPLES = 10_000
 """Postures of an arm that are drawn, and that are stretched, each."""
 STEP = 0.02
 """Spacing of the distances at which the reach of both hands is tested [m]."""
@@ -73,7 +73,7 @@ class ReachEnvelope:
         return float(self.mesh.volume)
 
 
-@cache
+@lru_cache(maxsize=8)
 def reach_envelopes(body: BodyModel) -> Mapping[str, ReachEnvelope]:
     """Reach of the ``"left"`` and the ``"right"`` hand and of ``"both"``, of a body with two arms.
 
@@ -92,21 +92,18 @@ def reach_envelopes(body: BodyModel) -> Mapping[str, ReachEnvelope]:
 
 
 def _of_hand(body: BodyModel, side: str) -> ReachEnvelope:
-    limb = limb_named(body, f"{side}_arm")
-    chain, rng = LimbKinematics(body, limb), np.random.default_rng(0)
-    drawn = chain.random_angles(rng, SAMPLES)
-    stretched, names = drawn.copy(), body.joint_names
-    straight = [any(part in names[slot - 6] for part in STRETCHED) for slot in limb_slots(body, limb)]
-    lower, upper = body.lower, body.upper
-    for column, slot in enumerate(limb_slots(body, limb)):
-        if straight[column]:
-            stretched[:, column] = np.clip(0.0, lower[slot - 6], upper[slot - 6])
+    limb, (directions, _, nearest) = limb_named(body, f"{side}_arm"), _sphere()
+    chain, slots = LimbKinematics(body, limb), limb_slots(body, limb)
+    drawn = chain.random_angles(np.random.default_rng(0), SAMPLES)
+    stretched = drawn.copy()
+    for column, slot in enumerate(slots):
+        if any(part in body.joint_names[slot - 6] for part in STRETCHED):
+            stretched[:, column] = np.clip(0.0, body.lower[slot - 6], body.upper[slot - 6])
     places = np.concatenate([chain.place(angles).positions for angles in (drawn, stretched)])
-    distance, radius = np.linalg.norm(places, axis=1), np.zeros(len(_sphere()[0]))
-    np.maximum.at(radius, _sphere()[2].query(places)[1], distance)
-    return ReachEnvelope(
-        parent_segment(body, limb), np.array(limb_origin(body, limb)), frozen_array(radius, "radius [m]")
-    )
+    radius = np.zeros(len(directions))
+    np.maximum.at(radius, nearest.query(places)[1], np.linalg.norm(places, axis=1))
+    origin = np.array(limb_origin(body, limb))
+    return ReachEnvelope(parent_segment(body, limb), origin, frozen_array(radius, "radius [m]"))
 
 
 @dataclass(frozen=True, eq=False)
