@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -335,8 +335,8 @@ def write_reach(path: str | Path, body: BodyModel, q: FloatArray, hand: str = "b
     to_world, mesh = np.eye(4), envelope.mesh
     to_world[:3, :3], to_world[:3, 3] = Configuration(body, q).segment_placement(envelope.segment)
     mesh.apply_transform(to_world)
-    data = mesh.export(file_type=path.suffix[1:].lower())
-    write_content(path, data)
+    data = cast("bytes | str", mesh.export(file_type=path.suffix[1:].lower()))
+    write_content(path, data.encode() if isinstance(data, str) else data)
     return path
 
 

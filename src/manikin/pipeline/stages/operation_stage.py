@@ -411,8 +411,8 @@ class _Operations:
 
 def _name(operation: OperationSection) -> str:
     """Name of an operation with its object."""
-    thing = next((getattr(operation.content, key, None) for key in ("object", "on")), None)
-    return operation.name if thing is None else f"{operation.name} {thing}"
+    things = (getattr(operation.content, key, None) for key in ("object", "on"))
+    return " ".join([operation.name, *(thing for thing in things if thing is not None)][:2])
 
 
 def _poser(scenario: Scenario, body: BodyModel, scene: Scene) -> PostureFinder:
