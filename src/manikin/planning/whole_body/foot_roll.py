@@ -56,6 +56,8 @@ class FootRoll:
         heel: (3,) middle of the heel's edge in the sole's frame [m].
         push_off: Pitch at lift-off, heel up [rad].
         touch: Pitch at landing, on the toes when positive, on the heel when negative [rad].
+        toes_back: Share of the flight after which the toes are straight again.
+        landing_rate: Pitch rate at landing, as a share of the mean one until the sole lies flat.
     """
 
     instants: FloatArray
@@ -65,6 +67,8 @@ class FootRoll:
     heel: FloatArray
     push_off: float = PUSH_OFF_PITCH
     touch: float = -HEEL_STRIKE_PITCH
+    toes_back: float = 0.6
+    landing_rate: float = 1.0
 
     @property
     def pivots(self) -> tuple[Pose, Pose]:
@@ -127,8 +131,7 @@ class FootRoll:
     @cached_property
     def _toe_return(self) -> BPoly:
         _, off, land, flat = self.instants
-        # Share of the flight after which the toes are straight again.
-        back = off + 0.6 * (land - off)
+        back = off + self.toes_back * (land - off)
         knots = {off: self._at_lift_off, back: [0.0] * 3}
         if flat > land and self.touch > 0.0:
             knots[land] = self._at_landing
@@ -136,10 +139,10 @@ class FootRoll:
 
     @property
     def _at_landing(self) -> list[float]:
-        """Pitch at landing, and its rate: the mean until the sole lies flat."""
+        """Pitch at landing, and its rate."""
         _, _, land, flat = self.instants
         angle = self.touch if flat > land else 0.0
-        return [angle, -angle / max(flat - land, 1e-9), 0.0]
+        return [angle, -self.landing_rate * angle / max(flat - land, 1e-9), 0.0]
 
     @cached_property
     def _pitch(self) -> BPoly:
