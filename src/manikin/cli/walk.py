@@ -47,6 +47,7 @@ def walk(
     stature: Annotated[float, option("M", "Stature [m].")] = 1.75,
     mass: Annotated[float, option("KG", "Mass [kg].")] = 70.0,
     sex: SexOption = "male",
+    execute: Annotated[bool, flag("--execute", "Walk in balance, and in the physics engine.")] = False,
     drive: Annotated[
         bool, flag("--drive", "Steer a walker in the browser with keys and sliders instead.")
     ] = False,
@@ -62,6 +63,7 @@ def walk(
     body: dict[str, Any] = {"model": "human", "stature_m": stature, "mass_kg": mass, "sex": sex}
     if drive:
         walked = {"--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out}
+        walked["--execute"] = execute or None
         console.refuse_given(walked | {"--json": json or None}, "it is for a walk to a place")
         return _drive(body, start, scene, 8080 if port is None else port, host)
     console.refuse(port is not None, "--port", "it is for --drive")
@@ -72,7 +74,9 @@ def walk(
     from manikin.scenarios.planned import walk_task
 
     around = None if scene is None else load_scenario(scene)
-    job = walk_task(to, start=start, body=body, max_speed=max_speed, weights=weights, around=around)
+    job = walk_task(
+        to, start=start, body=body, max_speed=max_speed, weights=weights, around=around, execute=execute
+    )
     return console.run_job(
         job, out, context.obj, draw=figures, json=json, part="walk", shown=SHOWN,
         beside={"max_stance_slide_m": None},

@@ -25,6 +25,7 @@ from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, e
 from manikin.pipeline.stages.operation_stage import run_operations
 from manikin.pipeline.stages.recovery_stage import recover_from_push
 from manikin.pipeline.stages.refinement_stage import from_rest_to_rest, is_hard, refine_contacts
+from manikin.pipeline.stages.walking_execution import walk_in_balance
 from manikin.pipeline.stages.walking_stage import walk_on_footprints, walk_to_goal
 from manikin.pipeline.stages.whole_body_stage import (
     follow_centre_of_mass,
@@ -88,6 +89,9 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     walking = context.scenario.file.walking
     if walking is not None and not walking.is_planned(context.scenario.file.supports):
         return RunResult.of(report, planned=walk_to_goal(context, report))
+    if walking is not None and walking.whole_body == "balanced":
+        walk = walk_in_balance(context, report, requirements)
+        return RunResult.of(report, execution=walk.execution, planned=walk.planned)
     if walking is not None:
         on_footprints = walk_on_footprints(context, report)
         if on_footprints is None:

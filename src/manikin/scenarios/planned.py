@@ -168,6 +168,7 @@ Place = tuple[float, float, float]
 def walk_task(
     to: Place, *, start: Place = (0.0, 0.0, 0.0), body: Mapping[str, Any] | None = None,
     max_speed: float | None = None, weights: str | None = None, around: Scenario | None = None,
+    execute: bool = False,
 ) -> Scenario:  # fmt: skip
     """A walk to a place; ScenarioError if a value is out of its range.
 
@@ -176,8 +177,9 @@ def walk_task(
         max_speed: Limit of the speed over the floor [m/s].
         weights: Weights of the path's criterion, by name.
         around: Scenario whose obstacles stand there.
+        execute: In balance, and in the physics engine.
     """
-    given = {"max_speed_m_s": max_speed, "weights": weights}
+    given = {"max_speed_m_s": max_speed, "weights": weights, "whole_body": "balanced" if execute else None}
     ends = {"start": start, "goal": to}
     data: dict[str, Any] = {
         "name": "walk-to-" + "-".join(f"{value:g}" for value in to),

@@ -202,7 +202,7 @@ class ScenarioFile(Section):
             problem = "is required; valid: none for"
             point_mass = self.body.model == "point_mass"
             refuse_if(point_mass, "execution", f"{problem} a point mass, which has no joints")
-            refuse_if(recorded, "execution", f"{problem} a recorded walk, or walking.whole_body: planned")
+            refuse_if(recorded, "execution", f"{problem} a recorded walk, or walking.whole_body: balanced")
         elif self.recovery is not None:
             raise refuse("execution", "is none; valid: required beside recovery, which is an execution")
 
@@ -252,6 +252,8 @@ class ScenarioFile(Section):
             if value := getattr(walking, key):
                 given = f"is {value:g}" if key == "wait_s" else "are given"
                 raise refuse(f"walking.{key}", f"{given} in a planned walk; valid there: leave it out")
+        if walking.whole_body == "balanced" and not alone:
+            raise refuse("walking.whole_body", "is balanced; valid before supports: planned, or leave it out")
         if walking.footprints == "library" and not (alone and walking.whole_body == "planned"):
             problem = "is library; valid: in a planned walk (whole_body) without supports"
             raise refuse("walking.footprints", problem)

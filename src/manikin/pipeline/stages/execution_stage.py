@@ -32,6 +32,8 @@ class ExecutionRequirements:
         com_rms_error: Root mean square distance of the CoM from its plan [m].
         foot_error: Largest distance of an effector from its plan [m].
         margin: Least margin, exclusive [N.m].
+        margin_share: Share of the control steps with such a margin, where not all need it: feet that strike
+            the ground and roll carry nothing, or a line, for some milliseconds.
         penetration: Deepest penetration of hard contacts [m]; ``padding_compression`` where the motion
             ends on a seat, whose impact shakes every contact.
         padding_compression: Deepest one of padded obstacles, which give way [m].
@@ -40,6 +42,7 @@ class ExecutionRequirements:
     com_rms_error: float = 0.015
     foot_error: float = 0.02
     margin: float = 0.0
+    margin_share: float | None = None
     penetration: float = 0.005
     padding_compression: float = 0.01
 
@@ -57,8 +60,7 @@ class ExecutionRequirements:
         deepest, motion = self.padding_compression if seated else self.penetration, execution.motion
         thinnest, pressed = float(motion.time[np.argmin(motion.margin)]), execution.max_padding_compression_m
         return [
-            Requirement("min_margin", "executed margin", motion.margin_unit, execution.min_margin, ">",
-                        self.margin, thinnest),
+            self._balanced(execution, thinnest),
             Requirement("com_rms_error_m", "RMS error of the centre of mass", "m",
                         execution.com_rms_error_m, "<=", self.com_rms_error, thinnest),
             Requirement("max_foot_error_m", "error", "m", execution.max_foot_error_m, "<=", self.foot_error,
@@ -68,6 +70,15 @@ class ExecutionRequirements:
             Requirement("max_padding_compression_m", "compression of padding", "m", pressed, "<=",
                         self.padding_compression, thinnest) if pressed > 0.0 else None,
         ]  # fmt: skip
+
+    def _balanced(self, execution: Execution, time: float) -> Requirement:
+        motion, name = execution.motion, "executed margin"
+        if self.margin_share is None:
+            least = execution.min_margin
+            return Requirement("min_margin", name, motion.margin_unit, least, ">", self.margin, time)
+        share = float(np.mean(motion.margin > self.margin))
+        return Requirement("margin_share", f"share of the time with an {name}", "", share, ">=",
+                           self.margin_share, time)  # fmt: skip
 
     def _returned(self, execution: Execution) -> list[Requirement | None]:
         """Requirements of a body that was pushed: it has to come back to its plan."""

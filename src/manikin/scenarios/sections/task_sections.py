@@ -238,10 +238,11 @@ class WalkerSection(Section):
 class WalkingSection(Section):
     """A walk from start to goal of the task: path by optimal control, whole body from recorded walks."""
 
-    whole_body: Literal["recorded", "planned"] = preset(
+    whole_body: Literal["recorded", "planned", "balanced"] = preset(
         "recorded",
         "recorded: as recorded people walk, along the path; planned: on footprints along the "
-        "path, balanced and executed in the physics engine",
+        "path, balanced and executed in the physics engine; balanced: as recorded people walk, in balance "
+        "on footprints as far apart and as frequent as people's, on feet that roll, and executed",
     )
     footprints: Literal["stepper", "library"] = preset(
         "stepper",
@@ -271,7 +272,7 @@ class WalkingSection(Section):
 
     def is_planned(self, supports: object) -> bool:
         """Whether footprints are planned and executed, as they always are before supports."""
-        return self.whole_body == "planned" or supports is not None
+        return self.whole_body != "recorded" or supports is not None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,367 +1,389 @@
-"""Walks in balance: people's cycles on given footprints, with a centre of mass that their feet can carry."""
+"""Walks in balance: the library's cycle on given footprints, over feet that roll.
+
+The centre of pressure of each foot goes from heel to toes, and the load from one foot to the next; together
+they give the ZMP. The centre of mass follows from it: of all solutions of the pendulum's equation
+``c - (z / (g + z'')) c'' = zmp + moment of L'``, which is stiff in both directions of time, the bounded one,
+as a banded system (Kajita et al. 2003 find it by preview control). The legs follow in closed form, and all
+else from the library's cycle at the speed and phase of the footprints. The angular momentum ``L`` of that
+whole-body motion, and the height that its legs allow, go back into the equation until both agree.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import PchipInterpolator
 from scipy.linalg import solve_banded
 
+from manikin.balance import wrench_polytopes
+from manikin.balance.motion_margin import motion_margin
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import toe_hinge
-from manikin.contact import (
-    Contact,
-    ContactSchedule,
-    Phase,
-    SolePart,
-    Stance,
-    StanceSequence,
-    default_normal_force_cap,
-    sole,
-    sole_part,
-)
+from manikin.contact import ContactSchedule, SolePart
+from manikin.errors import InputError
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.motion import Motion
 from manikin.numerics.signals import least_jerk, low_passed
-from manikin.numerics.spatial import GRAVITY, FloatArray, quaternions, rotation_from_yaw, rotations
-from manikin.planning.whole_body.foot_roll import FootRoll
-from manikin.planning.whole_body.swing_path import Pose
-from manikin.walking.footprints import FEET, Footprint, Footprints
+from manikin.numerics.spatial import GRAVITY, FloatArray, cross, finite_number, quaternions, rotations
+from manikin.walking.footprints import FEET, Footprints
 from manikin.walking.gait.blend import Gait
-from manikin.walking.gait.motion_library import load_library
+from manikin.walking.gait.motion_library import MotionLibrary, load_library
+from manikin.walking.gait.rolling_steps import RollingFoot, RollRule, rolling_schedule
+from manikin.walking.path.walking_path import SampledWalk
 
 STEP = 0.005
+"""Time between two samples [s], that of control."""
 
+LEAD = 0.8
+"""Time of standing before and after the footprints, in which the weight shifts [s]."""
 
-@dataclass(frozen=True)
-class RollRule:
-    push_off: float = np.radians(45.0)
-    touch: float = np.radians(16.0)
-    full_step: float = 0.6
-    heel_rise: float = 0.48
-    flat: float = 0.16
-    lift: float = 0.045
-    aside: float = 0.02
-    toes_back: float = 0.85
-    landing_rate: float = 0.5
-    lead_in: float = 0.8
-    drop: float = 0.095
-    knee: float = np.radians(18.0)
-    least_knee: float = np.radians(15.0)
+SHIFT = 0.7
+"""Longest time in which the load goes from one foot to the other [s]."""
 
+DROP = 0.095
+"""How far the centre of mass is lower between the feet than over one, over the squared step [1/m]."""
 
-@dataclass(frozen=True, eq=False)
-class _Support:
-    step: Footprint
-    flat: float
-    up: float
-    roll_in: float
-    roll_out: float
+STANDING_KNEE, LEAST_KNEE = float(np.radians(18.0)), float(np.radians(15.0))
+"""Bend of the knees over which the centre of mass stands, and least bend in the walk [rad]: a leg that is
+straighter cannot follow the height of the centre of mass."""
 
+STYLE_CUTOFF, HEIGHT_CUTOFF, MOMENTUM_CUTOFF = 6.0, 5.0, 15.0
+"""Low-pass filters of the library's angles, the height, and the angular momentum [Hz]."""
 
-def _supports(prints: Footprints, foot: str, rule: RollRule) -> list[_Support]:
-    steps, out = prints.of(foot), []
-    for k, step in enumerate(steps):
-        ahead = np.array([np.cos(step.yaw), np.sin(step.yaw)])
-        long = step.leaves - step.lands
-        before = 0.0 if k == 0 else float((step.position - steps[k - 1].position)[:2] @ ahead) / 2
-        after = 0.0 if k == len(steps) - 1 else float((steps[k + 1].position - step.position)[:2] @ ahead) / 2
-        rin, rout = (float(np.clip(x / rule.full_step, 0.0, 1.0)) for x in (before, after))
-        flat = step.lands + (min(rule.flat * long, 0.11) if rin > 0.1 else 0.0)
-        usual = min(long, 0.8)
-        up = step.leaves - (rule.heel_rise * usual if rout > 0.1 else 0.0)
-        out.append(_Support(step, flat, max(up, flat + 0.05), rin if rin > 0.1 else 0.0, rout if rout > 0.1 else 0.0))
-    return out
+PASSES, PLACED = 6, 1e-5
+"""Rounds of whole-body motion and centre of mass; error of the latter at which a round ends [m]."""
 
-
-class _Foot:
-    """Path of one foot, and contacts."""
-
-    def __init__(self, body: BodyModel, prints: Footprints, foot: str, rule: RollRule, time: FloatArray) -> None:
-        self.body, self.name, self.rule = body, foot, rule
-        self.supports = _supports(prints, foot, rule)
-        self.hinge = toe_hinge(body, foot)
-        n = len(time)
-        self.position, self.rotation, self.toes = np.empty((n, 3)), np.empty((n, 3, 3)), np.zeros(n)
-        heel = np.array([-0.5 * body.sole_length, 0.0, 0.0])
-        first = self.supports[0].step
-        self.position[:] = first.position
-        self.rotation[:] = rotation_from_yaw(first.yaw)
-        for a, b in pairwise(self.supports):
-            start, end = (Pose(np.array(s.step.position), rotation_from_yaw(s.step.yaw)) for s in (a, b))
-            roll = FootRoll(
-                np.array([a.up, a.step.leaves, b.step.lands, b.flat]), start, end, self.hinge, heel,
-                a.roll_out * rule.push_off, -b.roll_in * rule.touch,
-                rule.toes_back, rule.landing_rate,
-            )
-            rows = time >= a.up
-            t = time[rows]
-            share = np.clip((t - a.step.leaves) / (b.step.lands - a.step.leaves), 0.0, 1.0)
-            s = least_jerk(share)[0]
-            p, q = roll.pivots
-            place = p.position + s[:, None] * (q.position - p.position)
-            bump = 64.0 * (share * (1.0 - share)) ** 3
-            place[:, 2] += rule.lift * bump
-            side = 1.0 if foot == FEET[0] else -1.0
-            place[:, :2] += (side * rule.aside * bump)[:, None] * np.array([-np.sin(a.step.yaw), np.cos(a.step.yaw)])
-            turn = np.angle(np.exp(1j * (b.step.yaw - a.step.yaw)))
-            yaw = a.step.yaw + s * turn
-            upright = rotations(yaw, 0.0 * yaw, 0.0 * yaw)
-            self.position[rows], self.rotation[rows] = roll.pose(place, upright, t)
-            self.toes[rows] = roll.toe_extension(t)
-        self.cop = self._cop(time)
-
-    def _cop(self, time: FloatArray) -> FloatArray:
-        cop, hx, half = np.zeros((len(time), 2)), float(self.hinge[0]), 0.5 * self.body.sole_length
-        for k, s in enumerate(self.supports):
-            lands, leaves = s.step.lands, s.step.leaves
-            knots = []
-            if k == 0:
-                knots += [(lands - 5.0, 0.0), (lands, 0.0)]
-            elif s.roll_in:
-                knots += [(lands, -half + 0.02), (s.flat, -0.5 * half), ((0.5 * (s.flat + s.up)), 0.0)]
-            else:
-                knots += [(lands, 0.0)]
-            if s.roll_out:
-                knots += [(s.up - 0.2, 0.02)] if k == 0 else []
-                knots += [(s.up, hx + 0.01), (leaves, hx + 0.03)]
-            else:
-                knots += [(max(leaves, knots[-1][0] + 0.3), 0.0)]
-            knots = sorted(knots)
-            t, x = np.array(knots).T
-            keep = np.append(True, np.diff(t) > 1e-6)
-            rows = time >= (lands if k else -np.inf)
-            along = PchipInterpolator(t[keep], x[keep])(np.clip(time[rows], t[0], t[-1]))
-            ahead = np.array([np.cos(s.step.yaw), np.sin(s.step.yaw)])
-            cop[rows] = s.step.position[:2] + along[:, None] * ahead
-        return cop
-
-    def contact(self, s: _Support, part: SolePart, friction: float) -> Contact:
-        made = sole(self.name, s.step.position, s.step.yaw, length=self.body.sole_length,
-                    width=self.body.sole_width, friction=friction)
-        return sole_part(made, part, float(self.hinge[0]))
-
-    def part_at(self, t: float) -> tuple[int, SolePart] | None:
-        for k, s in enumerate(self.supports):
-            if (k == 0 or s.step.lands <= t) and (k == len(self.supports) - 1 or t < s.step.leaves):
-                if t < s.flat and s.roll_in:
-                    return k, SolePart.HEEL
-                if t >= s.up and s.roll_out:
-                    return k, SolePart.TOES
-                return k, SolePart.FULL
-        return None
-
-    def events(self) -> list[float]:
-        return [x for s in self.supports for x in (s.step.lands, s.flat, s.up, s.step.leaves)]
-
-
-def _schedule(body: BodyModel, feet: Sequence[_Foot], begin: float, end: float, friction: float) -> ContactSchedule:
-    cuts = sorted({round(t, 6) for f in feet for t in f.events() if begin + 1e-3 < t < end - 1e-3})
-    kept = [begin]
-    for t in cuts:
-        if t > kept[-1] + 1e-3:
-            kept.append(t)
-    kept.append(end)
-    phases = []
-    cap = default_normal_force_cap(body.mass)
-    for a, b in pairwise(kept):
-        held = []
-        for f in feet:
-            part = f.part_at(0.5 * (a + b))
-            if part is not None:
-                held.append(f.contact(f.supports[part[0]], part[1], friction))
-        phases.append(Phase(Stance(held, cap), b - a, b - a))
-    return ContactSchedule(StanceSequence(phases), np.array(kept))
-
-
-def _shares(feet: Sequence[_Foot], time: FloatArray) -> FloatArray:
-    """(2, n) of load; from one foot to the other while both stand."""
-    prints = sorted((s.step for f in feet for s in f.supports), key=lambda s: (s.lands, s.leaves))
-    left = np.full(len(time), 0.5)
-    value = 0.5
-    leaving = sorted((s for s in prints), key=lambda s: s.leaves)
-    leaving = [s for s in leaving if s.leaves < leaving[-1].leaves - 1e-6]
-    for s in leaving:
-        landed = max((o.lands for o in prints if o.effector != s.effector and o.lands < s.leaves))
-        begin = max(landed, s.leaves - 0.7)
-        target = 0.0 if s.effector == FEET[0] else 1.0
-        share = least_jerk(np.clip((time - begin) / (s.leaves - begin), 0.0, 1.0))[0]
-        rows = time >= begin
-        left[rows] = value + (target - value) * share[rows]
-        value = target
-    last = max(s.lands for s in prints)
-    rows = time >= last
-    left[rows] = value + (0.5 - value) * least_jerk(np.clip((time[rows] - last) / 0.6, 0.0, 1.0))[0]
-    return np.array([left, 1.0 - left])
-
-
-def _phase(feet: Sequence[_Foot], time: FloatArray, events: FloatArray) -> FloatArray:
-    knots = []
-    for number, f in enumerate(feet):
-        for a, b in pairwise(f.supports):
-            knots.append((a.step.leaves, number, 0))
-            knots.append((b.step.lands, number, 1))
-    knots.sort()
-    times, phases, cycle = [], [], 0.0
-    for t, number, kind in knots:
-        landing, off, other = events[min(int(np.searchsorted(time, t)), len(time) - 1)]
-        base = {(0, 0): 0.0, (0, 1): landing, (1, 0): off, (1, 1): other + 1.0}[number, kind]
-        low = phases[-1] if phases else 0.9
-        value = base + np.ceil(low - base - 0.3) if phases else base + (1.0 if base < 0.5 else 0.0)
-        while phases and value < low - 1e-6:
-            value += 1.0
-        times.append(t)
-        phases.append(value)
-    t, p = np.array(times), np.maximum.accumulate(np.array(phases))
-    keep = np.append(True, np.diff(t) > 1e-4)
-    return PchipInterpolator(t[keep], p[keep])(np.clip(time, t[0], t[-1]))
-
-
-def _height(prints: Footprints, time: FloatArray, high: float, rule: RollRule) -> FloatArray:
-    steps = sorted((s for f in FEET for s in prints.of(f)), key=lambda s: s.lands)
-    knots = [(time[0] - 1.0, high), (time[0], high)]
-    lands = [s for s in steps if s.lands > prints.start + 1e-6]
-    middles = []
-    for s in lands:
-        other = max((o for o in steps if o.effector != s.effector and o.lands < s.lands), key=lambda o: o.lands)
-        step = float(np.linalg.norm((s.position - other.position)[:2]))
-        step = np.sqrt(max(step**2 - 0.02, 0.0))
-        off = other.leaves if other.leaves < prints.end - 1e-6 else s.lands + 0.15
-        middles.append((0.5 * (s.lands + off), high - rule.drop * step**2, other.lands))
-    for k, (t, z, _) in enumerate(middles):
-        if k:
-            knots.append((0.5 * (middles[k - 1][0] + t), high))
-        else:
-            knots.append((t - 0.5, high))
-        knots.append((t, z))
-    knots += [(middles[-1][0] + 0.45, high), (max(time[-1], middles[-1][0] + 0.5) + 1.0, high)]
-    t, z = np.array(knots).T
-    keep = np.append(True, np.diff(t) > 1e-3)
-    return t[keep], z[keep]
-
-
-def _smooth_height(knots, time):
-    return low_passed(PchipInterpolator(*knots)(time)[:, None], 5.0, 1.0 / STEP, padding=50)[:, 0]
-
-
-def _lowered(knots, time, need):
-    """Knots lowered where a leg is too short."""
-    t, z = knots[0], knots[1].copy()
-    edges = np.concatenate([[-np.inf], 0.5 * (t[1:] + t[:-1]), [np.inf]])
-    for k in range(len(t)):
-        rows = (time >= edges[k]) & (time < edges[k + 1])
-        if rows.any():
-            z[k] -= need[rows].max()
-    return t, z
-
-
-def carried_com(zmp: FloatArray, z: FloatArray, moment: FloatArray, mass: float) -> FloatArray:
-    """(n, 2) bounded path of the centre of mass over a given ZMP."""
-    lift = np.gradient(np.gradient(z, STEP), STEP) + GRAVITY
-    k = z / lift / STEP**2
-    target = zmp.copy()
-    target[:, 0] += moment[:, 1] / (mass * lift)
-    target[:, 1] -= moment[:, 0] / (mass * lift)
-    n = len(z)
-    bands = np.zeros((3, n))
-    bands[1] = 1.0 + 2.0 * k
-    bands[0, 1:], bands[2, :-1] = -k[:-1], -k[1:]
-    bands[1, [0, -1]] = 1.0
-    bands[0, 1] = bands[2, -2] = 0.0
-    return solve_banded((1, 1), bands, target)
+_PADDING = 50
 
 
 @dataclass(frozen=True, eq=False)
 class BalancedWalk:
+    """A walk that is to be executed.
+
+    Attributes:
+        body: Who walks.
+        schedule: What touches when.
+        motion: The whole body, with its contact forces, torques and margin.
+        missed: Largest distance of an ankle from where its foot should be [m].
+        excess: Largest angle by which a hinge is beyond its range before it is cut off [rad].
+        zmp_error: (n,) distance of the motion's own ZMP from the wanted one [m].
+    """
+
+    body: BodyModel
     schedule: ContactSchedule
     motion: Motion
-    zmp: FloatArray
-    reach_error: float
-    shares: FloatArray
-    info: dict = field(default_factory=dict)
+    missed: float
+    excess: float
+    zmp_error: FloatArray
+
+    @cached_property
+    def torque_share(self) -> FloatArray:
+        """(n, h) joint torques over their limits, loads as planned [-]."""
+        tau = self.motion.tau[:, 6:]
+        return np.maximum(tau / self.body.torque_upper, tau / self.body.torque_lower)
 
 
-def balanced_walk(body: BodyModel, prints: Footprints, path, *, friction: float = 0.8,
-                  rule: RollRule | None = None, passes: int = 6) -> BalancedWalk:
-    rule = rule or RollRule()
-    begin, end = prints.start - rule.lead_in, prints.end + rule.lead_in
-    time = begin + STEP * np.arange(int(round((end - begin) / STEP)) + 1)
-    feet = [_Foot(body, prints, name, rule, time) for name in FEET]
-    schedule = _schedule(body, feet, float(time[0]), float(time[-1]), friction)
-    shares = _shares(feet, time)
-    zmp = sum(share[:, None] * foot.cop for share, foot in zip(shares, feet, strict=True))
-    # the style
-    gait, legs = Gait(load_library(), body), LegKinematics(body)
-    within = np.clip(time, 0.0, path.duration)
-    place, velocity = path.place_at(within), path.motion_at(within)[0].copy()
-    velocity[(time <= 0) | (time >= path.duration)] = 0.0
-    blend = gait.blend(velocity)
-    events = np.einsum("nk,nke->ne", blend.weights, gait.library.events[blend.cycles])
-    phase = _phase(feet, time, events)
-    frames = gait.frames(blend, phase, place)
-    rate = 1.0 / STEP
-    angles = low_passed(frames.angles, 6.0, rate, padding=50)
-    yaw = np.unwrap(np.arctan2(frames.pelvis[:, 1, 0], frames.pelvis[:, 0, 0]))
-    pitch = -np.arcsin(frames.pelvis[:, 2, 0])
-    roll = np.arctan2(frames.pelvis[:, 2, 1], frames.pelvis[:, 2, 2])
-    yaw, pitch, roll = low_passed(np.column_stack([yaw, pitch, roll]), 6.0, rate, padding=50).T
-    pelvis, turn = rotations(yaw, pitch, roll), quaternions(yaw, pitch, roll)
-    arm = body.effector(FEET[0]).translation
-    foot_rot = np.stack([f.rotation for f in feet])
-    ankle = np.stack([f.position - np.einsum("nij,j->ni", f.rotation, body.effector(f.name).translation) for f in feet])
-    toes = [body.joint_index(f"{side}_toe_extension") for side in ("left", "right")]
-    model, data = body.pinocchio, body.pinocchio.createData()
-    origin = low_passed(frames.place, 6.0, rate, padding=50)
-    floor = float(prints.steps[0].position[2])
-    # standing height
-    stand = float(Configuration(body).com[2])
-    legs_full = legs.thigh + legs.shank
-    high = stand - (legs_full - float(legs.length_at(np.array(rule.knee)))) + floor
-    knots = _height(prints, time, high, rule)
-    longest = float(legs.length_at(np.array(rule.least_knee)))
-    moment = np.zeros((len(time), 3))
-    com = np.empty((len(time), 3))
-    for _ in range(passes):
-        z = _smooth_height(knots, time)
-        want = np.column_stack([carried_com(zmp, z - floor, moment, body.mass), z])
-        for iteration in range(6):
-            a = legs.angles(pelvis, origin, foot_rot, ankle, angles)
-            for number, joint in enumerate(toes):
-                a[:, joint] = feet[number].toes
-            q = np.hstack([origin, turn, np.clip(a, body.lower, body.upper)])
-            for row, posture in enumerate(q):
-                com[row] = pin.centerOfMass(model, data, posture)
-            error = want - com
-            if np.abs(error).max() < 1e-5:
+def balanced_walk(
+    body: BodyModel, footprints: Footprints, path: SampledWalk, *, friction: float = 0.8,
+    rule: RollRule | None = None, library: MotionLibrary | None = None,
+) -> BalancedWalk:  # fmt: skip
+    """Walk on footprints along the path that they were placed on, in balance.
+
+    Args:
+        body: A human.
+        footprints: Where and when the feet stand; their time is that of the path.
+        path: Path of the middle between the feet.
+        friction: Coulomb coefficient of the soles, for the contacts of the schedule.
+        rule: How feet roll; as people's when omitted.
+        library: Cycles; those that come with this package if omitted.
+
+    Raises:
+        InputError: If the footprints have no step.
+        BodyError: If the body is no human.
+    """
+    if footprints.count == 0:
+        raise InputError("footprints have no step; valid: at least one")
+    friction = finite_number(friction, "friction of the soles", above=0.0)
+    plan = _Plan(body, footprints, path, rule or RollRule(), library or load_library())
+    for _ in range(PASSES):
+        plan.improve()
+    return plan.result(friction)
+
+
+class _Plan:
+    """A walk on its way to agreement between its centre of mass and its whole body."""
+
+    def __init__(
+        self,
+        body: BodyModel,
+        footprints: Footprints,
+        path: SampledWalk,
+        rule: RollRule,
+        library: MotionLibrary,
+    ) -> None:
+        self.body, self.legs = body, LegKinematics(body)
+        begin, end = footprints.start - LEAD, footprints.end + LEAD
+        self.time = begin + STEP * np.arange(round((end - begin) / STEP) + 1)
+        self.floor = float(footprints.steps[0].position[2])
+        self.feet = [RollingFoot(body, footprints, name, rule) for name in FEET]
+        paths = [foot.path(self.time) for foot in self.feet]
+        self.sole = np.stack([turn for _, turn, _ in paths])
+        self.ankle = np.stack([
+            place - turn @ foot.offset for foot, (place, turn, _) in zip(self.feet, paths, strict=True)
+        ])  # fmt: skip
+        self.toes = [(body.joint_index(f"{foot.name.removesuffix('_foot')}_toe_extension"), bend)
+                     for foot, (_, _, bend) in zip(self.feet, paths, strict=True)]  # fmt: skip
+        self.share = load_shares(footprints, self.time)
+        self.pressure = np.stack([foot.pressure(self.time) for foot in self.feet])
+        self.zmp = np.einsum("kn,kni->ni", self.share, self.pressure)
+        self._style(path, Gait(library, body))
+        straight = self.legs.thigh + self.legs.shank - float(self.legs.length_at(np.array(STANDING_KNEE)))
+        high = self.floor + float(Configuration(body).com[2]) - straight
+        self.height = HeightProfile(footprints, self.time, high)
+        self.longest = float(self.legs.length_at(np.array(LEAST_KNEE)))
+        ends = np.minimum(self.time - self.time[0], self.time[-1] - self.time)
+        self.inner = least_jerk(np.clip(ends / 0.4 - 0.5, 0.0, 1.0))[0]
+        bump = 64.0 * (lambda s: s * (1.0 - s))(np.clip((self.time - self.time[0]) / LEAD, 0.0, 1.0)) ** 3
+        self.bumps = np.column_stack([bump, bump[::-1]])
+        self.shifted = np.zeros((len(self.time), 3))
+        self.moment = np.zeros((len(self.time), 3))
+
+    def _style(self, path: SampledWalk, gait: Gait) -> None:
+        """Pelvis and hinges as in the library's cycle of the velocity, at the phase of the footprints."""
+        within = np.clip(self.time, 0.0, path.duration)
+        velocity = path.motion_at(within)[0].copy()
+        velocity[(self.time <= 0.0) | (self.time >= path.duration)] = 0.0
+        blend = gait.blend(velocity)
+        events = np.einsum("nk,nke->ne", blend.weights, gait.library.events[blend.cycles])
+        frames = gait.frames(blend, gait_phase(self.feet, self.time, events), path.place_at(within))
+        turn = frames.pelvis
+        yaw = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+        pitch, roll = -np.arcsin(turn[:, 2, 0]), np.arctan2(turn[:, 2, 1], turn[:, 2, 2])
+        rows = np.column_stack([yaw, pitch, roll, frames.place, frames.angles])
+        smooth = _smoothed(rows, STYLE_CUTOFF)
+        self.pelvis, self.turn = rotations(*smooth[:, :3].T), quaternions(*smooth[:, :3].T)
+        self.origin, self.angles = smooth[:, 3:6], smooth[:, 6:]
+
+    def improve(self) -> None:
+        """One round: centre of mass over the ZMP, the body with it, and what that changes."""
+        z = self.height.at(self.time)
+        self.wanted = np.column_stack([self._from_rest_to_rest(z - self.floor), z])
+        for _ in range(PASSES):
+            self._pose()
+            error = self.wanted - self.com
+            if np.abs(error).max() < PLACED:
                 break
-            origin = origin + error
-        line = ankle - legs.hips(pelvis, origin)
+            self.origin = self.origin + error
+        line = self.ankle - self.legs.hips(self.pelvis, self.origin)
         length = np.linalg.norm(line, axis=-1)
-        need = np.maximum((length - longest) * length / -line[..., 2], 0.0).max(axis=0)
-        knots = _lowered(knots, time, need)
-        v = np.zeros((len(time), body.nv))
-        steps = np.array([pin.difference(model, b, c) for b, c in zip(q[:-2], q[2:], strict=True)]) / (2 * STEP)
-        v[1:-1] = steps
-        momentum = np.empty((len(time), 3))
-        for row in range(len(time)):
-            pin.computeCentroidalMomentum(model, data, q[row], v[row])
-            momentum[row] = data.hg.angular
-        moment = np.gradient(low_passed(momentum, 8.0, rate, padding=50), STEP, axis=0)
-    reached, at = legs.feet(pelvis, origin, q[:, 7:])
-    missed = float(np.linalg.norm(at - ankle, axis=-1).max())
-    excess = np.maximum(a - body.upper, body.lower - a).max(axis=0)
-    accel = np.gradient(v, STEP, axis=0)
-    n = len(time)
-    tau = np.zeros((n, body.nv))
-    lift = body.mass * (GRAVITY + np.gradient(np.gradient(want[:, 2], STEP), STEP))
-    forces = np.zeros((n, 2, 6))
-    motion = Motion(
-        time=time, q=q, v=v, a=accel, tau=tau, com=com, angular_momentum=momentum,
-        margin=np.zeros(n), support=schedule.support(time, FEET), contact_force=forces,
-        contact_names=FEET, joint_names=body.joint_names,
+        lower = np.maximum((length - self.longest) * length / -line[..., 2], 0.0).max(axis=0)
+        self.height.lower(self.time, lower)
+        momentum = self._momentum()
+        self.moment = self.inner[:, None] * np.gradient(_smoothed(momentum, MOMENTUM_CUTOFF), STEP, axis=0)
+
+    def _from_rest_to_rest(self, height: FloatArray) -> FloatArray:
+        """(n, 2) centre of mass without speed at its ends [m].
+
+        Before the first step the pressure goes aside and back, by as much as sets the body going in time, as
+        that of people does; after the last one likewise.
+        """
+        mass, none = self.body.mass, np.zeros_like(self.moment)
+        level = carried_com(self.zmp[:, :2], height, self.moment, mass)
+        along = carried_com(self.bumps, height, none, mass)
+        ends = [(first[1] - first[0]) for first in (level, along, level[::-1], along[::-1])]
+        sway = np.linalg.solve(np.stack([ends[1], ends[3]]), -np.stack([ends[0], ends[2]]))
+        self.shifted[:, :2] = self.bumps @ sway
+        return level + along @ sway
+
+    def _pose(self) -> None:
+        """Postures of the pelvis where it is now, and their centre of mass."""
+        body, model, data = self.body, self.body.pinocchio, self.body.pinocchio.createData()
+        self.reached = self.legs.angles(self.pelvis, self.origin, self.sole, self.ankle, self.angles)
+        for joint, bend in self.toes:
+            self.reached[:, joint] = bend
+        within = np.clip(self.reached, body.lower, body.upper)
+        self.q = np.hstack([self.origin, self.turn, within])
+        self.com = np.array([pin.centerOfMass(model, data, q) for q in self.q])
+
+    def _momentum(self) -> FloatArray:
+        """(n, 3) angular momentum about the centre of mass [kg.m^2/s]; sets the velocities."""
+        model, data = self.body.pinocchio, self.body.pinocchio.createData()
+        self.v = np.zeros((len(self.time), self.body.nv))
+        pairs = zip(self.q[:-2], self.q[2:], strict=True)
+        self.v[1:-1] = np.array([pin.difference(model, a, b) for a, b in pairs]) / (2.0 * STEP)
+        found = np.empty((len(self.time), 3))
+        for row, (q, v) in enumerate(zip(self.q, self.v, strict=True)):
+            pin.computeCentroidalMomentum(model, data, q, v)
+            found[row] = data.hg.angular
+        return found
+
+    def result(self, friction: float) -> BalancedWalk:
+        """The walk as it is now, with its forces."""
+        body, time = self.body, self.time
+        schedule = rolling_schedule(body, self.feet, float(time[0]), float(time[-1]), friction)
+        a = np.gradient(self.v, STEP, axis=0)
+        tau, forces, wrench, zmp_error = self._forces(a, schedule)
+        stances = [phase.stance for phase in schedule.sequence]
+        margin = motion_margin(
+            stances, schedule.phase_at(time), wrench, self.com, polytopes=wrench_polytopes(stances)
+        )
+        motion = Motion(
+            time=time, q=self.q, v=self.v, a=a, tau=tau, com=self.com, angular_momentum=self._momentum(),
+            margin=margin.margin, support=schedule.support(time, FEET), contact_force=forces,
+            contact_names=FEET, joint_names=body.joint_names,
+        )  # fmt: skip
+        _, at = self.legs.feet(self.pelvis, self.origin, self.q[:, 7:])
+        missed = float(np.linalg.norm(at - self.ankle, axis=-1).max())
+        excess = float(np.maximum(self.reached - body.upper, body.lower - self.reached).max())
+        return BalancedWalk(body, schedule, motion, missed, max(excess, 0.0), zmp_error)
+
+    def _forces(
+        self, a: FloatArray, schedule: ContactSchedule
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Torques, contact forces, the wrench about the origin and the error of the ZMP of the motion.
+
+        Each foot takes its share of the force at its centre of pressure, and of what moment is left.
+        """
+        body, n = self.body, len(self.time)
+        model, data = body.pinocchio, body.pinocchio.createData()
+        tau, forces, wrench = np.zeros((n, body.nv)), np.zeros((n, 2, 6)), np.empty((n, 6))
+        whole = [(body.effector_frame(foot.name), body.segment_frame(_toes(foot.name))) for foot in self.feet]
+        left = np.empty((n, 3))
+        for row in range(n):
+            needed = pin.rnea(model, data, self.q[row], self.v[row], a[row])
+            root = pin.XYZQUATToSE3(self.q[row, :7]).rotation
+            force = root @ needed[:3]
+            moment = root @ needed[3:6] + cross(self.q[row, :3], force)
+            wrench[row] = np.concatenate([force, moment])
+            left[row] = moment - cross(self.zmp[row] + self.shifted[row], force)
+            pin.computeJointJacobians(model, data, self.q[row])
+            pin.updateFramePlacements(model, data)
+            stance = schedule.stance_at(float(self.time[row]))
+            for k, foot in enumerate(self.feet):
+                share, point = self.share[k, row], self.pressure[k, row] + self.shifted[row]
+                if share <= 0.0 or foot.name not in stance:
+                    continue
+                contact = stance[foot.name]
+                pull, twist = share * force, share * left[row]
+                forces[row, k] = np.concatenate([pull, cross(point - contact.position, pull) + twist])
+                frame = whole[k][contact.part is SolePart.TOES]
+                jacobian = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+                arm = point - data.oMf[frame].translation
+                needed = needed - jacobian.T @ np.concatenate([pull, cross(arm, pull) + twist])
+            tau[row, 6:] = needed[6:]
+        return tau, forces, wrench, np.hypot(left[:, 0], left[:, 1]) / wrench[:, 2]
+
+
+def carried_com(zmp: FloatArray, height: FloatArray, moment: FloatArray, mass: float) -> FloatArray:
+    """(n, 2) bounded path of the centre of mass over a ZMP, at rest over it at both ends [m].
+
+    Args:
+        zmp: (n, 2) wanted [m], at even instants.
+        height: (n,) of the centre of mass over the floor [m].
+        moment: (n, 3) rate of the angular momentum about it [N.m].
+        mass: Of the body [kg].
+    """
+    lift = np.gradient(np.gradient(height, STEP), STEP) + GRAVITY
+    target = zmp + np.column_stack([moment[:, 1], -moment[:, 0]]) / (mass * lift)[:, None]
+    stiff = height / lift / STEP**2
+    bands = np.stack([-np.roll(stiff, 1), 1.0 + 2.0 * stiff, -np.roll(stiff, -1)])
+    bands[1, [0, -1]] = 1.0
+    # Row i of the system has its own coefficient beside the diagonal: bands are stored by columns.
+    bands[0, 1], bands[2, -2] = 0.0, 0.0
+    return solve_banded((1, 1), bands, target)
+
+
+def load_shares(footprints: Footprints, time: FloatArray) -> FloatArray:
+    """(2, n) shares of the load of the left and the right foot, half each before and after the walk."""
+    left, now = np.full(len(time), 0.5), 0.5
+    last = max(step.lands for step in footprints.steps)
+    changes = [
+        (max(other.lands for other in footprints.steps
+             if other.effector != step.effector and other.lands < step.leaves),
+         step.leaves, 0.0 if step.effector == FEET[0] else 1.0)
+        for step in footprints.steps
+        if step.leaves < footprints.end - STEP
+    ]  # fmt: skip
+    for landed, leaves, then in [*sorted(changes, key=lambda item: item[1]), (last, last + SHIFT, 0.5)]:
+        begin = max(landed, leaves - SHIFT) if landed > footprints.start else leaves - SHIFT
+        rows = time >= begin
+        share = np.clip((time[rows] - begin) / (leaves - begin), 0.0, 1.0)
+        left[rows] = now + (then - now) * least_jerk(share)[0]
+        now = then
+    return np.array([left, 1.0 - left])
+
+
+def gait_phase(feet: Sequence[RollingFoot], time: FloatArray, events: FloatArray) -> FloatArray:
+    """(n,) shares of the library's cycle at which its feet leave and land when those of a walk do.
+
+    Args:
+        feet: Left and right.
+        time: (n,) [s].
+        events: (n, 3) landing of the left foot, lift-off and landing of the right one, from the left lift-off.
+    """
+    flights = sorted(
+        (before.step.leaves, after.step.lands, number)
+        for number, foot in enumerate(feet)
+        for before, after in zip(foot.supports[:-1], foot.supports[1:], strict=True)
     )
-    return BalancedWalk(schedule, motion, zmp, missed, shares, {
-        "excess": {body.joint_names[k]: round(float(np.degrees(x)), 2) for k, x in enumerate(excess) if x > 1e-4},
-        "knots": knots, "need": need.max(), "com": np.abs(error).max(), "feet": feet, "lift": lift, "phase": phase, "want": want})
+    instants, shares, cycle, last = [], [], 0.0, -np.inf
+    for leaves, lands, right in flights:
+        landing, off, other = events[min(int(np.searchsorted(time, leaves)), len(time) - 1)].tolist()
+        begin, end = (off, other + 1.0) if right else (0.0, landing)
+        while cycle + begin <= last - 0.25:  # feet overlap by less than a quarter of a cycle
+            cycle += 1.0
+        instants += [leaves, lands]
+        shares += [cycle + begin, cycle + end]
+        last = cycle + end
+    order = np.argsort(instants, kind="stable")
+    knots, values = np.array(instants)[order], np.maximum.accumulate(np.array(shares)[order])
+    distinct = np.append(True, np.diff(knots) > 1e-4)
+    return PchipInterpolator(knots[distinct], values[distinct])(np.clip(time, knots[0], knots[-1]))
+
+
+class HeightProfile:
+    """Height of the centre of mass: low between two feet, high over one, lower where legs are too short."""
+
+    def __init__(self, footprints: Footprints, time: FloatArray, high: float) -> None:
+        """Begin with what steps of that length need; ``high`` is the height when standing [m]."""
+        low: list[tuple[float, float]] = []
+        for step in footprints.steps:
+            others = [o for o in footprints.steps if o.effector != step.effector and o.lands < step.lands]
+            if others:
+                other = max(others, key=lambda item: item.lands)
+                ahead = np.array([np.cos(step.yaw), np.sin(step.yaw)])
+                long = float((step.position - other.position)[:2] @ ahead)
+                off = min(other.leaves, step.lands + 0.3)
+                low.append((0.5 * (step.lands + off), high - DROP * long**2))
+        middle = [(0.5 * (a[0] + b[0]), high) for a, b in zip(low[:-1], low[1:], strict=True)]
+        ends = [
+            (float(time[0]), high),
+            (low[0][0] - 0.5, high),
+            (low[-1][0] + 0.5, high),
+            (float(time[-1]), high),
+        ]
+        rows = np.array(sorted([*low, *middle, *ends]))
+        distinct = np.append(True, np.diff(rows[:, 0]) > 1e-3)
+        self.instants, self.heights = rows[distinct].T
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """(n,) heights at even instants [m]."""
+        return _smoothed(PchipInterpolator(self.instants, self.heights)(time)[:, None], HEIGHT_CUTOFF)[:, 0]
+
+    def lower(self, time: FloatArray, by: FloatArray) -> None:
+        """Go lower where (n,) heights are too large by so much [m]."""
+        edges = np.concatenate([[-np.inf], 0.5 * (self.instants[1:] + self.instants[:-1]), [np.inf]])
+        nearest = np.searchsorted(edges, time, side="right") - 1
+        most = np.zeros(len(self.instants))
+        np.maximum.at(most, nearest, by)
+        self.heights = self.heights - most
+
+
+def _toes(foot: str) -> str:
+    return f"{foot.removesuffix('_foot')}_toes"
+
+
+def _smoothed(values: FloatArray, cutoff: float) -> FloatArray:
+    """The columns without what is faster than a frequency [Hz]."""
+    return low_passed(values, cutoff, 1.0 / STEP, padding=_PADDING)
