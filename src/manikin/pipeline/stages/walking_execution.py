@@ -47,7 +47,8 @@ def walk_in_balance(context: RunContext, report: Report, requirements: Execution
     report.progress(STAGE, 1.0)
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count} | _measures(walk))
     table = requirement_table([
-        Requirement("missed_m", "distance of a foot from its place, out of reach", "m", walk.missed, "<=", REACHED)
+        Requirement("missed_m", "distance of a foot from its place, out of reach", "m", walk.missed, "<=",
+                    REACHED)
     ])  # fmt: skip
     report.require(STAGE, table)
     report.keep_motions(walk.schedule, walk.motion)

@@ -11,6 +11,7 @@ whole-body motion, and the height that its legs allow, go back into the equation
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -144,7 +145,8 @@ class _Plan:
         self.longest = float(self.legs.length_at(np.array(LEAST_KNEE)))
         ends = np.minimum(self.time - self.time[0], self.time[-1] - self.time)
         self.inner = least_jerk(np.clip(ends / 0.4 - 0.5, 0.0, 1.0))[0]
-        bump = 64.0 * (lambda s: s * (1.0 - s))(np.clip((self.time - self.time[0]) / LEAD, 0.0, 1.0)) ** 3
+        waited = np.clip((self.time - self.time[0]) / LEAD, 0.0, 1.0)
+        bump = 64.0 * (waited * (1.0 - waited)) ** 3
         self.bumps = np.column_stack([bump, bump[::-1]])
         self.shifted = np.zeros((len(self.time), 3))
         self.moment = np.zeros((len(self.time), 3))
@@ -157,12 +159,13 @@ class _Plan:
         blend = gait.blend(velocity)
         events = np.einsum("nk,nke->ne", blend.weights, gait.library.events[blend.cycles])
         frames = gait.frames(blend, gait_phase(self.feet, self.time, events), path.place_at(within))
-        turn = frames.pelvis
+        turn: FloatArray = frames.pelvis
         yaw = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
         pitch, roll = -np.arcsin(turn[:, 2, 0]), np.arctan2(turn[:, 2, 1], turn[:, 2, 2])
         rows = np.column_stack([yaw, pitch, roll, frames.place, frames.angles])
         smooth = _smoothed(rows, STYLE_CUTOFF)
-        self.pelvis, self.turn = rotations(*smooth[:, :3].T), quaternions(*smooth[:, :3].T)
+        yaw, pitch, roll = smooth[:, 0], smooth[:, 1], smooth[:, 2]
+        self.pelvis, self.turn = rotations(yaw, pitch, roll), quaternions(yaw, pitch, roll)
         self.origin, self.angles = smooth[:, 3:6], smooth[:, 6:]
 
     def improve(self) -> None:
@@ -320,7 +323,7 @@ def gait_phase(feet: Sequence[RollingFoot], time: FloatArray, events: FloatArray
     Args:
         feet: Left and right.
         time: (n,) [s].
-        events: (n, 3) landing of the left foot, lift-off and landing of the right one, from the left lift-off.
+        events: (n, 3) shares at which the left foot lands, and the right one leaves and lands.
     """
     flights = sorted(
         (before.step.leaves, after.step.lands, number)
@@ -356,7 +359,7 @@ class HeightProfile:
                 long = float((step.position - other.position)[:2] @ ahead)
                 off = min(other.leaves, step.lands + 0.3)
                 low.append((0.5 * (step.lands + off), high - DROP * long**2))
-        middle = [(0.5 * (a[0] + b[0]), high) for a, b in zip(low[:-1], low[1:], strict=True)]
+        middle = [(0.5 * (a[0] + b[0]), high) for a, b in pairwise(low)]
         ends = [
             (float(time[0]), high),
             (low[0][0] - 0.5, high),

@@ -1,9 +1,9 @@
 """Feet that walk on given footprints: down on the heel, over the sole, off from the toes.
 
-A foot has one place on the floor in each support. It lands on the edge of its heel, lies flat, rises about the
-hinge of its toes and leaves; its centre of pressure goes the same way. How much it rolls follows from how far
-it goes forward: a foot that goes back or aside lands and leaves flat. Angles and shares of the time are our own
-choice, after people's (Winter 2009): sole flat at 8 to 12 % of the cycle, heel up from about 40 %.
+A foot has one place on the floor in each support. It lands on the edge of its heel, lies flat, rises about
+the hinge of its toes and leaves; its centre of pressure goes the same way. How much it rolls follows from how
+far it goes forward: a foot that goes back or aside lands and leaves flat. Angles and shares of the time are
+our own choice, near people's.
 """
 
 from collections.abc import Sequence
@@ -168,13 +168,13 @@ class RollingFoot:
         self, before: RollingSupport, after: RollingSupport, time: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         rule, off, land = self.rule, before.step.leaves, after.step.lands
-        poses = [
+        start, stop = (
             Pose(np.array(item.step.position), rotation_from_yaw(item.step.yaw)) for item in (before, after)
-        ]
+        )
+        heel = np.array([-0.5 * self.length, 0.0, 0.0])
         roll = FootRoll(
-            np.array([before.up, off, land, after.flat]), *poses, self.hinge,
-            np.array([-0.5 * self.length, 0.0, 0.0]), before.roll_out * rule.push_off, -after.roll_in * rule.touch,
-            toes_back=0.85, landing_rate=0.5,
+            np.array([before.up, off, land, after.flat]), start, stop, self.hinge, heel,
+            before.roll_out * rule.push_off, -after.roll_in * rule.touch, toes_back=0.85, landing_rate=0.5,
         )  # fmt: skip
         share = np.clip((time - off) / (land - off), 0.0, 1.0)
         done, (begin, end) = least_jerk(share)[0], roll.pivots

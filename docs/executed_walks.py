@@ -1,0 +1,141 @@
+"""Execute walks of several speeds and directions in the physics engine: writes ``executed-walks.md``.
+
+Run ``python docs/executed_walks.py``: some ten minutes on one core. With names of walks, such as
+``"ahead 0.8"``, it prints their rows alone.
+"""
+
+import sys
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from manikin.body import human
+from manikin.scenarios import load_scenario
+from manikin.scene import Scene
+from manikin.simulation import Execution, execute
+from manikin.walking import Footprints, StepRule, place_footprints
+from manikin.walking.gait.balanced_walk import balanced_walk
+from manikin.walking.path.steady_walk import SteadyWalk
+
+PAGE = Path(__file__).with_name("executed-walks.md")
+RAMP = 0.8
+"""Acceleration, as the speed over the time in which it is reached [m/s^2]; that time is 0.8 s at least."""
+HOLD = 1.0
+"""Time at the full speed [s]."""
+LOADED = 0.02
+"""A foot is on the floor from this force on [body weights]."""
+
+WALKS = {
+    "ahead 0.8 m/s": (0.8, 0.0, 0.0),
+    "ahead 1.2 m/s": (1.2, 0.0, 0.0),
+    "ahead 1.5 m/s": (1.5, 0.0, 0.0),
+    "circle of 2 m, 1.0 m/s": (1.0, 0.0, 0.5),
+    "aside 0.4 m/s": (0.0, 0.4, 0.0),
+    "back 0.5 m/s": (-0.5, 0.0, 0.0),
+    "turning on the spot 46 deg/s": (0.0, 0.0, 0.8),
+}
+"""Velocity forward, left [m/s], angular [rad/s]."""
+
+TEXT = """# Executed walks
+
+From standing to standing, the velocity held for {hold:g} s in between, by a man of 1.75 m and 79 kg in the
+physics engine ([execution](execution.md)), undisturbed. By `docs/executed_walks.py`.
+
+*Margin* is the share of the control steps in which the contacts that touch have a positive margin, *slide*
+the farthest that a flat foot moves over the floor, *peaks* are the two largest vertical forces of a foot in a
+step at full speed, with the trough between them.
+
+| walk | end | margin | slide [mm] | penetration [mm] | foot off its plan [mm] |
+|---|---|---|---|---|---|
+"""
+STEPS = """
+Steps at full speed, beside those of people: step length and cadence of 43 people ($0.559\\,v^{0.523}$ m,
+$107.3\\,v^{0.477}$ per minute; Fukuchi et al. 2018); forces of one person at 1.43 m/s: 1.09, 0.65,
+1.10 (Winter 2009).
+
+| walk | step [m] | people | steps/min | people | both feet | peaks and trough [body weights] |
+|---|---|---|---|---|---|---|
+"""
+
+
+@dataclass(frozen=True)
+class Walked:
+    """An executed walk."""
+
+    velocity: tuple[float, float, float]
+    footprints: Footprints
+    path: SteadyWalk
+    execution: Execution
+
+
+def walked(velocity: tuple[float, float, float], scene: Scene) -> Walked:
+    """Walk with a velocity from rest to rest."""
+    body, fastest = human(), float(np.abs(velocity).max())
+    path = SteadyWalk(np.array(velocity), HOLD, max(0.8, fastest / RAMP))
+    footprints = place_footprints(path, StepRule.of_people(float(np.hypot(*velocity[:2]))))
+    walk = balanced_walk(body, footprints, path)
+    return Walked(velocity, footprints, path, execute(body, scene, walk.motion, walk.schedule, hold=0.3))
+
+
+def outcome(name: str, walk: Walked) -> str:
+    """Row of the first table."""
+    run = walk.execution
+    end = run.failure or "stands"
+    share = 100.0 * float(np.mean(run.motion.margin > 0.0))
+    slide, deep, off = (1e3 * x for x in (run.max_slip_m, run.max_penetration_m, run.max_foot_error_m))
+    return f"| {name} | {end} | {share:.1f} % | {slide:.1f} | {deep:.1f} | {off:.1f} |"
+
+
+def steps(name: str, walk: Walked) -> str | None:
+    """Row of the second table, of a walk straight ahead."""
+    speed, motion = walk.velocity[0], walk.execution.motion
+    if speed <= 0.0 or walk.velocity[1] or walk.execution.failure:
+        return None
+    full = (walk.path.ramp - 0.1, walk.path.ramp + walk.path.hold + 0.1)
+    landed = [step for step in sorted(walk.footprints.steps, key=lambda step: step.lands)
+              if full[0] <= step.lands <= full[1]]  # fmt: skip
+    times = np.array([step.lands for step in landed])
+    ways = [np.hypot(*(b.position - a.position)[:2]) for a, b in pairwise(landed)]
+    force = motion.contact_force[..., 2] / (human().mass * 9.81)
+    cycle = (motion.time >= times[0]) & (motion.time < times[-1])
+    both = float(np.mean((force[cycle] > LOADED).all(axis=1)))
+    peaks = np.array([loads(force, motion.time, walk, k) for k in range(len(landed) - 1)])
+    first, trough, second = np.median(peaks, axis=0) if len(peaks) else np.full(3, np.nan)
+    cadence = 60.0 / float(np.mean(np.diff(times)))
+    lengths = f"{np.mean(ways):.2f} | {0.559 * speed**0.523:.2f}"
+    rates, forces = f"{cadence:.0f} | {107.3 * speed**0.477:.0f}", f"{first:.2f}, {trough:.2f}, {second:.2f}"
+    return f"| {name} | {lengths} | {rates} | {100.0 * both:.0f} % | {forces} |"
+
+
+def loads(force: np.ndarray, time: np.ndarray, walk: Walked, number: int) -> list[float]:
+    """Means of 40 ms: largest force early in a support, least in its middle, largest late [body weights]."""
+    begin = walk.path.ramp - 0.1
+    step = [s for s in sorted(walk.footprints.steps, key=lambda s: s.lands) if s.lands >= begin][number]
+    column = 0 if step.effector == "left_foot" else 1
+    smooth = np.convolve(force[:, column], np.full(8, 1.0 / 8.0), mode="same")
+    share = (time - step.lands) / (step.leaves - step.lands)
+    early, middle, late = ((share > a) & (share < b) for a, b in ((0.05, 0.45), (0.3, 0.7), (0.55, 0.95)))
+    return [float(smooth[early].max()), float(smooth[middle].min()), float(smooth[late].max())]
+
+
+def main() -> None:
+    """Execute all walks, or those whose names begin with an argument."""
+    scene, asked = load_scenario("stroll").build_scene(), tuple(sys.argv[1:])
+    first, second = [], []
+    for name, velocity in WALKS.items():
+        if asked and not name.startswith(asked):
+            continue
+        walk = walked(velocity, scene)
+        first.append(outcome(name, walk))
+        second.append(steps(name, walk))
+        print(first[-1], second[-1] or "", sep="\n", flush=True)
+    if not asked:
+        rows = [row for row in second if row is not None]
+        page = TEXT.format(hold=HOLD) + "\n".join(first) + "\n" + STEPS + "\n".join(rows) + "\n"
+        PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
