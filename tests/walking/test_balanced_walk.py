@@ -71,7 +71,8 @@ def test_all_load_is_on_the_feet_that_stand(case):
 def test_the_planned_forces_carry_the_motion(case):
     """They sum up to ``m (c'' + g)``; differences of positions at 5 ms give it to some newtons."""
     walk, motion = case.walk, case.walk.motion
-    lift = np.gradient(np.gradient(motion.com, STEP, axis=0), STEP, axis=0) + [0.0, 0.0, GRAVITY]
+    lift = np.gradient(np.gradient(motion.com, STEP, axis=0), STEP, axis=0)
+    lift[:, 2] += GRAVITY
     force = motion.contact_force[..., :3].sum(axis=1)
     inside = slice(20, -20)
     np.testing.assert_allclose(force[inside], walk.body.mass * lift[inside], atol=15.0)
