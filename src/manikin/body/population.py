@@ -16,7 +16,7 @@ from functools import cache
 from itertools import product
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtri
 
 from manikin.body.anthropometry import Sex
 from manikin.errors import BodyError
@@ -172,7 +172,7 @@ def boundary_people(
     for signs in product((1.0, -1.0), repeat=count) if corners and count > 1 else ():
         names.append("corner" + "".join("+" if sign > 0 else "-" for sign in signs))
         directions.append(np.array(signs) / np.sqrt(count))
-    steps = np.sqrt(chi2.ppf(share, count) * variances) * np.array(directions)
+    steps = np.sqrt(chdtri(count, 1.0 - share) * variances) * np.array(directions)
     people = _completed(known, chosen, (steps @ axes.T) * deviation)
     return tuple(
         PersonOfPopulation(f"{sex}-{name}", sex, row) for name, row in zip(names, people, strict=True)
@@ -191,7 +191,7 @@ def percentile_person(sex: Sex, percent: float) -> PersonOfPopulation:
     """
     percent = finite_number(percent, "percentile", at_least=0.1, at_most=99.9, error=BodyError)
     known, chosen = population_statistics(sex), _numbers(("stature", "mass"))
-    off = norm.ppf(percent / 100.0) * known.deviation[chosen]
+    off = ndtri(percent / 100.0) * known.deviation[chosen]
     return PersonOfPopulation(f"{sex}-P{percent:g}", sex, _completed(known, chosen, off[None])[0])
 
 

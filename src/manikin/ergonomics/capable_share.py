@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from manikin.body import BodyModel
 from manikin.body.strength import DEFAULT_AGE, HUMAN_STRENGTH, hinge_strength, variation
@@ -54,7 +54,7 @@ class CapableShare:
 
 def capable_share(torque: float, mean: float, deviation: float) -> float:
     """Share of people whose normally distributed strength is at least a torque [N.m]."""
-    return float(norm.sf(torque, loc=mean, scale=deviation))
+    return float(ndtr((mean - torque) / deviation))
 
 
 def capable_shares(

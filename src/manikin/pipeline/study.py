@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from manikin.body.dimensions import DIMENSIONS
 from manikin.errors import ScenarioError
@@ -223,7 +223,7 @@ def wilson_interval(successes: int, count: int, confidence: float) -> tuple[floa
     """
     if count == 0:
         return None
-    z = float(norm.ppf(0.5 + 0.5 * confidence))
+    z = float(ndtri(0.5 + 0.5 * confidence))
     share, weight = successes / count, 1.0 + z**2 / count
     middle = (share + z**2 / (2.0 * count)) / weight
     half = z / weight * float(np.sqrt(share * (1.0 - share) / count + z**2 / (4.0 * count**2)))
