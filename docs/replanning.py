@@ -300,7 +300,7 @@ def posture_figure(plan: Adaptation, count: int = 9) -> Figure:
     return figure
 
 
-def adapted(found: Reconstruction, supports: RecordedSupports) -> dict[str, Replan]:
+def adapted(found: Reconstruction, supports: RecordedSupports) -> dict[str, Adaptation]:
     """A walk re-planned near its key frames, and executed with toes that roll, and free of its timing."""
     return {
         "near": adapt_recording(found, supports, rolling=False),
@@ -309,7 +309,7 @@ def adapted(found: Reconstruction, supports: RecordedSupports) -> dict[str, Repl
     }
 
 
-def draw(shown: dict[str, Replan]) -> None:
+def draw(shown: dict[str, Adaptation]) -> None:
     """Write the figures of the walk that is shown."""
     for name, figure in (
         ("keyframes", key_frame_figure(shown["near"])),

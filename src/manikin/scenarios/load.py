@@ -2,8 +2,10 @@
 
 import difflib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from manikin.errors import ScenarioError
@@ -103,8 +105,12 @@ def _hint(given: str, known: Mapping[str, object]) -> str:
 
 def built_in() -> dict[str, Path]:
     """Files of the built-in scenarios by name, sorted."""
-    folder = Path(str(resources.files("manikin.scenarios")))
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return {path.stem: path for path in _built_in_files()}
+
+
+@cache
+def _built_in_files() -> tuple[Path, ...]:
+    return tuple(sorted(Path(str(resources.files("manikin.scenarios"))).glob("*.yaml")))
 
 
 def find_scenario(name_or_path: str | Path, folder: Path = Path()) -> tuple[Path, str | None]:
@@ -145,8 +151,7 @@ def list_scenarios() -> dict[str, str]:
 def list_variants(name_or_path: str | Path) -> dict[str, str]:
     """Variants of a scenario with a one-line description each; ScenarioError if it cannot be read."""
     path, _ = find_scenario(name_or_path)
-    names = variants_of(read_extended(path), str(path))
-    return {variant: load_scenario(path, variant).file.description for variant in names}
+    return {variant: each.file.description for variant, each in _built(path).items() if variant is not None}
 
 
 def load_scenario(
@@ -165,10 +170,8 @@ def load_scenario(
     path, named = find_scenario(name_or_path)
     if variant is not None and named is not None:
         raise ScenarioError(f"{name_or_path}: names a variant, and so does {variant!r}; valid: one of them")
-    wanted, tree = named if variant is None else variant, read_extended(path)
-    built = {None: _build(tree, path)}
-    built |= {name: _build_variant(tree, name, path) for name in variants_of(tree, str(path))}
-    scenario = built.get(wanted) or _build_variant(tree, wanted or "", path)
+    wanted = named if variant is None else variant
+    scenario = _built(path).get(wanted) or _build_variant(read_extended(path), wanted or "", path)
     return scenario.with_overrides(overrides)
 
 
@@ -188,6 +191,23 @@ def load_scene(name_or_path: str | Path) -> Scenario:
 
 SOME_TASK: Mapping[str, Any] = {"task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
 """Task of a file that has none."""
+
+
+def _built(path: Path) -> Mapping[str | None, Scenario]:
+    """The scenario of a file, by None, and all its variants by name."""
+    return _built_once(path) if path in _built_in_files() else _built_now(path)
+
+
+def _built_now(path: Path) -> dict[str | None, Scenario]:
+    tree = read_extended(path)
+    built: dict[str | None, Scenario] = {None: _build(tree, path)}
+    return built | {name: _build_variant(tree, name, path) for name in variants_of(tree, str(path))}
+
+
+@cache
+def _built_once(path: Path) -> Mapping[str | None, Scenario]:
+    """Of a built-in scenario, whose file stays as it is while a process runs."""
+    return MappingProxyType(_built_now(path))
 
 
 def _build(tree: Tree, path: Path) -> Scenario:
