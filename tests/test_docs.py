@@ -113,12 +113,15 @@ def test_the_motion_file_is_read_in_ten_lines_without_manikin():
 
 
 @pytest.mark.slow
-def test_scenario_examples_succeed(tmp_path):
-    examples = yaml_examples("scenario")
-    assert examples
-    for text in examples:
+def test_scenario_examples_succeed(tmp_path, runs):
+    """The first one is the step whose run the tests share."""
+    first, *others = yaml_examples("scenario")
+    assert runs.step_file().read_text() == first
+    results = [runs.step(quick=False)]
+    for text in others:
         (tmp_path / "example.yaml").write_text(text)
-        result = manikin.run(tmp_path / "example.yaml")
+        results.append(manikin.run(tmp_path / "example.yaml"))
+    for result in results:
         assert result.succeeded, result.summary["failure"]
 
 

@@ -4,6 +4,7 @@ import ast
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 import typer
 
 from manikin.cli import app
+from manikin.pipeline import runner
+from manikin.scenarios import load_scenario
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -68,16 +71,43 @@ def _options(parameter):
     return [*parameter.opts, *parameter.secondary_opts]
 
 
-def test_the_example_prints_what_the_readme_says(tmp_path):
-    """The margins follow from the example's numbers alone, so they are compared to the printed digit."""
-    example = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
-    assert len(example[1].splitlines()) <= 10
+def example():
+    """The example of the README, and what it prints."""
+    code, printed = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL).groups()
+    assert len(code.splitlines()) <= 10
+    return code, printed
+
+
+def test_the_example_prints_what_the_readme_says(tmp_path, monkeypatch, capsys, runs):
+    """The margins follow from the example's numbers alone, so they are compared to the printed digit.
+
+    Its run is the one that the tests share, in a process of its own as that of the example.
+    """
+
+    def shared(job, *, out, seed):
+        assert job.to_yaml() == load_scenario("platform").to_yaml()
+        assert seed is None
+        result = runs("platform")
+        shutil.copytree(result.directory, out)
+        return result
+
+    code, printed = example()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(runner, "run", shared)
+    exec(compile(code, "README.md", "exec"), {})
+    assert capsys.readouterr().out == printed
+    assert (tmp_path / "margin.png").stat().st_size > 10_000
+
+
+@pytest.mark.long
+def test_the_example_runs_by_itself(tmp_path):
+    """Everything of it in a fresh process."""
+    code, printed = example()
     found = subprocess.run(
-        [sys.executable, "-c", example[1]], capture_output=True, text=True, check=True, cwd=tmp_path,
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path,
         env={**os.environ, "MPLBACKEND": "Agg"},
     )  # fmt: skip
-    assert found.stdout == example[2]
-    assert (tmp_path / "margin.png").stat().st_size > 10_000
+    assert found.stdout == printed
 
 
 @pytest.mark.long

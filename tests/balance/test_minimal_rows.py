@@ -41,7 +41,12 @@ STANCES = {
         sole("pelvis", (0.0, 0.0, 0.45), length=0.3, width=0.3, friction=0.5),
     ],
 }  # fmt: skip
-names = pytest.mark.parametrize("name", STANCES)
+MANY = {"two soles and a hand that turns", "a turned step", "a hand on a wall"}
+"""Names of those with many rows, whose kinds of contacts others have as well."""
+
+names = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] if name in MANY else []) for name in STANCES]
+)
 
 
 def centre(contacts):

@@ -8,6 +8,7 @@ import pytest
 
 from manikin.cli import main
 from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED
+from manikin.scenarios import load_scenario
 from manikin.simulation import HeldImpulse
 from manikin.simulation.push_search import DirectionSearch
 
@@ -117,6 +118,18 @@ def test_a_push_for_people_leaves_a_run_directory(capfd, tmp_path, monkeypatch):
     assert lines[-1] == f"report: {folder.relative_to(tmp_path)}/report.html"
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["push"]["program_share"] == 0.0
+    kept = load_scenario(folder / "scenario.yaml").file
+    assert (kept.recovery.feet, kept.recovery.locked, kept.recovery.strength) == ("free", ["arms"], 1.5)
+    assert (kept.push.force_N, kept.push.direction_deg) == (60.0, -30.0)
+
+
+@pytest.mark.long
+def test_the_directory_of_a_push_runs_again(capfd, tmp_path):
+    """To the same numbers."""
+    folder = tmp_path / "push"
+    assert main(["push", "--force", "60", "--direction", "-30", "--no-figures", "--out", str(folder)]) == DONE
+    capfd.readouterr()
+    summary = json.loads((folder / "summary.json").read_text())
     assert main(["run", str(folder / "scenario.yaml"), "--json"]) == DONE
     again = json.loads(capfd.readouterr().out)
     assert untimed(again["push"]) == untimed(summary["push"])

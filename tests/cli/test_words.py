@@ -18,7 +18,7 @@ TWO = ["words", "--slices", "340,150", "--jobs", "1"]
 
 @pytest.fixture(autouse=True)
 def small_grid(monkeypatch):
-    monkeypatch.setattr(words, "THESIS_GRID", WordGrid((-0.8, 0.4), (3.0, 3.4), 0.2))
+    monkeypatch.setattr(words, "THESIS_GRID", WordGrid((-0.8, 0.4), (3.0, 3.4), 0.4))
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_json_gives_counts_and_shares(capsys, solved, tmp_path, monkeypatch):
     assert main([*TWO, "--json"]) == DONE
     found = json.loads(capsys.readouterr().out)
     assert found["complete"]
-    assert found["problems"] == found["solved"] == sum(found["counts"].values()) == 42
+    assert found["problems"] == found["solved"] == sum(found["counts"].values()) == 16
     assert sum(found["shares"].values()) == pytest.approx(1.0)
     assert list(found["counts"])[:6] == ["IDI", "DID", "IDID", "DIDI", "IDIDI", "DIDID"]
     assert found["others"] == [word for word in found["counts"] if len(word) not in (3, 4, 5)]

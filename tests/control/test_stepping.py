@@ -1,6 +1,7 @@
 """Where a step goes, how the foot gets there, and what is held without one."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -152,6 +153,7 @@ def test_a_pendulum_on_springy_ankles_sways_as_integrated(share, pull, time):
     )
 
 
+@cache
 def limits(body=KUDOH, **options):
     controller = BalanceRecovery(body, body.standing_posture(), RecoverySettings(**options))
     return edge_limits(controller, body.standing_posture(), 0.1)

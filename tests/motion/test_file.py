@@ -277,7 +277,13 @@ with Interruption() as interruption:
 """
 
 
-@pytest.mark.parametrize(("number", "times"), [(signal.SIGKILL, 3), (signal.SIGTERM, 1), (signal.SIGINT, 1)])
+@pytest.mark.parametrize(
+    ("number", "times"),
+    [
+        (signal.SIGKILL, 1), pytest.param(signal.SIGKILL, 3, marks=pytest.mark.long),
+        pytest.param(signal.SIGTERM, 1, marks=pytest.mark.long), (signal.SIGINT, 1),
+    ],
+)  # fmt: skip
 def test_killed_writer_leaves_a_whole_file(content, tmp_path, number, times):
     """A process that writes the same file without pause is killed at arbitrary instants."""
     write_motions(tmp_path / "source.h5", MotionFile(random_motion(content.body, 2000), None, content.body))

@@ -20,7 +20,7 @@ def head_clearance(name, result):
     return min(proximity.minimum(q, others).distance for q in result.executed.q[::4])
 
 
-@pytest.fixture(scope="module", params=RECORDED)
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=pytest.mark.long) for name in RECORDED])
 def passage(request, runs):
     """Name of a passage and its run."""
     return request.param, runs(request.param)

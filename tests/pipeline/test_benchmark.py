@@ -17,6 +17,7 @@ def without_times(entry):
     return {key: value for key, value in entry.items() if key != "processor_s"}
 
 
+@pytest.mark.long
 def test_a_task_is_the_same_whatever_ran_before():
     task = BenchmarkTask("bars", 1)
     first = run_task(task)

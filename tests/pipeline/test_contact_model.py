@@ -48,20 +48,15 @@ def worst(model, schedule, time, names, forces):
     return most
 
 
-@pytest.mark.parametrize(
-    "model",
-    [model if model == "outer" else pytest.param(model, marks=pytest.mark.long) for model in FRICTION_MODELS],
-)
-def test_forces_of_every_stage_lie_in_the_cone_that_was_asked_for(model, runs):
-    """On a slippery floor all the pyramids matter: with the outer one alone 0.278 of 0.212 was planned.
+def slippery(model):
+    """Values to set for a floor on which friction matters."""
+    return f"supports.friction={FRICTION}", f"planning.friction_model={model}", "planning.min_margin=8"
 
-    Control keeps to one pyramid whatever is asked for, so that one run is executed, under the widest model.
-    """
-    settings = f"supports.friction={FRICTION}", f"planning.friction_model={model}", "planning.min_margin=8"
-    run = runs("platform", overrides=settings if model == "outer" else (*settings, "execution=none"))
-    summary = run.summary
-    assert run.centroidal.trajectory is not None
+
+def forces_of_every_stage_are_inside(model, run):
+    """Planned forces of the point mass and of the body at every sample, and what the summary says of them."""
     trajectory = run.centroidal.trajectory
+    assert trajectory is not None
     time = np.linspace(0.0, trajectory.duration, 400)
     names = trajectory.schedule.sequence.effectors
     mass_point = point_mass_forces(trajectory, time)
@@ -70,18 +65,46 @@ def test_forces_of_every_stage_lie_in_the_cone_that_was_asked_for(model, runs):
     planned = saved.planned
     args = saved.schedule, planned.time, planned.contact_names, planned.contact_force
     assert worst(model, *args) <= ROUNDING
-    for stage in ("centroidal", "wholebody", *(["execution"] if model == "outer" else [])):
-        used = summary[stage]["friction"]
+    stages = [stage for stage in ("centroidal", "wholebody", "execution") if run.summary[stage] is not None]
+    for stage in stages:
+        used = run.summary[stage]["friction"]
         assert used["model"] == model
-        assert 0.3 < used["max_share"] <= 1.0 + ROUNDING
-    if model == "outer":  # control keeps to the inner pyramid: stricter, as its documentation says
-        assert summary["execution"]["friction"]["max_share"] <= np.sqrt(0.5) + ROUNDING
-    else:
-        assert (run.verdict, run.succeeded) == ("planned", True)
-        assert (summary["planned"], summary["proved"]) == (True, False)
-        assert summary["execution"] is None
-        assert run.executed is None
-        assert {row["stage"] for row in summary["requirements"]} == {"centroidal", "wholebody"}
+        assert 0.1 < used["max_share"] <= 1.0 + ROUNDING
+
+
+def test_forces_of_every_stage_lie_in_the_cone_that_was_asked_for(runs):
+    """Of a quick step to the side, under the widest model.
+
+    Control keeps to the inner pyramid whatever is asked for: stricter, as its documentation says.
+    """
+    run = runs.step(slippery("outer"))
+    assert run.succeeded, run.summary["failure"]
+    forces_of_every_stage_are_inside("outer", run)
+    assert run.summary["execution"]["friction"]["max_share"] <= np.sqrt(0.5) + ROUNDING
+
+
+@pytest.mark.parametrize(
+    "model",
+    [pytest.param(model, marks=[] if model == "inner" else pytest.mark.long) for model in FRICTION_MODELS],
+)
+def test_planned_forces_lie_in_the_cone_that_was_asked_for(model, runs):
+    """A plan alone, which is planned and not proved."""
+    run = runs.step((*slippery(model), "execution=none"))
+    forces_of_every_stage_are_inside(model, run)
+    assert (run.verdict, run.succeeded) == ("planned", True)
+    assert (run.summary["planned"], run.summary["proved"]) == (True, False)
+    assert run.summary["execution"] is None
+    assert run.executed is None
+    assert {row["stage"] for row in run.summary["requirements"]} == {"centroidal", "wholebody"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", FRICTION_MODELS)
+def test_all_the_pyramids_matter_on_the_platform(model, runs):
+    """With the outer one alone 0.278 of 0.212 was planned on a slippery floor."""
+    run = runs("platform", overrides=(*slippery(model), *([] if model == "outer" else ["execution=none"])))
+    forces_of_every_stage_are_inside(model, run)
+    assert min(run.summary[stage]["friction"]["max_share"] for stage in ("centroidal", "wholebody")) > 0.3
 
 
 def test_the_older_word_for_the_outer_pyramid_is_accepted():

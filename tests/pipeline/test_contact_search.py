@@ -16,6 +16,7 @@ from manikin.scenarios import load_scenario
 from manikin.scene.distance import Proximity
 
 FOUND = ("crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found")
+SAMPLED = ("crouch", "stairs", "stand-up-chair")
 
 
 @cache
@@ -26,7 +27,9 @@ def search(name, seed=0):
     return find_supports(scenario, body, scene, np.random.default_rng(seed)), body, scene
 
 
-@pytest.mark.parametrize("name", FOUND)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in SAMPLED else pytest.mark.long) for name in FOUND]
+)
 def test_contacts_are_found_from_start_and_goal(name):
     found, body, scene = search(name)
     assert found.failure is None
@@ -133,6 +136,7 @@ def test_a_person_rises_from_a_chair_in_the_physics_engine(runs):
     assert len(kept["supports"]["phases"]) == result.summary["contacts"]["phases"]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_person_walks_from_start_to_goal_in_the_physics_engine(runs):
     result = runs.shorter("crouch")

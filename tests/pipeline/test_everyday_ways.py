@@ -155,7 +155,7 @@ def test_strides_on_the_flat_are_those_of_people():
     assert max(place[0] - other[0] for _, _, place, other in steps(plan)) >= 0.25 * draw.stature
 
 
-@pytest.mark.parametrize(("seed", "down"), [(4, False), (1, True)])
+@pytest.mark.parametrize(("seed", "down"), [pytest.param(4, False, marks=pytest.mark.long), (1, True)])
 def test_treads_shorter_than_a_foot_are_climbed_and_descended(seed, down):
     """Soles hang over edges, by 40 % of them at most."""
     plan, check = planned(stairs(Draw("stairs", seed), down))
@@ -165,25 +165,26 @@ def test_treads_shorter_than_a_foot_are_climbed_and_descended(seed, down):
     assert min(parts) < max(whole)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_ground_of_coplanar_boxes_beside_the_floor_is_one_ground(seed):
     """The body starts on floor and box at once, and goes over seams as over plain ground."""
     plan, _ = planned(ground_of_boxes(Draw("ground", seed)))
     assert len(steps(plan)) <= 6
 
 
+@pytest.mark.long
 def test_gaps_narrower_than_hanging_arms_are_passed():
     """Between the walls the body is turned or keeps its arms close; nobody is 0.40 m wide from the side."""
     planned(gap(Draw("gap", 0)))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_thin_bars_are_stepped_over(seed):
     """The foot lands beyond the bar, away from the posture in which it was lifted."""
     planned(bar(Draw("bar", seed)))
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_women_rise_from_chairs(seed):
     """1.52 to 1.74 m, no hands; feet are on the ground and the seat is left before the goal is reached."""
     plan, _ = planned(chair(Draw("chair", seed, statures=(1.52, 1.74), sex="female")))

@@ -117,6 +117,7 @@ def test_a_plan_at_the_end_of_the_legs_is_planned_lower_so_that_the_arms_may_han
             assert item.easier_com[2] < item.com[2] - 0.005
 
 
+@pytest.mark.long
 def test_a_goal_beyond_the_legs_is_named_without_planning_again(tmp_path):
     """The CoM at the goal is given: no plan can lower it. A standing body's is below 1 m."""
     result = run(stride(tmp_path, length=0.4, goal_height=1.15))

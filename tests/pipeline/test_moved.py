@@ -16,15 +16,22 @@ from manikin.scenarios import load_scenario
 MOVE = (10.0, -7.0, 37.0)
 
 NAMES = (
-    pytest.param("platform", marks=pytest.mark.long), "stand-up-chair",
-    pytest.param("push-back-500", marks=pytest.mark.long), "goal-left",
+    "step", "goal-left",
+    *(pytest.param(name, marks=pytest.mark.long) for name in ("platform", "stand-up-chair", "push-back-500")),
 )  # fmt: skip
+"""Supports that are listed and a walk; in the sweep supports that are found and a push as well."""
 
 
 @pytest.fixture
 def both(runs):
     """Runs of a scenario and of the same one moved."""
-    return lambda name: (runs.shorter(name), runs.shorter(name, moved=MOVE))
+
+    def made(name):
+        if name == "step":
+            return runs.step(quick=False), runs.step(quick=False, moved=MOVE)
+        return runs.shorter(name), runs.shorter(name, moved=MOVE)
+
+    return made
 
 
 @pytest.mark.slow

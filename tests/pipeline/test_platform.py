@@ -10,6 +10,7 @@ from manikin.motion.file import read_motions
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages import ExecutionRequirements
 from manikin.scenarios import load_scenario
+from manikin.scene import Proximity, Scene
 
 KEYS = {
     "centroidal": {
@@ -77,6 +78,20 @@ def test_arms_hang_at_rest(platform):
         shoulder = np.rad2deg(motion.q[0, 7 + body.joint_index(f"{side}_shoulder_flexion")])
         assert ((elbow >= 10.0) & (elbow <= 30.0)).all()
         assert abs(shoulder) <= 20.0
+
+
+@pytest.mark.slow
+def test_the_head_keeps_clear_of_the_roof(platform):
+    """Least distance of the executed head, every 20 ms; the summary has that of every 5 ms."""
+    scenario = load_scenario("platform")
+    body = scenario.build_body()
+    roof = Scene([item for item in scenario.build_scene() if item.name == "roof"], floor_height=None)
+    proximity = Proximity(body, roof, self_collision=False)
+    others = frozenset((segment.name, "roof") for segment in body.segments if segment.name != "head")
+    clearance = min(proximity.minimum(q, others).distance for q in platform.executed.q[::4])
+    told = platform.summary["execution"]["head_clearance_m"]
+    assert 0.02 <= told <= clearance + 1e-5
+    assert clearance < told + 0.01
 
 
 @pytest.mark.slow

@@ -39,7 +39,7 @@ def test_the_walk_asks_for_the_published_margin_and_duration():
     [
         ("walk@slippery", "friction of 0.05 is too low"),
         ("walk@long-step", "step is too long"),
-        ("beam-H2C2@slippery", "friction of 0.05 is too low"),
+        pytest.param("beam-H2C2@slippery", "friction of 0.05 is too low", marks=pytest.mark.long),
         ("ramp@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
         ("ramp-down@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
     ],

@@ -46,7 +46,7 @@ def finished(tmp_path_factory):
     """One study, done by two processes."""
     folder = tmp_path_factory.mktemp("study")
     for name, text in FILES.items():
-        (folder / name).write_text(text)
+        (folder / name).write_text(text.replace("[0.7, 0.5]", "[0.7]"))
     study = load_study(folder / "study.yaml")
     return study, folder / "two", run_study(study, path=folder / "two", jobs=2)
 

@@ -16,7 +16,11 @@ from manikin.scenarios import load_scenario
 from manikin.walking import Walker, walk_along
 from manikin.walking.path.walk_obstacles import clearance
 
-WALKING = ("goal-left", "goal-right", "corridor", "catch", "narrow")
+WALKING = (
+    "goal-left", pytest.param("goal-right", marks=pytest.mark.long), "corridor", "catch",
+    pytest.param("narrow", marks=pytest.mark.long),
+)  # fmt: skip
+"""The walk through a narrow door, twice as long as the others, is in the sweep."""
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +88,7 @@ def test_every_walk_is_walked(ran, name):
     }
 
 
-@pytest.mark.parametrize("name", ["corridor", "catch", "narrow"])
+@pytest.mark.parametrize("name", ["corridor", "catch", pytest.param("narrow", marks=pytest.mark.long)])
 def test_everybody_keeps_room_on_the_common_clock(planned, name):
     """Measured every millisecond and until all have come, between all who walk and what stands there."""
     context, plan = planned(name)
@@ -117,6 +121,7 @@ def test_the_one_from_the_side_corridor_turns_right_and_waits(planned):
     assert x[0] < other.place_at(wait[0])[0] < x[-1] + 0.6
 
 
+@pytest.mark.long
 def test_the_door_is_passed_sideways(ran, planned):
     result, _ = ran("narrow")
     _, plan = planned("narrow")

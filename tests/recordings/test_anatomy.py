@@ -101,6 +101,7 @@ def inside(volumes, clips, part):
     return float(np.mean(volumes[part].distance(np.concatenate([clip[part] for clip in clips])) >= 0.0))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_held_out_clips_are_inside(script, clips):
     """Volumes learnt from three clips in four hold at least 95 % of the frames of the fourth ones.
@@ -113,6 +114,7 @@ def test_held_out_clips_are_inside(script, clips):
         assert inside(learnt, [clips[name] for name in names[::4]], part) >= 0.95, part
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_people_who_were_not_recorded_move_within_the_hips_volume(script, clips):
     """Somebody who climbed, against fifteen others: 95 % of the frames of the hips, 80 % of the shoulders."""
@@ -123,6 +125,7 @@ def test_people_who_were_not_recorded_move_within_the_hips_volume(script, clips)
     assert inside(learnt, own, "upper_arm") >= 0.8
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_shipped_volumes_are_what_the_script_makes(script, clips):
     """To the half of 1e-4 rad with which they are written."""

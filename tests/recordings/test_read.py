@@ -233,11 +233,12 @@ def head_and_end(found):
 
 
 @pytest.mark.slow
-def test_every_real_recording_is_read(recordings_folder):
+@pytest.mark.parametrize("every", [6, pytest.param(1, marks=pytest.mark.long)])
+def test_every_real_recording_is_read(recordings_folder, every):
     """Joints stay above the floor, within a person's height or what was climbed."""
     files = sorted([*recordings_folder.glob("*/*.bvh"), *recordings_folder.glob("*/*.amc")])
     assert len(files) > 100
-    for file in files:
+    for file in files[::every]:
         found = read_recording(file)
         low, high = found.positions[..., 2].min(), found.positions[..., 2].max()
         assert -0.15 < low < 0.4, file.name
@@ -260,7 +261,8 @@ def test_heights_of_real_recordings_are_those_of_the_table(recordings_folder):
         np.testing.assert_allclose(measured, wanted, atol=0.0051)
 
 
-def test_velocities_of_real_recordings_are_those_of_the_table(recordings_folder):
+@pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.long)])
+def test_velocities_of_real_recordings_are_those_of_the_table(recordings_folder, every):
     """Mean velocity of the shoulders' middle along and across them, and of their turning, in all windows.
 
     The table was made independently, of shoulders smoothed by a mean over a quarter of a second, the ends
@@ -268,7 +270,7 @@ def test_velocities_of_real_recordings_are_those_of_the_table(recordings_folder)
     """
     rows = [row for row in table(recordings_folder, "clips_locomotion.csv") if row["class"] != "idle"]
     assert len(rows) > 80
-    for row in rows:
+    for row in rows[::every]:
         window = (int(row["first_frame0"]), int(row["end_frame0"]))
         found = read_recording(recordings_folder / row["file"])
         width = round(0.25 * found.rate) | 1

@@ -345,8 +345,8 @@ def analysed(path, frames=None):
         ("btkdata/PiG_Motion-FlatFoot-One.c3d", 61.3, 0.030, 0.94, 0.003),
         # No marker tells where trunk and arms are.
         ("btkdata/FunctionalWalk.c3d", 60.5, 0.030, 0.87, 0.002),
-        ("nimble_opencap_s4/walkingTO1.trc", 63.7, 0.030, 0.99, 0.002),
-        ("opensim_core/walking2.c3d", 66.6, 0.030, 0.93, 0.003),
+        pytest.param("nimble_opencap_s4/walkingTO1.trc", 63.7, 0.030, 0.99, 0.002, marks=pytest.mark.long),
+        pytest.param("opensim_core/walking2.c3d", 66.6, 0.030, 0.93, 0.003, marks=pytest.mark.long),
         ("opensim_core/walking5.c3d", 66.0, 0.030, 0.89, 0.005),
     ],
 )

@@ -8,7 +8,17 @@ from tests.robustness.leaks import CALLS, MOST, growth, growths
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read from /proc")
-@pytest.mark.parametrize("name", [*CALLS, "scenario", "stance", "bvh", "c3d", "stl", "urdf"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "margin", "scenario", "c3d",
+        *(
+            pytest.param(name, marks=pytest.mark.long)
+            for name in (*CALLS, "stance", "bvh", "stl", "urdf")
+            if name != "margin"
+        ),
+    ],
+)  # fmt: skip
 def test_memory_does_not_grow_with_the_number_of_calls(name):
     assert growths(20, [name])[name] <= MOST
 

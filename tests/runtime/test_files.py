@@ -20,20 +20,31 @@ OTHER = """
 import sys
 from manikin.errors import MotionFileError
 from manikin.pipeline.run_directory import RunDirectory
-try:
-    RunDirectory(sys.argv[1])
-    print("taken")
-except MotionFileError as error:
-    print(error)
+for line in sys.stdin:
+    try:
+        RunDirectory(line.strip())
+        print("taken", flush=True)
+    except MotionFileError as error:
+        print(error, flush=True)
 """
 
 
-def by_another_process(path):
-    command = [sys.executable, "-c", OTHER, str(path)]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+@pytest.fixture
+def by_another_process():
+    """What another process, that stays, says when it is to take a directory."""
+    with subprocess.Popen(
+        [sys.executable, "-c", OTHER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+
+        def said(path):
+            process.stdin.write(f"{path}\n")
+            process.stdin.flush()
+            return process.stdout.readline().strip()
+
+        yield said
 
 
-def test_a_run_directory_is_refused_to_a_second_process_and_free_afterwards(tmp_path):
+def test_a_run_directory_is_refused_to_a_second_process_and_free_afterwards(tmp_path, by_another_process):
     first = RunDirectory(tmp_path / "run")
     first.write("scenario.yaml", "name: first\n")
     first.write("summary.json", {"verdict": "proved"})
@@ -56,13 +67,24 @@ def test_a_directory_that_is_something_else_is_not_claimed(tmp_path):
     assert [item.name for item in tmp_path.iterdir()] == ["letter.txt"]
 
 
+RUN_ALL = """
+import sys
+from manikin.pipeline import batch
+batch.built_in_jobs = lambda **_: (batch.Job("platform"),)
+from manikin.cli import main
+raise SystemExit(main(sys.argv[1:]))
+"""
+"""The command with fewer scenarios to look at."""
+
+
 def test_a_set_of_runs_belongs_to_one_process_and_leaves_other_files_alone(tmp_path):
     (tmp_path / "letter.txt").write_text("Dear reader")
     (tmp_path / "results.json").write_text("{}")
     directory = BatchDirectory(tmp_path)
     assert not (tmp_path / "results.json").exists()
-    command = [sys.executable, "-m", "manikin", "run", "all", "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN_ALL, "run", "all", "--out", str(tmp_path)], capture_output=True, text=True
+    )
     assert done.returncode == 2
     assert done.stderr.startswith(f"manikin: {tmp_path}: another process writes to this set of runs; valid: ")
     assert len(done.stderr.splitlines()) == 1

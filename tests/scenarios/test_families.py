@@ -7,7 +7,7 @@ from manikin.scenarios import load_scenario
 from manikin.scenarios.families import FAMILIES, chosen_families, draw_scene
 from manikin.scenarios.families.family import BODY_MASS_INDICES, FARTHEST, STATURES
 
-SEEDS = range(20)
+SEEDS = range(6)
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -25,7 +25,7 @@ def test_scenes_are_plain_and_read_again_from_their_files(name, tmp_path):
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_bodies_and_places_are_in_their_ranges_and_half_of_the_scenes_are_moved(name):
-    scenes = [draw_scene(FAMILIES[name], seed) for seed in range(40)]
+    scenes = [draw_scene(FAMILIES[name], seed) for seed in range(16)]
     moved = 0
     for scene in scenes:
         body, start = scene.file.body, scene.file.task.start
@@ -41,7 +41,7 @@ def test_bodies_and_places_are_in_their_ranges_and_half_of_the_scenes_are_moved(
             *(x for item in scene.file.scene for x in item.position),
         ]
         moved += any(round(number, 4) != number for number in numbers)
-    assert 8 <= moved <= 32
+    assert 2 <= moved <= 14
 
 
 def test_a_family_that_is_not_known_is_refused():

@@ -3,13 +3,14 @@
 import itertools
 import time
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from manikin.contact import SolePart
 from manikin.errors import ScenarioError
-from manikin.pipeline.stages import Report, RunContext, whole_body_stage
+from manikin.pipeline.stages import Report, RunContext, contact_stage, whole_body_stage
 from manikin.pipeline.stages.contact_stage import find_supports, plan_contacts, slower
 from manikin.pipeline.stages.context import Passing
 from manikin.planning.com import Failure, plan_com
@@ -22,24 +23,30 @@ BLOCK = """
 """
 
 
-def way(tmp_path, height, *, goal=0.8, scene=""):
+@pytest.fixture(scope="module")
+def way(tmp_path_factory):
     """Scenario of a way to a place [m], onto a block of a height [m] or with a scene, and its contacts."""
-    ends = f"start: {{at: [0.0, 0.0], heading_deg: 0.0}}, goal: {{at: [{goal}, 0.0], heading_deg: 0.0}}"
-    text = f"name: way\ntask: {{{ends}}}\n" + (f"scene: {scene}" if scene else "")
-    if height:
-        text += "scene:" + BLOCK.replace("HEIGHT", str(height)).replace("MIDDLE", str(0.5 * height))
-    file = tmp_path / "way.yaml"
-    file.write_text(text)
-    scenario = load_scenario(file)
-    context = RunContext.of(scenario)
-    found = find_supports(scenario, context.body, context.scene, np.random.default_rng(0))
-    assert found.failure is None
-    return context, found
+
+    @cache
+    def found(height, *, goal=0.8, scene=""):
+        ends = f"start: {{at: [0.0, 0.0], heading_deg: 0.0}}, goal: {{at: [{goal}, 0.0], heading_deg: 0.0}}"
+        text = f"name: way\ntask: {{{ends}}}\n" + (f"scene: {scene}" if scene else "")
+        if height:
+            text += "scene:" + BLOCK.replace("HEIGHT", str(height)).replace("MIDDLE", str(0.5 * height))
+        file = tmp_path_factory.mktemp("way") / "way.yaml"
+        file.write_text(text)
+        scenario = load_scenario(file)
+        context = RunContext.of(scenario)
+        result = find_supports(scenario, context.body, context.scene, np.random.default_rng(0))
+        assert result.failure is None
+        return context, result
+
+    return found
 
 
-def test_a_body_walks_on_level_ground(tmp_path):
+def test_a_body_walks_on_level_ground(way):
     """It rests nowhere, its feet roll, and phases have both bounds; the goal is within its reach."""
-    context, found = way(tmp_path, 0.0)
+    context, found = way(0.0)
     walking = without_rests(context.scenario, found.plan)
     supports = walking.file.supports
     assert supports.foot == "rolling"
@@ -58,9 +65,9 @@ def test_a_body_walks_on_level_ground(tmp_path):
 
 
 @pytest.mark.parametrize("height", [0.12, 0.3])
-def test_a_body_climbs_without_rest_what_feet_alone_make(tmp_path, height):
+def test_a_body_climbs_without_rest_what_feet_alone_make(way, height):
     """On a step of stairs and on a high one it passes from foot to foot, on feet that land flat there."""
-    context, found = way(tmp_path, height)
+    context, found = way(height)
     walking = without_rests(context.scenario, found.plan)
     assert all(phase.com_near is None for phase in walking.file.supports.phases)
     sequence = walking.build_centroidal_problem().sequence
@@ -77,9 +84,9 @@ BAR = """
 """
 
 
-def test_a_body_that_bends_below_a_bar_walks(tmp_path):
+def test_a_body_that_bends_below_a_bar_walks(way):
     """Each phase has a plane above the postures at both its ends, in place of a bound by the bar's shape."""
-    context, found = way(tmp_path, 0.0, goal=2.0, scene=BAR)
+    context, found = way(0.0, goal=2.0, scene=BAR)
     walking, plan = without_rests(context.scenario, found.plan), found.plan
     supports, problem = walking.file.supports, walking.build_centroidal_problem()
     assert supports.foot is None
@@ -97,10 +104,12 @@ def test_a_body_that_bends_below_a_bar_walks(tmp_path):
     assert result.iterations < 150
 
 
-def paced(tmp_path):
+@pytest.fixture
+def paced(way, monkeypatch):
     """A walk onto a step as it is first planned, and a report that can be told of failures."""
-    context, _ = way(tmp_path, 0.12)
+    context, found = way(0.12)
     report = Report(context, None, None, time.perf_counter())
+    monkeypatch.setattr(contact_stage, "find_supports", lambda *_: found)  # it would be found again
     return plan_contacts(context, report), report
 
 
@@ -110,9 +119,9 @@ def rests(context):
     return {k for k, phase in enumerate(phases) if phase.com_near is not None}
 
 
-def test_a_walk_that_fails_has_more_time_then_rests_there_then_everywhere(tmp_path):
+def test_a_walk_that_fails_has_more_time_then_rests_there_then_everywhere(paced):
     """Each phase of the walk gets more time; rests are around the stage in which the motion failed."""
-    quick, report = paced(tmp_path)
+    quick, report = paced
     stages, at = len(quick.plan.stages), 3
 
     def least(context):
@@ -140,9 +149,9 @@ def test_a_walk_that_fails_has_more_time_then_rests_there_then_everywhere(tmp_pa
     assert slower(everywhere, report, at) is None
 
 
-def test_the_pace_of_a_task_stretches_all_phases_on_feet(tmp_path):
+def test_the_pace_of_a_task_stretches_all_phases_on_feet(way):
     """Walking and at rest; beside supports, which have their durations, it is refused."""
-    context, found = way(tmp_path, 0.0)
+    context, found = way(0.0)
     slow = context.scenario.with_overrides(["task.pace=slow"])
 
     def least(scenario):
@@ -191,8 +200,8 @@ def test_a_body_walks_to_a_seat_and_rests_before_it():
     assert "buttocks" not in sequence.effectors
 
 
-def test_a_walk_without_a_plan_of_the_centre_of_mass_rests_there_then_everywhere(tmp_path):
-    quick, report = paced(tmp_path)
+def test_a_walk_without_a_plan_of_the_centre_of_mass_rests_there_then_everywhere(paced):
+    quick, report = paced
     report.fail("centroidal", "the largest margin found is 2.07 N.m", 1.0, "phase 2")
     there = slower(quick, report, 3)
     assert rests(there) == {2, 3, 4, 5}
@@ -200,9 +209,9 @@ def test_a_walk_without_a_plan_of_the_centre_of_mass_rests_there_then_everywhere
     assert slower(there, report, 3) is there.resting
 
 
-def test_where_a_posture_is_missing_feet_are_flat_before_the_body_rests_everywhere(tmp_path):
+def test_where_a_posture_is_missing_feet_are_flat_before_the_body_rests_everywhere(paced):
     """More time is no help then."""
-    walking, report = paced(tmp_path)
+    walking, report = paced
     resting = walking.resting
     # Of supports with and without rests the centre of mass is mostly planned on one: none is posed before.
     assert not {"problem"} & (vars(walking).keys() | vars(resting).keys())
@@ -219,10 +228,10 @@ def test_where_a_posture_is_missing_feet_are_flat_before_the_body_rests_everywhe
     assert [item["stage"] for item in report.refused] == ["wholebody", "wholebody"]
 
 
-def test_a_flight_lasts_longer_over_a_sill(tmp_path):
+def test_a_flight_lasts_longer_over_a_sill(way):
     """By the way up and down again at 4 m/s; beside the sill flights are as before."""
     sill = "\n- {name: sill, box: [0.1, 1.0, 0.2], position: [0.45, 0.0, 0.1]}\n"
-    context, found = way(tmp_path, 0.0, scene=sill)
+    context, found = way(0.0, scene=sill)
     stages, supports = found.plan.stages, without_rests(context.scenario, found.plan).file.supports
     crossed = 0
     for number in (k for k, stage in enumerate(stages) if len(stage.contacts) == 1):
@@ -239,9 +248,9 @@ def test_a_flight_lasts_longer_over_a_sill(tmp_path):
 
 
 @pytest.mark.parametrize("given", [None, 6.0])
-def test_the_margin_of_a_file_is_not_eased(tmp_path, monkeypatch, given):
+def test_the_margin_of_a_file_is_not_eased(way, monkeypatch, given):
     """Where a walk has 0.7 of what is wanted, half of our own margin is asked for, and all of a file's."""
-    context, found = way(tmp_path, 0.0)
+    context, found = way(0.0)
     if given is not None:
         context = RunContext.of(context.scenario.with_overrides([f"planning.min_margin={given}"]))
     walking = context.with_supports(without_rests(context.scenario, found.plan))
@@ -262,10 +271,10 @@ def test_the_margin_of_a_file_is_not_eased(tmp_path, monkeypatch, given):
     assert asked == pytest.approx([wanted, 0.5 * wanted] if given is None else [wanted])
 
 
-def test_places_of_the_centre_of_mass_stay_where_phases_of_the_file_begin(tmp_path, monkeypatch):
+def test_places_of_the_centre_of_mass_stay_where_phases_of_the_file_begin(way, monkeypatch):
     """Feet that roll divide phases; a rest is asked for where the phase of the file begins."""
     monkeypatch.setattr(found_supports, "MILD", 0.2)  # so that it rests on the step
-    context, found = way(tmp_path, 0.3)
+    context, found = way(0.3)
     walking = without_rests(context.scenario, found.plan)
     supports, problem = walking.file.supports, walking.build_centroidal_problem()
     assert supports.foot == "rolling"

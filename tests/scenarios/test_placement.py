@@ -4,7 +4,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.numerics.spatial import PlanarTransform
@@ -40,7 +40,6 @@ def test_every_moved_scenario_has_the_same_bits_in_the_frame_of_its_task(name):
 
 
 @pytest.mark.parametrize("name", ["platform", "corridor"])
-@settings(max_examples=25)
 @given(move=PLACES)
 def test_a_scenario_moved_anywhere_has_the_same_bits_in_the_frame_of_its_task(name, move):
     scenario = load_scenario(name)
@@ -55,7 +54,6 @@ def test_the_frame_of_a_task_in_its_own_frame_is_the_identity(name):
 
 
 @pytest.mark.parametrize("name", ["platform", "narrow"])
-@settings(max_examples=25)
 @given(move=PLACES)
 def test_the_frame_of_a_task_moves_with_it(name, move):
     """To rounding of coordinates of up to 100 m, and of the file's twelve decimals."""
@@ -94,7 +92,6 @@ def test_moved_contacts_are_the_contacts_elsewhere(name):
                 np.testing.assert_allclose(second.rotation_contact_to_world, rotation, atol=1e-11)
 
 
-@settings(max_examples=25)
 @given(yaw=st.floats(-180.0, 180.0))
 def test_a_contact_that_faces_down_turns_with_the_world(yaw):
     overrides = ["supports.phases.0.left_foot.normal=[0, 0, -1]", "supports.phases.0.left_foot.kind=point"]
@@ -106,7 +103,6 @@ def test_a_contact_that_faces_down_turns_with_the_world(yaw):
 
 
 @pytest.mark.parametrize("name", ["platform", "ramp"])
-@settings(max_examples=25)
 @given(move=PLACES, share=st.floats(0.0, 1.0))
 def test_a_moved_height_band_has_the_same_heights_at_the_moved_places(name, move, share):
     """Expressions change by 0.9 m per metre at most, and places by rounding."""

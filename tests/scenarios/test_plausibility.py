@@ -83,8 +83,9 @@ def test_a_landing_that_steps_lead_up_to_may_be_started_on(tmp_path):
         judged(tmp_path, box=[1, 1, 2.5], position=[0, 0, 1.25], more=STEP.format(1.0, 0.5))
 
 
+@pytest.mark.parametrize("seeds", [2, pytest.param(10, marks=pytest.mark.long)])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_family_of_the_benchmark_is_plausible(family, tmp_path):
-    for seed in range(5):
+def test_every_family_of_the_benchmark_is_plausible(family, seeds, tmp_path):
+    for seed in range(seeds):
         scenario = draw_scene(FAMILIES[family], seed, tmp_path)
         check_plausible(scenario, scenario.build_body(), scenario.build_scene())

@@ -61,7 +61,9 @@ def test_no_sphere_reaches_farther_beyond_the_shape_than_said(a, b, c, number):
         assert beyond.max() <= found.overshoot + 1e-9
 
 
-@pytest.mark.parametrize("number", [10, 20, 21])
+@pytest.mark.parametrize(
+    "number", [10, pytest.param(20, marks=pytest.mark.long), pytest.param(21, marks=pytest.mark.long)]
+)
 def test_the_published_counts_of_a_car_can_be_used(number):
     """[Qiu2012]_ Table 7.2: sill, pillars and roof 10 to 20, seat 20, wheel 21 spheres.
 

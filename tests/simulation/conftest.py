@@ -1,7 +1,8 @@
 """Slow motions made by inverse kinematics, to be executed."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -107,6 +108,24 @@ def foot(body, name, placement, friction=0.7) -> Contact:
     )  # fmt: skip
 
 
+def beginning(plan: Plan, end: float) -> Plan:
+    """A motion up to a time [s], with what stands by then: for what is seen before its end."""
+    motion, rows = plan.motion, plan.motion.time <= end + 1e-9
+    samples = {
+        name: values[rows] for name, values in motion.arrays().items() if len(values) == len(motion.time)
+    }
+    instants = plan.schedule.instants
+    count = int(np.searchsorted(instants, end - 1e-9))
+    schedule = ContactSchedule(StanceSequence(list(plan.schedule.sequence)[:count]), [*instants[:count], end])
+    return Plan(plan.body, replace(motion, **samples), schedule)
+
+
+@pytest.fixture(scope="session")
+def cut() -> Callable[[Plan, float], Plan]:
+    """See :func:`beginning`."""
+    return beginning
+
+
 @pytest.fixture(scope="session")
 def body() -> BodyModel:
     return human()
@@ -130,6 +149,7 @@ def stand(body) -> Callable[..., Plan]:
 def step(body) -> Callable[..., Plan]:
     """Shift over the left foot, move the right one by ``stride`` (3,), shift back."""
 
+    @cache
     def make(shift=1.2, swing=0.8, stride=(0.0, 0.0, 0.0), height=0.08) -> Plan:
         kinematics = Kinematics(body)
         left, right = kinematics.feet

@@ -55,7 +55,9 @@ def test_squat_and_sway(body, stand):
     assert not result.fallbacks
 
 
-@pytest.mark.parametrize(("stature", "mass"), [(1.55, 50.0), (1.95, 110.0)])
+@pytest.mark.parametrize(
+    ("stature", "mass"), [(1.55, 50.0), pytest.param(1.95, 110.0, marks=pytest.mark.long)]
+)
 def test_small_and_large_people_crouch_without_chatter(stand, stature, mass):
     """Light toes under load neither sink nor let the foot creep."""
     person = human(stature, mass)
@@ -111,8 +113,8 @@ def test_summary_has_the_agreed_keys(body, stepped):
 
 
 def test_same_run_gives_the_same_bits(body, stand):
-    plan = stand(0.3)
-    first, second = (execute(body, Scene(), plan.motion, plan.schedule, hold=0.2) for _ in range(2))
+    plan = stand(0.1)
+    first, second = (execute(body, Scene(), plan.motion, plan.schedule, hold=0.1) for _ in range(2))
     for name, values in first.motion.arrays().items():
         assert np.array_equal(values, second.motion.arrays()[name]), name
 
@@ -129,19 +131,17 @@ def test_com_beyond_the_feet_falls_and_is_reported(body, stand):
 
 
 def test_slippery_floor_is_seen_as_slip(body, stand):
-    """Swaying with 0.06 of the weight sideways slides on friction 0.03 and not on 0.7."""
+    """Swaying with 0.06 of the weight sideways slides on friction 0.03; on 0.7 crouching bodies do not."""
 
     def sway(time):
         sideways = 0.03 * np.sin(1.4 * np.pi * time) * smooth(time) * smooth(2.0 - time)
         return np.array([0.0, sideways, -0.05 * smooth(time)])
 
     plan = stand(2.0, sway)
-    firm = execute(body, Scene(), plan.motion, plan.schedule, hold=0.0)
     icy = execute(
         body, Scene(), plan.motion, plan.schedule, hold=0.0,
         physics=PhysicsOptions(joint_damping=1.0, friction=0.03),
     )  # fmt: skip
-    assert firm.max_slip_m < 1e-3
     assert icy.max_slip_m > 5e-3
     assert icy.max_foot_error_m > 4e-3
 
@@ -166,7 +166,7 @@ def test_feet_do_not_slip_because_a_seat_is_smooth(body, stand):
 
 def test_push_is_withstood_and_too_strong_a_push_fells(body, stand):
     """20 N.s on the chest is absorbed, 80 N.s is not."""
-    plan = stand(2.0)
+    plan = stand(1.0)
     for impulse, falls in ((20.0, False), (80.0, True)):
         push = Push("thorax", np.array([10 * impulse, 0.0, 0.0]), start=0.3, duration=0.1)
         result = execute(body, Scene(), plan.motion, plan.schedule, pushes=[push])
@@ -176,21 +176,26 @@ def test_push_is_withstood_and_too_strong_a_push_fells(body, stand):
             assert result.final_com_error_m < 1e-3
 
 
-def test_floor_lower_than_planned_is_found(body, step):
-    """With the floor 4 mm below the plan the foot lands late and the step still succeeds."""
+@pytest.fixture(scope="module")
+def landed_late(body, step):
+    """A step onto a floor that is 4 mm below the planned one."""
     plan = step(shift=1.0, swing=0.6, stride=(0.1, 0.0, 0.0))
-    result = execute(body, Scene(floor_height=-0.004), plan.motion, plan.schedule)
+    return plan, execute(body, Scene(floor_height=-0.004), plan.motion, plan.schedule, hold=0.2)
+
+
+def test_floor_lower_than_planned_is_found(landed_late):
+    """With the floor 4 mm below the plan the foot lands late and the step still succeeds."""
+    _, result = landed_late
     assert result.succeeded, result.failure
     assert result.com_max_error_m < 0.02
 
 
-def test_the_margin_of_a_foot_that_lands_late_is_that_of_the_other_one(body, step):
+def test_the_margin_of_a_foot_that_lands_late_is_that_of_the_other_one(body, landed_late):
     """Planned on both feet, standing on one: the margin is that of the one that carries.
 
     The wrench of a sample is compared with that of the engine's first millisecond, hence the 3 N.m.
     """
-    plan = step(shift=1.0, swing=0.6, stride=(0.1, 0.0, 0.0))
-    result = execute(body, Scene(floor_height=-0.004), plan.motion, plan.schedule, hold=0.2)
+    plan, result = landed_late
     motion, names = result.motion, plan.schedule.sequence.effectors
     planned = plan.schedule.support(motion.time, names).all(axis=1)
     touches = motion.support[:, names.index("right_foot")]
@@ -212,9 +217,9 @@ def test_the_margin_of_a_foot_that_lands_late_is_that_of_the_other_one(body, ste
     assert np.abs(motion.margin[late] - one).max() < 3.0, np.abs(motion.margin[late] - one)
 
 
-def test_obstacle_in_the_way_is_an_unplanned_touch(body, step):
+def test_obstacle_in_the_way_is_an_unplanned_touch(body, stepped, cut):
     """A block under the flying foot is touched, named and timed."""
-    plan = step(shift=1.0, swing=0.6, stride=(0.2, 0.0, 0.0))
+    plan = cut(stepped[0], 1.7)
     block = Obstacle("block", Box((0.02, 0.1, 0.06)), translation=(0.25, -0.09, 0.03))
     result = execute(body, Scene([block]), plan.motion, plan.schedule, hold=0.0)
     assert not result.succeeded

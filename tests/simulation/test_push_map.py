@@ -30,7 +30,8 @@ from manikin.simulation import (
 
 KUDOH = kudoh()
 TRIALS = PushTrials(KUDOH, RecoveryTask((), Feet.FREE))
-NEVER_REACTS = PushTrials(KUDOH, RecoveryTask((), Feet.FREE), RecoverySettings(delay=60.0))
+LATE = PushTrials(KUDOH, RecoveryTask((), Feet.FREE), RecoverySettings(delay=1.5), begins=0.0)
+"""Trials of a body that reacts when it falls already."""
 
 
 class Tried:
@@ -161,10 +162,11 @@ def test_a_run_does_not_end_at_rest_before_the_push_is_over():
     assert 1.1 - 1e-6 <= found.trace.motion.time[-1] < 1.6
 
 
+@pytest.mark.long
 def test_processes_find_the_same_and_end_when_nobody_waits_for_them():
-    """Of a body that never reacts: its trials are short, and its border depends on all of the simulation."""
+    """Of a body that reacts late: its trials are short, and its border depends on all of the simulation."""
     before = set(multiprocessing.active_children())
-    searches = [DirectionSearch(NEVER_REACTS, direction, 500.0) for direction in (0.0, 120.0)]
+    searches = [DirectionSearch(LATE, direction, 500.0) for direction in (0.0, 120.0)]
     with closing(search_directions(searches, jobs=2)) as found:
         number, beside = next(found)
     assert beside == searches[number].run()

@@ -26,7 +26,7 @@ TRIALS = PushTrials(
     begins=0.0,
 )
 AT_REST = 0.2
-PUSHES = 8
+PUSHES = 3
 
 
 def random_pushes(shares, border, seed):

@@ -13,6 +13,8 @@ from manikin.scene import Scene
 from manikin.simulation import Push, execute, push_impulse, push_on_the_way
 
 READY = ControlSettings(returning=ReturnSettings())
+HOLD = 0.5
+"""Time of standing after a motion [s]."""
 SQUARE = SupportArea(np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]), 0.0)
 
 
@@ -30,43 +32,51 @@ def stepping(step):
 
 
 @pytest.fixture(scope="module")
-def undisturbed(stepping):
-    return execute(stepping.body, Scene(), stepping.motion, stepping.schedule, settings=READY)
+def beginning(stepping, cut):
+    """The first 0.4 s of the step."""
+    return cut(stepping, 0.4)
+
+
+@pytest.fixture(scope="module")
+def begun(beginning):
+    """They without a push."""
+    return execute(beginning.body, Scene(), beginning.motion, beginning.schedule, settings=READY, hold=0.0)
 
 
 @pytest.fixture(scope="module")
 def waiting(stepping):
     """Pushed from the front while the weight goes over the standing foot."""
-    return pushed(stepping, 20.0, 180.0, 0.3)
+    return pushed(stepping, 20.0, 180.0, 0.3, hold=HOLD)
 
 
-def test_without_a_push_being_ready_for_one_changes_no_bit(stepping, undisturbed):
-    plain = execute(stepping.body, Scene(), stepping.motion, stepping.schedule)
+def test_without_a_push_being_ready_for_one_changes_no_bit(beginning, begun):
+    plain = execute(beginning.body, Scene(), beginning.motion, beginning.schedule, hold=0.0)
     for name in ("time", "q", "v", "tau", "margin"):
-        np.testing.assert_array_equal(getattr(undisturbed.motion, name), getattr(plain.motion, name))
-    assert undisturbed.push is None
-    assert undisturbed.schedule is None
-    assert undisturbed.summary()["push"] is None
+        np.testing.assert_array_equal(getattr(begun.motion, name), getattr(plain.motion, name))
+    assert begun.push is None
+    assert begun.schedule is None
+    assert begun.summary()["push"] is None
 
 
-def test_a_short_push_changes_the_momentum_by_its_impulse(stepping, undisturbed):
+def test_a_short_push_changes_the_momentum_by_its_impulse(beginning, begun):
     """10 N.s within 10 ms, less what the ground takes meanwhile, which is read from two samples (0.5 N.s)."""
     push = Push("thorax", np.array([1000.0, 0.0, 0.0]), 0.3, 0.01)
     assert push_impulse(push) == pytest.approx(10.0)
     hit = execute(
-        stepping.body, Scene(), stepping.motion, stepping.schedule, pushes=[push], settings=READY
-    ).motion
-    free = undisturbed.motion
+        beginning.body, Scene(), beginning.motion, beginning.schedule, pushes=[push], settings=READY,
+        hold=0.0,
+    ).motion  # fmt: skip
+    free = begun.motion
     sample = int(np.searchsorted(free.time, 0.31 - 1e-6))
     np.testing.assert_array_equal(hit.q[: sample - 2], free.q[: sample - 2])
-    dynamics = [_momentum(stepping.body, motion, sample) for motion in (hit, free)]
+    dynamics = [_momentum(beginning.body, motion, sample) for motion in (hit, free)]
     gained = dynamics[0] - dynamics[1]
     ground = sum(_ground(motion, sample) * sign for motion, sign in ((hit, 1.0), (free, -1.0)))
     assert gained[0] == pytest.approx(10.0 + ground, abs=0.5)
     assert gained[0] > 5.0
 
 
-def test_the_plan_waits_and_the_body_comes_back_on_it(stepping, undisturbed, waiting):
+def test_the_plan_waits_and_the_body_comes_back_on_it(stepping, waiting):
     outcome = waiting.push
     assert waiting.succeeded, waiting.failure
     assert ExecutionRequirements().table(waiting).held
@@ -76,7 +86,7 @@ def test_the_plan_waits_and_the_body_comes_back_on_it(stepping, undisturbed, wai
     assert outcome.max_deviation_m > 0.01
     assert 0.0 < outcome.return_s < 2.0
     assert waiting.final_com_error_m < 1e-3
-    late = waiting.motion.time[-1] - undisturbed.motion.time[-1]
+    late = waiting.motion.time[-1] - HOLD - stepping.motion.time[-1]
     assert late == pytest.approx(outcome.waited_s, abs=0.006)
     planned, due = stepping.schedule.instants, waiting.schedule.instants
     assert due[0] == planned[0]
@@ -97,7 +107,9 @@ def test_the_foot_is_lifted_when_the_waiting_is_over(stepping, waiting):
 
 def test_a_plan_that_waits_saves_what_one_that_goes_on_does_not(stepping):
     """The same push is held by the one and not by the other."""
-    outcomes = [pushed(stepping, 36.0, 270.0, 0.3, settings) for settings in (READY, ControlSettings())]
+    outcomes = [
+        pushed(stepping, 36.0, 270.0, 0.3, settings, hold=HOLD) for settings in (READY, ControlSettings())
+    ]
     assert [result.succeeded for result in outcomes] == [True, False]
 
 

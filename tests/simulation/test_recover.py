@@ -35,6 +35,9 @@ from manikin.simulation.recovery_record import SegmentMomenta
 
 KUDOH, HUMAN = kudoh(), human()
 
+RESTED = 0.3
+"""Time at rest that ends a run [s]; such a run has the verdict of a whole one, see ``test_push_map.py``."""
+
 
 @cache
 def pushed(
@@ -45,7 +48,7 @@ def pushed(
     q = q if apart is None else feet_apart_posture(body, apart)
     push = push_near_com(body, force, 0.2, lasting, frequency=frequency, q=q)
     support = None if foot is None else (foot,)
-    task = RecoveryTask((push,), feet, until, q=q, support=support, steps=steps)
+    task = RecoveryTask((push,), feet, until, q=q, support=support, steps=steps, until_at_rest=RESTED)
     return recover(body, task, RecoverySettings(delay=delay, **options), scene=scene)
 
 
@@ -148,6 +151,7 @@ def test_a_push_from_the_side_is_held_with_the_delay_of_the_thesis(feet):
     assert not found.trace.fallbacks
 
 
+@pytest.mark.long
 def test_free_feet_hold_a_push_as_held_ones_do():
     """The forces asked of held feet are those that unilateral contact with friction can give."""
     force = (250.0, 0.0, 0.0)
@@ -199,6 +203,7 @@ def test_the_body_stands_on_both_feet_after_its_step(stepped):
     assert np.abs(stepped.trace.motion.contact_force[flying, number]).max() == 0.0
 
 
+@pytest.mark.long
 def test_a_step_back_recovers_experiment_2():
     found = pushed((-300.0, 0.0, 0.0), feet=Feet.FREE, steps=1)
     assert found.recovered, found.failure
@@ -224,6 +229,7 @@ def boxes(*places):
     ])  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_step_goes_where_the_scene_leaves_room(stepped):
     """A box where the left foot went: the right one goes, or another place is found."""
     (step,) = stepped.steps
@@ -274,7 +280,10 @@ def test_held_feet_take_no_step():
 # --- one foot -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("body", "force"), [(KUDOH, (100.0, 0.0, 0.0)), (HUMAN, (0.0, -60.0, 0.0))])
+@pytest.mark.parametrize(
+    ("body", "force"),
+    [(KUDOH, (100.0, 0.0, 0.0)), pytest.param(HUMAN, (0.0, -60.0, 0.0), marks=pytest.mark.long)],
+)
 def test_a_push_is_held_on_one_foot(body, force):
     found = pushed(force, body=body, feet=Feet.FREE, foot="left_foot")
     assert found.recovered, found.failure
@@ -307,6 +316,7 @@ def test_feet_that_would_overlap_or_are_out_of_reach_are_refused(distance):
         feet_apart_posture(KUDOH, distance)
 
 
+@pytest.mark.long
 def test_from_the_side_less_is_held_with_the_feet_together():
     """As in the thesis ([Kudoh2002]_ 3.3, experiment 4): the soles are then 20 cm wide and 25 cm long."""
     assert pushed((250.0, 0.0, 0.0), apart=0.1, until=2.7).recovered
@@ -355,6 +365,7 @@ def test_locked_hips_and_trunk_stay_where_they_are():
         assert np.abs(np.degrees(angle(found, name))).max() < 6.0
 
 
+@pytest.mark.long
 def test_both_experiments_stand_with_the_delay_on_ankles_that_hold():
     """1 and 2 as in the thesis: at rest within 3 s, the ZMP inside as soon as the control acts (3.3)."""
     back = pushed((500.0, 0.0, 0.0), ankle_stiffness=45.0, sole_inset=0.01)
@@ -371,6 +382,7 @@ def test_both_experiments_stand_with_the_delay_on_ankles_that_hold():
     assert np.degrees(angle(front, "left_shoulder_flexion")).max() > 60.0
 
 
+@pytest.mark.long
 def test_a_small_body_recovers():
     """From a push that gives it a speed of 0.25 m/s, on free feet."""
     body = human(1.55, 48.0, "female")
@@ -379,6 +391,7 @@ def test_a_small_body_recovers():
     assert found.zmp_excess < 1e-3
 
 
+@pytest.mark.long
 def test_another_standing_body_recovers_as_well():
     found = pushed((200.0, 0.0, 0.0), body=HUMAN, until=2.2)
     assert found.recovered, found.failure

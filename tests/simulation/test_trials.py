@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, quadruped
@@ -36,7 +36,6 @@ def shelf():
     return Scene([Obstacle("shelf", Box((0.3, 1.0, 0.05)), translation=(0.8, 0.0, 0.4))])
 
 
-@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1))
 def test_worlds_are_within_what_is_stated(body, still, shelf, seed):
     """Masses, friction, heights, delay, angles and push; and the centre of mass in the standing posture."""
@@ -131,6 +130,7 @@ def test_standing_is_kept_in_stated_worlds_and_not_in_wild_ones(body, still):
     assert wild.summary()["first_failures"] == {"fell in phase 0 on left_foot, right_foot": 1}
 
 
+@pytest.mark.long
 def test_other_processes_find_the_same(body, still):
     task = TrialTask(body, Scene(), still.motion, still.schedule, ControlSettings(), hold=0.0)
     assert run_trials(task, 2, seed=5, workers=2).worlds == run_trials(task, 2, seed=5).worlds

@@ -17,7 +17,8 @@ pytest.importorskip("viser")
 
 from manikin.viewer.door import Door  # only where viser is
 
-FRAME = 1.0 / 60.0
+FRAME = 1.0 / 20.0
+"""Of a page on a slow computer [s]: bodies are drawn as often as needed to see them move."""
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -94,6 +94,7 @@ def test_a_route_of_one_leg_is_the_path():
     assert len(walk_along(route).time) == len(walk_along(path).time)
 
 
+@settings(max_examples=5)
 @given(st.floats(-np.pi, np.pi), st.floats(0.05, np.pi), st.sampled_from([-1, 1]))
 def test_a_turn_on_the_spot_is_the_optimum_of_the_criterion(heading, angle, side):
     """``a0 T + a3 int u^2`` is least for the cubic that takes ``T^4 = 36 a3 D^2 / a0``."""

@@ -171,6 +171,7 @@ def test_feet_keep_to_their_contacts_and_fly_clear_of_the_floor(walk):
         assert heels.min() > floor - 0.005
 
 
+@pytest.mark.long
 def test_a_walk_over_plates_is_reproduced_in_balance(walked):
     """The bar of the key frame method: 1.5 cm, with a margin that is never negative, measured here again."""
     told = walked.as_dict()
@@ -183,6 +184,7 @@ def test_a_walk_over_plates_is_reproduced_in_balance(walked):
     assert min(polytopes[p].margin(w) for p, w in zip(phases, wrench, strict=True)) >= 0.0
 
 
+@pytest.mark.long
 def test_the_walk_is_executed_at_its_own_speed(walked):
     """The controller follows it through both steps; 2 cm of CoM is a tenth of what a fall begins with."""
     ran = walked.execution
@@ -192,6 +194,7 @@ def test_the_walk_is_executed_at_its_own_speed(walked):
     assert np.mean(ran.motion.margin > 0.0) > 0.9
 
 
+@pytest.mark.long
 def test_plan_and_execution_keep_to_the_recorded_postures(walked):
     """Below 8 degrees, with nothing in touch; the strongest joint needs 1.47 times the mean adult's strength.
 
@@ -208,6 +211,7 @@ def test_plan_and_execution_keep_to_the_recorded_postures(walked):
     assert len(walked.execution.touches) == 0
 
 
+@pytest.mark.long
 def test_the_plan_is_in_balance_as_a_point_mass_and_with_its_angular_momentum(walked):
     """Both every millisecond; the rate is no small one: walkers turn with some 30 N.m and more."""
     trajectory = walked.com.trajectory
@@ -256,6 +260,7 @@ def test_who_turns_on_the_toes_while_they_carry_does_not_leave_at_once(walk):
     assert sorted(set(np.round(earlier, 9))) == [0.0, EARLY]
 
 
+@pytest.mark.long
 def test_a_foot_is_on_its_contact_up_to_the_instant_of_its_lift_off(walked):
     """And no farther off by then than elsewhere: its hinge starts from rest."""
     schedule, instants = walked.schedule, walked.schedule.instants
@@ -290,6 +295,7 @@ def test_a_foot_about_to_land_where_a_clip_ends_is_not_held_up(walk):
     assert flying
 
 
+@pytest.mark.long
 def test_a_motion_that_ends_at_speed_is_not_stopped_dead(walked):
     """Load changes by less than a fifth of the weight in the last step, where one to rest would take all."""
     ran = walked.execution.motion
@@ -341,6 +347,7 @@ def test_planned_timing_free_double_supports_last_longer(walk):
     assert compared["com"]["point_mass"]["rms_distance_m"] == pytest.approx(told["com_rms_m"], rel=0.2)
 
 
+@pytest.mark.long
 def test_planned_timing_free_nobody_walks_through_the_floor(recordings_folder):
     """Feet admit a way underground: without bounds of the height this walk found one, 1.2 m below."""
     pytest.importorskip("ezc3d")

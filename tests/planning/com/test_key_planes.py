@@ -15,7 +15,7 @@ coordinate = st.floats(-2.0, 2.0)
 place = st.tuples(coordinate, coordinate, coordinate).map(np.array)
 
 
-@pytest.mark.parametrize("key", [2, 4])
+@pytest.mark.parametrize("key", [2, pytest.param(4, marks=pytest.mark.long)])
 def test_the_plan_passes_exactly_behind_a_plane_at_its_key_instant(planned, key):
     """Pushed 2 cm off the free plan's place along a level direction, the CoM touches the plane to 1e-6 m."""
     there = planned.trajectory.position(planned.key_instants[key])

@@ -75,6 +75,7 @@ def test_noise_that_no_foot_could_follow_is_not_followed():
     assert np.sqrt(np.mean(away**2)) < 0.01
 
 
+@pytest.mark.long
 def test_a_wanted_margin_is_kept_and_costs_nearness(usual):
     wide = plan_com_near_key_frames(asked(stepping()[0], required_margin=6.0))
     assert wide.succeeded

@@ -139,6 +139,7 @@ def test_a_body_that_rises_comes_to_rest_at_each_change(problem):
     assert _parted(steep, keys) == keys
 
 
+@pytest.mark.long
 def test_a_part_of_one_phase_has_the_six_conditions_of_rest_at_both_ends(problem):
     """A spline of degree 4, as walks have, would have five control points there."""
     kept = {1, *range(PART + 1, len(problem.sequence), PART)}

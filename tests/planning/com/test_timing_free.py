@@ -89,7 +89,10 @@ def test_duration_weight_shortens_the_motion(platform, planned):
     assert result.key_instants[-1] < planned.key_instants[-1] - 0.3
 
 
-@pytest.mark.parametrize(("stature", "mass", "required"), [(1.60, 58.0, 13.0), (1.90, 95.0, 20.0)])
+@pytest.mark.parametrize(
+    ("stature", "mass", "required"),
+    [(1.60, 58.0, 13.0), pytest.param(1.90, 95.0, 20.0, marks=pytest.mark.long)],
+)
 def test_other_bodies_find_their_way(platform, stature, mass, required):
     """Heights above the supports and reach scale with the stature.
 
@@ -199,8 +202,8 @@ def test_a_single_phase_needs_no_internal_knot(platform_stances):
     ("changes", "requirement", "words"),
     [
         ({"required_margin": 60.0}, "balance margin", "required 60.00 N.m"),
-        ({"max_duration": 3.0}, "balance margin", "largest margin found"),
-        ({"support_distance": 0.94}, "balance margin", "phase"),
+        pytest.param({"max_duration": 3.0}, "balance margin", "largest margin found", marks=pytest.mark.long),
+        pytest.param({"support_distance": 0.94}, "balance margin", "phase", marks=pytest.mark.long),
     ],
 )
 def test_what_the_optimisation_cannot_reach_is_explained(platform, changes, requirement, words):

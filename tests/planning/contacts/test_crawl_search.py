@@ -99,7 +99,10 @@ def test_a_lower_way_to_crawl_has_sloped_thighs_a_lower_pelvis_and_is_not_too_ha
     assert (np.diff(hips) < np.radians(-5.0)).all()
 
 
-@pytest.mark.parametrize(("height", "first"), [(0.65, 0), (0.58, 1), (0.52, 2)])
+@pytest.mark.parametrize(
+    ("height", "first"),
+    [pytest.param(0.65, 0, marks=pytest.mark.long), pytest.param(0.58, 1, marks=pytest.mark.long), (0.52, 2)],
+)
 def test_the_ways_to_crawl_that_have_room_are_tried_first(monkeypatch, height, first):
     tried = []
 

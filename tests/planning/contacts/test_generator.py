@@ -189,7 +189,7 @@ def turned(body, rng):
     return integrate(body, body.standing_posture(), move)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_the_efort_of_every_answer_is_usable_and_that_of_its_posture(seed, person, creature):
     """Any limb, scene, direction, role, heuristic and way to touch: anew from the posture's Jacobian."""
     rng, found = np.random.default_rng(seed), 0
@@ -262,7 +262,7 @@ def exhaustive(generator, scene, q, limb, samples, task, usable):
     return None
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2, 3))])
 def test_a_request_has_the_answer_of_an_exhaustive_search(seed, person, creature):
     """Trees of samples, bounds of surfaces, and what is known to collide change no answer."""
     rng, found = np.random.default_rng(seed), 0
@@ -342,6 +342,7 @@ def test_a_hand_can_grasp_and_pull(person, at_wall):
     assert answer.contact.max_force == ContactRules().grasp_force
 
 
+@pytest.mark.long
 def test_the_same_request_has_the_same_answer(person, person_samples, at_wall):
     q = person.standing_posture()
     for heuristic in (Efort(), Random(1)):

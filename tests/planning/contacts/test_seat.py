@@ -1,6 +1,7 @@
 """Seats: a start that suits body and seat, rising at rest or in motion, sitting down."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -42,6 +43,12 @@ def planned(scenario):
     return found
 
 
+@cache
+def mean_man():
+    """Contacts of 1.75 m and 75 kg on a seat 0.45 m high."""
+    return planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
+
+
 def test_a_small_woman_rises_from_a_chair():
     """1.55 m and 52 kg, a seat 0.45 m high: contacts hold, the feet before the seat."""
     found = planned(on_chair(stature=1.55, mass=52.0, sex="female", height=0.45))
@@ -51,7 +58,7 @@ def test_a_small_woman_rises_from_a_chair():
 
 def test_the_pelvis_rolls_so_that_the_spine_need_not_bend():
     """The weight is 4.5 cm inside the feet with less than half of the bend that lumbar and thorax have."""
-    found = planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
+    found = mean_man()
     body, off = human(1.75, 75.0, "male"), next(s for s in found.plan.stages if "buttocks" not in s.contacts)
     region = StaticRegion.of(Stance(list(off.contacts.values())), body.mass)
     assert signed_distance(off.com[:2], region.polygon) > 0.044
@@ -66,7 +73,7 @@ def test_the_pelvis_rolls_so_that_the_spine_need_not_bend():
 
 def test_the_times_of_a_rise_are_peoples():
     """Young adults take 1.60 s (SD 0.28) to lean and rise (Kazi, Miller and Silverman 2025)."""
-    found = planned(on_chair(stature=1.75, mass=75.0, sex="male", height=0.45))
+    found = mean_man()
     times, stages = rising_times(found.plan.stages), found.plan.stages
     assert 1.60 - 2.0 * 0.28 < sum(times) < 1.60 + 0.28
     assert min(times) > 0.0
@@ -141,7 +148,10 @@ def test_hands_push_until_the_weight_is_over_the_feet():
     assert off.contacts["left_wrist"].position[2] == pytest.approx(0.66)
 
 
-@pytest.mark.parametrize(("name", "stature"), [("stand-up-chair@hands", 1.60), ("stand-up-sofa@hands", 1.88)])
+@pytest.mark.parametrize(
+    ("name", "stature"),
+    [("stand-up-chair@hands", 1.60), pytest.param("stand-up-sofa@hands", 1.88, marks=pytest.mark.long)],
+)
 def test_hands_push_where_they_are_to_be_used(name, stature):
     """The heels of both hands carry with the feet as the seat is left, level within what a palm yields."""
     scenario = load_scenario(name).replaced(

@@ -162,6 +162,7 @@ def test_durations_allow_for_the_change_of_posture(climbed):
         assert np.abs(q[7:] - stage.q[7:]).max() <= WalkSettings().hinge_pace * stage.min_duration + 1e-9
 
 
+@pytest.mark.long
 def test_the_same_task_has_the_same_plan(climbed):
     again, _, _ = planned(STEPS, (1.5, 0.0))
     np.testing.assert_array_equal(again.plan.postures, climbed.postures)
@@ -193,7 +194,10 @@ WAYS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    "way",
+    ["through a gap of 0.5 m", *(pytest.param(way, marks=pytest.mark.long) for way in WAYS if "over" in way)],
+)
 def test_ways_that_people_take_are_found_with_as_many_steps(way):
     """Steps are counted; nobody needs more than these."""
     obstacles, goal, most = WAYS[way]
@@ -264,6 +268,7 @@ def test_a_hand_joins_where_feet_alone_do_not_make_a_step(checked):
     assert set(found.plan.stages[-1].contacts) == {"left_foot", "right_foot"}
 
 
+@pytest.mark.long
 def test_a_step_deeper_than_legs_is_made_facing_the_block_with_a_hand_on_it(checked):
     """0.485 of the stature down: behind the foot that stays, which looks at the block.
 
@@ -323,6 +328,7 @@ def test_a_hand_reaches_down_to_what_is_beside_the_feet():
         assert item.position[2] >= 0.69
 
 
+@pytest.mark.long
 def test_the_feet_of_small_people_make_a_step_of_three_tenths_of_their_stature():
     """0.45 m up by feet alone, at 1.53 m: the way over the ground is not walled off."""
     step = Scene([Obstacle("step", Box((1.2, 1.5, 0.45)), translation=(0.95, 0.0, 0.225))], 0.0)

@@ -5,6 +5,7 @@ between the keys does, and the centre of mass stays between the feet even where 
 """
 
 from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +75,7 @@ class KeyMaker:
         return result.q
 
 
+@cache
 def crouch(steps: int, duration: float = 0.6, height: float = 1.25) -> Case:
     """Walk under a floating slab, ``steps`` steps of 0.3 m and one to close up."""
     slab = Obstacle("slab", Box((0.5, 1.6, 0.1)), translation=(0.75, 0.0, height + 0.05))
@@ -127,6 +129,7 @@ def on_wall(effector: str, number: int) -> Contact:
     return grasp(effector, (WALL - 0.2, 0.26 * side, z), max_force=150.0, max_moment=10.0)
 
 
+@cache
 def climb(moves: int, duration: float = 0.8) -> Case:
     """Climb the wall: left hand, right foot, right hand, left foot, again and again."""
     body = human(1.75, 79.0, "male", strength=2.0)  # 0.8 s a move is beyond the mean man

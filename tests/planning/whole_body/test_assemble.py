@@ -89,6 +89,7 @@ def test_one_fit_meets_the_contacts_exactly_where_they_are_constraints(step_atte
         assert np.abs(com - step_com.position(np.array([time]))[0]).max() <= 1.0e-4
 
 
+@pytest.mark.long
 def test_one_fit_holds_the_contacts_of_a_random_step():
     """Any body, up a step of 5 to 20 cm with a turned foot: feet that stand are on their places to 0.03 mm.
 
@@ -180,6 +181,7 @@ def test_the_motion_begins_and_ends_at_rest(step_motion):
     assert np.abs(step_motion.motion.v[[0, -1]]).max() < 5e-3
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_bits(step_motion, person, flat_ground, step_com):
     again = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
     for name, array in step_motion.motion.arrays().items():
@@ -196,7 +198,7 @@ def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, 
     assert result.failure.where.startswith("phase ")
 
 
-@pytest.mark.parametrize("led_is_caught", [False, True])
+@pytest.mark.parametrize("led_is_caught", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
     led_is_caught, step_motion, person, flat_ground, step_com, monkeypatch
 ):
@@ -236,6 +238,7 @@ def step_attempt(person, flat_ground, step_com):
     return first_attempt(person, flat_ground, step_com)
 
 
+@pytest.mark.long
 def test_where_straight_toes_are_in_the_way_they_may_bend(person, flat_ground, step_com, monkeypatch):
     """Toes that are too near something while they are straight are fitted without that.
 
@@ -314,6 +317,7 @@ def test_repairs_end_where_they_make_nothing_better(step_attempt, key, values, t
     assert best.certificate.value(key) == min(values)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_step_found_by_the_bi_rrt_is_followed_like_any_other(person, flat_ground, step_com, monkeypatch):
     """With smooth curves made to fail, the whole motion still keeps every requirement."""

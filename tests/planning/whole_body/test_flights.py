@@ -44,7 +44,7 @@ def test_every_step_of_the_platform_has_a_smooth_curve_that_keeps_clear(planner)
         assert dense.curve.peak_speed <= SwingLimits().speed
 
 
-@pytest.mark.parametrize("number", [0, 2])
+@pytest.mark.parametrize("number", [0, pytest.param(2, marks=pytest.mark.long)])
 def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypatch, number):
     """With the smooth family made to pass through something, a step of the platform is searched instead."""
     swing = planner.flights[number]

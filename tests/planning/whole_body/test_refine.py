@@ -28,9 +28,13 @@ FEET = [
 ]
 
 
+each = pytest.mark.parametrize("name", ["crouching", pytest.param("climbing", marks=pytest.mark.long)])
+"""On feet, and with hands that grasp."""
+
+
 @pytest.fixture(scope="module")
 def crouching(cases):
-    case = cases.crouch(2)
+    case = cases.crouch(1)
     return case, refine_motion(*case)
 
 
@@ -40,14 +44,14 @@ def climbing(cases):
     return case, refine_motion(*case)
 
 
-@pytest.mark.parametrize("name", ["crouching", "climbing"])
+@each
 def test_a_refined_motion_keeps_every_requirement(name, request):
     _, result = request.getfixturevalue(name)
     assert result.failure is None, result.failure
     assert result.certificate.held
 
 
-@pytest.mark.parametrize("name", ["crouching", "climbing"])
+@each
 def test_a_refined_motion_is_smoother_and_physical(name, request):
     """At least a fifth of the squared accelerations, a tenth of the violation, and no penetration.
 
@@ -64,7 +68,7 @@ def test_a_refined_motion_is_smoother_and_physical(name, request):
     assert after.contact_slide_mps < before.contact_slide_mps
 
 
-@pytest.mark.parametrize("name", ["crouching", "climbing"])
+@each
 def test_a_refined_motion_is_smoother_than_a_spline_through_its_input(name, request):
     """The jumps of the input's velocity at its keys do not decide the comparison."""
     _, result = request.getfixturevalue(name)
@@ -98,6 +102,7 @@ def test_a_motion_with_rests_is_at_rest_there_in_its_key(knee_bends):
     assert result.motion.time[-1] == pytest.approx(result.schedule.instants[-1])
 
 
+@pytest.mark.long
 def test_a_motion_with_rests_ends_with_the_part_that_fails(knee_bends):
     """A post in the pelvis: nothing after the first rest is fitted."""
     body, time, q, schedule = knee_bends
@@ -108,7 +113,7 @@ def test_a_motion_with_rests_ends_with_the_part_that_fails(knee_bends):
     assert result.failure.time <= result.motion.time[-1] == result.schedule.instants[-1]
 
 
-@pytest.mark.parametrize("name", ["crouching", "climbing"])
+@each
 def test_margin_is_positive_every_10_ms(name, request):
     """Measured from differences of the configurations alone, with the scene's own polytopes."""
     (body, *_), result = request.getfixturevalue(name)

@@ -88,6 +88,7 @@ def test_a_hand_that_is_not_where_its_contact_is_is_let_go(listed, shown):
     assert result.motion.contact_names == ("left_foot", "right_foot")
 
 
+@pytest.mark.long
 def test_a_contact_out_of_reach_is_let_go_when_the_motion_shows_it():
     """No key lies in the phase that lists it: the first fit misses it, the second goes on without."""
     far = Obstacle("shelf", Box((0.4, 0.4, 0.04)), translation=(1.4, -0.25, 1.18))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from manikin.reports.figures import raster
 from manikin.reports.figures.raster import Camera, hiding, nearness, picture
 from manikin.reports.solids import DrawnSolid, body_solid, scene_solids
 from manikin.scene import Box, Mesh, Obstacle, Scene
@@ -11,6 +12,12 @@ from manikin.scene import Box, Mesh, Obstacle, Scene
 AHEAD = Camera.at(0.0, 0.0, np.zeros(3))
 WINDOW = (-1.0, 1.0, -1.0, 1.0)
 RED, BLUE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+
+@pytest.fixture(autouse=True)
+def as_fine_as_they_are_drawn(monkeypatch):
+    """Four points are computed for a pixel, which other tests do without."""
+    monkeypatch.setattr(raster, "FINER", 2)
 
 
 def solid(mesh, colour, name, smooth=False):

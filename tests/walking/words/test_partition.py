@@ -79,6 +79,7 @@ def test_paths_of_one_branch_have_no_border():
         equal_paths(word_path((0.0, 6.0, 2.0)), word_path((0.2, 6.0, 2.0)))
 
 
+@pytest.mark.long
 def test_several_processes_find_the_same(small):
     found = {one.heading_deg: one for one in solve_slices([340, 90], SMALL, jobs=2)}
     assert set(found) == {340.0, 90.0}
