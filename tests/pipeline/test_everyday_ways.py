@@ -192,6 +192,7 @@ def test_women_rise_from_chairs(seed):
     assert set(plan.stages[-1].contacts) == set(FEET)
 
 
+@pytest.mark.long
 def test_a_walk_round_a_box_takes_as_long_as_a_slow_walk_of_people():
     """People walk at 1.3 m/s, very old ones at 0.6; at rest at every step, 2.5 m take no more than 18 s."""
     plan, _ = planned(round_a_box(Draw("round", 0)))

@@ -86,6 +86,7 @@ def test_a_plan_too_high_for_the_legs_is_planned_again_lower_and_executed(tmp_pa
     assert kept["reason"] == [None] * 6
 
 
+@pytest.mark.long
 def test_a_plan_at_the_end_of_the_legs_is_planned_lower_so_that_the_arms_may_hang(tmp_path, monkeypatch):
     """Feet 0.66 m apart: the first plan has postures, with the trunk bent and arms thrown up to be that high.
 

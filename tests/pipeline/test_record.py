@@ -75,6 +75,7 @@ def test_a_full_run_has_motions_and_plan(tmp_path, finished_run):
     assert record.effectors == ("left_foot", "right_foot")
 
 
+@pytest.mark.long
 def test_products_of_a_point_mass_run_are_its_figures(tmp_path):
     names = {path.name for path in write_outputs(write_run(tmp_path / "com"))}
     assert {"com.png", "margin.png", "zmp.png", "contacts.png", "timing.png", "scene.png"} <= names

@@ -332,12 +332,14 @@ def test_on_one_foot_no_part_of_the_body_is_in_another(body, foot):
     assert np.degrees(np.abs(found.trace.motion.q[:, 7:] - q[7:])).max() < 1.0
 
 
+@pytest.mark.long
 def test_less_is_held_on_one_foot_than_on_two():
     """From the side: 200 N are held on two feet, experiment 4, and not on one."""
     assert pushed((0.0, 200.0, 0.0), feet=Feet.FREE).recovered
     assert not pushed((0.0, 200.0, 0.0), feet=Feet.FREE, foot="left_foot").recovered
 
 
+@pytest.mark.long
 def test_nothing_beyond_the_bound_is_held():
     """A tenth more than the pendulum with a flywheel holds, from two sides."""
     controller = BalanceRecovery(KUDOH, KUDOH.standing_posture())

@@ -108,6 +108,7 @@ def test_movements_are_the_recorded_ones(built, recordings):
         assert np.degrees(best) < 3.0
 
 
+@pytest.mark.long
 def test_the_command(recordings, tmp_path, capsys):
     out = tmp_path / "library.npz"
     assert main(["library", "build", str(recordings), "--out", str(out), "--json"]) == 0

@@ -83,6 +83,7 @@ def test_a_wanted_margin_is_kept_and_costs_nearness(usual):
     assert wide.rms >= usual.rms - 1e-4
 
 
+@pytest.mark.long
 def test_more_margin_than_has_to_be_kept_is_wished_for(monkeypatch, usual):
     """Where none is required the lower half of the margins is larger than without the wish."""
     times = np.linspace(0.0, 3.0, 301)

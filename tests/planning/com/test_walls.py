@@ -94,10 +94,13 @@ def test_a_stance_moved_elsewhere_has_the_polytope_it_would_have(problem):
 @pytest.mark.parametrize(
     ("setting", "says"),
     [
-        ("supports.friction=0.05", "a friction of 0.05 pressed with 2000 N in all is too small"),
+        pytest.param(
+            "supports.friction=0.05", "a friction of 0.05 pressed with 2000 N in all is too small",
+            marks=pytest.mark.long,
+        ),
         ("supports.contact_normal_force_cap_N=250", "push up with 1000 N at most"),
     ],
-)
+)  # fmt: skip
 def test_too_little_friction_or_squeeze_is_named_at_once(setting, says):
     problem = load_scenario("walls", overrides=[setting]).build_centroidal_problem()
     failure = assess_feasibility(problem, polytopes_of(problem)).failure

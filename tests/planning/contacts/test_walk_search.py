@@ -208,6 +208,7 @@ def test_ways_that_people_take_are_found_with_as_many_steps(way):
     assert landed <= most
 
 
+@pytest.mark.long
 def test_a_high_step_is_made_in_postures_that_the_joints_can_hold(checked):
     """Upright, a woman on one foot before a step of 0.4 m needs more than the strength of hip and knee."""
     woman = human(1.66, 70.7, "female")

@@ -79,6 +79,7 @@ def test_a_flight_that_is_clear_already_stays_as_it_is(walked):
     np.testing.assert_array_equal(same.time[same.time <= end], path.time[path.time <= end])
 
 
+@pytest.mark.long
 def test_a_flight_without_a_posture_stays_as_it_is(walked):
     """A foot cannot be lifted into a slab that begins where it lands."""
     case, path, _ = walked

@@ -34,12 +34,14 @@ def leaning(person, step_com):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_the_certificate_does_not_count_what_may_be_leant_on(leaning, person):
     assert least_distance(person, BACKREST, leaning.motion) < REQUIRED - 0.001
     assert leaning.succeeded, leaning.failure
     assert leaning.certificate.value("min_clearance_m") >= REQUIRED
 
 
+@pytest.mark.long
 def test_the_fit_keeps_off_it_where_it_can(leaning, step_motion, person):
     """The same step without the armrest passes through its place."""
     assert least_distance(person, ARMREST, step_motion.motion) < -0.03
