@@ -163,6 +163,22 @@ def euler_angles(rotation: FloatArray, order: str) -> FloatArray:
         return Rotation.from_matrix(rotation).as_euler(order)
 
 
+def continuous_angles(rotations: FloatArray, order: str) -> FloatArray:
+    """(n, s, 3) angles [rad] of rotations (n, s, 3, 3), of both triples that nearer to the sample before.
+
+    The order names three different axes, as in SciPy's ``as_euler``.
+    """
+    first = euler_angles(rotations, order)
+    other = first * [1.0, -1.0, 1.0] + np.pi
+    result = first.copy()
+    for sample in range(1, len(result)):
+        both = np.stack([first[sample], other[sample]])
+        both += 2.0 * np.pi * np.round((result[sample - 1] - both) / (2.0 * np.pi))
+        nearer = np.abs(both - result[sample - 1]).max(axis=2).argmin(axis=0)
+        result[sample] = both[nearer, np.arange(both.shape[1])]
+    return result
+
+
 def rotation_from_normal(normal: ArrayLike, yaw: float = 0.0) -> FloatArray:
     """Rotation with z along ``normal`` (3,): the smallest tilt of the world, after a ``yaw`` [rad] about z.
 

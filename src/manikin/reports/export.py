@@ -15,15 +15,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.skin import has_skin
 from manikin.ergonomics import reach_envelopes
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.pipeline.run_directory import read_run
 from manikin.planning.contacts.single_contact import ContactAnswer
+from manikin.recordings.virtual_markers import virtual_markers
 from manikin.reports.comparison import RunComparison
 from manikin.reports.figures import ChoicePanel, contact_choice_figure, save_figure, write_figures
 from manikin.reports.formats.bvh import scene_obj, to_bvh
+from manikin.reports.formats.opensim import coordinates_mot, external_loads, to_osim
+from manikin.reports.formats.recorded import loads_mot, to_c3d, to_trc
 from manikin.reports.formats.robots import scene_urdf, to_mjcf, to_urdf
 from manikin.reports.formats.video import SIZE, Film, to_gif, to_mp4
 from manikin.reports.gltf import to_glb
@@ -195,6 +199,26 @@ def _write_gif(export: _Export) -> None:
     write_content(export.path, to_gif(export.film, export.rate, export.options.progress))
 
 
+def _write_trc(export: _Export) -> None:
+    write_result(export.path, to_trc(export.body, export.motion))
+    if export.motion.contact_names:
+        write_result(export.beside("_grf.mot"), loads_mot(export.body, export.motion))
+
+
+def _write_c3d(export: _Export) -> None:
+    write_content(export.path, to_c3d(export.body, export.motion))
+
+
+def _write_osim(export: _Export) -> None:
+    body, motion = export.body, export.motion
+    write_result(export.path, to_osim(body, virtual_markers(body) if has_skin(body) else ()))
+    write_result(export.beside(".mot"), coordinates_mot(body, motion))
+    if motion.contact_names:
+        forces = export.beside("_grf.mot")
+        write_result(forces, loads_mot(body, motion))
+        write_result(forces.with_suffix(".xml"), external_loads(body, motion, forces.name))
+
+
 @dataclass(frozen=True)
 class _Format:
     """How a format is written.
@@ -218,6 +242,9 @@ _FORMATS: Mapping[str, _Format] = {
     "gif": _Format(_write_gif, 12.5),
     "mjcf": _Format(_write_mjcf, None, ending="xml"),
     "urdf": _Format(_write_urdf, None),
+    "osim": _Format(_write_osim, 100.0),
+    "trc": _Format(_write_trc, 100.0),
+    "c3d": _Format(_write_c3d, 100.0),
 }
 FORMATS = tuple(_FORMATS)
 

@@ -24,7 +24,7 @@ from manikin.body.segments import end_of
 from manikin.body.skin import segment_frames
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray, euler_angles
+from manikin.numerics.spatial import FloatArray, continuous_angles
 from manikin.reports.solids import finite_obstacles
 from manikin.scene import Scene
 
@@ -147,7 +147,7 @@ class _BvhText:
         count, step = len(self.motion.time), _frame_time(self.motion)
         result.write(f"MOTION\nFrames: {count}\nFrame Time: {step:.9g}\n")
         position = CENTIMETRES * self.motion.q[:, :3] @ self._axes.T
-        angles = _continuous_angles(self._turns(order), ORDERS[self.up])
+        angles = continuous_angles(self._turns(order), ORDERS[self.up])
         table = np.hstack([position, np.degrees(angles).reshape(count, -1)])
         np.savetxt(result, table, fmt="%.7f")
         return result.getvalue()
@@ -204,16 +204,3 @@ def _frame_time(motion: Motion) -> float:
 
 def _numbers(values: FloatArray) -> str:
     return " ".join(f"{value:.7f}" for value in values + 0.0)
-
-
-def _continuous_angles(rotations: FloatArray, order: str) -> FloatArray:
-    """(n, s, 3) angles [rad] of rotations (n, s, 3, 3), of both triples that nearer to the sample before."""
-    first = euler_angles(rotations, order)
-    other = first * [1.0, -1.0, 1.0] + np.pi
-    result = first.copy()
-    for sample in range(1, len(result)):
-        both = np.stack([first[sample], other[sample]])
-        both += 2.0 * np.pi * np.round((result[sample - 1] - both) / (2.0 * np.pi))
-        nearer = np.abs(both - result[sample - 1]).max(axis=2).argmin(axis=0)
-        result[sample] = both[nearer, np.arange(both.shape[1])]
-    return result
