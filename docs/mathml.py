@@ -15,12 +15,17 @@ def as_mathml(html: str) -> str:
     """HTML with each formula of TeX as MathML.
 
     Raises:
+        ValueError: If an alignment is left in a formula, whose environment latex2mathml does not know then.
         Exception: Of latex2mathml, for a formula that it cannot read; the build stops there.
     """
 
     def drawn(match: re.Match[str]) -> str:
         block = match["open"] == "["
-        mathml = convert(unescape(match["tex"]).strip(), display="block" if block else "inline")
+        # Of the two names of the same alignment the converter knows the one.
+        tex = unescape(match["tex"]).strip().replace("{aligned}", "{align*}")
+        mathml = convert(tex, display="block" if block else "inline")
+        if ">&<" in mathml or ">&#x00026;<" in mathml:
+            raise ValueError(f"the alignment of {tex!r} is not understood; valid: aligned, bmatrix, cases")
         return f'<{match["tag"]} class="formula">{mathml}</{match["tag"]}>'
 
     return FORMULA.sub(drawn, html)

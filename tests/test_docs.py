@@ -217,6 +217,9 @@ def test_formulas_become_mathml():
     assert "&lt;" in mathml or "&#x0003C;" in mathml
     assert "arithmatex" not in mathml
     assert "\\" not in mathml
+    lines = r"\begin{aligned} a &= b \\ c &= d \end{aligned}".replace("&", "&amp;")
+    aligned = script("mathml").as_mathml(f'<div class="arithmatex">\\[{lines}\\]</div>')
+    assert aligned.count("<mtr>") == 2
 
 
 def test_pages_fetch_nothing_from_other_sites():
