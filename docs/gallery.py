@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from manikin.pipeline.run_directory import RunRecord, read_run
+from manikin.motion.file import MotionFile, read_motions
 from manikin.reports.figures.raster import hiding, picture
 from manikin.reports.figures.space import Space
 from manikin.reports.figures.views import distinct_contacts
@@ -25,19 +25,19 @@ WIDTH, MOST_HIGH = 360, 400
 MOST_BYTES = 300_000
 
 
-def frames(record: RunRecord) -> list[Image.Image]:
+def frames(content: MotionFile) -> list[Image.Image]:
     """The pictures of a run's last motion."""
-    motion, body = list(record.motions.values())[-1], record.body
+    motion, body = list(content.motions.values())[-1], content.body
     assert body is not None  # a run directory with a motion has its body
     samples = np.linspace(0, len(motion.time) - 1, round(SECONDS * RATE)).round().astype(int)
-    contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
+    contacts = [] if content.schedule is None else distinct_contacts(content.schedule)
     postures = motion.q[samples]
-    space = Space.of(record.scene, [motion.com], contacts=contacts, body=body, postures=postures[::6])
+    space = Space.of(content.scene, [motion.com], contacts=contacts, body=body, postures=postures[::6])
     left, right, bottom, top = space.window
     scale = min(WIDTH / (right - left), MOST_HIGH / (top - bottom))
     clear = hiding(space.bodies, space.obstacles, space.camera, space.window)
     still = [*space.obstacles, *contact_solids(contacts)]
-    floor = None if record.scene is None else record.scene.floor_height
+    floor = None if content.scene is None else content.scene.floor_height
     shown = [body_solid(body, q) for q in postures]
     return [
         Image.fromarray(
@@ -50,7 +50,7 @@ def frames(record: RunRecord) -> list[Image.Image]:
 
 def write(name: str, run: Path) -> Path:
     """Write the moving picture of a run, in the best quality that keeps it below :data:`MOST_BYTES`."""
-    first, *rest = frames(read_run(run))
+    first, *rest = frames(read_motions(run))
     times = [round(1000 / RATE)] * len(rest) + [500]
     FOLDER.mkdir(parents=True, exist_ok=True)
     file = FOLDER / f"{name}.webp"

@@ -3,6 +3,8 @@
 import importlib.util
 import json
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -220,6 +222,23 @@ def test_formulas_become_mathml():
     lines = r"\begin{aligned} a &= b \\ c &= d \end{aligned}".replace("&", "&amp;")
     aligned = script("mathml").as_mathml(f'<div class="arithmatex">\\[{lines}\\]</div>')
     assert aligned.count("<mtr>") == 2
+
+
+def test_a_browser_draws_what_the_hook_makes_and_tells_what_is_not_drawn(tmp_path):
+    """By ``docs/screenshots/shoot.mjs``, where Node, Puppeteer and Chromium are installed."""
+    pytest.importorskip("latex2mathml", reason="the extra docs is not installed")
+    folder = DOCS / "screenshots"
+    if shutil.which("node") is None or not (folder / "node_modules").is_dir():
+        pytest.skip("no headless Chromium: run npm install in docs/screenshots")
+    raw = '<span class="arithmatex">\\(\\frac{a}{b}\\)</span>'
+    (tmp_path / "raw.html").write_text(raw)
+    (tmp_path / "drawn.html").write_text(script("mathml").as_mathml(raw))
+    for name, status in (("drawn", 0), ("raw", 1)):
+        command = ["node", str(folder / "shoot.mjs"), str(tmp_path), str(tmp_path / f"{name}.html")]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == status, done.stdout + done.stderr
+        assert (tmp_path / f"{name}.png").stat().st_size > 0
+        assert ("not drawn" in done.stdout) == bool(status)
 
 
 def test_pages_fetch_nothing_from_other_sites():

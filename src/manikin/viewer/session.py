@@ -40,7 +40,7 @@ BESIDE = 1.2
 """Distance of the motion beside from the motion shown [m]."""
 NOTHING = "nothing"
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
-STEPS = {"-0.1 s": -0.1, "-0.01 s": -0.01, "+0.01 s": 0.01, "+0.1 s": 0.1}
+STEPS = {"-0.1": -0.1, "-0.01": -0.01, "+0.01": 0.01, "+0.1": 0.1}
 MARGIN = "margin"
 VIEWS = {"front": (2.8, 0.0, 0.4), "behind": (-2.8, 0.0, 0.6), "left": (0.0, 2.8, 0.2),
          "right": (0.0, -2.8, 0.2), "above": (-0.05, 0.0, 4.0)}  # fmt: skip
@@ -318,7 +318,7 @@ class ViewerSession(Page):
         with gui.add_folder("Playback"):
             self._slider = gui.add_slider("time [s]", min=0.0, max=last, step=0.001, initial_value=self.time)
             self._button = gui.add_button("Play")
-            steps = gui.add_button_group("step", tuple(STEPS))
+            steps = gui.add_button_group("step [s]", tuple(STEPS))
             speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
             loop = gui.add_checkbox("loop", initial_value=False)
             motions = gui.add_dropdown("motion", tuple(self.content.motions), initial_value=self.chosen)
