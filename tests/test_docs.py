@@ -241,6 +241,13 @@ def test_a_browser_draws_what_the_hook_makes_and_tells_what_is_not_drawn(tmp_pat
         assert ("not drawn" in done.stdout) == bool(status)
 
 
+def test_every_moving_picture_is_shown_and_small():
+    files = sorted((DOCS / "images/gallery").iterdir())
+    shown = re.findall(r"\(images/gallery/([\w.]+)\)", PAGES["gallery.md"])
+    assert sorted(shown) == [file.name for file in files]
+    assert [file.name for file in files if file.stat().st_size > 300_000] == []
+
+
 def test_pages_fetch_nothing_from_other_sites():
     """What the theme would fetch is in the repository; ``docs/screenshots/shoot.mjs`` watches whole pages."""
     settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
