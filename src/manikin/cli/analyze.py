@@ -102,6 +102,7 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
 
     margin, residual, effort = summary["margin"], summary["reconstruction_residual_m"], summary["ergonomics"]
     shown = {
+        "activity": summary["activity"]["kind"],
         "duration": f"{summary['duration_s']:.2f} s, {summary['frames']} frames",
         "person": f"{summary['stature_m']:.2f} m, {summary['mass_kg']:.1f} kg",
         "residual": f"{1e3 * residual['median']:.1f} mm (median), {1e3 * residual['max']:.1f} mm (largest)",
@@ -109,6 +110,12 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         "phases [s]": " ".join(f"{duration:.2f}" for duration in summary["phase_durations_s"]),
         "lowest CoM": f"{summary['com_height_min_m']:.3f} m at {summary['com_height_min_at_s']:.2f} s",
     }
+    if (gait := summary["gait"]) is not None and gait["cycles"] and gait["cadence_per_min"] is not None:
+        by_plates = sum(one["moments_by"] == "plate" for one in gait["cycles"])
+        shown["gait"] = (
+            f"{len(gait['cycles'])} cycles, {by_plates} with moments by plates; "
+            f"{gait['cadence_per_min']:.0f} steps/min, {gait['speed_mps']:.2f} m/s"
+        )
     share = margin["share_positive_in_contact"]
     if margin["min"] is not None:
         shown["lowest margin"] = (
