@@ -131,9 +131,9 @@ def farthest_support(recording: RecordedCom) -> float:
     return float(max(distances))
 
 
-SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
+SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0), watch_toes=True)
 """Settings of the execution. A recorded posture is worth six times as much as one that was only preferred:
-that keeps arms off the trunk while they make up for what the contacts do not give."""
+that keeps arms off the trunk while they make up for what the contacts do not give. Feet land at speed."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -213,9 +213,10 @@ class Controller:
             tasks.posture_task("posture", state, reference, gains.posture, weights.posture, self._others)
         )
         for name, toes in self._toes.items():  # followed as their foot is
-            rests = supports[name].mode is SupportMode.STANCE
-            off = np.abs(state.q[7:][toes] - reference.q[7:][toes]).max(initial=0.0) > BOUNCED
-            gain = (TOES_BACK if off else gains.posture) if rests else gains.swing
+            gain = gains.posture if supports[name].mode is SupportMode.STANCE else gains.swing
+            if self.settings.watch_toes and _lies_flat(supports[name]):
+                away = np.abs(state.q[7:][toes] - reference.q[7:][toes])
+                gain = TOES_BACK if away.max(initial=0.0) > BOUNCED else gain
             if toes:
                 wanted.append(
                     tasks.posture_task(f"toes of {name}", state, reference, gain, weights.effectors, toes)
@@ -281,8 +282,8 @@ class Controller:
         upper = basis.upper
         if support.settling:
             upper = np.minimum(upper, cap * self._low_shares(geometry, contact, state, edges))
-        elif (lifted_toes := self._lifted_toes(geometry, contact, state, edges)) is not None:
-            upper = np.minimum(upper, cap * lifted_toes)
+        elif self.settings.watch_toes and _lies_flat(support) and len(geometry.patches) > 1:
+            upper = np.minimum(upper, cap * self._toe_shares(geometry, contact, state, edges))
         if support.fades:
             upper = np.minimum(upper, state.mass * GRAVITY * self._point_shares(support, contact, edges))
         return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
@@ -318,19 +319,17 @@ class Controller:
         return np.repeat(np.clip(2.0 - (height - height.min()) / raised, 0.0, 1.0), edges)
 
     @classmethod
-    def _lifted_toes(
+    def _toe_shares(
         cls, geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int
-    ) -> FloatArray | None:
-        """(e k,) shares of the load as of :meth:`_low_shares`, where toes are off the ground; else None.
+    ) -> FloatArray:
+        """(e k,) shares of the load as of :meth:`_low_shares` of the tips of toes.
 
         Toes are light: those that bounce off as a foot lands would be thrown back by the torque for a load
         that they do not carry. What is behind their hinge keeps its share.
         """
-        if len(geometry.patches) < 2 or contact.part is not SolePart.FULL:
-            return None
         shares = cls._low_shares(geometry, contact, state, edges, RAISED_TOES)
         shares[: edges * len(geometry.patches[0][1])] = 1.0
-        return shares if np.any(shares < 1.0) else None
+        return shares
 
     def _point_shares(self, support: SupportState, contact: Contact, edges: int) -> FloatArray:
         """(e k,) body weights that each point's variables may carry while the touching part changes."""
@@ -350,6 +349,12 @@ class Controller:
         if relaxed.solved:
             return relaxed, f"without joint bounds: {solution.status}"
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
+
+
+def _lies_flat(support: SupportState) -> bool:
+    """Whether an effector carries with its whole sole."""
+    part = None if support.contact is None else support.contact.part
+    return support.mode is SupportMode.STANCE and part is SolePart.FULL
 
 
 def _touching_points(contact: Contact) -> tuple[str, SolePart, bytes]:

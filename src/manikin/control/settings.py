@@ -190,6 +190,8 @@ class ControlSettings:
         joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
         returning: What to do when the body is off its plan; None follows the plan as ever.
+        watch_toes: Whether toes that bounce off as a foot lands carry nothing until they are down again, and
+            come down fast; for motions that land at speed.
     """
 
     period: float = 0.005
@@ -199,6 +201,7 @@ class ControlSettings:
     joint_limit_horizon: float = 0.05
     max_joint_acceleration: float = 500.0
     returning: ReturnSettings | None = None
+    watch_toes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):
