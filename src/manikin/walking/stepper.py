@@ -82,10 +82,10 @@ class StepRule:
         """Steps of people on feet that roll, at a speed over the floor [m/s].
 
         The walk ratio is that of 43 people's cadence of ``107.3 v^0.477`` per minute (Fukuchi et al. 2018),
-        to 3 % from 0.5 to 1.8 m/s. Both feet are on the floor for 34 % of the time when slow, and for 21 % at
+        to 3 % from 0.5 to 1.8 m/s. Both feet are on the floor for 30 % of the time when slow, and for 21 % at
         1.5 m/s: a foot that has landed carries little at first.
         """
-        share = float(np.clip(0.48 - 0.18 * finite_number(speed, "speed [m/s]", at_least=0.0), 0.2, 0.34))
+        share = float(np.clip(0.48 - 0.18 * finite_number(speed, "speed [m/s]", at_least=0.0), 0.2, 0.3))
         return cls(
             walk_ratio=0.32, longest_step=0.9, longest=1.1, width=0.14, narrowest=0.13, standing_width=0.18,
             splay=float(np.radians(4.0)), single=0.36, double_share=share, standing=0.25, lengthened=0.5,

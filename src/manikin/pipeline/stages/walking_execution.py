@@ -17,6 +17,9 @@ from manikin.walking.gait.balanced_walk import BalancedWalk, balanced_walk
 REACHED = 2e-3
 """A foot is where it should be when its ankle is this near to its place [m]."""
 
+BEYOND = float(np.radians(1.0))
+"""Most that a hinge of the plan may be beyond its range, where it is cut off [rad]."""
+
 BALANCED = 0.97
 """Least share of the control steps with a positive margin: in the others a foot just strikes or leaves."""
 
@@ -48,7 +51,8 @@ def walk_in_balance(context: RunContext, report: Report, requirements: Execution
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count} | _measures(walk))
     table = requirement_table([
         Requirement("missed_m", "distance of a foot from its place, out of reach", "m", walk.missed, "<=",
-                    REACHED)
+                    REACHED),
+        Requirement("beyond_range_rad", "angle of a hinge beyond its range", "rad", walk.excess, "<=", BEYOND),
     ])  # fmt: skip
     report.require(STAGE, table)
     report.keep_motions(walk.schedule, walk.motion)

@@ -2,8 +2,8 @@
 
 A foot has one place on the floor in each support. It lands on the edge of its heel, lies flat, rises about
 the hinge of its toes and leaves; its centre of pressure goes the same way. How much it rolls follows from how
-far it goes forward: a foot that goes back or aside lands and leaves flat. Angles and shares of the time are
-our own choice, near people's.
+far it goes forward: a foot that goes back lands on its toes, one that goes aside flat, and both leave flat.
+Angles and shares of the time are our own choice, near people's.
 """
 
 from collections.abc import Sequence
@@ -37,6 +37,10 @@ from manikin.walking.stepper import SIDE
 
 LEAST_ROLL = 0.1
 """Steps forward that are shorter than this share of a full one begin and end flat."""
+
+
+BACK_LIFT = 0.03
+"""How much higher a foot is lifted that lands on its toes, which hang down before [m]."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ class RollingSupport:
         step: Where and when the foot stands.
         flat: When the sole lies flat [s].
         up: When the heel rises [s].
-        roll_in: Share of the full pitch with which the foot lands, 0 for a flat landing.
+        roll_in: Share of the full pitch with which it lands on its heel, or, if negative, on its toes.
         roll_out: Share of the full pitch with which it leaves.
     """
 
@@ -95,7 +99,7 @@ class RollingSupport:
     def part_at(self, time: float) -> SolePart:
         """Part of the sole that touches at a time of the support [s]."""
         if time < self.flat and self.roll_in:
-            return SolePart.HEEL
+            return SolePart.HEEL if self.roll_in > 0.0 else SolePart.TOES
         return SolePart.TOES if time >= self.up and self.roll_out else SolePart.FULL
 
 
@@ -125,8 +129,9 @@ class RollingFoot:
     def _support(self, step: Footprint, before: float, after: float) -> RollingSupport:
         """Support between strides of which the body goes forward ``before`` and ``after`` [m]."""
         rule, held = self.rule, step.leaves - step.lands
-        shares = (min(max(way / rule.full_step, 0.0), 1.0) for way in (before, after))
-        roll_in, roll_out = (share if share > LEAST_ROLL else 0.0 for share in shares)
+        shares = (min(max(way / rule.full_step, -1.0), 1.0) for way in (before, after))
+        roll_in, roll_out = (share if abs(share) > LEAST_ROLL else 0.0 for share in shares)
+        roll_out = max(roll_out, 0.0)
         flat = step.lands + (min(rule.flat * held, rule.latest_flat) if roll_in else 0.0)
         up = step.leaves - (rule.rise * min(held, rule.longest) if roll_out else 0.0)
         return RollingSupport(step, flat, max(up, flat + rule.slowest_flat), roll_in, roll_out)
@@ -182,7 +187,7 @@ class RollingFoot:
         pivot = begin.position + done[:, None] * (end.position - begin.position)
         turn = float(np.angle(np.exp(1j * (after.step.yaw - before.step.yaw))))
         yaw = before.step.yaw + done * turn
-        pivot[:, 2] += rule.lift * raised
+        pivot[:, 2] += (rule.lift + (BACK_LIFT if after.roll_in < 0.0 else 0.0)) * raised
         aside = SIDE[self.name] * rule.aside * raised
         pivot[:, :2] += aside[:, None] * np.column_stack([-np.sin(yaw), np.cos(yaw)])
         level = np.zeros(len(time))
@@ -203,17 +208,19 @@ class RollingFoot:
         """Instants [s] and places along the sole [m] through which its pressure goes."""
         half, line, rule = 0.5 * self.length, float(self.hinge[0]), self.rule
         knots = {item.step.lands: 0.0}
-        if item.roll_in:
+        if item.roll_in < 0.0:
+            knots = {item.step.lands: line + rule.pressed_up, item.flat + 0.1: 0.0}
+        elif item.roll_in:
             middle = 0.5 * (item.flat + item.up)
             knots = {item.step.lands: -0.85 * half, item.flat: -0.5 * half, middle: 0.0}
         if item.roll_out:
             if first:  # forward from standing
                 knots[max(item.up - 0.2, item.step.lands + 0.01)] = 0.02
             knots |= {item.up: line + rule.pressed_up, item.step.leaves: line + rule.pressed_off}
-        elif item.roll_in:
+        elif item.roll_in > 0.0:
             knots = {item.step.lands: -0.85 * half, item.flat: -0.5 * half, item.flat + 0.3: 0.0}
         else:
-            knots[item.step.lands + 0.3] = 0.0
+            knots[max(knots) + 0.3] = 0.0
         instants = np.array(sorted(knots))
         return instants, np.array([knots[t] for t in instants.tolist()])
 
