@@ -258,7 +258,9 @@ class _Operations:
         if act is not None:
             task["act"] = {**act}
         scenario = context.scenario.replaced(task=task)
-        self._add(replace(context, scenario=scenario, start=self._stage), None)
+        # The centre of mass at the start is that of the body with what it holds.
+        start = Stage.of(context.body, self._stage.contacts, self._stage.q, RESTING)
+        self._add(replace(context, scenario=scenario, start=start), None)
         if self._held is not None:
             self._held = replace(self._held, place=self._between_hands(self._held))
 
