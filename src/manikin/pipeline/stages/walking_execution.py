@@ -52,7 +52,8 @@ def walk_in_balance(context: RunContext, report: Report, requirements: Execution
     table = requirement_table([
         Requirement("missed_m", "distance of a foot from its place, out of reach", "m", walk.missed, "<=",
                     REACHED),
-        Requirement("beyond_range_rad", "angle of a hinge beyond its range", "rad", walk.excess, "<=", BEYOND),
+        Requirement("beyond_range_rad", "angle of a hinge beyond its range", "rad", walk.excess,
+                    "<=", BEYOND),
     ])  # fmt: skip
     report.require(STAGE, table)
     report.keep_motions(walk.schedule, walk.motion)
