@@ -125,7 +125,7 @@ class _Plan:
     ) -> None:
         self.body, self.legs = body, LegKinematics(body)
         begin, end = footprints.start - LEAD, footprints.end + LEAD
-        self.time = begin + STEP * np.arange(round((end - begin) / STEP) + 1)
+        self.time: FloatArray = begin + STEP * np.arange(round((end - begin) / STEP) + 1, dtype=np.float64)
         self.floor = float(footprints.steps[0].position[2])
         self.feet = [RollingFoot(body, footprints, name, rule) for name in FEET]
         paths = [foot.path(self.time) for foot in self.feet]
@@ -225,7 +225,7 @@ class _Plan:
         """The walk as it is now, with its forces."""
         body, time = self.body, self.time
         schedule = rolling_schedule(body, self.feet, float(time[0]), float(time[-1]), friction)
-        a = np.gradient(self.v, STEP, axis=0)
+        a = np.asarray(np.gradient(self.v, STEP, axis=0), dtype=np.float64)
         tau, forces, wrench, zmp_error = self._forces(a, schedule)
         stances = [phase.stance for phase in schedule.sequence]
         margin = motion_margin(
