@@ -7,7 +7,7 @@ import base64
 import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -23,6 +23,7 @@ from manikin.reports.figures import png_of
 from manikin.reports.figures.study_maps import VERDICTS, study_maps
 from manikin.reports.player import player_data
 from manikin.reports.summary_table import FAMILY_HEADER, family_rows, verdict_line
+from manikin.reports.taken_objects import object_places
 from manikin.runtime import __version__
 from manikin.runtime.display import readable
 from manikin.runtime.files import FIGURES, write_result
@@ -137,7 +138,9 @@ def _motion(record: RunRecord | None) -> dict[str, Any] | None:
     """What the player shows of the last motion of a run, or None without a body to show."""
     if record is None or not record.motions or record.body is None or record.body.is_point_mass:
         return None
-    return player_data(record.body, list(record.motions.values())[-1], record.scene, record.schedule)
+    motion = list(record.motions.values())[-1]
+    places = partial(object_places, record, motion)
+    return player_data(record.body, motion, record.scene, record.schedule, places)
 
 
 def _contacts(record: RunRecord | None) -> list[dict[str, Any]]:

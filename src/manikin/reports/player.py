@@ -6,6 +6,8 @@ float32 at most :data:`RATE` times a second.
 """
 
 import base64
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.body.flesh import MATERIALS
-from manikin.body.skin import segment_frames
+from manikin.body.skin import Skin, segment_frames
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
@@ -32,9 +34,14 @@ AROUND = 2.0
 
 
 def player_data(
-    body: BodyModel, motion: Motion, scene: Scene | None = None, schedule: ContactSchedule | None = None
-) -> dict[str, Any]:
+    body: BodyModel, motion: Motion, scene: Scene | None = None, schedule: ContactSchedule | None = None,
+    places: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """What ``player.js`` shows, ready for JSON.
+
+    Args:
+        places: Position [m] and yaw [rad], (n, 4), of obstacles that are moved, by name, at samples (n,) of
+            the motion; none when omitted.
 
     Raises:
         MotionFileError: If the body has nothing to draw.
@@ -43,11 +50,13 @@ def player_data(
     wanted = np.linspace(motion.time[0], motion.time[-1], count)
     samples = np.searchsorted(motion.time, wanted - 1e-9).clip(0, len(motion.time) - 1)
     frames = [segment_frames(body, motion.q[sample]) for sample in samples]
-    skin = surface_of(body)
+    taken = {} if scene is None or places is None else places(samples)
     seen = np.array([origins for _, origins in frames]).reshape(-1, 3)
     low, high = seen.min(axis=0), seen.max(axis=0)
     contacts = [] if schedule is None else distinct_contacts(schedule)
-    shown = [] if scene is None else _limited(scene_solids(scene, low - AROUND, high + AROUND))
+    drawn = [] if scene is None else scene_solids(scene, low - AROUND, high + AROUND)
+    shown = _limited([solid for solid in drawn if solid.name not in taken])
+    skin, frames = _with_objects(surface_of(body), frames, [x for x in drawn if x.name in taken], taken)
     order = np.argsort(skin.materials, kind="stable")
     width = 2 if len(skin.vertices) <= 65536 else 4
     materials, counts = np.unique(skin.materials, return_counts=True)
@@ -67,6 +76,41 @@ def player_data(
         "middle": ((low + high) / 2.0).tolist(), "reach": float(np.linalg.norm(high - low)),
         "azimuth": _azimuth(motion.q[samples]),
     }  # fmt: skip
+
+
+def _with_objects(
+    skin: Skin, frames: list[tuple[FloatArray, FloatArray]], solids: list[DrawnSolid],
+    places: Mapping[str, FloatArray],
+) -> tuple[Skin, list[tuple[FloatArray, FloatArray]]]:  # fmt: skip
+    """The surface and its frames with what moves in the scene, each as one more segment."""
+    for solid in solids:
+        place = places[solid.name]
+        corners = solid.vertices[solid.faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
+        count, number = 3 * len(corners), len(skin.segments)
+        skin = replace(
+            skin,
+            vertices=np.concatenate([skin.vertices, corners.reshape(-1, 3)]),
+            normals=np.concatenate([skin.normals, np.repeat(across, 3, axis=0)]),
+            faces=np.concatenate([skin.faces, len(skin.vertices) + np.arange(count).reshape(-1, 3)]),
+            materials=np.append(skin.materials, np.full(len(corners), OBJECT)),
+            bones=np.concatenate([skin.bones, np.full((count, 4), number)]),
+            weights=np.concatenate([skin.weights, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))]),
+            segments=(*skin.segments, solid.name),
+            rotations=np.concatenate([skin.rotations, np.eye(3)[None]]),
+            origins=np.concatenate([skin.origins, place[:1, :3]]),
+        )
+        turns = Rotation.from_euler("z", (place[:, 3] - place[0, 3])[:, None]).as_matrix()
+        frames = [
+            (np.concatenate([turn, turns[k : k + 1]]), np.concatenate([origin, place[k : k + 1, :3]]))
+            for k, (turn, origin) in enumerate(frames)
+        ]
+    return skin, frames
+
+
+OBJECT = len(MATERIALS)
+"""Number of the material of what moves in the scene."""
 
 
 def _tracks(
@@ -140,6 +184,8 @@ def _weights(weights: FloatArray) -> str:
 
 
 def _colour(number: int) -> list[float]:
+    if number == OBJECT:
+        return rgb(COLOURS["obstacle"]).round(3).tolist()
     return rgb(COLOURS["trunk"] if number < 0 else MATERIAL_COLOURS[MATERIALS[number]]).round(3).tolist()
 
 

@@ -1,8 +1,6 @@
 """A motion in its scene: bodies along the path of the centre of mass, and postures side by side."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,13 +11,12 @@ from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.motion import phases_of, segment_positions
-from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
 from manikin.reports.figures import style, views
 from manikin.reports.figures.space import Space
+from manikin.reports.taken_objects import scene_at
 from manikin.runtime.display import COLOURS, colours_of, side_colour
-from manikin.scene import Obstacle, Scene
-from manikin.scene.scene import FLOOR
 
 MOST = 9
 """Largest number of key instants drawn; of more some are left out, evenly."""
@@ -86,8 +83,7 @@ def operations_figure(record: RunRecord) -> Figure:
         left, right = view(np.array([low, high]))[:, 0]
         offsets = [(widest + GAP) * column for column in range(len(samples))]
         for offset, sample, item in zip(offsets, samples, operations, strict=True):
-            then = replace(record, content=replace(record.content, scene=_scene_with(record.scene, item)))
-            _draw_posture(axes, then, motion, sample, view.moved(offset, 0.0), (low, high))
+            _draw_posture(axes, record, motion, sample, view.moved(offset, 0.0), (low, high))
             if row == 0:
                 top = offset + (left + right) / 2, high[2]
                 style.note(axes, f"{item['operation']}, {item['end_s']:.1f} s", top, 4, fontsize=9)
@@ -95,21 +91,6 @@ def operations_figure(record: RunRecord) -> Figure:
         style.dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
     return figure
-
-
-def _scene_with(scene: Scene | None, operation: Mapping[str, Any]) -> Scene | None:
-    """The scene with the objects where they are at the end of an operation of a run's summary."""
-    if scene is None:
-        return None
-    moved, obstacles = {item["name"]: item for item in operation["objects"]}, list[Obstacle]()
-    for item in scene:
-        there = moved.get(item.name)
-        if there is not None:
-            turn = rotation_from_yaw(float(np.deg2rad(there["yaw_deg"])))
-            obstacles.append(Obstacle(item.name, item.shape, turn, there["position"]))
-        elif item.name != FLOOR:
-            obstacles.append(item)
-    return Scene(obstacles, floor_height=scene.floor_height)
 
 
 def _draw_posture(
@@ -128,7 +109,7 @@ def draw_moment(
 ) -> None:
     """Draw the body among the obstacles in a box [m] at one sample of a motion, with its CoM."""
     if record.body is not None:
-        views.draw_body(axes, record.scene, record.body, motion.q[sample], view, box)
+        views.draw_body(axes, scene_at(record, motion, sample), record.body, motion.q[sample], view, box)
     axes.plot(*view(motion.com[sample]), "o", color=COLOURS["ink"], markersize=4, zorder=5)
 
 
