@@ -458,11 +458,11 @@ class Analysis(Displayed):
         }  # fmt: skip
 
 
-def _later(numbers: Any, start: float) -> Any:
-    """Numbers with instants, by keys that end in ``at_s``, on a clock that shows ``start`` at their zero."""
-    if not isinstance(numbers, dict):
-        return numbers
-    return {
-        key: value + start if key.endswith("at_s") and value is not None else _later(value, start)
-        for key, value in numbers.items()
-    }
+def _later(numbers: Any, start: float, *, instants: bool = False) -> Any:
+    """Numbers with instants, below keys ending in ``at_s``, on a clock that shows ``start`` at their zero."""
+    if isinstance(numbers, dict):
+        return {
+            key: _later(value, start, instants=instants or key.endswith("at_s"))
+            for key, value in numbers.items()
+        }
+    return numbers + start if instants and numbers is not None else numbers
