@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
@@ -35,7 +36,7 @@ AROUND = 2.0
 
 def player_data(
     body: BodyModel, motion: Motion, scene: Scene | None = None, schedule: ContactSchedule | None = None,
-    places: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
+    places: Callable[[NDArray[np.int64]], Mapping[str, FloatArray]] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """What ``player.js`` shows, ready for JSON.
 

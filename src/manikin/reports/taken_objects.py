@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration
 from manikin.motion import Motion
@@ -23,7 +24,7 @@ STILL = 1.0e-6
 """Change of a place below which an object rests during an operation [m, rad]."""
 
 
-def object_places(record: RunRecord, motion: Motion, samples: FloatArray) -> dict[str, FloatArray]:
+def object_places(record: RunRecord, motion: Motion, samples: NDArray[np.int64]) -> dict[str, FloatArray]:
     """Position [m] and yaw [rad], (n, 4), of each object that is taken up, by name.
 
     Args:
@@ -85,11 +86,11 @@ def _place(obstacle: Obstacle) -> FloatArray:
 
 def _held(
     body: BodyModel, motion: Motion, item: Mapping[str, Any], before: FloatArray, after: FloatArray,
-    samples: FloatArray,
+    samples: NDArray[np.int64],
 ) -> FloatArray:  # fmt: skip
     """Places (k, 4) in the hands at those of the samples before the object is set down."""
     first, last = np.searchsorted(motion.time, (item["start_s"], item["end_s"]))
-    grid = np.linspace(first, min(last, len(motion.time) - 1), LOOKED_AT).astype(int)
+    grid = np.linspace(first, min(last, len(motion.time) - 1), LOOKED_AT).astype(np.int64)
     # Where the object is in the frame of the hands when they begin to move it.
     begin = _hands(body, motion, grid[:1])[0]
     offset = before - begin
@@ -107,7 +108,7 @@ def _carried(hands: FloatArray, offset: FloatArray) -> FloatArray:
     return hands + np.column_stack([cos * x - sin * y, sin * x + cos * y, z * same, turn * same])
 
 
-def _hands(body: BodyModel, motion: Motion, samples: FloatArray) -> FloatArray:
+def _hands(body: BodyModel, motion: Motion, samples: NDArray[np.int64]) -> FloatArray:
     """(n, 4) middle of the palms [m] and direction across the line between them [rad]."""
     places = np.empty((len(samples), 2, 3))
     for row, sample in enumerate(samples):
