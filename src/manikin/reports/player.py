@@ -87,13 +87,11 @@ def _with_objects(
     for solid in solids:
         place = places[solid.name]
         corners = solid.vertices[solid.faces]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
         count, number = 3 * len(corners), len(skin.segments)
         skin = replace(
             skin,
             vertices=np.concatenate([skin.vertices, corners.reshape(-1, 3)]),
-            normals=np.concatenate([skin.normals, np.repeat(across, 3, axis=0)]),
+            normals=np.concatenate([skin.normals, _flat_normals(corners)]),
             faces=np.concatenate([skin.faces, len(skin.vertices) + np.arange(count).reshape(-1, 3)]),
             materials=np.append(skin.materials, np.full(len(corners), OBJECT)),
             bones=np.concatenate([skin.bones, np.full((count, 4), number)]),
@@ -155,14 +153,19 @@ def _triangles(solids: list[DrawnSolid]) -> dict[str, Any] | None:
     if not solids:
         return None
     corners = np.concatenate([solid.vertices[solid.faces] for solid in solids])
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
     colours = np.repeat(np.concatenate([solid.colours for solid in solids]), 3, axis=0)
     padded = np.column_stack([np.round(255.0 * colours), np.full(len(colours), 255)])
     return {
         "count": 3 * len(corners), **_places(corners.reshape(-1, 3)),
-        "normals": _signed(np.repeat(across, 3, axis=0)), "colours": _encoded(padded, "u1"),
+        "normals": _signed(_flat_normals(corners)), "colours": _encoded(padded, "u1"),
     }  # fmt: skip
+
+
+def _flat_normals(corners: FloatArray) -> FloatArray:
+    """(3m, 3) unit normals of triangles (m, 3, 3) at each of their corners."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
+    return np.repeat(across, 3, axis=0)
 
 
 def _places(points: FloatArray) -> dict[str, Any]:

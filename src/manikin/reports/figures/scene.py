@@ -40,27 +40,9 @@ def postures_figure(record: RunRecord) -> Figure:
     if len(instants) == 2:
         instants = eventful_instants(motion)
     samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
+    words = [f"{instant:.2f} s" for instant in instants]
     low, high = _frame(record, motion.com)
-    spans = high - low
-    widest = spans[:2].max()
-    scale = 1.85 / widest
-    figure, grid = style.new_grid(
-        (widest + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
-        f"Postures at the key instants ({name})", 2, 1, top=0.65, between=0.5,
-    )  # fmt: skip
-    for row, view in enumerate((views.ALONG_Y, views.ALONG_X)):
-        axes = figure.add_subplot(grid[row, 0])
-        left, right = view(np.array([low, high]))[:, 0]
-        offsets = [(widest + GAP) * column for column in range(len(samples))]
-        for offset, sample, instant in zip(offsets, samples, instants, strict=True):
-            _draw_posture(axes, record, motion, sample, view.moved(offset, 0.0), (low, high))
-            if row == 0:
-                top = offset + (left + right) / 2, high[2]
-                style.note(axes, f"{instant:.2f} s", top, 4, fontsize=9)
-        horizontal, vertical = view.labels
-        style.dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
-        frame_panels(axes, (left, right), (low[2], high[2]), offsets)
-    return figure
+    return _panels(record, motion, samples, words, f"Postures at the key instants ({name})", (low, high))
 
 
 def operations_figure(record: RunRecord) -> Figure:
@@ -72,21 +54,31 @@ def operations_figure(record: RunRecord) -> Figure:
     low, high = _frame(record, motion.com)
     for place in (there["position"] for item in operations for there in item["objects"]):
         low, high = np.minimum(low, np.array(place) - AROUND), np.maximum(high, np.array(place) + AROUND)
+    words = [f"{item['operation']}, {item['end_s']:.1f} s" for item in operations]
+    title = f"Postures at the ends of the operations ({name})"
+    return _panels(record, motion, samples, words, title, (low, high), least_scale=1.0)
+
+
+def _panels(
+    record: RunRecord, motion: Motion, samples: Sequence[int], words: Sequence[str], title: str, box: Corners,
+    least_scale: float = 0.0,
+) -> Figure:  # fmt: skip
+    """The body at samples of a motion, with words above each, seen along y and along x."""
+    low, high = box
     spans, widest = high - low, float((high - low)[:2].max())
-    scale = max(1.0, 1.85 / widest)
+    scale = max(least_scale, 1.85 / widest)
     figure, grid = style.new_grid(
-        (widest + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
-        f"Postures at the ends of the operations ({name})", 2, 1, top=0.65, between=0.5,
+        (widest + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7, title, 2, 1,
+        top=0.65, between=0.5,
     )  # fmt: skip
     for row, view in enumerate((views.ALONG_Y, views.ALONG_X)):
         axes = figure.add_subplot(grid[row, 0])
         left, right = view(np.array([low, high]))[:, 0]
         offsets = [(widest + GAP) * column for column in range(len(samples))]
-        for offset, sample, item in zip(offsets, samples, operations, strict=True):
-            _draw_posture(axes, record, motion, sample, view.moved(offset, 0.0), (low, high))
+        for offset, sample, text in zip(offsets, samples, words, strict=True):
+            _draw_posture(axes, record, motion, sample, view.moved(offset, 0.0), box)
             if row == 0:
-                top = offset + (left + right) / 2, high[2]
-                style.note(axes, f"{item['operation']}, {item['end_s']:.1f} s", top, 4, fontsize=9)
+                style.note(axes, text, (offset + (left + right) / 2, high[2]), 4, fontsize=9)
         horizontal, vertical = view.labels
         style.dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
