@@ -151,19 +151,56 @@ def test_segments_are_coloured_by_the_largest_share_of_their_joints(finished_run
     tau[:, 6 + knee] = body.torque_upper[knee]
     viewer = ViewerSession(replace(finished_run, executed=replace(motion, tau=tau)), Door(0))
     try:
-        viewer.show_torques(True)
+        viewer.paint_by("torque")
         colours = dict(zip(viewer._shapes.frames, (m.color for m in viewer._shapes._meshes), strict=True))
         assert tuple(colours["left_leg"]) == tuple(SHARES[2])
         assert tuple(colours["right_leg"]) == tuple(SHARES[0])
         assert all(frame.visible for frame in viewer._shapes.frames.values())
         viewer.plot("left_knee_flexion")
         np.testing.assert_allclose(viewer._plot_values[-1], 1.0)
-        viewer.show_torques(False)
+        viewer.paint_by("as it is")
         assert tuple(viewer._shapes._meshes[0].color) == side_colour(next(iter(colours)))
         with pytest.raises(InputError, match="valid: margin, "):
             viewer.plot("knee")
     finally:
         viewer.close()
+
+
+def test_the_whole_body_is_coloured_by_the_margin(finished_run):
+    """At the largest margin as without torque, at none as at the limit; then in its own clothes again."""
+    from manikin.viewer.canvas import SHARES
+    from manikin.viewer.session import ViewerSession
+
+    motion = finished_run.executed
+    margin = np.linspace(0.0, 40.0, len(motion.time))
+    viewer = ViewerSession(replace(finished_run, executed=replace(motion, margin=margin)), Door(0))
+    try:
+        clothes = [tuple(mesh.color) for mesh in viewer._shapes._surface]
+        viewer.paint_by("margin")
+        for time, row in ((motion.time[0], 2), (motion.time[-1], 0)):
+            viewer.show(time)
+            assert {tuple(mesh.color) for mesh in viewer._shapes._surface} == {tuple(SHARES[row])}
+        viewer.paint_by("as it is")
+        assert [tuple(mesh.color) for mesh in viewer._shapes._surface] == clothes
+        with pytest.raises(InputError, match="valid: as it is, torque, margin"):
+            viewer.paint_by("mood")
+    finally:
+        viewer.close()
+
+
+def test_a_motion_beside_can_be_laid_over(session):
+    session.put_beside("planned")
+    session.set_apart(0.0)
+    q = session.content.planned.q[session._sample(session.content.planned)]
+    np.testing.assert_allclose(
+        session._second.data.oMf[session._body.segment_frame("pelvis")].translation[:2],
+        Configuration(session._body, q).segment_placement("pelvis")[1][:2],
+        atol=1e-12,
+    )
+    session.set_apart(1.5)
+    moved = session._second.data.oMf[session._body.segment_frame("pelvis")].translation[:2]
+    there = Configuration(session._body, q).segment_placement("pelvis")[1][:2]
+    assert np.linalg.norm(moved - there) == pytest.approx(1.5)
 
 
 def test_motions_can_be_switched(session):

@@ -1,15 +1,21 @@
 """``manikin view``, ``compare`` and ``export``: runs and motions watched, compared, written for others."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from manikin.cli import console
-from manikin.cli.console import HostOption, JsonOption, MotionArgument, argument, flag, option
+from manikin.cli.console import HostOption, JsonOption, MotionArgument, OutOption, argument, flag, option
 from manikin.viewer import THIS_COMPUTER
 
-_SOURCE = "Run directory or motion file (.h5); with --contacts a scenario's name or file."
+if TYPE_CHECKING:
+    from manikin.scenarios import Scenario
+    from manikin.viewer.placing import Planned
+
+_SOURCE = "Run directory or motion file (.h5); with --contacts or --scene a scenario's name or file."
 
 
 def view(
@@ -22,8 +28,14 @@ def view(
     samples: Annotated[
         int | None, option("N", "With --contacts: samples of each limb.", min=100, max=1_000_000)
     ] = None,
+    placing: Annotated[
+        bool, flag("--scene", "Place start and goal in a scene with the mouse, plan and watch.")
+    ] = False,
+    out: OutOption = None,
 ) -> None:
-    """Show a motion in the browser, or the contacts of a body moved by hand."""
+    """Show a motion in the browser, the contacts of a body moved by hand, or a task placed by hand."""
+    console.refuse(contacts and placing, "--contacts", "it does not go with --scene")
+    console.refuse(out is not None and not placing, "--out", "it is for --scene")
     if contacts:
         from manikin.scenarios import load_scenario
         from manikin.scenarios.world import contact_rules, start_posture
@@ -37,6 +49,14 @@ def view(
         serve_contacts(live, port, console.announce, host=host)
         return
     console.refuse(samples is not None, "--samples", "it is for --contacts")
+    if placing:
+        from manikin.scenarios import load_scene
+        from manikin.viewer import serve_task
+
+        job = load_scene(source)
+        directory = Path("runs") / job.name if out is None else out
+        serve_task(job, partial(_planned, directory), port, console.announce, host=host)
+        return
     from manikin.motion.file import read_motions
     from manikin.pipeline.run_directory import other_motions
 
@@ -45,6 +65,18 @@ def view(
     from manikin.viewer import serve
 
     serve(content, port=port, announce=console.announce, others=others, host=host)
+
+
+def _planned(directory: Path, job: "Scenario", progress: Callable[..., None]) -> "Planned":
+    """Run a task that was placed by hand, in a run directory."""
+    from manikin.motion.file import read_motions
+    from manikin.pipeline import runner
+    from manikin.reports.summary_table import verdict_line
+    from manikin.viewer.placing import Planned
+
+    result = runner.run(job, out=directory, progress=progress)
+    words = verdict_line(result.summary)
+    return Planned(words, None if result.motion is None else read_motions(directory))
 
 
 def compare(

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from manikin.motion.file import MotionFile
+    from manikin.scenarios import Scenario
     from manikin.scene import Scene
     from manikin.viewer.canvas import Page
     from manikin.viewer.door import Door
     from manikin.viewer.drive import LiveContacts
+    from manikin.viewer.placing import Plan
     from manikin.walking import WalkController
 
-__all__ = ["serve", "serve_contacts", "serve_drive"]
+__all__ = ["serve", "serve_contacts", "serve_drive", "serve_task"]
 
 THIS_COMPUTER = "127.0.0.1"
 """Address that only this computer can reach."""
@@ -39,6 +41,38 @@ def serve(
     from manikin.viewer.session import ViewerSession
 
     _run(ViewerSession(content, _door(port, host), others), announce)
+
+
+def serve_task(
+    job: Scenario, plan: Plan, port: int = 8080, announce: Callable[[str], None] | None = None, *,
+    host: str = THIS_COMPUTER,
+) -> None:  # fmt: skip
+    """Let the user place start and goal in a scene, plan the task and watch the motion, until Ctrl-C.
+
+    Args:
+        job: Scenario whose scene and body these are.
+        plan: Plans what was placed.
+        port: Port to listen on; 0 picks a free one.
+        announce: Told the page's address when it can be opened.
+        host: Address to listen to.
+
+    Raises:
+        InputError: If the body or the scene is of no use here.
+    """
+    from manikin.viewer.placing import TaskViewer
+    from manikin.viewer.session import ViewerSession
+
+    door = _door(port, host)
+    while True:
+        page = TaskViewer(job, door, plan)
+        _run(page, announce)
+        if page.planned is None or page.planned.content is None:
+            return
+        job, announce = page.scenario(), None
+        session = ViewerSession(page.planned.content, door, verdict=page.planned.words)
+        _run(session, None)
+        if not session.again:
+            return
 
 
 def serve_contacts(

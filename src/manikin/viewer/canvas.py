@@ -169,27 +169,25 @@ class BodyShapes:
         skin = skin_of(body)
         self._surface = [] if skin is None else _add_surface(server, skin, f"{root}/surface", opacity)
         self.has_surface = bool(self._surface)
+        self._colours = [(mesh, mesh.color) for mesh in (*self._meshes, *self._surface)]
         self._visible, self._shapes_wanted = True, False
         self._show()
 
-    def paint(self, colour: tuple[int, int, int]) -> None:
-        """Give the whole body one colour, other than those of its sides or clothes."""
-        for mesh in (*self._meshes, *self._surface):
-            mesh.color = colour
+    def paint(self, colour: tuple[int, int, int] | None) -> None:
+        """Give the whole body one colour, or those of its sides and clothes."""
+        for mesh, own in self._colours:
+            mesh.color = own if colour is None else colour
 
-    def paint_shares(self, shares: FloatArray | None) -> None:
+    def paint_shares(self, shares: FloatArray) -> None:
         """Colour the shapes by the largest share of the joints of each segment.
 
         Args:
-            shares: (nv - 6,) torques over their limits, or None for the colours of the sides.
+            shares: (nv - 6,) torques over their limits.
         """
         index = self._body.joint_index
         for name, mesh in zip(self.frames, self._meshes, strict=True):
-            if shares is None:
-                mesh.color = side_colour(name)
-            else:
-                joints = [index(hinge.name) for hinge in self._body.segment(name).hinges]
-                mesh.color = share_colour(float(shares[joints].max(initial=0.0)))
+            joints = [index(hinge.name) for hinge in self._body.segment(name).hinges]
+            mesh.color = share_colour(float(shares[joints].max(initial=0.0)))
 
     def place(self, q: FloatArray) -> None:
         """Show the configuration (nq,)."""

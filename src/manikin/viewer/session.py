@@ -24,6 +24,7 @@ from manikin.viewer.canvas import (
     carry_cameras,
     look_at,
     look_from,
+    share_colour,
     side_colour,
 )
 from manikin.viewer.door import Door
@@ -37,11 +38,14 @@ PLOT_POINTS = 400
 MOST_PLACES = 1000
 """Places of the centre of mass that are drawn, about."""
 BESIDE = 1.2
-"""Distance of the motion beside from the motion shown [m]."""
+"""Distance of the motion beside from the motion shown, to begin with [m]."""
 NOTHING = "nothing"
+AS_IT_IS, TORQUE = "as it is", "torque"
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 STEPS = {"-0.1": -0.1, "-0.01": -0.01, "+0.01": 0.01, "+0.1": 0.1}
 MARGIN = "margin"
+PAINTINGS = (AS_IT_IS, TORQUE, MARGIN)
+"""What the body may be coloured by."""
 VIEWS = {"front": (2.8, 0.0, 0.4), "behind": (-2.8, 0.0, 0.6), "left": (0.0, 2.8, 0.2),
          "right": (0.0, -2.8, 0.2), "above": (-0.05, 0.0, 4.0)}  # fmt: skip
 """Where the camera stands from the centre of mass: ahead on the way, to its left, upward [m]."""
@@ -59,12 +63,17 @@ class ViewerSession(Page):
         speed: Seconds of motion per second.
         looping: Whether time begins again at the end.
         following: Whether the cameras go along with the centre of mass.
+        apart: Distance of the motion beside from the motion shown [m]; 0 lays it over.
+        again: Whether the page was closed to place the task anew.
     """
 
     def __init__(
-        self, content: MotionFile, door: Door, others: Mapping[str, MotionFile] | None = None
-    ) -> None:
+        self, content: MotionFile, door: Door, others: Mapping[str, MotionFile] | None = None,
+        verdict: str | None = None,
+    ) -> None:  # fmt: skip
         """Start the server and draw the first instant, with others who are there on the same clock, by name.
+
+        A verdict is of a task that was placed on the page, which then has a button to place it anew.
 
         Raises:
             InputError: If a file holds no body.
@@ -79,7 +88,8 @@ class ViewerSession(Page):
         self.chosen = list(content.motions)[-1]
         self.beside = "recorded" if content.recorded is not None and self.chosen != "recorded" else NOTHING
         self.playing, self.speed, self.looping, self.following = False, 1.0, False, False
-        self._torques, self.plotted = False, MARGIN
+        self._painting, self.plotted = AS_IT_IS, MARGIN
+        self.apart, self.again = BESIDE, False
         self._feet: dict[str, FloatArray] = {}
         if content.body.is_point_mass:
             names = self.motion.contact_names
@@ -94,6 +104,9 @@ class ViewerSession(Page):
             if other.body is not None
         ]
         self._build_controls()
+        if verdict is not None:
+            self.server.gui.add_markdown(verdict, order=-2)
+            self.server.gui.add_button("Place anew", order=-1).on_click(lambda _: self.place_anew())
         self.put_beside(self.beside)
 
     @property
@@ -112,8 +125,7 @@ class ViewerSession(Page):
                 carry_cameras(self.server, motion.com[index] - before)
             with self.server.atomic():
                 self._shapes.place(motion.q[index])
-                if self._torques:
-                    self._shapes.paint_shares(self._body.torque_share(motion.tau[index, 6:]))
+                self._paint(motion, index)
                 self._place_legs(motion, index)
                 self._place_forces(motion, index)
                 self._com.position = motion.com[index]
@@ -155,7 +167,7 @@ class ViewerSession(Page):
         """Show the collision shapes of the bodies instead of their surfaces; torques are shown on shapes."""
         with self._lock:
             for shapes in (self._shapes, self._second, *(item for item, _ in self._others)):
-                shapes.show_shapes(wanted or (shapes is self._shapes and self._torques))
+                shapes.show_shapes(wanted or (shapes is self._shapes and self._painting == TORQUE))
 
     def play(self) -> None:
         """Let time run, from the beginning when it is at the end."""
@@ -202,14 +214,30 @@ class ViewerSession(Page):
             middle = self.motion.com[self._sample(self.motion)]
             look_from(self.server, middle, np.append(forward * ahead + aside * left, up))
 
-    def show_torques(self, wanted: bool) -> None:
-        """Colour the shapes of the body by the shares of the joints' torques, or as they are."""
+    def paint_by(self, quantity: str) -> None:
+        """Colour the shapes of the body by the joints' torques, the whole body by the margin, or neither.
+
+        Raises:
+            InputError: If there is no such quantity.
+        """
+        if quantity not in PAINTINGS:
+            raise InputError(f"colour is by {quantity!r}; valid: {', '.join(PAINTINGS)}")
         with self._lock:
-            self._torques = wanted
-            if not wanted:
-                self._shapes.paint_shares(None)
+            self._painting = quantity
+            self._shapes.paint(None)
             self.show_shapes(self._shapes_box.value)
             self.show(self.time)
+
+    def set_apart(self, distance: float) -> None:
+        """Draw the motion beside at a distance from the motion shown [m]; 0 lays it over."""
+        with self._lock:
+            self.apart = distance
+            self.show(self.time)
+
+    def place_anew(self) -> None:
+        """Close the page, for the task to be placed anew."""
+        self.again = True
+        self.close()
 
     def plot(self, quantity: str) -> None:
         """Plot the margin, or the torque of a joint over its limit, of all motions of the file.
@@ -265,7 +293,7 @@ class ViewerSession(Page):
         scene = self.server.scene
         self._shapes = BodyShapes(self.server, self._body)  # the centre of mass and its path are inside
         self._second = BodyShapes(self.server, self._body, 0.45, "/beside")
-        self._aside = BESIDE * _across(self.motion.com)
+        self._aside = _across(self.motion.com)
         places = ("shown", "beside")
         self._names = [scene.add_label(f"/names/{of}", of, anchor="bottom-center") for of in places]
         self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
@@ -276,6 +304,15 @@ class ViewerSession(Page):
         """Sample of a motion at the instant shown."""
         return int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))
 
+    def _paint(self, motion: Motion, index: int) -> None:
+        if self._painting == TORQUE:
+            self._shapes.paint_shares(self._body.torque_share(motion.tau[index, 6:]))
+        elif self._painting == MARGIN and np.isfinite(motion.margin[index]):
+            largest = float(np.nanmax(motion.margin, initial=0.0, where=np.isfinite(motion.margin)))
+            self._shapes.paint(share_colour(1.0 - float(motion.margin[index]) / max(largest, 1e-9)))
+        elif self._painting == MARGIN:
+            self._shapes.paint(None)
+
     def _place_beside(self) -> None:
         together = self.beside != NOTHING
         self._second.show(together)
@@ -285,7 +322,7 @@ class ViewerSession(Page):
             return
         motion = self.content.motions[self.beside]
         q = np.array(motion.q[self._sample(motion)])
-        q[:2] += self._aside
+        q[:2] += self.apart * self._aside
         self._second.place(q)
         bodies = (self.chosen, self._shapes), (self.beside, self._second)
         for label, (name, shapes) in zip(self._names, bodies, strict=True):
@@ -323,6 +360,7 @@ class ViewerSession(Page):
             loop = gui.add_checkbox("loop", initial_value=False)
             motions = gui.add_dropdown("motion", tuple(self.content.motions), initial_value=self.chosen)
             beside = gui.add_dropdown("beside", (NOTHING, *self.content.motions), initial_value=self.beside)
+            apart = gui.add_slider("apart [m]", 0.0, 2.0, 0.1, self.apart)
         with gui.add_folder("View"):
             views = gui.add_button_group("from", tuple(VIEWS))
             follow = gui.add_checkbox("follow the body", initial_value=False)
@@ -331,8 +369,11 @@ class ViewerSession(Page):
                 "collision shapes", initial_value=not self._shapes.has_surface
             )
             self._shapes_box.visible = self._shapes.has_surface
-            torques = gui.add_checkbox("colour by torque", initial_value=False)
-            torques.hint = "Torque over its limit: grey none, yellow half, red all of it, dark more"
+            painting = gui.add_dropdown(
+                "colour by", PAINTINGS, initial_value=AS_IT_IS,
+                hint="Torque over its limit: grey none, yellow half, red all of it, dark more. Margin: grey "
+                "the largest of the motion, yellow half of it, red none, dark less.",
+            )  # fmt: skip
             picture = gui.add_button("Save a picture")
         with gui.add_folder("Now"):
             self._text = gui.add_markdown("")
@@ -355,7 +396,8 @@ class ViewerSession(Page):
         follow.on_update(lambda _: setattr(self, "following", follow.value))
         self._forces.on_update(lambda _: self.show(self.time))
         self._shapes_box.on_update(lambda _: self.show_shapes(self._shapes_box.value))
-        torques.on_update(lambda _: self.show_torques(torques.value))
+        painting.on_update(lambda _: self.paint_by(painting.value))
+        apart.on_update(lambda _: self.set_apart(apart.value))
         picture.on_click(lambda event: None if event.client is None else self.send_picture(event.client))
         plotted.on_update(lambda _: self.plot(plotted.value))
 
