@@ -145,7 +145,7 @@ def test_own_supports_and_their_options_are_left_out(job):
 
 def test_a_body_that_does_not_stand_is_refused():
     mass = {"body": {"model": "point_mass", "mass_kg": 79.0}, "execution": "none"}
-    job = load_scenario("platform").replaced(**mass)
+    job = load_scenario("platform").replaced(reference_stature_m=None, **mass)
     with pytest.raises(InputError, match="valid here: a body that stands"):
         TaskViewer(job, Door(0), lambda *_: Planned("", None))
 

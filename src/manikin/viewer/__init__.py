@@ -62,17 +62,15 @@ def serve_task(
     from manikin.viewer.placing import TaskViewer
     from manikin.viewer.session import ViewerSession
 
-    door = _door(port, host)
-    while True:
-        page = TaskViewer(job, door, plan)
-        _run(page, announce)
+    door, session = _door(port, host), None
+    while session is None or session.again:
+        page = TaskViewer(job, door, plan, session)
+        _run(page, announce if session is None else None)
         if page.planned is None or page.planned.content is None:
             return
-        job, announce = page.scenario(), None
-        session = ViewerSession(page.planned.content, door, verdict=page.planned.words)
+        job = page.scenario()
+        session = ViewerSession(page.planned.content, door, verdict=page.planned.words, before=page)
         _run(session, None)
-        if not session.again:
-            return
 
 
 def serve_contacts(

@@ -23,17 +23,33 @@ from manikin.viewer.door import Door
 
 
 class Page(ABC):
-    """Serves one page until it is closed, by the viser server ``server``."""
+    """Serves one page until it is closed or left, by the viser server ``server``.
 
-    def __init__(self, door: Door, frame_rate: float) -> None:
-        """Start the server, which makes at most ``frame_rate`` pictures per second, behind a door."""
+    Attributes:
+        root: Node of the page that all nodes of this one are below.
+    """
+
+    def __init__(self, door: Door, frame_rate: float, before: "Page | None" = None) -> None:
+        """Start the server, which makes at most ``frame_rate`` pictures per second, behind a door.
+
+        A page that comes after one that was left has its server, and so its visitors. What that one drew is
+        hidden: a browser with viser 1.1 fails where a skinned mesh is removed.
+        """
         self._lock = threading.RLock()
-        self._closed = threading.Event()
+        self._closed, self._left = threading.Event(), False
         self._frame_rate = frame_rate
         self.door = door
-        # viser greets on standard output, whatever its verbosity.
-        with redirect_stdout(StringIO()), door.watched():
-            self.server = viser.ViserServer(host=door.host, port=door.port, verbose=False)
+        if before is None:
+            # viser greets on standard output, whatever its verbosity.
+            with redirect_stdout(StringIO()), door.watched():
+                self.server = viser.ViserServer(host=door.host, port=door.port, verbose=False)
+            number = 1
+        else:
+            self.server, number = before.server, before._number + 1
+            self.server.gui.reset()
+            self.server.scene.remove_click_callback("all")
+        self._number, self.root = number, f"/{number}"
+        self._node = self.server.scene.add_frame(self.root, show_axes=False)
         self.server.scene.set_up_direction("+z")
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
 
@@ -47,7 +63,7 @@ class Page(ABC):
         """Show the state after ``seconds`` more of real time [s]."""
 
     def run(self) -> None:
-        """Serve until :meth:`close` is called or Ctrl-C is pressed."""
+        """Serve until :meth:`close` or :meth:`leave` is called or Ctrl-C is pressed."""
         before = clock.monotonic()
         try:
             while not self._closed.wait(max(0.0, before + 1.0 / self._frame_rate - clock.monotonic())):
@@ -57,12 +73,47 @@ class Page(ABC):
         except KeyboardInterrupt:
             pass
         finally:
-            self.close()
+            if not self._left:
+                self.close()
+
+    def _add_scene(self, scene: Scene | None, *, endless_floor: bool = False) -> None:
+        """Draw the finite obstacles and the floor."""
+        nodes = self.server.scene
+        for obstacle in scene or ():
+            if isinstance(obstacle.shape, (HalfSpace, Plane)):
+                continue
+            mesh = obstacle.to_trimesh()
+            nodes.add_mesh_simple(
+                f"{self.root}/scene/{obstacle.name}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
+                color=COLOURS["obstacle"], opacity=0.85, flat_shading=True, side="double",
+            )  # fmt: skip
+        if scene is not None and scene.floor_height is not None:
+            nodes.add_grid(
+                f"{self.root}/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy",
+                position=(0, 0, scene.floor_height - 1e-3), infinite_grid=endless_floor,
+            )  # fmt: skip
+
+    def _add_body(self, body: BodyModel, opacity: float = 0.7, name: str = "body") -> "BodyShapes":
+        """Draw a body as the node ``name`` of the page; see :class:`BodyShapes`."""
+        return BodyShapes(self.server, body, opacity, f"{self.root}/{name}")
+
+    def _add_arrow(self, name: str, colour: tuple[int, int, int]) -> viser.ArrowsHandle:
+        """Make the arrow of a force or a normal, which is placed later, as the node ``name`` of the page."""
+        points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]])
+        return self.server.scene.add_arrows(
+            f"{self.root}/{name}", points, np.array(colour, dtype=np.uint8), shaft_radius=0.012,
+            head_radius=0.03, head_length=0.06, visible=False,
+        )  # fmt: skip
 
     def _draw_lines(self, path: str, lines: FloatArray, colour: tuple[int, int, int], width: float) -> None:
         """Draw lines (n, 2, 3) in a colour, so many pixels wide, as the node ``path`` of the page."""
         look: dict[str, Any] = {"thickness": width, "thickness_units": "screen"}
-        self.server.scene.add_line_segments(path, lines, np.array(colour), **look)
+        self.server.scene.add_line_segments(f"{self.root}/{path}", lines, np.array(colour), **look)
+
+    def leave(self) -> None:
+        """End :meth:`run` without stopping the server, for another page to come."""
+        self._left, self._node.visible = True, False
+        self._closed.set()
 
     def close(self) -> None:
         """Stop the server; a second call does nothing."""
@@ -82,32 +133,6 @@ WHOLE = 2.0
 """Size of what that camera sees as a whole, without a body [m]."""
 ABOVE = 0.35
 """Height of a name above the origin of the head [m]."""
-
-
-def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: bool = False) -> None:
-    """Draw the finite obstacles and the floor."""
-    for obstacle in scene or ():
-        if isinstance(obstacle.shape, (HalfSpace, Plane)):
-            continue
-        mesh = obstacle.to_trimesh()
-        server.scene.add_mesh_simple(
-            f"/scene/{obstacle.name}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
-            color=COLOURS["obstacle"], opacity=0.85, flat_shading=True, side="double",
-        )  # fmt: skip
-    if scene is not None and scene.floor_height is not None:
-        server.scene.add_grid(
-            "/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy",
-            position=(0, 0, scene.floor_height - 1e-3), infinite_grid=endless_floor,
-        )  # fmt: skip
-
-
-def add_arrow(server: viser.ViserServer, name: str, colour: tuple[int, int, int]) -> viser.ArrowsHandle:
-    """Make the arrow of a force or a normal, which is placed later."""
-    points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]])
-    return server.scene.add_arrows(
-        name, points, np.array(colour, dtype=np.uint8), shaft_radius=0.012, head_radius=0.03,
-        head_length=0.06, visible=False,
-    )  # fmt: skip
 
 
 def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) -> None:
@@ -152,10 +177,8 @@ class BodyShapes:
         has_surface: Whether there is a surface beside the shapes.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7, root: str = "/body"
-    ) -> None:
-        """Draw the body, called ``root`` on the page, with an opacity in [0, 1]; of a person the surface."""
+    def __init__(self, server: viser.ViserServer, body: BodyModel, opacity: float, root: str) -> None:
+        """Draw the body as the node ``root``, with an opacity in [0, 1]; of a person the surface."""
         self._body, self.data = body, body.pinocchio.createData()
         self.frames: dict[str, viser.FrameHandle] = {}
         self._meshes: list[viser.MeshHandle] = []

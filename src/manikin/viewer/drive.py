@@ -21,7 +21,7 @@ from manikin.planning.contacts.heuristics import heuristic_named
 from manikin.planning.contacts.single_contact import Role, ask_limb, check_limbs
 from manikin.runtime.display import readable
 from manikin.scene import Scene
-from manikin.viewer.canvas import COLOURS, VIEW, BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
+from manikin.viewer.canvas import COLOURS, VIEW, Page, look_at, side_colour
 from manikin.viewer.door import Door
 from manikin.walking import WalkController, WalkFrame
 
@@ -91,11 +91,11 @@ class WalkViewer(Page):
         self.notice: str | None = None
         self._place = np.zeros(3)
         self._trail: list[FloatArray] = []
-        add_scene(self.server, scene, endless_floor=True)
+        self._add_scene(scene, endless_floor=True)
         self._floor = scene.floor_height
         self._raised = np.zeros(controller.body.nq)
         self._raised[2] = self._floor
-        self._shapes = BodyShapes(self.server, controller.body)
+        self._shapes = self._add_body(controller.body)
         self._build_controls()
         self.advance(1.0 / FRAME_RATE)
         look_at(self.server, self._middle)
@@ -170,7 +170,7 @@ class WalkViewer(Page):
             self._shapes.place(frame.q + self._raised)
             if len(self._trail) > 1:
                 path = np.array(self._trail)
-                self._draw_lines("/trail", np.stack([path[:-1], path[1:]], axis=1), COLOURS["planned"], 2.0)
+                self._draw_lines("trail", np.stack([path[:-1], path[1:]], axis=1), COLOURS["planned"], 2.0)
         if moved and self._follow.value:
             middle = self._middle
             for client in self.server.get_clients().values():
@@ -297,8 +297,8 @@ class ContactViewer(Page):
         self.live = live
         self.updates = 0
         self._wanted = threading.Event()
-        add_scene(self.server, live.scene)
-        self._shapes = BodyShapes(self.server, live.body)
+        self._add_scene(live.scene)
+        self._shapes = self._add_body(live.body)
         self._build_handles()
         self._build_controls()
         look_at(self.server, live.q[:3])
@@ -348,12 +348,14 @@ class ContactViewer(Page):
     def _build_handles(self) -> None:
         scene, (x, y, z, w) = self.server.scene, self.live.q[3:7]
         self.gizmo = scene.add_transform_controls(
-            "/move", scale=0.35, position=self.live.q[:3], wxyz=(w, x, y, z), depth_test=False
+            f"{self.root}/move", scale=0.35, position=self.live.q[:3], wxyz=(w, x, y, z), depth_test=False
         )
         self.gizmo.on_update(lambda _: self.move(self.gizmo.position, self.gizmo.wxyz))
-        self._task = scene.add_arrows("/task", _arrow(np.zeros(3), np.ones(3)), np.zeros(3, dtype=np.uint8))
+        self._task = scene.add_arrows(
+            f"{self.root}/task", _arrow(np.zeros(3), np.ones(3)), np.zeros(3, dtype=np.uint8)
+        )
         sides = {limb.name: side_colour(limb.name) for limb in self.live.body.limbs}
-        self._normals = {name: add_arrow(self.server, f"/contacts/{name}", sides[name]) for name in sides}
+        self._normals = {name: self._add_arrow(f"contacts/{name}", sides[name]) for name in sides}
 
     def _build_controls(self) -> None:
         gui, names = self.server.gui, [limb.name for limb in self.live.body.limbs]

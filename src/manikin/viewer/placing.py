@@ -13,7 +13,7 @@ from manikin.errors import InputError, ManikinError
 from manikin.motion.file import MotionFile
 from manikin.numerics.spatial import FloatArray, turned_root
 from manikin.scenarios import Scenario
-from manikin.viewer.canvas import COLOURS, BodyShapes, Page, add_arrow, add_scene, look_at
+from manikin.viewer.canvas import COLOURS, Page, look_at
 from manikin.viewer.door import Door
 
 FRAME_RATE = 30.0
@@ -65,8 +65,8 @@ class TaskViewer(Page):
         planned: What became of the task that was planned last.
     """
 
-    def __init__(self, job: Scenario, door: Door, plan: Plan) -> None:
-        """Start the server and show the body at the places that the scenario gives.
+    def __init__(self, job: Scenario, door: Door, plan: Plan, before: Page | None = None) -> None:
+        """Show the body at the places that the scenario gives, on a new server or that of a page before.
 
         Raises:
             InputError: If it is a scenario of a point mass, or of a scene without level ground.
@@ -87,12 +87,12 @@ class TaskViewer(Page):
         self.planned: Planned | None = None
         self._wanted, self._working, self._stopping = False, False, False
         self._held: End | None = None
-        super().__init__(door, FRAME_RATE)
-        add_scene(self.server, self._scene, endless_floor=True)
+        super().__init__(door, FRAME_RATE, before)
+        self._add_scene(self._scene, endless_floor=True)
         self._standing = self._body.standing_posture()
         self._shapes = {
-            "start": BodyShapes(self.server, self._body, root="/start"),
-            "goal": BodyShapes(self.server, self._body, GHOST, "/goal"),
+            "start": self._add_body(self._body, name="start"),
+            "goal": self._add_body(self._body, GHOST, "goal"),
         }
         self._build_handles()
         self._build_controls()
@@ -148,7 +148,7 @@ class TaskViewer(Page):
             self._wanted, self._stopping = False, True
 
     def advance(self, seconds: float) -> None:  # noqa: ARG002
-        """Plan, if that was asked for, and close the page once there is a motion to watch."""
+        """Plan, if that was asked for, and leave the page once there is a motion to watch."""
         with self._lock:
             wanted, self._wanted = self._wanted, False
             self._working = wanted
@@ -165,7 +165,7 @@ class TaskViewer(Page):
         self._say(words)
         self._working, self._button.disabled = False, False
         if self.planned is not None and self.planned.content is not None:
-            self.close()
+            self.leave()
 
     def _report(self, stage: str, share: float, remark: str = "") -> None:
         if self._stopping:
@@ -202,12 +202,14 @@ class TaskViewer(Page):
         scene = self.server.scene
         self._gizmos: dict[End, viser.TransformControlsHandle] = {
             end: scene.add_transform_controls(
-                f"/move/{end}", scale=0.5, active_axes=(True, True, False), depth_test=False
+                f"{self.root}/move/{end}", scale=0.5, active_axes=(True, True, False), depth_test=False
             )
             for end in ENDS
         }
-        self._arrows = {end: add_arrow(self.server, f"/heading/{end}", COLOURS["force"]) for end in ENDS}
-        self._names = {end: scene.add_label(f"/names/{end}", end, anchor="bottom-center") for end in ENDS}
+        self._arrows = {end: self._add_arrow(f"heading/{end}", COLOURS["force"]) for end in ENDS}
+        self._names = {
+            end: scene.add_label(f"{self.root}/names/{end}", end, anchor="bottom-center") for end in ENDS
+        }
         for end, gizmo in self._gizmos.items():
             gizmo.on_update(partial(self._dragged, end))
         scene.on_click()(self._clicked)

@@ -17,10 +17,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import readable
 from manikin.viewer.canvas import (
     COLOURS,
-    BodyShapes,
     Page,
-    add_arrow,
-    add_scene,
     carry_cameras,
     look_at,
     look_from,
@@ -64,16 +61,17 @@ class ViewerSession(Page):
         looping: Whether time begins again at the end.
         following: Whether the cameras go along with the centre of mass.
         apart: Distance of the motion beside from the motion shown [m]; 0 lays it over.
-        again: Whether the page was closed to place the task anew.
+        again: Whether the page was left to place the task anew.
     """
 
     def __init__(
         self, content: MotionFile, door: Door, others: Mapping[str, MotionFile] | None = None,
-        verdict: str | None = None,
+        verdict: str | None = None, before: Page | None = None,
     ) -> None:  # fmt: skip
         """Start the server and draw the first instant, with others who are there on the same clock, by name.
 
-        A verdict is of a task that was placed on the page, which then has a button to place it anew.
+        A verdict is of a task that was placed on the page before, whose server this one then has, and a
+        button to place it anew.
 
         Raises:
             InputError: If a file holds no body.
@@ -94,12 +92,12 @@ class ViewerSession(Page):
         if content.body.is_point_mass:
             names = self.motion.contact_names
             self._feet = effector_positions(content.body, self.motion, names, content.schedule)
-        super().__init__(door, FRAME_RATE)
+        super().__init__(door, FRAME_RATE, before)
         self.time = float(self.motion.time[0])
         self._build_scene()
         self._build_body()
         self._others = [
-            (BodyShapes(self.server, other.body, 0.35, f"/others/{name}"), list(other.motions.values())[-1])
+            (self._add_body(other.body, 0.35, f"others/{name}"), list(other.motions.values())[-1])
             for name, other in (others or {}).items()
             if other.body is not None
         ]
@@ -235,9 +233,9 @@ class ViewerSession(Page):
             self.show(self.time)
 
     def place_anew(self) -> None:
-        """Close the page, for the task to be placed anew."""
+        """Leave the page, for the task to be placed anew."""
         self.again = True
-        self.close()
+        self.leave()
 
     def plot(self, quantity: str) -> None:
         """Plot the margin, or the torque of a joint over its limit, of all motions of the file.
@@ -269,10 +267,10 @@ class ViewerSession(Page):
     # --- what stands still ---------------------------------------------------------------
 
     def _build_scene(self) -> None:
-        add_scene(self.server, self.content.scene)
+        self._add_scene(self.content.scene)
         for name, motion in self.content.motions.items():
             path = motion.com[:: max(1, len(motion.com) // MOST_PLACES)]
-            self._draw_lines(f"/com/{name}", np.stack([path[:-1], path[1:]], axis=1), COLOURS[name], 3.0)
+            self._draw_lines(f"com/{name}", np.stack([path[:-1], path[1:]], axis=1), COLOURS[name], 3.0)
         self._draw_contacts()
         path = self.motion.com
         look_at(self.server, path.mean(axis=0), float(np.linalg.norm(np.ptp(path, axis=0))))
@@ -285,20 +283,22 @@ class ViewerSession(Page):
                 corners, name = contact.points_in_world + 0.002 * contact.normal, contact.effector
                 if len(corners) >= 3:
                     edges = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-                    self._draw_lines(f"/contacts/{number}_{name}", edges, side_colour(name), 2.0)
+                    self._draw_lines(f"contacts/{number}_{name}", edges, side_colour(name), 2.0)
 
     # --- what moves ----------------------------------------------------------------------
 
     def _build_body(self) -> None:
         scene = self.server.scene
-        self._shapes = BodyShapes(self.server, self._body)  # the centre of mass and its path are inside
-        self._second = BodyShapes(self.server, self._body, 0.45, "/beside")
+        self._shapes = self._add_body(self._body)  # the centre of mass and its path are inside
+        self._second = self._add_body(self._body, 0.45, "beside")
         self._aside = _across(self.motion.com)
         places = ("shown", "beside")
-        self._names = [scene.add_label(f"/names/{of}", of, anchor="bottom-center") for of in places]
-        self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
+        self._names = [
+            scene.add_label(f"{self.root}/names/{of}", of, anchor="bottom-center") for of in places
+        ]
+        self._com = scene.add_icosphere(f"{self.root}/com/now", radius=0.03, color=(34, 34, 34))
         names = dict.fromkeys(name for item in self.content.motions.values() for name in item.contact_names)
-        self._arrows = {name: add_arrow(self.server, f"/forces/{name}", COLOURS["force"]) for name in names}
+        self._arrows = {name: self._add_arrow(f"forces/{name}", COLOURS["force"]) for name in names}
 
     def _sample(self, motion: Motion) -> int:
         """Sample of a motion at the instant shown."""
@@ -345,7 +345,7 @@ class ViewerSession(Page):
         for name, places in self._feet.items():
             on = bool(motion.support[index, motion.contact_names.index(name)])
             leg = np.array([[motion.com[index], places[index]]])
-            self._draw_lines(f"/legs/{name}", leg, side_colour(name), 6.0 if on else 2.0)
+            self._draw_lines(f"legs/{name}", leg, side_colour(name), 6.0 if on else 2.0)
 
     # --- controls ------------------------------------------------------------------------
 
