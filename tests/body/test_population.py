@@ -12,12 +12,19 @@ from manikin.body.population import (
     percentile_person,
     population_statistics,
     random_people,
-    squared_distance,
 )
 from manikin.errors import BodyError
 
 SEXES = list(Sex)
 TWO = ("stature", "mass")
+
+
+def squared_distance(people, measures):
+    """(n,) squared Mahalanobis distances of people of one sex from its mean, by the measures named."""
+    known = population_statistics(people[0].sex)
+    chosen = [MEASURES_OF_A_PERSON.index(name) for name in measures]
+    off = (np.array([person.values for person in people]) - known.mean)[:, chosen]
+    return np.sum(off * np.linalg.solve(known.covariance[np.ix_(chosen, chosen)], off.T).T, axis=1)
 
 
 @pytest.mark.parametrize("sex", SEXES)

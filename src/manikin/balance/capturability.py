@@ -53,11 +53,6 @@ class Momentum:
         """The same motion backwards in time, with which a contact is made."""
         return replace(self, velocity=frozen_array(-self.velocity, "velocity", (3,)))
 
-    def extrapolated(self, com: FloatArray, staying: Stance) -> FloatArray:
-        """(3,) where the velocity would carry a centre of mass over the contacts (Hof 2008) [m]."""
-        height = float(com[2]) - support_height(staying)
-        return com + self.velocity * [1.0, 1.0, 0.0] * np.sqrt(max(height, 0.0) / GRAVITY)
-
 
 def momentum_to_rest(staying: Stance, mass: float, com: FloatArray, rest: FloatArray) -> Momentum | None:
     """Slowest motion with which contacts may be left at ``com``, to come to rest on the others.

@@ -125,17 +125,6 @@ def population_statistics(sex: Sex) -> PopulationStatistics:
     return PopulationStatistics(covariance=frozen_array(covariance, "covariance", (6, 6)), **fixed)
 
 
-def squared_distance(people: Sequence[PersonOfPopulation], measures: Sequence[str]) -> FloatArray:
-    """(n,) squared Mahalanobis distances from the mean of each person's sex, by the measures named."""
-    chosen = _numbers(measures)
-    distances = []
-    for person in people:
-        known = population_statistics(person.sex)
-        off = (person.values - known.mean)[chosen]
-        distances.append(off @ np.linalg.solve(known.covariance[np.ix_(chosen, chosen)], off))
-    return np.array(distances)
-
-
 def boundary_people(
     sex: Sex, share: float, measures: Sequence[str] = MEASURES_OF_A_PERSON, *, corners: bool = False
 ) -> tuple[PersonOfPopulation, ...]:

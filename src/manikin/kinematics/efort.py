@@ -1,4 +1,4 @@
-"""How well a limb can press along a direction: EFORT ([Tonneau2015]_ 5.2) and its ellipsoids.
+"""How well a limb can press along a direction: EFORT ([Tonneau2015]_ 5.2).
 
 All functions take the translation's ``J J^T`` (3, 3) of each limb configuration, as the Jacobian of
 one limb is 3 by the number of its joints (the thesis prints l by n in 5.2), and directions of unit
@@ -19,35 +19,6 @@ MOST_RATIO = 1e6
 """Ratio at which EFORT takes a limb that needs no torque, which has an infinite one [N per N.m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Ellipsoid:
-    """Ellipsoid ``{x : x^T A^-1 x <= 1}`` by its half axes.
-
-    Attributes:
-        axes: (3, 3) unit directions in columns, the longest first.
-        lengths: (3,) half lengths; infinite along what a singular limb carries without torque.
-    """
-
-    axes: FloatArray
-    lengths: FloatArray
-
-
-def velocity_ellipsoid(product: ArrayLike) -> Ellipsoid:
-    """Velocities of the effector at joint speeds with a norm of at most 1 rad/s (5.4) [m/s]."""
-    values, vectors = np.linalg.eigh(np.asarray(product, dtype=np.float64))
-    return Ellipsoid(vectors[:, ::-1], np.sqrt(np.maximum(values[::-1], 0.0)))
-
-
-def force_ellipsoid(product: ArrayLike) -> Ellipsoid:
-    """Forces of the effector at joint torques with a norm of at most 1 N.m (5.10) [N].
-
-    Its axes are those of the velocity ellipsoid, its lengths the inverse.
-    """
-    speed = velocity_ellipsoid(product)
-    with np.errstate(divide="ignore"):
-        return Ellipsoid(speed.axes[:, ::-1], 1.0 / speed.lengths[::-1])
-
-
 def unit_direction(direction: ArrayLike, name: str = "task direction") -> FloatArray:
     """(3,) direction of length 1.
 
@@ -61,16 +32,11 @@ def unit_direction(direction: ArrayLike, name: str = "task direction") -> FloatA
     return frozen_array(vector / length, name)
 
 
-def force_transmission_ratio(products: FloatArray, direction: ArrayLike) -> FloatArray:
-    """``f_T = (v^T J J^T v)^(-1/2)``, the force along ``v`` of unit torque (5.11) [N per N.m].
+def force_transmission_ratio(products: FloatArray, v: FloatArray) -> FloatArray:
+    """(n,) ``f_T = (v^T J J^T v)^(-1/2)``, the force along unit ``v`` (3,) of unit torque (5.11) [N per N.m].
 
-    From (n, 3, 3) ``J J^T`` [m^2] and a vector ``v`` (3,) in the same frame, of which the direction counts;
-    (n,), infinite where the limb carries it without torque.
+    From (n, 3, 3) ``J J^T`` [m^2] in the same frame; infinite where the limb carries it without torque.
     """
-    return _ratio(products, unit_direction(direction))
-
-
-def _ratio(products: FloatArray, v: FloatArray) -> FloatArray:
     squares = np.maximum(products.reshape(-1, 9) @ (v[:, None] * v).ravel(), 0.0)
     with np.errstate(divide="ignore"):
         return 1.0 / np.sqrt(squares)
@@ -90,15 +56,11 @@ def efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> Fl
         normals: (n, 3) unit normals of the surfaces, out of the scene, in the same frame.
 
     Returns:
-        (n,) finite, negative where the surface would have to pull.
+        (n,) finite, negative where the surface would have to pull. What holds on and pulls has ``-alpha``
+        (5.13).
     """
     v = unit_direction(direction)
-    return np.minimum(_ratio(products, v), MOST_RATIO) * (normals @ v)
-
-
-def pulling_efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:
-    """EFORT of what holds on to a surface and pulls at it: ``-alpha`` (5.13), (n,)."""
-    return -efort(products, direction, normals)
+    return np.minimum(force_transmission_ratio(products, v), MOST_RATIO) * (normals @ v)
 
 
 def usable_efort(body: BodyModel, limb: Limb) -> float:

@@ -218,9 +218,8 @@ def mirrored_samples(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbS
 
 
 def sample_limbs(
-    body: BodyModel, rng: np.random.Generator, count: int = 10_000, threshold: float = THRESHOLD, *,
-    natural: bool = False,
-) -> dict[str, LimbSamples]:  # fmt: skip
+    body: BodyModel, rng: np.random.Generator, count: int = 10_000, *, natural: bool = False
+) -> dict[str, LimbSamples]:
     """Samples of every limb by its name; mirrored limbs share one set, reflected.
 
     The arguments are those of :func:`sample_limb`.
@@ -231,5 +230,5 @@ def sample_limbs(
         if twin is not None and are_mirrored(body, twin.limb, limb):
             sampled[limb.name] = mirrored_samples(body, twin, limb)
         else:
-            sampled[limb.name] = sample_limb(body, limb, rng, count, threshold, natural=natural)
+            sampled[limb.name] = sample_limb(body, limb, rng, count, natural=natural)
     return sampled

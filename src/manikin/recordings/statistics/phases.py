@@ -192,18 +192,16 @@ class SequenceConsistency:
 
 
 def sequence_consistency(
-    motions: Sequence[PhaseSequence], *, phases: int | None = None, shortest: float = SHORTEST,
-    start: str | None = None,
-) -> SequenceConsistency:  # fmt: skip
-    """Count the sequences of supports and the first steps.
+    motions: Sequence[PhaseSequence], *, phases: int | None = None, start: str | None = None
+) -> SequenceConsistency:
+    """Count the sequences of supports, of phases of :data:`SHORTEST` at least, and the first steps.
 
     Args:
         phases: How many phases are compared; None for all.
-        shortest: Phases shorter than this are passed over [s].
         start: Kind of the first compared phase, such as ``DS``, for recordings that begin anywhere: the first
             one that is seen from its beginning. None for the first phase of all.
     """
-    lasting = [one.without_short(shortest) for one in motions]
+    lasting = [one.without_short(SHORTEST) for one in motions]
     compared = (_from(one, start)[:phases] for one in lasting)
     sequences = Counter(tuple(frozenset(phase.effectors) for phase in part) for part in compared)
     steps = Counter(one.first_step for one in lasting if one.first_step is not None)
