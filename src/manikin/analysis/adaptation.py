@@ -171,7 +171,7 @@ class Adaptation:
     @property
     def planned_duration(self) -> float:
         """Duration of the plan, or of what it was to follow [s]."""
-        return float(self.schedule.instants[-1] - self.schedule.instants[0])
+        return self.schedule.duration
 
     @property
     def planned(self) -> Motion | None:

@@ -1,6 +1,6 @@
 """Stances and surfaces of a recorded person as a planned body can use them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -58,7 +58,7 @@ def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
     A recorded heel rolls down within some sixty milliseconds, on a round edge and a soft shoe; a stiff
     sole lands flat. Phases that do not differ any more are one.
     """
-    flat = _with_contacts(schedule, lambda contact: _whole(contact, body))
+    flat = schedule.with_contacts(lambda contact: _whole(contact, body))
     return _joined(list(flat.sequence), flat.instants)
 
 
@@ -136,7 +136,7 @@ def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSc
     Whoever stands on the toes of one foot has the centre of pressure at most the toes' torque limit over the
     load ahead of the hinge; the rest of their length is no support.
     """
-    return _with_contacts(schedule, lambda contact: _strong_part(contact, body))
+    return schedule.with_contacts(lambda contact: _strong_part(contact, body))
 
 
 def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
@@ -149,7 +149,7 @@ def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
         turn = seats[0].rotation_contact_to_world
         changed |= {item: replace(item, position=place, rotation_contact_to_world=turn) for item in near}
         seats = [item for item in seats if item not in changed]
-    return _with_contacts(schedule, lambda contact: changed.get(contact, contact))
+    return schedule.with_contacts(lambda contact: changed.get(contact, contact))
 
 
 def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
@@ -174,14 +174,6 @@ def _without_first_remnants(phases: list[Phase], durations: FloatArray) -> None:
         for index, phase in enumerate(phases[:count]):
             contacts = [parts[count] if c.effector == name else c for c in phase.stance]
             phases[index] = replace(phase, stance=phase.stance.with_contacts(contacts))
-
-
-def _with_contacts(schedule: ContactSchedule, change: Callable[[Contact], Contact]) -> ContactSchedule:
-    phases = [
-        replace(phase, stance=phase.stance.with_contacts(map(change, phase.stance)))
-        for phase in schedule.sequence
-    ]
-    return ContactSchedule(StanceSequence(phases), schedule.instants)
 
 
 def _timed(phases: Sequence[Phase], instants: FloatArray) -> ContactSchedule:

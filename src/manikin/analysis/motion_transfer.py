@@ -200,16 +200,7 @@ def leg_length(body: BodyModel) -> float:
 
 def _transformed(motion: MotionOnContacts, transform: PlanarTransform) -> MotionOnContacts:
     """The same motion, seen from another frame; what it lies on follows."""
-    changed: dict[Contact, Contact] = {}
-    for contact in (contact for phase in motion.schedule.sequence for contact in phase.stance):
-        place = frozen_array(transform.points(contact.position), "contact position")
-        turn = frozen_array(transform.rotations(contact.rotation_contact_to_world), "contact rotation")
-        changed[contact] = replace(contact, position=place, rotation_contact_to_world=turn)
-    phases = [
-        replace(phase, stance=phase.stance.with_contacts(changed[contact] for contact in phase.stance))
-        for phase in motion.schedule.sequence
-    ]
-    schedule = ContactSchedule(StanceSequence(phases), motion.schedule.instants)
+    schedule = motion.schedule.moved(transform)
     return replace(
         motion, schedule=schedule, q=transform.poses(motion.q), scene=scene_under(schedule, motion.floor),
         transform=transform,

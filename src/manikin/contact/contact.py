@@ -12,6 +12,7 @@ from manikin.numerics.polytope import chord, convex_polygon
 from manikin.numerics.spatial import (
     GRAVITY,
     FloatArray,
+    PlanarTransform,
     check_rotation,
     finite_number,
     frozen_array,
@@ -240,6 +241,12 @@ class Contact(Displayed):
         turn = self.rotation_contact_to_world - other.rotation_contact_to_world
         apart = max(np.abs(self.position - other.position).max(), np.abs(turn).max())
         return self.effector == other.effector and bool(apart <= tolerance)
+
+    def moved(self, transform: PlanarTransform) -> "Contact":
+        """The contact as seen from another frame of the world."""
+        position = frozen_array(transform.points(self.position), "contact position")
+        rotation = frozen_array(transform.rotations(self.rotation_contact_to_world), "contact rotation")
+        return replace(self, position=position, rotation_contact_to_world=rotation)
 
 
 def sole(

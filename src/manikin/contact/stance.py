@@ -6,8 +6,9 @@ rolling never costs margin against single support.
 """
 
 import itertools
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +24,7 @@ from manikin.contact.contact import (
 )
 from manikin.errors import ContactError
 from manikin.numerics.signals import mask_runs
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, PlanarTransform, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 
 
@@ -242,6 +243,31 @@ class ContactSchedule(Displayed):
     def durations(self) -> FloatArray:
         """(phases,) duration of each phase [s]."""
         return np.diff(self.instants)
+
+    @property
+    def duration(self) -> float:
+        """Duration of all phases [s]."""
+        return float(self.instants[-1] - self.instants[0])
+
+    def with_contacts(self, change: Callable[[Contact], Contact]) -> "ContactSchedule":
+        """The schedule with every contact of every phase changed."""
+        phases = [
+            replace(phase, stance=phase.stance.with_contacts(map(change, phase.stance)))
+            for phase in self.sequence
+        ]
+        return ContactSchedule(StanceSequence(phases), self.instants)
+
+    def moved(self, transform: PlanarTransform) -> "ContactSchedule":
+        """The schedule as seen from another frame; a contact that several phases hold stays one."""
+        if transform.is_identity:
+            return self
+        placed = self.with_contacts(cache(lambda contact: contact.moved(transform)))
+        phases = [
+            phase if (load := phase.load) is None
+            else replace(phase, load=replace(load, offset=transform.directions(load.offset)))
+            for phase in placed.sequence
+        ]  # fmt: skip
+        return ContactSchedule(StanceSequence(phases), self.instants)
 
     def phase_at(self, time: ArrayLike) -> NDArray[np.int64]:
         """Index of the phase ``[start, end)`` at each time [s]; outside, that of the first or the last."""

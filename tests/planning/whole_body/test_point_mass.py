@@ -9,7 +9,6 @@ from manikin.motion.file import read_motions
 from manikin.motion.motion import LIFT, foot_positions
 from manikin.numerics.spatial import rotation_from_quaternion
 from manikin.pipeline.runner import run
-from manikin.pipeline.stages.context import schedule_in_world
 from manikin.reports.export import write_outputs
 from manikin.reports.figures import FIGURES
 from manikin.scenarios import load_scenario
@@ -22,7 +21,7 @@ def climbed(runs):
 
 def in_world(run):
     """Schedule of a run in the world; the stages themselves work in the frame of the task."""
-    return schedule_in_world(run.centroidal.trajectory.schedule, run.transform_task_to_world)
+    return run.centroidal.trajectory.schedule.moved(run.transform_task_to_world)
 
 
 def test_the_run_ends_with_its_certificate(climbed):

@@ -6,21 +6,21 @@ where they leave, in :class:`Report` and :class:`RunResult`.
 
 import re
 import time as clock
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 from manikin.body import BodyModel
-from manikin.contact import Contact, ContactSchedule, Stance, StanceSequence
+from manikin.contact import ContactSchedule
 from manikin.ergonomics.load_report import ergonomics_in_short
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
 from manikin.motion.naturalness import measure_naturalness
 from manikin.motion.passage import measure_passage
-from manikin.numerics.spatial import IDENTITY, PlanarTransform, frozen_array
+from manikin.numerics.spatial import IDENTITY, PlanarTransform
 from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import CONTACT_PLAN, MOTION, SCENARIO, STAGES, SUMMARY, RunDirectory
 from manikin.pipeline.stages.contact_guides import ContactSearch
@@ -59,31 +59,6 @@ def motion_in_world(motion: Motion | None, transform_task_to_world: PlanarTransf
     )  # fmt: skip
 
 
-def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: PlanarTransform) -> ContactSchedule:
-    """Contacts in time, where they are in the world."""
-    if transform_task_to_world.is_identity:
-        return schedule
-    moved = _in_world((phase.stance for phase in schedule.sequence), transform_task_to_world)
-    phases = []
-    for phase in schedule.sequence:
-        stance = Stance([moved[id(contact)] for contact in phase.stance], model=phase.stance.model)
-        load = phase.load
-        if load is not None:
-            load = replace(load, offset=transform_task_to_world.directions(load.offset))
-        phases.append(replace(phase, stance=stance, load=load))
-    return ContactSchedule(StanceSequence(phases), schedule.instants)
-
-
-def _in_world(stances: Iterable[Iterable[Contact]], transform: PlanarTransform) -> dict[int, Contact]:
-    """Contacts in the world by the identity of each, so that one which several stances hold stays one."""
-    moved = {}
-    for contact in {id(contact): contact for stance in stances for contact in stance}.values():
-        position = frozen_array(transform.points(contact.position), "contact position")
-        turned = frozen_array(transform.rotations(contact.rotation_contact_to_world), "contact rotation")
-        moved[id(contact)] = replace(contact, position=position, rotation_contact_to_world=turned)
-    return moved
-
-
 def trajectory_in_world(
     trajectory: CentroidalTrajectory, transform_task_to_world: PlanarTransform
 ) -> CentroidalTrajectory:
@@ -94,7 +69,7 @@ def trajectory_in_world(
     return replace(
         trajectory,
         spline=BSpline(spline.degree, spline.knots, transform.points(spline.control_points)),
-        schedule=schedule_in_world(trajectory.schedule, transform),
+        schedule=trajectory.schedule.moved(transform),
         turning=None if turning is None
         else BSpline(turning.degree, turning.knots, transform.directions(turning.control_points)),
     )  # fmt: skip
@@ -103,10 +78,10 @@ def trajectory_in_world(
 def plan_in_world(plan: ContactPlan, transform_task_to_world: PlanarTransform) -> PlannedContacts:
     """A contact plan as other programs and the check read it, in the world."""
     transform = transform_task_to_world
-    moved = _in_world((stage.contacts.values() for stage in plan.stages), transform)
+    move = cache(lambda contact: contact.moved(transform))  # what several stages hold stays one
     stages = [
         PlannedStage(
-            {name: moved[id(contact)] for name, contact in stage.contacts.items()},
+            {name: move(contact) for name, contact in stage.contacts.items()},
             transform.poses(stage.q), transform.points(stage.com),
             via=None if stage.via is None else transform.poses(stage.via), duration=stage.min_duration,
             on_toes=frozenset(contact.effector for contact in stage.tilted),
@@ -404,7 +379,7 @@ class Report:
         transform = self.transform
         content = MotionFile(
             motion_in_world(planned, transform), motion_in_world(executed, transform), self._context.body,
-            self._context.scene_in_world, schedule_in_world(schedule, transform),
+            self._context.scene_in_world, schedule.moved(transform),
         )  # fmt: skip
         self._write(file, lambda directory: write_motions(directory.path / file, content))
 
