@@ -29,10 +29,11 @@ from manikin.body import human
 from manikin.body.human_parts import HUMAN_HINGES
 from manikin.body.joint_volume import JointVolume, ball_angles, volume_of
 from manikin.body.natural_range import FILE, FORMAT, UNIT
+from manikin.body.segments import SIDES
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.recordings import Recording, read_recording
-from manikin.recordings.readers.marker_sets import JOINTS, SIDES, joint_of
+from manikin.recordings.readers.marker_sets import JOINTS, joint_of
 from manikin.runtime.files import atomic_path
 
 HERE = Path(__file__).parent

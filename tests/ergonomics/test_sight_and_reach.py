@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from manikin.body import Configuration, human
+from manikin.body.segments import SIDES
 from manikin.ergonomics import reach_envelopes, reach_use, sight_of, sight_zone
-from manikin.ergonomics.body_parts import SIDES
 from manikin.ergonomics.sight import eyes_of
 from manikin.errors import BodyError, InputError
 from manikin.reports.export import write_reach

@@ -27,10 +27,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.body.segments import FEET, HANDS
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.recordings.reconstruction.proportions import Reconstruction
-from manikin.recordings.supports.body_supports import HANDS, SEAT, TRUNK, RecordedSupports, Support
+from manikin.recordings.supports.body_supports import SEAT, TRUNK, RecordedSupports, Support
 from manikin.recordings.supports.support_levels import JOINTS, com_path, effector_places
 
 MOSTLY, OFTEN = 0.6, 0.3
@@ -194,7 +195,7 @@ def _measures(found: Reconstruction, supports: RecordedSupports, motion: Motion)
 def _com_height(found: Reconstruction) -> float:
     """Height of the centre of mass above the soles in standing [m]."""
     posture = found.body.standing_posture()[None]
-    soles = effector_places(found.body, posture, ("left_foot", "right_foot"))[:, 0, 2]
+    soles = effector_places(found.body, posture, FEET)[:, 0, 2]
     return float(com_path(found.body, posture)[0, 2] - soles.min())
 
 

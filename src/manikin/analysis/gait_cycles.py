@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.body.segments import SIDES
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.readers.marker_sets import SIDES
 from manikin.recordings.supports.body_supports import RecordedSupports, Support
 from manikin.recordings.supports.supports import TimingError
 

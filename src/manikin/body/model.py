@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
 from manikin.body.segments import (
+    FEET,
     Effector,
     Hinge,
     Limb,
@@ -254,7 +255,7 @@ class BodyModel(Displayed):
         A creature without soles has the ends of its limbs at that height on average.
         """
         q = self.posture(self.standing_angles)
-        soles = [name for name in ("left_foot", "right_foot") if name in self.effectors]
+        soles = [name for name in FEET if name in self.effectors]
         soles = soles or [limb.effector for limb in self.limbs]
         if soles:
             data = self.pinocchio.createData()

@@ -16,6 +16,10 @@ from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, frozen_array
 
+SIDES = ("left", "right")
+FEET, HANDS = ("left_foot", "right_foot"), ("left_hand", "right_hand")
+"""Sides of a human, and its effectors by them."""
+
 
 class ShapeKind(StrEnum):
     """Kinds of collision shape and what their ``size`` holds [m]."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from manikin.body.segments import FEET
 from manikin.cli import console
 from manikin.cli.console import Interruption, JsonOption, SexOption, argument, flag, option
 from manikin.errors import InputError
@@ -129,7 +130,6 @@ def _settings(
     from manikin.numerics.spatial import finite_number
     from manikin.recordings.statistics.clip_statistics import StatisticsSettings
     from manikin.recordings.statistics.passages import LIMIT, Overhead
-    from manikin.recordings.supports.supports import FEET
 
     console.refuse(bar is not None and box is not None, "--bar", "a box is given")
     above = None if bar is None else Overhead(bar)

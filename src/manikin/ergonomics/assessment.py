@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from manikin.body import BodyModel
+from manikin.body.segments import SIDES
 from manikin.ergonomics import rula_reba
-from manikin.ergonomics.body_parts import SIDES, Bearing, bearing_of
+from manikin.ergonomics.body_parts import Bearing, bearing_of
 from manikin.ergonomics.postural_angles import PosturalAngles, postural_angles
 from manikin.ergonomics.rula_reba import Circumstances, Scores
 from manikin.motion import Motion

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel, limb_named
+from manikin.body.segments import FEET, SIDES
 from manikin.errors import BodyError
 from manikin.motion import Motion
 from manikin.motion.motion import com_velocity, effector_positions
@@ -54,10 +55,9 @@ def bearing_of(body: BodyModel, motion: Motion) -> Bearing:
     above the other.
     """
     known = bool(motion.contact_names) and bool(np.any(motion.support))
-    feet = ("left_foot", "right_foot")
-    places = effector_positions(body, motion, feet)
-    left_foot, right_foot = (places[name] for name in feet)
-    marked = (_contact(motion, name) for name in feet)
+    places = effector_positions(body, motion, FEET)
+    left_foot, right_foot = (places[name] for name in FEET)
+    marked = (_contact(motion, name) for name in FEET)
     on, load = (np.column_stack(part) for part in zip(*marked, strict=True))
     if not known:
         height = np.column_stack([left_foot[:, 2], right_foot[:, 2]])
@@ -88,9 +88,6 @@ def _contact(motion: Motion, effector: str) -> tuple[Flags, FloatArray]:
     column = motion.contact_names.index(effector)
     force = np.maximum(np.nan_to_num(motion.contact_force[:, column, 2]), 0.0)
     return motion.support[:, column], force
-
-
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.limbs import limb_named
+from manikin.body.segments import HANDS, SIDES
 from manikin.contact import ContactSchedule
 from manikin.ergonomics.lifting import COUPLING, LEAST_FREQUENCY, LEAST_TRAVEL, HandPlace, Lift
 from manikin.errors import InputError
@@ -26,9 +27,6 @@ LEVEL_FEET = 0.10
 """At the ends of a lift one sole is not higher above the other than this [m]; ours."""
 TWO_STEPS = 1.0
 """The ankles go no further than this between its ends [m]; ours, the manual allows one or two steps."""
-
-HANDS = ("left_hand", "right_hand")
-SIDES = ("left", "right")
 
 
 def lift_of(

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel
-from manikin.ergonomics.body_parts import SIDES, Bearing, parts_of
+from manikin.body.segments import SIDES
+from manikin.ergonomics.body_parts import Bearing, parts_of
 from manikin.ergonomics.postural_angles import PosturalAngles
 from manikin.ergonomics.rula_reba import Scores, degrees, looked_up
 from manikin.kinematics.point_targets import SegmentPlacements

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.ergonomics.body_parts import SIDES, parts_of, twist_about_z
+from manikin.body.segments import SIDES
+from manikin.ergonomics.body_parts import parts_of, twist_about_z
 from manikin.errors import BodyError
 from manikin.kinematics.point_targets import SegmentPlacements
 from manikin.numerics.spatial import FloatArray, dot

@@ -16,7 +16,7 @@ from scipy.spatial import KDTree
 
 from manikin.body import BodyModel, limb_named
 from manikin.body.limbs import limb_origin, limb_slots, parent_segment
-from manikin.ergonomics.body_parts import SIDES
+from manikin.body.segments import SIDES
 from manikin.kinematics.limb_kinematics import LimbKinematics
 from manikin.kinematics.point_targets import SegmentPlacements
 from manikin.numerics.spatial import FloatArray, frozen_array

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.body.segments import Segment
-from manikin.ergonomics.body_parts import SIDES, parts_of
+from manikin.body.segments import SIDES, Segment
+from manikin.ergonomics.body_parts import parts_of
 from manikin.ergonomics.rula_reba import Scores, degrees
 from manikin.errors import BodyError
 from manikin.kinematics.point_targets import SegmentPlacements

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from manikin.ergonomics.body_parts import SIDES, Flags
+from manikin.body.segments import SIDES
+from manikin.ergonomics.body_parts import Flags
 from manikin.ergonomics.postural_angles import PosturalAngles
 from manikin.ergonomics.rula_reba import TURNED, Scores, degrees
 from manikin.numerics.spatial import FloatArray

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import REFLECTION, hinge_line
-from manikin.body.segments import Limb
+from manikin.body.segments import SIDES, Limb
 from manikin.contact import ContactKind, SolePart
 from manikin.errors import BodyError
 from manikin.kinematics.leg_kinematics import LegKinematics, bend
@@ -56,7 +56,6 @@ _SWINGS = np.deg2rad([
 ])  # fmt: skip
 """(6, 3) flexion and abduction of the hip and flexion of the knee of a leg that hangs free."""
 
-_SIDES = ("left", "right")
 _SPINE = ("pelvis", "lumbar", "thorax")
 _SPINE_COLUMNS = slice(6, 9)
 _PITCHES = 9
@@ -225,8 +224,8 @@ class ReachSampler:
         self._others: list[LocalContact] = []
         for contact in contacts:
             side = contact.effector.removesuffix("_foot")
-            if parts.legs is not None and contact.effector.endswith("_foot") and side in _SIDES:
-                self._feet[_SIDES.index(side)] = contact
+            if parts.legs is not None and contact.effector.endswith("_foot") and side in SIDES:
+                self._feet[SIDES.index(side)] = contact
             else:
                 self._others.append(contact)
 

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.segments import HANDS
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.pipeline.run_directory import RunRecord
 from manikin.scene import Obstacle, Scene
 from manikin.scene.scene import FLOOR
 
-HANDS = ("left_hand", "right_hand")
 LOOKED_AT = 60
 """Number of instants of an operation among which that of setting down is sought."""
 STILL = 1.0e-6

@@ -8,13 +8,13 @@ import pytest
 
 from manikin.balance import StaticRegion, static_torque_share
 from manikin.body import Configuration, human
+from manikin.body.segments import FEET
 from manikin.contact import Stance
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import IDENTITY
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.pipeline.stages.context import plan_in_world
 from manikin.planning.contacts import Endpoints, Habit, PostureFinder, leave_seat, rising_times
-from manikin.planning.contacts.footholds import FEET
 from manikin.planning.contacts.seat import hand_supports
 from manikin.scenarios import load_scenario
 from manikin.scene import Box, Obstacle, Scene

@@ -4,10 +4,10 @@ import pytest
 
 from manikin.balance.contact_forces import friction_share
 from manikin.body import Configuration
+from manikin.body.segments import HANDS
 from manikin.contact import FRICTION_MODELS, ContactKind
 from manikin.numerics.spatial import GRAVITY
 from manikin.planning.push_pull import Act, largest_force, share_force
-from manikin.planning.push_pull.act import HANDS
 
 
 @pytest.mark.parametrize("measure", [largest_force, share_force])

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from manikin.body.segments import HANDS
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
 from manikin.motion import Motion
 from manikin.planning.push_pull import Timing, measure_act, plan_act
-from manikin.planning.push_pull.act import HANDS
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ import numpy as np
 from manikin.balance import wrench_polytopes
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel, Configuration
+from manikin.body.segments import HANDS
 from manikin.body.strength import hand_masses
 from manikin.contact import CarriedLoad, ContactSchedule, StanceSequence
 from manikin.motion import Motion
@@ -78,7 +79,7 @@ class OperationMotion:
     @property
     def duration(self) -> float:
         """[s]."""
-        return float(self.schedule.instants[-1] - self.schedule.instants[0])
+        return self.schedule.duration
 
     @property
     def q(self) -> FloatArray:
@@ -194,7 +195,7 @@ def _palm_error(body: BodyModel, part: OperationMotion, row: int) -> float:
     """Distance of palms from their places in a sample, or of their distance from a breadth [m]."""
     state = Configuration(body, part.q[row])
     if part.held is not None:
-        left, right = (state.effector_placement(hand)[1] for hand in ("left_hand", "right_hand"))
+        left, right = (state.effector_placement(hand)[1] for hand in HANDS)
         return abs(float(np.linalg.norm(left - right)) - float(part.held.sizes[1]))
     assert part.course is not None
     wanted = part.course.targets(np.array([1.0 if part.course.kind is CourseKind.TAKE else 0.0]))

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.segments import HANDS
 from manikin.kinematics import Placement
 from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_yaw
 from manikin.pipeline.stages.contact_guides import stage_at
@@ -404,7 +405,7 @@ class _Operations:
     def _between_hands(self, held: PlacedObject) -> FloatArray:
         """(4,) place of what is held, as the palms are."""
         state = Configuration(self._context.body, self._stage.q)
-        left, right = (state.effector_placement(hand)[1] for hand in ("left_hand", "right_hand"))
+        left, right = (state.effector_placement(hand)[1] for hand in HANDS)
         across = left - right
         yaw = math.atan2(-across[0], across[1])
         hold = held.holds["left_hand"].position[0]

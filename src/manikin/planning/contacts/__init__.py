@@ -5,7 +5,7 @@ from manikin.planning.contacts.candidates import Candidates, Situation, find_can
 from manikin.planning.contacts.contact_plan import ContactPlan, ContactRules, Stage
 from manikin.planning.contacts.crawl_search import CrawlSearch
 from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
-from manikin.planning.contacts.footholds import FEET, Footholds
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.generator import (
     ContactGenerator,
     GeneratedContact,
@@ -33,7 +33,7 @@ from manikin.planning.contacts.seat import leave_seat, rising_times, take_seat
 from manikin.planning.contacts.walk_search import WalkSearch, WalkSettings
 
 __all__ = [
-    "FEET", "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
+    "HEURISTICS", "BalanceScore", "Candidates", "ClosestDistance", "Comfort", "ContactGenerator",
     "ContactPlan", "ContactRules", "CrawlSearch", "Duration", "Efort", "Endpoint", "Endpoints",
     "Extension", "Footholds", "GeneratedContact", "GeneratorSettings", "Habit", "Heuristic", "Hindrance",
     "LimbHolds", "LimbSearch", "LimbSettings", "Manipulability",

@@ -16,13 +16,14 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import stature_of
+from manikin.body.segments import FEET
 from manikin.contact import Contact, point
 from manikin.numerics.spatial import FloatArray, onto_normal, rotation_from_yaw
 from manikin.planning.contacts.best_first import Extension
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.crawl_postures import CRAWLERS, STYLES, CrawlPostures, CrawlStyle, fingers_out
 from manikin.planning.contacts.endpoint import Endpoints, Habit
-from manikin.planning.contacts.footholds import FEET, Footholds, feet_of
+from manikin.planning.contacts.footholds import Footholds, feet_of
 from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings

@@ -13,10 +13,11 @@ import numpy as np
 
 from manikin.body import Configuration
 from manikin.body.limbs import stature_of
+from manikin.body.segments import FEET
 from manikin.contact import Contact
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import Stage
-from manikin.planning.contacts.footholds import FEET, Footholds
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.limb_search import LimbHolds
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.seat import Sitter, Sitting, hand_supports, leave_seat

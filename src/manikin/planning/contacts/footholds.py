@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
+from manikin.body.segments import FEET
 from manikin.contact import Contact, sole
 from manikin.errors import ContactError
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.scene import Scene
 from manikin.scene.collision import CollisionPart, collision_parts, column_is_clear
 from manikin.scene.footing import WHOLE, FootingTable, Places
-
-FEET = ("left_foot", "right_foot")
 
 SHIFT = 0.08  # longest shift of a candidate along the sole [m]; half of it across; our choice
 STEEPEST = math.radians(30.0)  # largest slope of a surface to stand on [rad]; our choice

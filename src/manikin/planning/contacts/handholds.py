@@ -12,13 +12,12 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.limbs import stature_of
+from manikin.body.segments import HANDS
 from manikin.contact import Contact, grasp, point
 from manikin.numerics.spatial import FloatArray, onto_normal, rotation_from_yaw
 from manikin.planning.contacts.best_first import heading_of
 from manikin.planning.contacts.limb_places import PALM_ROOM
 from manikin.scene import Scene
-
-HANDS = ("left_hand", "right_hand")
 
 HEIGHTS = (0.5, 1.35)  # lowest and greatest height of a hold above the lower foot [m]
 WANTED = (0.30, 0.30, 0.0)  # where a hand is best: ahead of the root, to its side, and above it [m]

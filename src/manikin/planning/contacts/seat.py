@@ -19,12 +19,13 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import ANKLE_FROM_HEEL
 from manikin.body.human import BUTTOCK_RADIUS, SEAT_LENGTH, SEAT_WIDTH
 from manikin.body.limbs import of_both_sides, stature_of
+from manikin.body.segments import FEET
 from manikin.contact import Contact, Stance, point, rolling_front, sole
 from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.numerics.signals import least_jerk
 from manikin.numerics.spatial import FloatArray, onto_normal, rotation_from_yaw
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Stage
-from manikin.planning.contacts.footholds import FEET, Footholds
+from manikin.planning.contacts.footholds import Footholds
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.scene import Scene, Surface
 

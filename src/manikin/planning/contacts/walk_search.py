@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hinge_line, stature_of
+from manikin.body.segments import FEET
 from manikin.contact import Contact, SolePart, sole_part
 from manikin.kinematics.step_reach import StepReach
 from manikin.kinematics.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
-from manikin.planning.contacts.footholds import FEET, Foothold, Footholds, feet_of
+from manikin.planning.contacts.footholds import Foothold, Footholds, feet_of
 from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder

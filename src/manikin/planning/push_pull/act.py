@@ -20,14 +20,12 @@ from scipy.optimize import linprog
 from manikin.balance.contact_forces import ContactGenerators
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import carrying_segment
+from manikin.body.segments import HANDS
 from manikin.contact import Contact, ContactKind, ContactModel, FrictionModel, Stance, point
 from manikin.errors import InputError
 from manikin.kinematics.efort import Task, unit_direction
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number
 from manikin.planning.contacts import Efort
-
-HANDS = ("left_hand", "right_hand")
-"""Effectors that act."""
 
 
 class ActKind(StrEnum):

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance import motion_margin
+from manikin.body.segments import HANDS
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.control import ForceWish
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
-from manikin.planning.push_pull.act import HANDS, Act, ActKind, BracedForces
+from manikin.planning.push_pull.act import Act, ActKind, BracedForces
 
 SAMPLING = 1.0e-3
 """Time between two samples of the held posture [s]."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance import zero_moment_point
+from manikin.body.segments import SIDES
 from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.motion import Motion
 from manikin.numerics.signals import low_passed
@@ -25,7 +26,6 @@ from manikin.recordings.dynamics.recorded_dynamics import (
     margins_of_wrenches,
 )
 from manikin.recordings.dynamics.recorded_forces import torques_of
-from manikin.recordings.readers.marker_sets import SIDES
 from manikin.recordings.readers.markers import ForcePlate
 
 CUTOFF = 20.0

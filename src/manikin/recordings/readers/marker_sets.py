@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from manikin.body.segments import SIDES
 from manikin.errors import InputError
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
@@ -90,8 +91,6 @@ _CENTRAL: tuple[tuple[str, str, str], ...] = (
 
 _MIDLINE = frozenset({"pelvis", "thorax", "head"})
 _SIDES = (("left", "left"), ("right", "right"), ("l", "left"), ("r", "right"))
-
-SIDES = ("left", "right")
 
 
 def _sided(segment: str, side: str) -> str:

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from manikin.body.segments import SIDES
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.readers.marker_sets import SIDES, marker_set
+from manikin.recordings.readers.marker_sets import marker_set
 from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
 from manikin.recordings.readers.text_files import UP_TO_Z
 

@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
+from manikin.body.segments import SIDES
 from manikin.errors import InputError
 from manikin.kinematics.point_targets import PointTargets, SegmentPlacements
 from manikin.kinematics.tracking import follow, improved
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.readers.marker_sets import SIDES, MarkerSet, marker_set
+from manikin.recordings.readers.marker_sets import MarkerSet, marker_set
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Subject
 from manikin.recordings.reconstruction.cleaning import Cleaning, Repair, gaps_of, without_jumps

@@ -12,9 +12,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
+from manikin.body.segments import SIDES
 from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import FloatArray
-from manikin.recordings.readers.marker_sets import SIDES, MarkerSet, joint_of
+from manikin.recordings.readers.marker_sets import MarkerSet, joint_of
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.proportions import (

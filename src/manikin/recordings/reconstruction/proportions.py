@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 from manikin.body import BodyModel, human
 from manikin.body.anthropometry import Anthropometry
 from manikin.body.joint_volume import ball_angles, ball_rotation
+from manikin.body.segments import SIDES
 from manikin.errors import InputError
 from manikin.kinematics.point_targets import PointTargets
 from manikin.numerics.spatial import FloatArray, frozen_array
-from manikin.recordings.readers.marker_sets import SIDES, joint_of
+from manikin.recordings.readers.marker_sets import joint_of
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.cleaning import Repair
 from manikin.runtime.display import Displayed

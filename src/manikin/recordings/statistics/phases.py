@@ -16,10 +16,10 @@ from itertools import accumulate, pairwise
 from types import MappingProxyType
 from typing import Any, Literal
 
+from manikin.body.segments import FEET
 from manikin.errors import InputError
 from manikin.numerics.signals import Spread
 from manikin.recordings.supports.body_supports import SupportPhase
-from manikin.recordings.supports.supports import FEET
 
 FLIGHT = "flight"
 
@@ -236,8 +236,7 @@ def _initial(effector: str) -> str:
 MOTIONS = 30
 """All that were made by the person, and all that Table 3.5 is about."""
 
-_BOTH = ("left_foot", "right_foot")
-_FEET = {"LR": _BOTH, "L": _BOTH[:1], "R": _BOTH[1:]}
+_FEET = {"LR": FEET, "L": FEET[:1], "R": FEET[1:]}
 
 
 @dataclass(frozen=True)

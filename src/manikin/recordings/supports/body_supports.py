@@ -23,6 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.body.segments import HANDS
 from manikin.errors import InputError
 from manikin.numerics.signals import lasting, mask_runs, switch
 from manikin.numerics.spatial import FloatArray, frozen_array
@@ -222,7 +223,6 @@ def slow_and_leaving(one: Track) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     return slow | (one.speed < ROLLS), fast & (one.speed > LEAVES)
 
 
-HANDS = ("left_hand", "right_hand")
 OWN = ("left_thigh", "left_leg", "right_thigh", "right_leg")
 """Segments at whose origins, hips and knees, a hand may rest on the own body."""
 

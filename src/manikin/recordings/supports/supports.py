@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from manikin.body.segments import FEET
 from manikin.errors import InputError
 from manikin.numerics.signals import lasting, mask_runs, switch
 from manikin.numerics.spatial import FloatArray
@@ -45,8 +46,6 @@ from manikin.recordings.supports.support_levels import (
     Track,
     surfaces_under,
 )
-
-FEET = ("left_foot", "right_foot")
 
 NEAR, AWAY, NEAR_LYING, AWAY_LYING = 0.05, 0.10, 0.13, 0.18
 """Height above a surface within which a point touches down, and distance from it beyond which it has left
