@@ -4,7 +4,7 @@ import difflib
 import re
 from collections.abc import Mapping, Sequence
 from enum import Enum
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, Self, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -54,6 +54,27 @@ class Section(BaseModel):
     @classmethod
     def _keys(cls) -> list[str]:
         return [field.alias or name for name, field in cls.model_fields.items()]
+
+
+class OneOf(Section):
+    """A mapping with exactly one of its keys."""
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        keys = self._keys()
+        if sum(getattr(self, key) is not None for key in keys) != 1:
+            raise refuse("", f"holds none or several; valid: exactly one of {', '.join(keys)}")
+        return self
+
+    @property
+    def name(self) -> str:
+        """The key that is given."""
+        return next(key for key in self._keys() if getattr(self, key) is not None)
+
+    @property
+    def content(self) -> Any:
+        """Value of the key that is given."""
+        return getattr(self, self.name)
 
 
 def _unknown_key(key: Any, keys: Sequence[str]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Sections of a scenario file about its task, and the operations in it, one after the other."""
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -9,6 +9,7 @@ from manikin.scenarios.sections.task_sections import ActSection, ObstacleSection
 from manikin.scenarios.validation import (
     FrameMoves,
     Number,
+    OneOf,
     Positive,
     Section,
     Text,
@@ -16,7 +17,6 @@ from manikin.scenarios.validation import (
     Vector3,
     optional,
     preset,
-    refuse,
     required,
 )
 
@@ -90,7 +90,7 @@ class StandUpSection(Section):
     """Rise from the seat."""
 
 
-class OperationSection(Section):
+class OperationSection(OneOf):
     """One operation: exactly one of the keys."""
 
     walk_to: WalkToSection | None = optional("walk to a place, with what the hands hold")
@@ -103,23 +103,6 @@ class OperationSection(Section):
     pull: ForceSection | None = optional("hold on with both hands and draw; the last operation")
     sit: SitSection | None = optional("walk to a seat and sit down")
     stand: StandUpSection | None = optional("rise from the seat")
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        keys = type(self)._keys()
-        if sum(getattr(self, key) is not None for key in keys) != 1:
-            raise refuse("", f"holds none or several; valid: exactly one of {', '.join(keys)}")
-        return self
-
-    @property
-    def name(self) -> str:
-        """Key of the operation that is given."""
-        return next(key for key in type(self)._keys() if getattr(self, key) is not None)
-
-    @property
-    def content(self) -> Any:
-        """Section of the operation that is given."""
-        return getattr(self, self.name)
 
 
 class TaskSection(Section):

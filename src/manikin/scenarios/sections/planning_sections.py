@@ -23,6 +23,7 @@ from manikin.scenarios.sections.task_sections import FrameSection
 from manikin.scenarios.validation import (
     NonNegative,
     Number,
+    OneOf,
     Positive,
     Section,
     Text,
@@ -57,7 +58,7 @@ class HeightBandSection(Section):
         return text
 
 
-class ComConstraintSection(Section):
+class ComConstraintSection(OneOf):
     """One constraint on the centre of mass: exactly one of the keys."""
 
     height_band: HeightBandSection | None = optional("bounds of the CoM's height")
@@ -68,13 +69,6 @@ class ComConstraintSection(Section):
         "keep the CoM low enough for the body to fold below overhead obstacles: 'automatic' for "
         "all that hover over the way at least 0.3 m above the supports, or the names of those to pass below"
     )
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        keys = type(self)._keys()
-        if sum(getattr(self, key) is not None for key in keys) != 1:
-            raise refuse("", f"holds none or several; valid: exactly one of {', '.join(keys)}")
-        return self
 
 
 class ContactsSection(Section):
