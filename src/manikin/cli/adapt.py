@@ -9,7 +9,9 @@ from manikin.cli import console
 from manikin.cli.console import (
     AgeOption,
     FiguresOption,
+    FramesOption,
     JsonOption,
+    MarkersOption,
     MassOption,
     OutOption,
     SexOption,
@@ -46,13 +48,8 @@ def adapt(
     window: Annotated[
         tuple[float, float] | None, option("START END", "Part of the recording that is taken [s].")
     ] = None,
-    frames: Annotated[
-        tuple[int, int] | None,
-        option("FIRST STOP", "Frames from FIRST up to, not with, STOP; counted from 0."),
-    ] = None,
-    markers: Annotated[
-        Path | None, option("MAP.yaml", "What markers mark, where their names do not say it.")
-    ] = None,
+    frames: FramesOption = None,
+    markers: MarkersOption = None,
     friction: Annotated[float, option("MU", "Of soles on the ground, and of seats.")] = 0.8,
     pace: Annotated[
         float | None,

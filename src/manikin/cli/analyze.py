@@ -10,10 +10,12 @@ import typer
 from manikin.cli import console
 from manikin.cli.console import (
     FiguresOption,
+    FramesOption,
     Interruption,
     JobsOption,
     JsonOption,
     LoadHandOption,
+    MarkersOption,
     SexOption,
     argument,
     flag,
@@ -30,13 +32,8 @@ def analyze(
     out: Annotated[
         Path | None, option("DIR", "Default: runs/analysis/NAME or runs/analysis; none with --json.")
     ] = None,
-    frames: Annotated[
-        tuple[int, int] | None,
-        option("FIRST STOP", "Frames from FIRST up to, not with, STOP; counted from 0."),
-    ] = None,
-    markers: Annotated[
-        Path | None, option("MAP.yaml", "What markers mark, where their names do not say it.")
-    ] = None,
+    frames: FramesOption = None,
+    markers: MarkersOption = None,
     mass: Annotated[
         float | None, option("KG", "Mass of the person. Default: the file's, or the plates'.")
     ] = None,
@@ -159,8 +156,6 @@ def _several(
     paths: Sequence[Path], directory: Path | None, options: Any, interruption: Interruption,
     jobs: int | None, *, draw: bool, json: bool,
 ) -> int:  # fmt: skip
-    from joblib import cpu_count
-
     from manikin.analysis import AnalysisJob
     from manikin.reports import analysis_directory as files
 
@@ -170,7 +165,7 @@ def _several(
     work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
     began, entries = clock.perf_counter(), {}
     with console.bars(interruption) as progress:
-        for entry in files.analyze_files(work, options, workers=jobs or cpu_count()):
+        for entry in files.analyze_files(work, options, workers=console.processes(jobs)):
             entries[entry.job.path] = entry
             if entry.summary is None:
                 console.complain(entry.refusal, console.BAD_INPUT)

@@ -69,12 +69,7 @@ def benchmark(
     from manikin.reports.summary_table import failure_lines, family_table
 
     page = None if directory is None else write_benchmark_page(directory, result)
-    if json:
-        console.print_json(result)
-        return console.DONE
-    typer.echo("\n".join([family_table(result), *failure_lines(result)]))
-    if page is not None:
-        typer.echo(f"report: {page}")
+    console.print_lines(result, [family_table(result), *failure_lines(result)], page, json=json)
     return console.DONE
 
 
@@ -87,8 +82,6 @@ def _checked(plan: Path, scenario: str | None, *, json: bool) -> int:
     job = None if scenario is None else load_scenario(scenario)
     result = check_contact_plan(*load_contact_plan(plan, job))
     report = result.to_dict()
-    if json:
-        console.print_json(report)
-    else:
-        typer.echo("\n".join([result.verdict, *requirement_lines(report["requirements"])]))
+    rows = report["requirements"]
+    console.print_lines(report, [result.verdict, *requirement_lines(rows)], json=json)
     return console.DONE if result.held else console.FAILED

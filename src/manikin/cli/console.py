@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from types import FrameType
@@ -110,6 +110,12 @@ HostOption = Annotated[
     option("ADDRESS", "Listen to this address, as 0.0.0.0, so that others can open the page by its token."),
 ]
 JobsOption = Annotated[int | None, option("N", "Processes side by side; default: one per core.", min=1)]
+FramesOption = Annotated[
+    tuple[int, int] | None, option("FIRST STOP", "Frames from FIRST up to, not with, STOP; counted from 0.")
+]
+MarkersOption = Annotated[
+    Path | None, option("MAP.yaml", "What markers mark, where their names do not say it.")
+]
 SexOption = Annotated[Literal["male", "female"] | None, option("male|female", "Sex of the person.")]
 LoadHandOption = Annotated[
     Literal["left", "right", "both"] | None,
@@ -288,6 +294,23 @@ def print_report(report: Mapping[str, Any], shown: dict[str, Any], *, json: bool
         print_json(report)
     else:
         print_table(shown)
+
+
+def print_lines(
+    report: Mapping[str, Any], lines: Iterable[str], page: Path | None = None, *, json: bool
+) -> None:
+    """Print a report as JSON, or in lines with where its page is."""
+    if json:
+        print_json(report)
+    else:
+        typer.echo("\n".join(lines if page is None else [*lines, f"report: {page}"]))
+
+
+def processes(jobs: int | None) -> int:
+    """How many processes work side by side: as asked for, else one per core."""
+    from joblib import cpu_count
+
+    return jobs or cpu_count()
 
 
 def announce(url: str) -> None:

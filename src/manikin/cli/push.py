@@ -169,8 +169,6 @@ def _search(
     jobs: int | None, draw: bool, json: bool,
 ) -> None:  # fmt: skip
     """Search maps, keep every direction as soon as it is known, draw and print."""
-    from joblib import cpu_count
-
     from manikin.reports.directories import MapDirectory, maps_as_dict
     from manikin.simulation import search_directions
 
@@ -184,7 +182,7 @@ def _search(
     with console.bars(interruption) as progress:
         progress("map", known / total, f"{known} of {total} directions")
         searches = [asked[number][1][index] for number, index in waiting]
-        done = search_directions(searches, jobs=jobs or cpu_count())
+        done = search_directions(searches, jobs=console.processes(jobs))
         for count, (which, result) in enumerate(done, known + 1):
             number, index = waiting[which]
             maps[number] = maps[number].with_found(index, result)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from manikin.body.segments import FEET
 from manikin.cli import console
 from manikin.cli.console import Interruption, JsonOption, SexOption, argument, flag, option
 from manikin.errors import InputError
@@ -127,6 +126,7 @@ def _settings(
     start: str | None, origin: "From",
 ) -> "StatisticsSettings":  # fmt: skip
     """Settings of the statistics; a bar and a box exclude each other."""
+    from manikin.body.segments import FEET
     from manikin.numerics.spatial import finite_number
     from manikin.recordings.statistics.clip_statistics import StatisticsSettings
     from manikin.recordings.statistics.passages import LIMIT, Overhead

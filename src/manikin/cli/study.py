@@ -42,17 +42,9 @@ def study(
             progress("study", done / count, f"{done} of {count}, {entry['job']}")
 
         result = run_study(known, path=directory, jobs=jobs, cluster=cluster, fresh=fresh, report=report_job)
-    page = None
-    if directory is not None:
-        from manikin.reports.pages import write_study_page
-
-        page = write_study_page(directory, result)
-    if json:
-        console.print_json(result)
-        return console.DONE
+    from manikin.reports.pages import write_study_page
     from manikin.reports.summary_table import group_table, person_lines
 
-    typer.echo("\n".join([group_table(result), *person_lines(result)]))
-    if page is not None:
-        typer.echo(f"report: {page}")
+    page = None if directory is None else write_study_page(directory, result)
+    console.print_lines(result, [group_table(result), *person_lines(result)], page, json=json)
     return console.DONE

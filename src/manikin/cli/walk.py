@@ -112,14 +112,12 @@ def words(
     headings = _headings(slices)
     directory = console.directory_of(out, "words", json=json)
     console.refuse(figures is True and directory is None, "--figures", "there is no directory to draw into")
-    from joblib import cpu_count
-
     from manikin.reports.directories import solve_partition
     from manikin.walking.words import THESIS_GRID
 
     with console.bars(context.obj) as progress:
         summary = solve_partition(
-            headings, THESIS_GRID, directory, jobs=jobs or cpu_count(), draw=figures is not False,
+            headings, THESIS_GRID, directory, jobs=console.processes(jobs), draw=figures is not False,
             progress=progress,
         )  # fmt: skip
     if json:
