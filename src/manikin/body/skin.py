@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from manikin.body.flesh import FAR, MATERIALS, Flesh, Material, body_density
 from manikin.body.model import BodyModel
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, unit
 
 SEGMENTS = frozenset((
     "pelvis", "lumbar", "thorax", "neck", "head",
@@ -97,7 +97,7 @@ class Skin:
         places = np.einsum("nij,nj->ni", blend, self.vertices)
         places += np.einsum("nk,nki->ni", self.weights, shifts[self.bones])
         normals = np.einsum("nij,nj->ni", blend, self.normals)
-        return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+        return places, unit(normals)
 
 
 def has_skin(body: BodyModel) -> bool:
@@ -376,7 +376,7 @@ def _onto_surface(
             move = (values.mean(axis=0) / square)[:, None] * gradient
             longest = np.linalg.norm(move, axis=1, keepdims=True)
             vertices = vertices - move * np.minimum(1.0, 0.5 * spacing / np.maximum(longest, 1e-12))
-    return vertices, gradient / np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 1e-9)
+    return vertices, unit(gradient)
 
 
 def _both_halves(

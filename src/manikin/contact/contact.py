@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.errors import ContactError
-from manikin.numerics.polytope import chord, convex_polygon
+from manikin.numerics.polytope import chord, convex_polygon, polygon_area
 from manikin.numerics.spatial import (
     GRAVITY,
     FloatArray,
@@ -199,8 +199,7 @@ class Contact(Displayed):
         toes = self.toe_outline(hinge)
         if len(toes) < 3:
             return False
-        x, y = convex_polygon(toes).T
-        area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        area = polygon_area(convex_polygon(toes))
         # Where the heel is cut off, the toes are whole.
         tip = max(0.5 * self.length, float(toes[:, 0].max()))
         return area >= LEAST_TOES * (tip - hinge) * self.width

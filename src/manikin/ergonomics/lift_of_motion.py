@@ -18,7 +18,7 @@ from manikin.errors import InputError
 from manikin.kinematics.point_targets import SegmentPlacements
 from manikin.motion import Motion
 from manikin.motion.motion import effector_positions
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, unit
 
 BETWEEN_FEET = 0.10
 """Hands that are nearer to the ankles than this along the floor are straight ahead [m]; ours."""
@@ -108,8 +108,7 @@ def _ankles_and_hands(
     heights = np.array([place[:, 2] for place in soles.values()])
     base[:, 2] = heights.min(axis=0)
     middle = np.mean([hands[name] for name in HANDS], axis=0)
-    straight = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
-    return base, np.ptp(heights, axis=0), middle - base, straight
+    return base, np.ptp(heights, axis=0), middle - base, unit(ahead)
 
 
 def _place(away: FloatArray, ahead: FloatArray) -> HandPlace:

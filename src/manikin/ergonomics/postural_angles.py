@@ -22,7 +22,7 @@ from manikin.body.segments import SIDES
 from manikin.ergonomics.body_parts import parts_of, twist_about_z
 from manikin.errors import BodyError
 from manikin.kinematics.point_targets import SegmentPlacements
-from manikin.numerics.spatial import FloatArray, dot
+from manikin.numerics.spatial import FloatArray, dot, unit
 
 SIDEWAYS = np.deg2rad(45.0)
 """An upper arm lifted further sideways than this has no angle in the sagittal plane worth the name; ours."""
@@ -155,8 +155,7 @@ def upright_neck(body: BodyModel, q: FloatArray) -> float | None:
 
 def _upright_axes(pelvis: FloatArray) -> FloatArray:
     """(n, 3, 3) forward, left and up as rows, where the pelvis' left is made level."""
-    left = pelvis[:, :, 1] * [1.0, 1.0, 0.0]
-    left = left / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-12)
+    left = unit(pelvis[:, :, 1] * [1.0, 1.0, 0.0], 1e-12)
     up = np.broadcast_to([0.0, 0.0, 1.0], left.shape)
     return np.stack([np.cross(left, up), left, up], axis=1)
 

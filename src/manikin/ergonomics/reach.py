@@ -19,7 +19,7 @@ from manikin.body.limbs import limb_origin, limb_slots, parent_segment
 from manikin.body.segments import SIDES
 from manikin.kinematics.limb_kinematics import LimbKinematics
 from manikin.kinematics.point_targets import SegmentPlacements
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import FloatArray, frozen_array, unit
 
 SAMPLES = 10_000
 """Postures of an arm that are drawn, and that are stretched, each."""
@@ -52,8 +52,7 @@ class ReachEnvelope:
 
     def farthest(self, directions: FloatArray) -> FloatArray:
         """(n,) how far it reaches in directions (n, 3) of any length [m]."""
-        length = np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
-        return self.radius[_sphere()[2].query(directions / length)[1]]
+        return self.radius[_sphere()[2].query(unit(directions, 1e-12))[1]]
 
     def share(self, points: FloatArray) -> FloatArray:
         """(n,) distance of points (n, 3) of the segment's frame as a share of how far it reaches there."""

@@ -14,7 +14,7 @@ from manikin.body.model import BodyModel
 from manikin.body.natural_range import NaturalRange
 from manikin.body.segments import Limb
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, cross, frozen_array, skew
+from manikin.numerics.spatial import FloatArray, area_normals, cross, frozen_array, skew
 
 MIN_COUNT = 100
 """Fewest samples from which a hull is made; 10,000 are a fair picture ([Tonneau2015]_ 4.3.4)."""
@@ -75,9 +75,7 @@ def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
     hull = ConvexHull(points)
     used, numbers = np.unique(hull.simplices, return_inverse=True)
     vertices, faces = points[used], numbers.reshape(hull.simplices.shape)
-    corners = vertices[faces]
-    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("fi,fi->f", turned, hull.equations[:, :3]) < 0.0
+    inward = np.einsum("fi,fi->f", area_normals(vertices[faces]), hull.equations[:, :3]) < 0.0
     faces[inward] = faces[inward][:, ::-1]
     faces.setflags(write=False)
     A, b = frozen_array(hull.equations[:, :3], "A"), frozen_array(-hull.equations[:, 3], "b")

@@ -13,7 +13,7 @@ from manikin.body.natural_range import NaturalRange
 from manikin.errors import BodyError
 from manikin.kinematics.efort import MOST_RATIO
 from manikin.kinematics.limb_kinematics import LimbKinematics, ReachVolume, hull_of, rigid_reach
-from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.numerics.spatial import FloatArray, finite_number, unit
 
 THRESHOLD = 0.05  # least manipulability, as a share of the largest seen; our choice, open in the thesis
 _FEWEST_KEPT = 0.02
@@ -130,8 +130,7 @@ class SampleLeaves:
         places, directions = positions[rows], upward[rows]
         centres = 0.5 * (places.min(axis=1) + places.max(axis=1))
         radii = np.sqrt(((places - centres[:, None]) ** 2).sum(axis=2).max(axis=1)) + _SINGLE
-        axes = directions.mean(axis=1)
-        axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-12)
+        axes = unit(directions.mean(axis=1), 1e-12)
         cosines = np.einsum("lki,li->lk", directions, axes).min(axis=1)
         spreads = np.arccos(np.clip(cosines, -1.0, 1.0)) + _SINGLE
         directions[~real] = np.nan

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from manikin.body import BodyModel
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, unit
 
 FILE = Path(__file__).with_name("human_postures.npz")
 """File of the shipped postures."""
@@ -116,21 +116,16 @@ def part_directions(body: BodyModel, postures: FloatArray) -> FloatArray:
 
 def directions_of(origins: dict[str, FloatArray]) -> FloatArray:
     """(n, 11, 3) directions from origins (n, 3) of thighs, legs, feet, upper arms, forearms, hands [m]."""
-
-    def between(start: FloatArray, end: FloatArray) -> FloatArray:
-        way = end - start
-        return way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-
     hips, shoulders = ((origins[f"left_{name}"], origins[f"right_{name}"]) for name in ("thigh", "upper_arm"))
     found = [
-        between(0.5 * (hips[0] + hips[1]), 0.5 * (shoulders[0] + shoulders[1])),
-        between(shoulders[1], shoulders[0]), between(hips[1], hips[0]),
+        unit(0.5 * (shoulders[0] + shoulders[1]) - 0.5 * (hips[0] + hips[1])),
+        unit(shoulders[0] - shoulders[1]), unit(hips[0] - hips[1]),
     ]  # fmt: skip
     found += [
-        between(origins[f"{side}_{first}"], origins[f"{side}_{last}"])
+        unit(origins[f"{side}_{last}"] - origins[f"{side}_{first}"])
         for first, last in _ENDS.values() for side in ("left", "right")
     ]  # fmt: skip
-    left = found[2][:, :2] / np.maximum(np.linalg.norm(found[2][:, :2], axis=1, keepdims=True), 1e-9)
+    left = unit(found[2][:, :2])
     turn = np.zeros((len(left), 3, 3))  # rows: ahead, left, up
     turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, :2], turn[:, 2, 2] = left[:, 1], -left[:, 0], left, 1.0
     return np.einsum("nij,npj->npi", turn, np.stack(found, axis=1))

@@ -215,6 +215,12 @@ def convex_polygon(points: ArrayLike) -> FloatArray:
     return _without_twins(np.array([*_half_hull(p)[:-1], *_half_hull(p[::-1])[:-1]]))
 
 
+def polygon_area(corners: ArrayLike) -> float:
+    """Area of a polygon of (k, 2) corners, positive counter-clockwise."""
+    x, y = np.asarray(corners).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
 def polygon_of_halfplanes(A: ArrayLike, b: ArrayLike) -> FloatArray:
     """(k, 2) bounded polygon ``{x : A x <= b}``, counter-clockwise, of rows (m, 2), from a square of 20 km.
 

@@ -95,6 +95,16 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return product
 
 
+def unit(vectors: FloatArray, least: float = 1e-9) -> FloatArray:
+    """(..., k) vectors as unit vectors; those that are shorter than ``least`` become shorter than 1."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least)
+
+
+def area_normals(corners: FloatArray) -> FloatArray:
+    """(m, 3) normals of triangles (m, 3, 3), as long as twice their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def skew(vector: ArrayLike) -> FloatArray:
     """(..., 3, 3) matrices of cross products by (..., 3): ``skew(a) @ b = cross(a, b)`` ([Qiu2012]_ 2.10)."""
     v = np.asarray(vector, dtype=np.float64)

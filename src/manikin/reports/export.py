@@ -160,19 +160,11 @@ class _Export:
         return Film(self.body, self.motion, self.content.scene, self.options.size)
 
 
-def _write_csv(export: _Export) -> None:
-    write_result(export.path, to_csv(export.motion))
-
-
 def _write_bvh(export: _Export) -> None:
     options = export.options
     write_result(export.path, to_bvh(export.body, export.motion, options.names, options.up))
     if export.scene is not None:
         write_result(export.beside("_scene.obj"), scene_obj(export.scene, options.up))
-
-
-def _write_mjcf(export: _Export) -> None:
-    write_result(export.path, to_mjcf(export.body, export.motion, export.content.scene))
 
 
 def _write_urdf(export: _Export) -> None:
@@ -187,26 +179,10 @@ def _write_urdf(export: _Export) -> None:
             write_content(folder / name, data)
 
 
-def _write_glb(export: _Export) -> None:
-    write_content(export.path, to_glb(export.body, export.motion, export.content.scene))
-
-
-def _write_mp4(export: _Export) -> None:
-    write_content(export.path, to_mp4(export.film, export.rate, export.options.progress))
-
-
-def _write_gif(export: _Export) -> None:
-    write_content(export.path, to_gif(export.film, export.rate, export.options.progress))
-
-
 def _write_trc(export: _Export) -> None:
     write_result(export.path, to_trc(export.body, export.motion))
     if export.motion.contact_names:
         write_result(export.beside("_grf.mot"), loads_mot(export.body, export.motion))
-
-
-def _write_c3d(export: _Export) -> None:
-    write_content(export.path, to_c3d(export.body, export.motion))
 
 
 def _write_osim(export: _Export) -> None:
@@ -228,7 +204,7 @@ class _Format:
         ending: Of the file's name; the format's own when empty.
     """
 
-    write: Callable[[_Export], None]
+    write: Callable[[_Export], object]
     rate: float | None
     needs_body: bool = True
     ending: str = ""
@@ -236,15 +212,17 @@ class _Format:
 
 _FORMATS: Mapping[str, _Format] = {
     "bvh": _Format(_write_bvh, 100.0),
-    "csv": _Format(_write_csv, None, needs_body=False),
-    "glb": _Format(_write_glb, 60.0),
-    "mp4": _Format(_write_mp4, 25.0),
-    "gif": _Format(_write_gif, 12.5),
-    "mjcf": _Format(_write_mjcf, None, ending="xml"),
+    "csv": _Format(lambda e: write_result(e.path, to_csv(e.motion)), None, needs_body=False),
+    "glb": _Format(lambda e: write_content(e.path, to_glb(e.body, e.motion, e.content.scene)), 60.0),
+    "mp4": _Format(lambda e: write_content(e.path, to_mp4(e.film, e.rate, e.options.progress)), 25.0),
+    "gif": _Format(lambda e: write_content(e.path, to_gif(e.film, e.rate, e.options.progress)), 12.5),
+    "mjcf": _Format(
+        lambda e: write_result(e.path, to_mjcf(e.body, e.motion, e.content.scene)), None, ending="xml"
+    ),
     "urdf": _Format(_write_urdf, None),
     "osim": _Format(_write_osim, 100.0),
     "trc": _Format(_write_trc, 100.0),
-    "c3d": _Format(_write_c3d, 100.0),
+    "c3d": _Format(lambda e: write_content(e.path, to_c3d(e.body, e.motion)), 100.0),
 }
 FORMATS = tuple(_FORMATS)
 
@@ -340,14 +318,13 @@ REACH_FORMATS = (".stl", ".obj", ".ply", ".glb")
 """Endings of the files of a reach."""
 
 
-def write_reach(path: str | Path, body: BodyModel, q: FloatArray, hand: str = "both") -> Path:
-    """Write what the hands of a person reach in a posture (nq,), the trunk still, as a mesh in the world.
+def write_reach(path: str | Path, body: BodyModel, q: FloatArray) -> Path:
+    """Write what both hands of a person reach in a posture (nq,), the trunk still, as a mesh in the world.
 
     Args:
         path: File, one of :data:`REACH_FORMATS`.
         body: With two arms.
         q: Posture.
-        hand: ``"left"``, ``"right"`` or ``"both"``, what is within the reach of each.
 
     Raises:
         InputError: If the ending is another one.
@@ -358,7 +335,7 @@ def write_reach(path: str | Path, body: BodyModel, q: FloatArray, hand: str = "b
         raise InputError(
             f"reach mesh is {path.name!r}; valid: a name that ends in {', '.join(REACH_FORMATS)}"
         )
-    envelope = reach_envelopes(body)[hand]
+    envelope = reach_envelopes(body)["both"]
     to_world, mesh = np.eye(4), envelope.mesh
     to_world[:3, :3], to_world[:3, 3] = Configuration(body, q).segment_placement(envelope.segment)
     mesh.apply_transform(to_world)

@@ -17,7 +17,7 @@ from manikin.body.segments import segment_triangles
 from manikin.body.skin import Skin, segment_frames, skin_of
 from manikin.errors import MotionFileError
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, area_normals, unit
 from manikin.scene import Scene
 from manikin.scene.scene import FLOOR
 
@@ -135,17 +135,14 @@ def _shapes(body: BodyModel) -> Skin:
     if not places:
         raise MotionFileError(f"body {body.name!r} has no shape; valid: a body with shapes for glb")
     vertices, triangles = np.concatenate(places), np.concatenate(faces)
-    corners = vertices[triangles]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.zeros_like(vertices)
+    across, normals = area_normals(vertices[triangles]), np.zeros_like(vertices)
     for column in triangles.T:
         np.add.at(normals, column, across)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     weights = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     names, size = tuple(segment.name for segment in body.segments), len(body.segments)
     return Skin(
-        vertices, normals, triangles, np.full(len(triangles), -1), np.concatenate(bones), weights, names,
-        np.tile(np.eye(3), (size, 1, 1)), np.zeros((size, 3)),
+        vertices, unit(normals, 1e-12), triangles, np.full(len(triangles), -1), np.concatenate(bones),
+        weights, names, np.tile(np.eye(3), (size, 1, 1)), np.zeros((size, 3)),
     )  # fmt: skip
 
 
@@ -174,7 +171,7 @@ def _skinned(skin: Skin, buffer: _Buffer, numbers: dict[str, int], body: BodyMod
 def _solid(shape: Any, buffer: _Buffer, material: int) -> dict[str, Any]:
     """One flat shaded solid of a scene, in the world."""
     corners = np.asarray(shape.vertices)[np.asarray(shape.faces)]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    across = area_normals(corners)
     size = np.linalg.norm(across, axis=1)
     corners, across = corners[size > 0.0], across[size > 0.0] / size[size > 0.0, None]
     places = buffer.add(corners.reshape(-1, 3), "VEC3", target=_VERTICES, bounds=True)

@@ -19,7 +19,7 @@ from manikin.body.flesh import MATERIALS
 from manikin.body.skin import Skin, segment_frames
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, area_normals, unit
 from manikin.reports.figures.views import distinct_contacts
 from manikin.reports.gltf import continuous, surface_of
 from manikin.reports.solids import DrawnSolid, contact_solids, rgb, scene_solids
@@ -163,9 +163,7 @@ def _triangles(solids: list[DrawnSolid]) -> dict[str, Any] | None:
 
 def _flat_normals(corners: FloatArray) -> FloatArray:
     """(3m, 3) unit normals of triangles (m, 3, 3) at each of their corners."""
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
-    return np.repeat(across, 3, axis=0)
+    return np.repeat(unit(area_normals(corners), 1e-15), 3, axis=0)
 
 
 def _places(points: FloatArray) -> dict[str, Any]:

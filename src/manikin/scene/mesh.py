@@ -12,7 +12,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from manikin.errors import SceneError
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, area_normals, finite_number, frozen_array
 from manikin.scene.triangles import IntArray, decimated
 
 Convexity = Literal["no", "hull", "parts"]
@@ -361,7 +361,7 @@ def _piece(vertices: FloatArray, faces: IntArray) -> MeshPiece:
 def _is_convex(vertices: FloatArray, faces: IntArray) -> bool:
     """Whether every vertex lies behind every face (to a hundred-thousandth of the size)."""
     corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = area_normals(corners)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offsets = np.einsum("ij,ij->i", normals, corners[:, 0])
     tolerance = 1e-5 * float(np.ptp(vertices, axis=0).max())

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapely import Geometry
 
 from manikin.numerics.signals import mask_runs
-from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array, skew
+from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array, skew, unit
 from manikin.scene.mesh import Mesh, as_trimesh
 from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane
 
@@ -385,8 +385,7 @@ def palm_places(lines: Sequence[GraspLine], numbers: NDArray[np.int64], points: 
     """
     ends = np.array([(line.start, line.end) for line in lines if line.round])
     start, end = ends[numbers // _SIDES].transpose(1, 0, 2)
-    axis = end - start
-    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-12)
+    axis = unit(end - start, 1e-12)
     length = np.linalg.norm(end - start, axis=1)
     along = np.clip(np.einsum("ni,ni->n", points - start, axis), 0.0, length)
     return start + along[:, None] * axis

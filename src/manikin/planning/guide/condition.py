@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.errors import InputError, SceneError
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, area_normals, finite_number, frozen_array
 from manikin.scene.mesh import Mesh
 from manikin.scene.obstacle import HalfSpace, Obstacle, Plane
 from manikin.scene.scene import Scene
@@ -89,7 +89,7 @@ class SceneTriangles:
         """Triangles of every obstacle that is not endless; round shapes become many."""
         parts = [(index, *part) for index, item in enumerate(scene) for part in _triangles(item)]
         corners = np.vstack([np.empty((0, 3, 3)), *(part[1] for part in parts)])
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        cross = area_normals(corners)
         length = np.linalg.norm(cross, axis=1)
         counts = np.array([len(part[1]) for part in parts], dtype=np.int64)
         closed = np.repeat(np.array([part[2] for part in parts], dtype=bool), counts)

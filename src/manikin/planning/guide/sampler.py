@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray, axes_of_normal, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, area_normals, axes_of_normal, finite_number, frozen_array
 from manikin.planning.guide.checker import ReachabilityChecker
 from manikin.planning.guide.condition import SceneTriangles, endless
 from manikin.scene.obstacle import HalfSpace, Obstacle
@@ -99,8 +99,7 @@ class PoseSampler:
             raise InputError("sampling region holds no surface within reach; valid: a region near the scene")
         self.corners: FloatArray = corners[near]
         self._normals, self._closed = normals[near], closed[near]
-        edges = self.corners[:, 1:] - self.corners[:, :1]
-        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        area = np.linalg.norm(area_normals(self.corners), axis=1)
         self._cumulative = np.cumsum(area) / area.sum()
 
     def pick(self, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from manikin.errors import InputError
 from manikin.numerics.signals import mask_runs
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array, unit
 from manikin.recordings.readers.skeleton_recording import FARTHEST, UNKNOWN, Subject
 from manikin.runtime.display import Displayed
 
@@ -113,8 +113,7 @@ class ForcePlate:
         corners = self.corners[:, :2]
         sides = np.roll(corners, -1, axis=0) - corners
         turning = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
-        inward = np.sign(turning) * np.stack([-sides[:, 1], sides[:, 0]], axis=1)
-        inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-9)
+        inward = unit(np.sign(turning) * np.stack([-sides[:, 1], sides[:, 0]], axis=1))
         depth = np.sum((points[..., None, :2] - corners) * inward, axis=-1)
         return bool(depth.min() > -overhang)
 

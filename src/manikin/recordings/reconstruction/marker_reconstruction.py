@@ -29,13 +29,13 @@ from manikin.body.segments import SIDES
 from manikin.errors import InputError
 from manikin.kinematics.point_targets import PointTargets, SegmentPlacements
 from manikin.kinematics.tracking import follow, improved
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, unit
 from manikin.recordings.readers.marker_sets import MarkerSet, marker_set
 from manikin.recordings.readers.markers import MarkerRecording
 from manikin.recordings.readers.skeleton_recording import Subject
 from manikin.recordings.reconstruction.cleaning import Cleaning, Repair, gaps_of, without_jumps
 from manikin.recordings.reconstruction.orientation_targets import placing_targets
-from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle, unit
+from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle
 
 KNEE_WIDTH, ANKLE_WIDTH, ELBOW_WIDTH, MARKER_RADIUS = 0.10, 0.07, 0.08, 0.007
 """Width of a joint where neither the file nor a second marker gives it, and radius of a marker [m]."""

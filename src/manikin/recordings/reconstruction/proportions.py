@@ -14,7 +14,7 @@ from manikin.body.joint_volume import ball_angles, ball_rotation
 from manikin.body.segments import SIDES
 from manikin.errors import InputError
 from manikin.kinematics.point_targets import PointTargets
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import FloatArray, frozen_array, unit
 from manikin.recordings.readers.marker_sets import joint_of
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.cleaning import Repair
@@ -108,11 +108,6 @@ def _set_ball(body: BodyModel, q: FloatArray, segment: str, turns: FloatArray) -
     first = 7 + body.joint_index(hinges[0].name)
     q[:, first : first + 3] = angles
     return ball_rotation(axes, angles)
-
-
-def unit(vectors: FloatArray) -> FloatArray:
-    """(..., 3) unit vectors."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -102,15 +102,6 @@ def write_figures(
     return written
 
 
-def comparison_pictures(comparison: RunComparison) -> dict[str, bytes]:
-    """PNG files of the figures of two runs that apply, by what they show."""
-    result = {}
-    for name, draw in COMPARISONS.items():
-        with suppress(FigureError):
-            result[name.replace("_", " ")] = png_of(draw(comparison))
-    return result
-
-
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as a PNG file, atomically.
 

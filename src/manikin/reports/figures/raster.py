@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, area_normals, unit
 from manikin.reports.solids import DrawnSolid
 
 FINER = 2
@@ -112,11 +112,8 @@ class _Triangles:
             np.zeros((0, 3), dtype=int),
             *(solid.faces + start for solid, start in zip(solids, starts[:-1], strict=True)),
         ])  # fmt: skip
-        a, b, c = (vertices[faces[:, k]] for k in range(3))
-        flat = np.cross(b - a, c - a)
-        flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-15)
         return _Triangles(
-            vertices, normals, faces, flat,
+            vertices, normals, faces, unit(area_normals(vertices[faces]), 1e-15),
             np.repeat([solid.normals is not None for solid in solids], counts).astype(bool),
             np.concatenate([np.zeros((0, 3)), *(solid.colours for solid in solids)]),
             np.repeat(np.arange(len(solids)), counts),
@@ -212,7 +209,7 @@ class _Layer:
         second, third = self._shares(self._row[face], columns[smooth], rows[smooth])
         shares = np.stack([1.0 - second - third, second, third], axis=-1)
         curved = np.einsum("nk,nki->ni", shares, triangles.normals[triangles.faces[face]])
-        normals[smooth] = curved / np.maximum(np.linalg.norm(curved, axis=1, keepdims=True), 1e-9)
+        normals[smooth] = unit(curved)
         return normals
 
     def world(self, rows: np.ndarray, columns: np.ndarray) -> FloatArray:

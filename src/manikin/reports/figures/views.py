@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactSchedule, SolePart
-from manikin.numerics.polytope import convex_polygon
+from manikin.numerics.polytope import convex_polygon, polygon_area
 from manikin.numerics.spatial import FloatArray
 from manikin.reports.figures.raster import Camera, hiding, picture
 from manikin.reports.solids import body_solid, finite_obstacles, scene_solids
@@ -203,12 +203,6 @@ def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list
     values = step * np.arange(np.ceil((low + 0.04 * span) / step), np.floor((high - 0.04 * span) / step) + 1)
     places = [float(offset + value) for offset in offsets for value in values]
     return places, [f"{value + 0.0:.3g}" for _ in offsets for value in values]
-
-
-def polygon_area(corners: FloatArray) -> float:
-    """Area of a convex polygon of (k, 2) corners, counter-clockwise."""
-    x, y = np.asarray(corners).T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def sections(values: np.ndarray) -> list[slice]:

@@ -25,17 +25,14 @@ from manikin.body.skin import segment_frames
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, continuous_angles
+from manikin.reports.gltf import TO_GLTF
 from manikin.reports.solids import finite_obstacles
 from manikin.scene import Scene
-
-TO_BVH: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-"""Rotation of our world's axes to BVH's: X = y (left), Y = z (up), Z = x (forward)."""
-TO_BVH.setflags(write=False)
 
 CENTIMETRES = 100.0
 ORDERS: Mapping[str, str] = {"y": "ZXY", "z": "XYZ"}
 """Order of the rotation channels by the axis that points up: about forward, left and up."""
-AXES: Mapping[str, FloatArray] = {"y": TO_BVH, "z": np.eye(3)}
+AXES: Mapping[str, FloatArray] = {"y": TO_GLTF, "z": np.eye(3)}
 """Rotation of our world's axes to the file's, by the file's axis that points up."""
 
 _TRUNK: Mapping[str, Mapping[str, str]] = {
